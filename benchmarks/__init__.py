@@ -1,0 +1,1 @@
+"""What the README quotes, one figure a module: python -m benchmarks [name ...]."""

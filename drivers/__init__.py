@@ -1,0 +1,1 @@
+"""Drivers: one link a file, found by its scheme."""

@@ -1,0 +1,1 @@
+"""Wire formats: pure codecs, bytes in and samples out, one a file."""

@@ -1,0 +1,1 @@
+"""Recalibrate an inertial measurement unit in the field, with honest uncertainty."""

@@ -1,0 +1,132 @@
+"""What every driver is.
+
+To add one, write drivers/<scheme>_imu.py with a subclass of `Driver` named `Imu`; then
+`open_driver("<scheme>:<address>")` finds it. Opening takes the address, which may carry
+options as a query: ``serial:/dev/ttyUSB0?baud=115200&format=witmotion``.
+
+`receive` returns what has come, or None when nothing whole came in time: None is no
+fault, an exception is. A link that stumbles and comes back resumes the stream; the gap
+shows in the times and in `Health`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from time import monotonic
+from typing import ClassVar, Self
+
+from fieldcal.errors import DeviceError, DeviceSilent, InputError
+from fieldcal.samples import Block
+
+
+@dataclass(slots=True)
+class Health:
+    """How the link does, counted since it was opened.
+
+    Attributes
+    ----------
+    samples : whole samples delivered
+    bad : frames refused by their checksum or their form
+    skipped : bytes that belonged to no frame
+    gaps : times that samples were missing between two others
+
+    """
+
+    samples: int = 0
+    bad: int = 0
+    skipped: int = 0
+    gaps: int = 0
+
+
+class Driver(ABC):
+    """A link to one IMU: a context manager that yields blocks.
+
+    Exceptions listed in `faults` become `DeviceError` with `name` in the text.
+    """
+
+    faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)
+
+    name: str
+    health: Health
+
+    @abstractmethod
+    def __init__(self, address: str) -> None: ...
+
+    @abstractmethod
+    def receive(self, timeout: float) -> Block | None:
+        """Return what has come, or None if nothing whole came in `timeout` seconds."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release the link; safe to call twice."""
+
+    def blocks(self, timeout: float = 3.0) -> Iterator[Block]:
+        """Yield blocks as they come.
+
+        Raises
+        ------
+        DeviceSilent
+            If no whole sample comes for `timeout` seconds of the host's clock.
+        DeviceError
+            If the link fails.
+
+        """
+        deadline = monotonic() + timeout
+        while True:
+            block = self._receive(max(0.0, deadline - monotonic()))
+            if block is not None and len(block):
+                deadline = monotonic() + timeout
+                yield block
+            elif monotonic() >= deadline:
+                raise DeviceSilent(self._silence(timeout))
+
+    def _silence(self, timeout: float) -> str:
+        if self.health.samples:
+            return f"{self.name} went silent for {timeout:g} s: check cable and power"
+        heard = self.health.skipped or self.health.bad
+        cause = (
+            "bytes come, but none that this format knows: check format and baud rate"
+            if heard
+            else "not a byte came: check cable, power and port"
+        )
+        return f"{self.name} has sent no sample in {timeout:g} s: {cause}"
+
+    def _receive(self, timeout: float) -> Block | None:
+        try:
+            return self.receive(timeout)
+        except self.faults as fault:
+            raise DeviceError(f"{self.name} failed: {fault}") from fault
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+
+def open_driver(url: str) -> Driver:
+    """Open ``scheme:address``, e.g. ``serial:/dev/ttyUSB0?format=witmotion``.
+
+    Raises
+    ------
+    InputError
+        If no driver has that scheme, or the driver refuses its options.
+    DeviceError
+        If the device cannot be opened.
+
+    """
+    scheme, _, address = url.partition(":")
+    module = f"fieldcal.drivers.{scheme}_imu"
+    if not scheme.isidentifier() or find_spec(module) is None:
+        raise InputError(
+            f"no driver for {url!r}: write a scheme first, such as serial:/dev/ttyUSB0"
+        )
+    imu: type[Driver] = import_module(module).Imu
+    try:
+        return imu(address)
+    except imu.faults as fault:
+        raise DeviceError(f"cannot open {url}: {fault}") from fault

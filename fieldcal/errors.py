@@ -1,0 +1,81 @@
+"""What can go wrong, and with which exit code the command line ends.
+
+FieldcalError                2
++-- InputError               2  what the user gave cannot be used
+|    +-- SessionError        2  a session folder: names file, place and remedy
+|    +-- PlanError           2  a plan, refused before anything moves
+|    +-- NotObservable       2  the positions cannot determine what was asked for
++-- DeviceError              3  the link to the device failed
+|    +-- DeviceSilent        3  no sample came in time
++-- Moved                    1  the device was not still during a window
++-- WrongPosition            1  the device is not where the procedure needs it
++-- CalibrationFailed        1  the procedure could not reach a result
+
+Texts are for the operator: what happened, where, what to do now. One sentence.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class FieldcalError(Exception):
+    """Base of every error raised on purpose; the text is for the operator."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class InputError(FieldcalError):
+    """What the user gave cannot be used."""
+
+
+class SessionError(InputError):
+    """A session folder cannot be read or written."""
+
+
+class PlanError(InputError):
+    """A plan is wrong; refused before anything moves."""
+
+
+class NotObservable(InputError):
+    """The positions cannot determine what was asked for."""
+
+
+class DeviceError(FieldcalError):
+    """The link to the device failed."""
+
+    exit_code = 3
+
+
+class DeviceSilent(DeviceError):
+    """No sample came in time."""
+
+
+class Moved(FieldcalError):
+    """The device was not still during a window.
+
+    Attributes
+    ----------
+    at : device time of the disturbance, s
+    axis : name of the channel that shows it, e.g. ``"ax"``
+
+    """
+
+    exit_code = 1
+
+    def __init__(self, text: str, at: float, axis: str) -> None:
+        super().__init__(text)
+        self.at = at
+        self.axis = axis
+
+
+class WrongPosition(FieldcalError):
+    """The device is not where the procedure needs it."""
+
+    exit_code = 1
+
+
+class CalibrationFailed(FieldcalError):
+    """The procedure could not reach a result."""
+
+    exit_code = 1

@@ -1,0 +1,1 @@
+"""Recordings of others made into sessions, one format a file."""

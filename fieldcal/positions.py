@@ -1,0 +1,86 @@
+"""Positions an operator can be asked to hold, and the sets that procedures use."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.frames import earth_rate, force
+from fieldcal.samples import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where the device is held; angles in rad, None where they are not known.
+
+    Attributes
+    ----------
+    name : what the operator is told
+    alpha, beta : turns (1), (2) from home, rad
+    rate : constant rate about the procedure axes on a rate table, rad/s
+
+    """
+
+    name: str
+    alpha: float | None = None
+    beta: float | None = None
+    rate: tuple[float, float, float] | None = None
+
+    @classmethod
+    def deg(cls, alpha: float, beta: float, name: str = "") -> Position:
+        """Position from angles in degrees."""
+        return cls(
+            name or f"α = {alpha:g}°, β = {beta:g}°",
+            float(np.deg2rad(alpha)),
+            float(np.deg2rad(beta)),
+        )
+
+    @property
+    def oriented(self) -> bool:
+        """Whether both angles are known."""
+        return self.alpha is not None and self.beta is not None
+
+    @property
+    def degrees(self) -> tuple[float, float] | None:
+        """Both angles in degrees, if known."""
+        if self.alpha is None or self.beta is None:
+            return None
+        return float(np.rad2deg(self.alpha)), float(np.rad2deg(self.beta))
+
+
+def angles(positions: Sequence[Position]) -> tuple[Array, Array]:
+    """Alpha and beta of the positions, (n,) rad each, nan where unknown."""
+    both = [(p.alpha, p.beta) for p in positions]
+    table = np.array(both, dtype=float).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
+
+
+def forces(positions: Sequence[Position], gravity: float) -> Array:
+    """Specific force at rest in procedure axes, (n, 3) m/s^2, nan where unknown."""
+    return force(*angles(positions), gravity)
+
+
+def earth_rates(positions: Sequence[Position], latitude: float) -> Array:
+    """Earth's rate in procedure axes, (n, 3) rad/s, nan where unknown."""
+    return earth_rate(*angles(positions), latitude)
+
+
+def _set(*pairs: tuple[float, float]) -> tuple[Position, ...]:
+    return tuple(Position.deg(alpha, beta) for alpha, beta in pairs)
+
+
+TWO = _set((0, 0), (45, 5))
+"""The paper's two positions: bias and scale factor on a level base."""
+
+FIVE = _set((0, 0), (22.5, 0), (22.5, 2.5), (45, 2.5), (45, 5))
+"""The paper's five positions: the tilt of the base as well."""
+
+WIDE = _set((-45, -5), (-45, 5), (0, 0), (45, -5), (45, 5))
+"""Five positions that use the whole of a small ladder, to both sides."""
+
+SIX_FACES = _set((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
+"""Each axis up and down; needs more than a ladder."""
+
+SETS = {"two": TWO, "five": FIVE, "wide": WIDE, "six_faces": SIX_FACES}

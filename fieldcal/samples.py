@@ -1,0 +1,89 @@
+"""Raw samples in SI units, device axes: the one currency between drivers and core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating[Any]]
+
+CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
+UNITS = ("m/s^2",) * 3 + ("rad/s",) * 3
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Consecutive samples of one IMU, uncalibrated; nan where a value is unknown.
+
+    Attributes
+    ----------
+    t : (n,) s, device clock, strictly increasing
+    acc : (n, 3) m/s^2, accelerometer outputs
+    gyr : (n, 3) rad/s, gyroscope outputs
+    temperature : (n,) deg C
+    seq : (n,) device sequence counter
+    t_host : (n,) s, host arrival
+
+    """
+
+    t: Array
+    acc: Array
+    gyr: Array
+    temperature: Array
+    seq: Array
+    t_host: Array
+
+    @classmethod
+    def of(
+        cls,
+        t: Array,
+        acc: Array,
+        gyr: Array | None = None,
+        temperature: Array | None = None,
+        seq: Array | None = None,
+        t_host: Array | None = None,
+    ) -> Block:
+        """Build a block; what is not given is unknown."""
+        n = len(t)
+
+        def known(values: Array | None, shape: tuple[int, ...]) -> Array:
+            return np.full(shape, np.nan) if values is None else np.asarray(values)
+
+        return cls(
+            np.asarray(t, dtype=float),
+            np.asarray(acc, dtype=float),
+            known(gyr, (n, 3)),
+            known(temperature, (n,)),
+            known(seq, (n,)),
+            known(t_host, (n,)),
+        )
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def six(self) -> Array:
+        """Accelerometers and gyroscopes side by side, (n, 6), in `CHANNELS` order."""
+        return np.hstack([self.acc, self.gyr])
+
+    def between(self, start: float, end: float) -> Block:
+        """Samples with start <= t < end, s of device time."""
+        first, last = np.searchsorted(self.t, [start, end])
+        return self[int(first) : int(last)]
+
+    def __getitem__(self, rows: slice) -> Block:
+        return Block(*(getattr(self, f.name)[rows] for f in fields(Block)))
+
+
+def concat(blocks: Iterable[Block]) -> Block:
+    """Join blocks in time order; no block at all gives an empty one."""
+    parts = list(blocks)
+    if not parts:
+        return Block.of(np.empty(0), np.empty((0, 3)))
+    return Block(
+        *(np.concatenate([getattr(b, f.name) for b in parts]) for f in fields(Block))
+    )

@@ -1,0 +1,1 @@
+"""Estimators: from window averages to parameters with their covariance."""

@@ -1,0 +1,1 @@
+"""Procedures: generators of steps, one a file."""

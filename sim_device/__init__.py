@@ -1,0 +1,1 @@
+"""A device that is not ours: its own physics, sample by sample, from motion."""

@@ -32,7 +32,7 @@ def gravity(latitude_deg: float, height_m: float = 0.0) -> float:
         If the place is not on the Earth's surface or in the air above it.
 
     >>> round(gravity(50.45, 170.0), 5)
-    9.81062
+    9.81058
     """
     if not -90 <= latitude_deg <= 90 or not -1000 <= height_m <= 100_000:
         raise InputError(

@@ -1,0 +1,255 @@
+"""session.toml: what was known and planned about a recording.
+
+Parsing is strict where a slip would change numbers: a key of the wrong kind, an unknown
+unit or a mounting that is none is an error that names file, key and remedy. Keys this
+version does not know are left alone, so that others may add theirs.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal.errors import InputError, SessionError
+from fieldcal.frames import mounting_matrix
+from fieldcal.gravity import G0, gravity
+from fieldcal.positions import Position
+from fieldcal.samples import Array
+
+FORMAT = 1
+GRADES = ("tactical", "navigation")
+
+ACC_UNITS = {"m/s^2": 1.0, "g": G0, "mg": 1e-3 * G0, "V": 1.0, "count": 1.0}
+GYR_UNITS = {
+    "rad/s": 1.0,
+    "deg/s": np.pi / 180,
+    "mrad/s": 1e-3,
+    "V": 1.0,
+    "count": 1.0,
+}
+"""SI units in one of each; what has no such relation ("V", "count") stays as it is."""
+
+_UNITS = {"acceleration": ACC_UNITS, "angular_rate": GYR_UNITS}
+
+TRIADS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+NOMINAL = {"acc_bias": 0.0, "acc_scale": 1.0, "gyr_bias": 0.0, "gyr_scale": 1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What session.toml says, checked and in SI units.
+
+    Attributes
+    ----------
+    device : name, serial and whatever else [device] holds
+    grade : "tactical", or "navigation" when the gyroscopes see the Earth rate
+    rate_hz : nominal sampling rate, None where unknown
+    units : of "acceleration" and "angular_rate" in the samples
+    limits : full scale of the same two, in SI; absent where unknown
+    latitude_deg, height_m, gravity : the site; gravity in m/s^2
+    axes : the mounting, procedure axis x, y, z is device axis ...
+    nominal : (3,) for each of `TRIADS`: the calibration a simulation starts from
+    model : parameters of the effects that the simulation includes, by id
+    positions : in the order they were held
+    windows : (start, end) of each position, s of device time; None where not yet known
+
+    """
+
+    device: Mapping[str, Any]
+    grade: str
+    rate_hz: float | None
+    units: Mapping[str, str]
+    limits: Mapping[str, float]
+    latitude_deg: float
+    height_m: float
+    gravity: float
+    axes: tuple[str, ...]
+    nominal: Mapping[str, Array]
+    model: Mapping[str, Mapping[str, Any]]
+    positions: tuple[Position, ...]
+    windows: tuple[tuple[float, float] | None, ...]
+    raw: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def mounting(self) -> Array:
+        """P of procedure = P @ device, (3, 3)."""
+        return mounting_matrix(self.axes)
+
+    @property
+    def latitude(self) -> float:
+        """Latitude in rad."""
+        return float(np.deg2rad(self.latitude_deg))
+
+
+def read(path: Path) -> Description:
+    """Read a session.toml.
+
+    Raises
+    ------
+    SessionError
+        Naming the file, the key and the remedy.
+
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise SessionError(
+            f"{path.parent}: is no session: it has no {path.name}; name a folder that"
+            " has one, or make one with fieldcal import"
+        ) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise SessionError(f"{path}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SessionError(f"{path}: is not TOML: {error}") from error
+    try:
+        return parse(raw)
+    except InputError as error:
+        raise SessionError(f"{path}: {error}") from error
+
+
+def parse(raw: Mapping[str, Any]) -> Description:
+    """Check the tables of a session.toml.
+
+    Raises
+    ------
+    InputError
+        Naming the key and the remedy.
+
+    """
+    if raw.get("format", FORMAT) != FORMAT:
+        raise InputError(
+            f"format = {raw['format']!r} is not {FORMAT}; this version reads format"
+            f" {FORMAT} only"
+        )
+    device, site = _table(raw, "device"), _table(raw, "site")
+    units = {
+        kind: _choice(raw, "units", kind, known, next(iter(known)))
+        for kind, known in _UNITS.items()
+    }
+    latitude = _number(site, "site", "latitude_deg", 45.0)
+    height = _number(site, "site", "height_m", 0.0)
+    positions, windows = _positions(raw)
+    axes = _table(raw, "frame").get("mounting", ["+x", "+y", "+z"])
+    if not isinstance(axes, list) or not all(isinstance(a, str) for a in axes):
+        raise InputError('[frame] mounting must be like ["+x", "+y", "+z"]')
+    mounting_matrix(axes)
+    return Description(
+        device=device,
+        grade=_choice(raw, "device", "grade", GRADES, "tactical"),
+        rate_hz=_positive(_table(raw, "sampling"), "sampling", "rate_hz"),
+        units=units,
+        limits=_limits(_table(raw, "range"), units),
+        latitude_deg=latitude,
+        height_m=height,
+        gravity=_positive(site, "site", "gravity") or gravity(latitude, height),
+        axes=tuple(axes),
+        nominal={name: _triad(_table(raw, "nominal"), name) for name in TRIADS},
+        model=_model(_table(raw, "model")),
+        positions=positions,
+        windows=windows,
+        raw=raw,
+    )
+
+
+def _table(raw: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = raw.get(name, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"{name} must be a table: write [{name}]")
+    return table
+
+
+def _number(table: Mapping[str, Any], name: str, key: str, default: float) -> float:
+    value = table.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"[{name}] {key} = {value!r} is not a number")
+    if not np.isfinite(value):
+        raise InputError(f"[{name}] {key} = {value} is not a finite number")
+    return float(value)
+
+
+def _positive(table: Mapping[str, Any], name: str, key: str) -> float | None:
+    if key not in table:
+        return None
+    value = _number(table, name, key, 0.0)
+    if value <= 0:
+        raise InputError(f"[{name}] {key} = {value:g} must be above 0; mend it")
+    return value
+
+
+def _choice(
+    raw: Mapping[str, Any], name: str, key: str, known: Any, default: str
+) -> str:
+    value = _table(raw, name).get(key, default)
+    if value not in known:
+        raise InputError(f"[{name}] {key} = {value!r} is none of: {', '.join(known)}")
+    return str(value)
+
+
+def _limits(table: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, float]:
+    limits = {kind: _positive(table, "range", kind) for kind in _UNITS}
+    return {k: v * _UNITS[k][units[k]] for k, v in limits.items() if v is not None}
+
+
+def _triad(table: Mapping[str, Any], name: str) -> Array:
+    value = table.get(name, [NOMINAL[name]] * 3)
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError(f"[nominal] {name} = {value!r} must be three numbers, x y z")
+    return np.array([_number({name: v}, "nominal", name, 0.0) for v in value])
+
+
+def _model(table: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    ids = table.get("effects", [])
+    if not isinstance(ids, list) or not all(isinstance(i, str) for i in ids):
+        raise InputError('[model] effects must be a list of ids, like ["base_tilt"]')
+    return {i: _table(table, i) for i in ids}
+
+
+def _positions(
+    raw: Mapping[str, Any],
+) -> tuple[tuple[Position, ...], tuple[tuple[float, float] | None, ...]]:
+    tables = raw.get("position", [])
+    if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
+        raise InputError("position must be tables: write [[position]] above each")
+    rows = [_position(i, table) for i, table in enumerate(tables)]
+    return tuple(p for p, _ in rows), tuple(w for _, w in rows)
+
+
+def _position(
+    i: int, table: Mapping[str, Any]
+) -> tuple[Position, tuple[float, float] | None]:
+    name = f"position {i}"
+    given = [key for key in ("alpha_deg", "beta_deg") if key in table]
+    if len(given) == 1:
+        raise InputError(f"{name} has {given[0]} alone; give both angles or neither")
+    rate = table.get("rate_deg_s")
+    if rate is not None:
+        if not isinstance(rate, list) or len(rate) != 3:
+            raise InputError(f"{name}: rate_deg_s must be three numbers, deg/s")
+        rate = tuple(np.deg2rad([_number({"r": r}, name, "r", 0.0) for r in rate]))
+    label = str(table.get("name", ""))
+    if given:
+        alpha, beta = (_number(table, name, k, 0.0) for k in ("alpha_deg", "beta_deg"))
+        position = Position.deg(alpha, beta, label)
+    else:
+        position = Position(label or name)
+    position = Position(position.name, position.alpha, position.beta, rate)
+    return position, _window(name, table)
+
+
+def _window(name: str, table: Mapping[str, Any]) -> tuple[float, float] | None:
+    given = [key for key in ("start_s", "end_s") if key in table]
+    if not given:
+        return None
+    if len(given) == 1:
+        raise InputError(f"{name} has {given[0]} alone; give start_s and end_s")
+    start, end = (_number(table, name, key, 0.0) for key in ("start_s", "end_s"))
+    if start >= end:
+        raise InputError(
+            f"{name}: start_s = {start:g} must come before end_s = {end:g}"
+        )
+    return start, end

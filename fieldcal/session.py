@@ -1,0 +1,189 @@
+"""The session folder: one format for live sessions, imports and offline work.
+
+    session.toml    what was known and planned          (`description`)
+    samples.<ext>   the raw samples                     (`sample_files`, `recorder`)
+    marks.jsonl     what happened, as it happened
+    result.json     calibration, by solve
+
+session.toml is never rewritten: windows of a live session stand in marks.jsonl, and
+whatever is derived goes into its own file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal import description, sample_files
+from fieldcal.description import ACC_UNITS, GYR_UNITS, Description
+from fieldcal.errors import SessionError
+from fieldcal.positions import Position
+from fieldcal.samples import Array, Block
+
+DESCRIPTION = "session.toml"
+MARKS = "marks.jsonl"
+RESULT = "result.json"
+
+
+@dataclass
+class Session:
+    """A session folder, opened for reading.
+
+    Attributes
+    ----------
+    folder : where
+    about : what session.toml says, with the windows that marks.jsonl adds
+    warnings : what was cut off or passed over while reading
+
+    """
+
+    folder: Path
+    about: Description
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def open(cls, folder: Path | str) -> Session:
+        """Open a session folder.
+
+        Raises
+        ------
+        SessionError
+            If it is none, or its session.toml or marks.jsonl cannot be used.
+
+        """
+        folder = Path(folder)
+        about = description.read(folder / DESCRIPTION)
+        marks = list(read_marks(folder / MARKS))
+        return cls(folder, _with_windows(about, marks))
+
+    @property
+    def positions(self) -> tuple[Position, ...]:
+        """Positions in the order of session.toml."""
+        return self.about.positions
+
+    @property
+    def windows(self) -> tuple[tuple[float, float] | None, ...]:
+        """Window of each position, (start, end) in s of device time."""
+        return self.about.windows
+
+    @property
+    def gravity(self) -> float:
+        """Local gravity, m/s^2."""
+        return self.about.gravity
+
+    @property
+    def latitude(self) -> float:
+        """Latitude, rad."""
+        return self.about.latitude
+
+    @property
+    def mounting(self) -> Array:
+        """P of procedure = P @ device, (3, 3)."""
+        return self.about.mounting
+
+    @property
+    def grade(self) -> str:
+        """Grade: tactical, or navigation when the gyroscopes see the Earth rate."""
+        return self.about.grade
+
+    @property
+    def nominal(self) -> Mapping[str, Array]:
+        """The calibration a simulation starts from: (3,) by group."""
+        return self.about.nominal
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal rate, or what the times say where none is given."""
+        t = self.block.t
+        if self.about.rate_hz is not None or len(t) < 2:
+            return self.about.rate_hz or np.nan
+        return float(1 / np.median(np.diff(t)))
+
+    @cached_property
+    def block(self) -> Block:
+        """All samples, in SI units (or as they stand, where the unit has no SI)."""
+        raw, cut = sample_files.read(sample_files.find(self.folder))
+        self.warnings += cut
+        units = self.about.units
+        acc = raw.acc * ACC_UNITS[units["acceleration"]]
+        gyr = raw.gyr * GYR_UNITS[units["angular_rate"]]
+        return replace(raw, acc=acc, gyr=gyr)
+
+    def marks(self) -> Iterator[dict[str, Any]]:
+        """What happened, in order."""
+        return read_marks(self.folder / MARKS)
+
+    def write_json(self, name: str, content: Mapping[str, Any]) -> Path:
+        """Write a derived file whole, or not at all."""
+        return write_whole(
+            self.folder / name, json.dumps(content, indent=2, allow_nan=False) + "\n"
+        )
+
+
+def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:
+    windows = list(about.windows)
+    for mark in marks:
+        i = mark.get("position")
+        if mark.get("event") == "window" and isinstance(i, int) and i < len(windows):
+            windows[i] = (float(mark["start_s"]), float(mark["end_s"]))
+    return replace(about, windows=tuple(windows))
+
+
+def read_marks(path: Path) -> Iterator[dict[str, Any]]:
+    """Marks of a file; a last line that was cut off is left out, no file gives none.
+
+    Raises
+    ------
+    SessionError
+        If a line before the last is not a JSON object.
+
+    """
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+    except FileNotFoundError:
+        return
+    for number, line in enumerate(lines, start=1):
+        try:
+            mark = json.loads(line) if line.strip() else None
+        except ValueError as error:
+            if number == len(lines):
+                return
+            raise SessionError(f"{path}: line {number} is not JSON: {error}") from error
+        if isinstance(mark, dict):
+            yield mark
+
+
+def write_whole(path: Path, text: str) -> Path:
+    """Write a file so that a reader finds the old one or the new one, never half.
+
+    Raises
+    ------
+    SessionError
+        If it cannot be written.
+
+    """
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(name)
+            raise
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be written: {error}") from error
+    return path

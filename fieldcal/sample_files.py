@@ -127,7 +127,7 @@ def _read_csv(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     if not data.strip():
         raise SessionError(f"{path}: is empty; it needs a row of names and samples")
     data, short = _without_short_row(data)
-    names = data.split(b"\n", 1)[0].decode(errors="replace").strip().split(",")
+    names = _names(data)
     if not set(names) & set(COLUMNS):
         raise SessionError(
             f"{path}: the first row must name the columns: {', '.join(COLUMNS)}"
@@ -135,7 +135,9 @@ def _read_csv(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     try:
         table = pyarrow.csv.read_csv(
             pa.BufferReader(data),
-            read_options=pyarrow.csv.ReadOptions(use_threads=False),
+            read_options=pyarrow.csv.ReadOptions(
+                use_threads=False, skip_rows=1, column_names=names
+            ),
             convert_options=pyarrow.csv.ConvertOptions(
                 column_types={name: pa.float64() for name in COLUMNS},
                 include_columns=[n for n in names if n in COLUMNS],
@@ -145,6 +147,11 @@ def _read_csv(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         raise SessionError(f"{path}: {_place(data)}") from error
     return table, _cut_off(path, table) if cut or short else ()
+
+
+def _names(data: bytes) -> list[str]:
+    first = data.split(b"\n", 1)[0].decode(errors="replace")
+    return [name.strip().strip('"') for name in first.split(",")]
 
 
 def _gunzip(path: Path, data: bytes) -> tuple[bytes, bool]:
@@ -176,7 +183,7 @@ def _without_short_row(data: bytes) -> tuple[bytes, bool]:
 def _place(data: bytes) -> str:
     """Say where the first row that is none stands: the slow way, after a failure."""
     lines = data.decode(errors="replace").splitlines()
-    names = [name.strip() for name in lines[0].split(",")]
+    names = _names(data)
     for row, line in enumerate(lines[1:], start=1):
         cells = line.split(",")
         if line and len(cells) != len(names):

@@ -1,4 +1,4 @@
-"""The windowed averager."""
+"""The mean of a still window, with a standard error that holds."""
 
 from __future__ import annotations
 

@@ -1,0 +1,9 @@
+"""The windowed averager: mean, honest standard error, stillness, disturbance."""
+
+from fieldcal.windows.limits import Limits
+from fieldcal.windows.mean import Average
+from fieldcal.windows.stillness import Stillness
+from fieldcal.windows.stretches import still_stretches
+from fieldcal.windows.window import Window, average
+
+__all__ = ["Average", "Limits", "Stillness", "Window", "average", "still_stretches"]

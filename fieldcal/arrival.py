@@ -71,7 +71,8 @@ def judge(wanted: Position, f: Array, gravity: float, held: Held | None) -> Arri
 
     """
     norm = float(np.linalg.norm(f))
-    seen = np.rad2deg(angles_of(_without_offset(f, gravity, held)))
+    alpha, beta = np.rad2deg(angles_of(_without_offset(f, gravity, held)))
+    seen = (float(alpha), float(beta))
     if abs(norm - gravity) > NORM * gravity:
         problem = (
             f"the accelerometers read {norm:.2f} m/s² in all, gravity is"
@@ -101,7 +102,10 @@ def _chord(a: Position, b: Position, gravity: float) -> float:
 
 
 def _without_offset(f: Array, gravity: float, held: Held | None) -> Array:
-    return f - (held.f - _force(held.position, gravity)) if held else f
+    if held is None:
+        return f
+    clean: Array = f - (held.f - _force(held.position, gravity))
+    return clean
 
 
 def _miss(wanted: Position, f: Array, gravity: float, held: Held | None) -> float:
@@ -132,11 +136,11 @@ def _nearest_slip(
     return slips[best][1], misses[best]
 
 
-def _explain(wanted: Position, seen: Array, slip: str) -> str:
+def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:
     a, b = wanted.degrees or (0.0, 0.0)
     where = f"the device is at α = {seen[0]:.1f}°, β = {seen[1]:.1f}°"
     asked = f"asked for is α = {a:g}°, β = {b:g}°"
     if slip:
         return f"{slip}: {where}, {asked}"
-    off = np.array([a, b]) - seen
+    off = (a - seen[0], b - seen[1])
     return f"{where}, {asked}: turn it by {off[0]:+.1f}° in α, {off[1]:+.1f}° in β"

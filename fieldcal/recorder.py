@@ -38,7 +38,7 @@ class Recorder:
 
     def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
         import pyarrow as pa
-        import tomli_w
+        import tomlkit
 
         self.folder = folder
         try:
@@ -47,7 +47,7 @@ class Recorder:
                 raise SessionError(
                     f"{folder}: holds a session already; name another folder"
                 )
-            write_whole(folder / DESCRIPTION, tomli_w.dumps(about))
+            write_whole(folder / DESCRIPTION, tomlkit.dumps(about))
             self._samples = (folder / SAMPLES).open("xb", buffering=0)
             self._marks = (folder / MARKS).open("a", encoding="utf-8")
         except OSError as error:

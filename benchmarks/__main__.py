@@ -1,0 +1,15 @@
+"""Run benchmarks: all of them, or those named."""
+
+import sys
+from importlib import import_module
+from pkgutil import iter_modules
+
+import benchmarks
+
+available = [m.name for m in iter_modules(benchmarks.__path__) if m.name != "__main__"]
+wanted = sys.argv[1:] or available
+if unknown := set(wanted) - set(available):
+    sys.exit(f"no benchmark {', '.join(sorted(unknown))}; there are {available}")
+for name in wanted:
+    print(f"== {name}", flush=True)
+    import_module(f"benchmarks.{name}").main()

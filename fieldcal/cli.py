@@ -1,0 +1,101 @@
+"""The command line: one command a module in `commands`, loaded when it is called.
+
+Exit codes: 0 good, 1 the calibration or the verdict is bad, 2 wrong usage or input,
+3 the device failed, 130 interrupted. What a command has to say goes to standard output,
+with --json exactly one JSON object; messages go to standard error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Protocol, cast
+
+COMMANDS = {
+    "run": ("recalibrate a device, at the console or headless", "run"),
+    "solve": ("calibrate from a recorded session", "solve"),
+    "import": ("make a session of a recording from elsewhere", "import_recording"),
+    "sim": ("be a virtual device on a link", "sim"),
+    "ports": ("list the devices that are plugged in", "ports"),
+}
+"""Name, what it does, module."""
+
+EXIT_CODES = """\
+exit codes:
+  0    good
+  1    the calibration or the verdict is bad
+  2    wrong usage or input
+  3    the device failed
+  130  interrupted
+"""
+
+INTERRUPTED = 130
+
+
+class Command(Protocol):
+    """What a module of `commands` offers."""
+
+    EXAMPLE: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
+def _load(name: str) -> Command:
+    return cast(Command, import_module(f"fieldcal.commands.{COMMANDS[name][1]}"))
+
+
+def _top(version: str) -> argparse.ArgumentParser:
+    width = max(map(len, COMMANDS))
+    listed = "\n".join(f"  {n:{width}}  {what}" for n, (what, _) in COMMANDS.items())
+    parser = argparse.ArgumentParser(
+        prog="fieldcal",
+        description="Recalibrate an inertial measurement unit in the field.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog=f"commands:\n{listed}\n\n{EXIT_CODES}\n"
+        "example:\n  fieldcal run five_position --virtual",
+    )
+    parser.add_argument("--version", action="version", version=f"fieldcal {version}")
+    parser.add_argument("command", choices=COMMANDS, metavar="COMMAND")
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+    return parser
+
+
+def _command_parser(name: str, command: Command) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=f"fieldcal {name}",
+        description=COMMANDS[name][0][0].upper() + COMMANDS[name][0][1:] + ".",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog=f"example:\n{command.EXAMPLE.rstrip()}\n\n{EXIT_CODES}",
+    )
+    command.add_arguments(parser)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if not arguments or arguments[0] not in COMMANDS:
+        from fieldcal import __version__
+
+        _top(__version__).parse_args(arguments or ["--help"])
+    return _guarded(arguments[0], arguments[1:])
+
+
+def _guarded(name: str, arguments: list[str]) -> int:
+    """Turn errors into one sentence and an exit code."""
+    from fieldcal.errors import FieldcalError
+
+    command = _load(name)
+    try:
+        return command.run(_command_parser(name, command).parse_args(arguments))
+    except FieldcalError as error:
+        sys.stderr.write(f"fieldcal {name}: {error}\n")
+        return error.exit_code
+    except KeyboardInterrupt:
+        sys.stderr.write(f"fieldcal {name}: interrupted\n")
+        return INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0

@@ -1,0 +1,119 @@
+"""From a session's windows to what the estimators are given.
+
+A window that somebody else marked may hold a disturbance. Then the longest calm part of
+it is used, and that is said; a window with no calm part, or with no samples, is left
+out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fieldcal.description import Description
+from fieldcal.errors import FieldcalError, Moved, SessionError
+from fieldcal.samples import Block
+from fieldcal.session import Session
+from fieldcal.solve.observations import Observations
+from fieldcal.windows import Average, average
+
+SHORTEST = 5.0
+"""Shortest calm part of a disturbed window that is worth using, s."""
+
+
+def observations(
+    about: Description, averages: Sequence[Average], rows: Sequence[int] | None = None
+) -> Observations:
+    """Averages with what is known of the positions they were taken in.
+
+    Parameters
+    ----------
+    about : device, site, frame and positions
+    averages : one for each position, or for those numbered in `rows`
+    rows : numbers of the positions, all by default
+
+    """
+    numbers = range(len(about.positions)) if rows is None else rows
+    return Observations.of(
+        [about.positions[i] for i in numbers],
+        averages,
+        about.gravity,
+        latitude=about.latitude,
+        mounting=about.mounting,
+        grade="navigation" if about.grade == "navigation" else "tactical",
+        nominal=about.nominal,
+    )
+
+
+def observe(session: Session) -> tuple[Observations, tuple[str, ...]]:
+    """Average the windows of a recorded session; warnings name what was left out.
+
+    Raises
+    ------
+    SessionError
+        If it has no position, or no window of any position can be used.
+
+    """
+    if not session.positions:
+        raise SessionError(
+            f"{session.folder}: session.toml has no [[position]]: write down when each"
+            " position was held, or let fieldcal import find the still stretches"
+        )
+    block = session.block
+    rows, averages, warnings = [], [], list(session.warnings)
+    for i, window in enumerate(session.windows):
+        try:
+            found, said = _take(block, window)
+        except FieldcalError as error:
+            warnings.append(f"position {i} is left out: {error}")
+            continue
+        rows.append(i)
+        averages.append(found)
+        if said:
+            warnings.append(f"position {i}: {said}")
+    if not rows:
+        raise SessionError(f"{session.folder}: no window can be used; {warnings[-1]}")
+    return observations(session.about, averages, rows), tuple(warnings)
+
+
+def _take(block: Block, window: tuple[float, float] | None) -> tuple[Average, str]:
+    if window is None:
+        raise SessionError("its window was not taken before the recording ended")
+    part = block.between(*window)
+    if len(part) < 2:
+        raise SessionError(
+            f"no samples lie between {window[0]:g} and {window[1]:g} s; the recording"
+            f" spans {block.t[0]:g} to {block.t[-1]:g} s"
+        )
+    try:
+        return average(part), ""
+    except Moved as moved:
+        calm = _calm(part, moved)
+        if calm is None:
+            raise
+        return calm, (
+            f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s is"
+            " used"
+        )
+
+
+def _calm(block: Block, moved: Moved) -> Average | None:
+    """Average of the longest calm part, None if there is none worth it."""
+    sides = [
+        block.between(-float("inf"), moved.at),
+        block.between(moved.at, float("inf")),
+    ]
+    best: Average | None = None
+    for side in sorted(sides, key=len, reverse=True):
+        length = float(side.t[-1] - side.t[0]) if len(side) > 1 else 0.0
+        if length < SHORTEST or (best and length <= best.end - best.start):
+            continue
+        try:
+            found: Average | None = average(side)
+        except Moved as again:
+            inside = side.t[0] < again.at < side.t[-1]
+            # a disturbance lasts: what follows its first instant is disturbed as well
+            shifted = again.at if inside else side.t[0] + 1.0
+            found = _calm(side, Moved(str(again), shifted, again.axis))
+        if found and (best is None or found.end - found.start > best.end - best.start):
+            best = found
+    return best

@@ -1,0 +1,25 @@
+"""Five positions: the tilt of the base as well, so that it need not be level.
+
+The joint estimate of all parameters from the same averages is several times better
+than the equations one after the other. Source: Avrutov and Pozniak 2023, (15)-(34).
+"""
+
+from __future__ import annotations
+
+from fieldcal.calibration import Calibration
+from fieldcal.description import Description
+from fieldcal.observing import observations
+from fieldcal.plan import Plan
+from fieldcal.positions import FIVE, Position
+from fieldcal.procedures.holding import hold_all
+from fieldcal.solve import solve
+
+POSITIONS: tuple[Position, ...] = FIVE
+
+
+def plan(
+    about: Description, seconds: float = 30.0, sigma: float | None = None
+) -> Plan[Calibration]:
+    """Hold the positions of `about` for `seconds` each and solve."""
+    averages = yield from hold_all(about.positions, seconds, sigma)
+    return solve(observations(about, averages))

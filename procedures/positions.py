@@ -1,0 +1,25 @@
+"""Any positions: all that they determine, estimated jointly.
+
+For sets of positions of one's own. What they leave undetermined is named in the
+warnings.
+"""
+
+from __future__ import annotations
+
+from fieldcal.calibration import Calibration
+from fieldcal.description import Description
+from fieldcal.observing import observations
+from fieldcal.plan import Plan
+from fieldcal.positions import WIDE, Position
+from fieldcal.procedures.holding import hold_all
+from fieldcal.solve import solve
+
+POSITIONS: tuple[Position, ...] = WIDE
+
+
+def plan(
+    about: Description, seconds: float = 30.0, sigma: float | None = None
+) -> Plan[Calibration]:
+    """Hold the positions of `about` for `seconds` each and solve."""
+    averages = yield from hold_all(about.positions, seconds, sigma)
+    return solve(observations(about, averages))

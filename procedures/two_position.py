@@ -1,0 +1,26 @@
+"""Two positions: bias and scale factor of the accelerometers, bias of the gyroscopes.
+
+Home, then both joints turned by small angles. The base must be level: what it is tilted
+by goes into the biases (one degree: 0.17 m/s^2), and two positions cannot see it.
+Source: Avrutov and Pozniak 2023, (11)-(14), (36), (45)-(48).
+"""
+
+from __future__ import annotations
+
+from fieldcal.calibration import Calibration
+from fieldcal.description import Description
+from fieldcal.observing import observations
+from fieldcal.plan import Plan
+from fieldcal.positions import TWO, Position
+from fieldcal.procedures.holding import hold_all
+from fieldcal.solve import solve
+
+POSITIONS: tuple[Position, ...] = TWO
+
+
+def plan(
+    about: Description, seconds: float = 30.0, sigma: float | None = None
+) -> Plan[Calibration]:
+    """Hold the positions of `about` for `seconds` each and solve."""
+    averages = yield from hold_all(about.positions, seconds, sigma)
+    return solve(observations(about, averages), method="two_position")

@@ -31,6 +31,33 @@ COMPONENTS: dict[str, tuple[tuple[str, ...], str]] = {
 
 
 @dataclass(frozen=True, slots=True)
+class Nominal:
+    """The calibration to start from, in device axes: U = bias + scale f.
+
+    Attributes
+    ----------
+    acc_bias, gyr_bias : (3,) m/s^2, rad/s
+    acc_scale, gyr_scale : (3,) without unit
+
+    """
+
+    acc_bias: tuple[float, ...] = (0.0, 0.0, 0.0)
+    acc_scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+    gyr_bias: tuple[float, ...] = (0.0, 0.0, 0.0)
+    gyr_scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        for name in ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale"):
+            three = getattr(self, name)
+            if len(three) != 3 or not np.isfinite(three).all():
+                raise InputError(f"nominal {name} is {three}: give three numbers")
+            if name.endswith("scale") and not np.all(three):
+                raise InputError(
+                    f"nominal {name} is {three}: a scale of 0 sees nothing"
+                )
+
+
+@dataclass(frozen=True, slots=True)
 class Calibration:
     """Parameters, their covariance, and how well the data agree with them.
 

@@ -1,0 +1,286 @@
+"""Accelerometers and the tilt of the base from five or more known positions.
+
+The outputs are expanded in known functions of the angles, (17) (24); their
+coefficients come from least squares, (20) (26), and the parameters from them, per axis.
+With a = alpha, b = beta, g gravity, S and C for sine and cosine:
+
+joint offset (15):  f = g (-S(a+a0), -C(a+a0) C(b+b0), +C(a+a0) S(b+b0))
+
+    Ux = C0 + C1 Sa + C2 Ca               C1 = -k11 g Ca0,       C2 = -k11 g Sa0    (17)
+    Uy = C0 + C1 CaCb + C2 CaSb + C3 SaCb + C4 SaSb                                 (24)
+              C1 = -k22 g Ca0 Cb0, C2 = k22 g Ca0 Sb0, C3 = k22 g Sa0 Cb0, C4 = ...
+    Uz = the same functions
+              C1 = k33 g Ca0 Sb0,  C2 = k33 g Ca0 Cb0, C4 = -k33 g Sa0 Cb0, C3 = ...
+    a0 = atan(C2x / C1x), -atan(C3y / C1y), -atan(C4z / C2z)             (23) (29) (33)
+    b0 = -atan(C2y / C1y), atan(C1z / C2z)                                    (28) (32)
+    k g = sqrt(sum C^2) with the sign of the leading coefficient         (22) (30) (34)
+
+tilted base:  f = A(a, b) g n,  n = (-Sa0, -Ca0 Cb0, Ca0 Sb0), a0 about z, b0 about x
+
+    Ux = C0 + C1 Sa + C2 Ca               C1, C2 = k11 g (n_y, n_x)
+    Uy = C0 + C1 CaCb + C2 Sb + C3 SaCb   C1, C2, C3 = k22 g (n_y, n_z, -n_x)
+    Uz = C0 + C1 CaSb + C2 Cb + C3 SaSb   C1, C2, C3 = k33 g (-n_y, n_z, n_x)
+
+The three values of a0 and two (three) of b0 are combined by their covariance. Print and
+what holds: (17) both coefficients need the minus; (22), (30), (34) lose the sign of k;
+(23) is inverted; (24) is missing, and with (5) the signs of z. U in m/s^2, procedure
+axes inside, device axes outside. Source: Avrutov and Pozniak 2023.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from fieldcal.errors import InputError, NotObservable
+from fieldcal.samples import Array
+from fieldcal.solve import linear
+from fieldcal.solve.design import RAD, Model, Tilt, ladder_remedy, predict
+from fieldcal.solve.estimate import Estimate, not_determined
+from fieldcal.solve.observations import ACC, Observations
+
+Found = dict[str, Array]
+
+STEP = 1e-30
+"""Imaginary step of the derivatives; exact to the machine, since nothing cancels."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisEstimates:
+    """What each procedure axis gives by itself.
+
+    Attributes
+    ----------
+    names : (q,) such as ``"x.bias"``, ``"y.alpha0_deg"``
+    values : (q,) m/s^2, 1, degrees
+    gain : (q, n, 3) derivative by the means in procedure axes
+    covariance : (q, q)
+    missing : axes, "x", "y" or "z", that these positions do not determine
+
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    gain: Array
+    covariance: Array
+    missing: tuple[str, ...]
+
+
+def axis_estimates(
+    observations: Observations, tilt: Tilt = "angle_offset", as_printed: bool = False
+) -> AxisEstimates:
+    """Bias, scale factor and tilt from each axis, (20)-(23), (26)-(34).
+
+    Parameters
+    ----------
+    observations : n positions with known angles
+    tilt : "angle_offset" as in the print, or "base_tilt"
+    as_printed : take (22), (23), (30), (34) as printed, to compare
+
+    """
+    if as_printed and tilt != "angle_offset":
+        raise InputError("the print has the tilt only as an offset of the angles")
+    p = observations.mounting
+    outputs = observations.mean[:, ACC] @ p.T
+    noise = p @ observations.covariance[:, ACC, ACC] @ p.T
+    solved = [linear.decompose(f)[:2] for f in expansion(observations, tilt)]
+    usable = [bool(determined.all()) for _, determined in solved]
+    if tilt == "base_tilt":
+        usable[0] &= usable[1]
+    if not any(usable):
+        raise NotObservable(
+            f"{len(observations)} positions separate bias, scale factor and tilt on "
+            "no axis: take at least three different α, or assume a level base"
+        )
+    # all coefficients in a row, and their gain by the outputs (20) (26)
+    rows = [np.zeros((0, *outputs.shape))] * 3
+    for axis in range(3):
+        if usable[axis]:
+            rows[axis] = solved[axis][0][:, :, None] * np.eye(3)[axis]
+    by_output = np.concatenate(rows)
+    coefficients = np.einsum("knc,nc->k", by_output, outputs)
+    limits = np.cumsum([0, *(len(r) for r in rows)])
+    names, values, slope = _differentiated(
+        coefficients, limits, tilt, observations.gravity, as_printed
+    )
+    gain = np.tensordot(slope, by_output, axes=1)
+    covariance = np.einsum("pnc,ncd,qnd->pq", gain, noise, gain)
+    missing = tuple(x for x, ok in zip("xyz", usable, strict=True) if not ok)
+    return AxisEstimates(names, values, gain, covariance, missing)
+
+
+def five_position(
+    observations: Observations, tilt: Tilt = "angle_offset", as_printed: bool = False
+) -> Estimate:
+    """Bias, scale factor and tilt of the accelerometers from five positions or more.
+
+    Parameters as in `axis_estimates`. chi2 and dof are those of the whole model: what
+    of the means no parameter can explain.
+
+    Raises
+    ------
+    NotObservable
+        If no axis is determined.
+
+    """
+    each = axis_estimates(observations, tilt, as_printed)
+    pick, names = _picked(each, tilt, observations.mounting)
+    values = pick @ each.values
+    gain = np.einsum("pq,qnc->pnc", pick, each.gain) @ observations.mounting
+    covariance = pick @ each.covariance @ pick.T
+    out = Estimate(
+        names, values, covariance, gain=gain,
+        warnings=_warnings(observations, each, tilt, as_printed),
+        extra={"axis_estimates": _each(each)},
+    )  # fmt: skip
+    if each.missing or as_printed:
+        return out
+    return _judged(out, observations, tilt)
+
+
+def expansion(observations: Observations, tilt: Tilt) -> tuple[Array, Array, Array]:
+    """Functions of the angles that each axis is expanded in, (n, 3 to 5) each."""
+    a, b = observations.angles
+    sa, ca, sb, cb = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
+    one = np.ones_like(a)
+    x = np.stack([one, sa, ca], axis=1)  # (17)
+    if tilt == "base_tilt":
+        y = np.stack([one, ca * cb, sb, sa * cb], axis=1)
+        z = np.stack([one, ca * sb, cb, sa * sb], axis=1)
+        return x, y, z
+    yz = np.stack([one, ca * cb, ca * sb, sa * cb, sa * sb], axis=1)  # (24)
+    return x, yz, yz
+
+
+def _differentiated(
+    c: Array, limits: Array, tilt: Tilt, g: float, as_printed: bool
+) -> tuple[tuple[str, ...], Array, Array]:
+    """Parameters from all coefficients, and their derivatives by them."""
+    stepped = np.vstack([c + 0j, c + 1j * STEP * np.eye(len(c))]).T
+    x, y, z = (stepped[i:j] for i, j in pairwise(limits))
+    if tilt == "base_tilt":
+        found = _of_base(x, y, z, g)
+    else:
+        found = _of_offset(x, y, z, g, as_printed)
+    table = np.stack(list(found.values()))
+    return tuple(found), table[:, 0].real, table[:, 1:].imag / STEP
+
+
+def _of_offset(x: Array, y: Array, z: Array, g: float, as_printed: bool) -> Found:
+    """(21)-(23), (27)-(34); coefficients (k, ...) of each axis, none if not usable."""
+    out: Found = {}
+    if len(x):
+        a0 = x[1] / x[2] if as_printed else x[2] / x[1]  # (23)
+        out |= _axis("x", x, -x[1], g, as_printed)
+        out["x.alpha0_deg"] = np.arctan(a0) / RAD
+    if len(y):
+        out |= _axis("y", y, -y[1], g, as_printed)
+        out["y.alpha0_deg"] = -np.arctan(y[3] / y[1]) / RAD  # (29)
+        out["y.beta0_deg"] = -np.arctan(y[2] / y[1]) / RAD  # (28)
+    if len(z):
+        out |= _axis("z", z, z[2], g, as_printed)
+        out["z.alpha0_deg"] = -np.arctan(z[4] / z[2]) / RAD  # (33)
+        out["z.beta0_deg"] = np.arctan(z[1] / z[2]) / RAD  # (32)
+    return out
+
+
+def _of_base(x: Array, y: Array, z: Array, g: float) -> Found:
+    """Parameters of each axis on a tilted base; k g n stands in the coefficients."""
+    out: Found = {}
+    if len(x):
+        # of n the x axis sees n_x and n_y only; what of it is n_z, the y axis says
+        level = 1 - y[2] ** 2 / (y[1:] ** 2).sum(axis=0)
+        out["x.bias"] = x[0]
+        norm = np.sqrt((x[1] ** 2 + x[2] ** 2) / level)
+        out["x.scale"] = -np.sign(x[1][0].real) * norm / g
+        cosine = np.cos(np.arctan(-y[2] / y[1]))
+        out["x.alpha0_deg"] = np.arctan(x[2] / x[1] * cosine) / RAD
+    for axis, c in (("y", y), ("z", z)):
+        if len(c):
+            n = (-c[3], c[1], c[2]) if axis == "y" else (c[3], -c[1], c[2])
+            beta0 = np.arctan(-n[2] / n[1])
+            out |= _axis(axis, c, -n[1], g, False)
+            out[f"{axis}.alpha0_deg"] = np.arctan(n[0] / n[1] * np.cos(beta0)) / RAD
+            out[f"{axis}.beta0_deg"] = beta0 / RAD
+    return out
+
+
+def _axis(axis: str, c: Array, lead: Array, g: float, as_printed: bool) -> Found:
+    """Bias (21) (27) (31) and scale factor (22) (30) (34) of an axis."""
+    sign = 1.0 if as_printed else np.sign(lead[0].real)
+    norm = np.sqrt((c[1:] ** 2).sum(axis=0))
+    return {f"{axis}.bias": c[0], f"{axis}.scale": sign * norm / g}
+
+
+def _picked(
+    each: AxisEstimates, tilt: Tilt, mounting: Array
+) -> tuple[Array, tuple[str, ...]]:
+    """Rows that turn the axes' estimates into parameters of the device, (p, q).
+
+    A device axis that points against a procedure axis has its bias reversed there; the
+    scale factor is the same. Angles that several axes give are weighted by covariance.
+    """
+    picked: dict[str, Array] = {}
+    units = np.eye(len(each.names))
+    for group in ("bias", "scale"):
+        for device in range(3):
+            axis = int(np.abs(mounting[:, device]).argmax())
+            name = f"{'xyz'[axis]}.{group}"
+            if name in each.names:
+                sign = mounting[axis, device] if group == "bias" else 1.0
+                full = f"acc_{group}.{'xyz'[device]}"
+                picked[full] = sign * units[each.names.index(name)]
+    parts = {"alpha0_deg": "about_z_deg", "beta0_deg": "about_x_deg"}
+    for part in parts if tilt == "angle_offset" else reversed(parts):
+        rows = [i for i, n in enumerate(each.names) if n.endswith(part)]
+        if rows:
+            weight = np.linalg.solve(
+                each.covariance[np.ix_(rows, rows)], np.ones(len(rows))
+            )
+            name = part if tilt == "angle_offset" else parts[part]
+            picked[f"{tilt}.{name}"] = weight @ units[rows] / weight.sum()
+    return np.array(list(picked.values())), tuple(picked)
+
+
+def _judged(out: Estimate, observations: Observations, tilt: Tilt) -> Estimate:
+    """Add chi2 and rms: of the residual only what no parameter could have taken."""
+    model = Model(tilt)
+    x = out.values[[out.names.index(n) for n in model.names]]
+    u, slope = predict(
+        model, observations.positions, observations.gravity, observations.mounting, x
+    )
+    y = observations.mean[:, ACC] - u
+    fit = linear.fit(slope, y, linear.whitener(observations.covariance[:, ACC, ACC]))
+    return replace(
+        out, chi2=fit.chi2, dof=fit.dof, rms=float(np.sqrt(np.mean(y**2)))
+    )  # fmt: skip
+
+
+def _warnings(
+    observations: Observations, each: AxisEstimates, tilt: Tilt, as_printed: bool
+) -> tuple[str, ...]:
+    notes = []
+    if each.missing:
+        wanted = np.ones(len(Model(tilt).names), dtype=bool)
+        notes.append(
+            not_determined(
+                [f"bias and scale of procedure axis {axis}" for axis in each.missing],
+                ladder_remedy(observations, wanted, Model(tilt)),
+                "these positions with an unknown tilt",
+            )
+        )
+    if as_printed:
+        notes.append("as printed: (23) is inverted, (22), (30), (34) lose the sign")
+    return tuple(notes)
+
+
+def _each(each: AxisEstimates) -> dict[str, dict[str, float]]:
+    """Angles that each axis gives by itself, for the report."""
+    sigma = np.sqrt(np.diag(each.covariance))
+    return {
+        name: {"value": float(value), "sigma": float(s)}
+        for name, value, s in zip(each.names, each.values, sigma, strict=True)
+        if name.endswith("_deg")
+    }

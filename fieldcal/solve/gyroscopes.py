@@ -1,0 +1,166 @@
+"""Gyroscopes of a device at rest in known positions.
+
+Tactical grade, (36): the mean output is the bias B. The Earth's rate is in it,
+
+    <U> = B + A w_base,   w_base = Omega (c sin psi, -sin phi, c cos psi),  c = cos phi
+
+so it is taken out with what is known of it: the vertical part by the latitude phi, the
+level part by the heading psi, or as an unknown of that size where psi is not known.
+s = 1 is near enough here, a scale error of 1 % makes 7e-7 rad/s.
+
+Navigation grade, (42)-(48): bias and scale factor from the Earth's rate,
+
+    <U> = B + s w,  w = A Omega (0, -sin phi, cos phi)                          (39)
+
+per axis from two positions (45)-(48), or by least squares from more. The print has
++sin phi in (39)-(41), -sin phi for cos phi in the third line of (40), and sin alpha for
+cos alpha in the third line of (41). U, B, w in device axes, rad/s. Source: Avrutov and
+Pozniak 2023.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.frames import EARTH_RATE, turn
+from fieldcal.samples import Array
+from fieldcal.solve import linear
+from fieldcal.solve.estimate import Estimate, axes, not_determined
+from fieldcal.solve.observations import ACC, GYR, Observations
+
+USEFUL = 0.1
+"""A scale factor less well known than this is not offered."""
+
+
+def bias(
+    observations: Observations,
+    heading_sigma: float | None = None,
+    as_printed: bool = False,
+) -> Estimate:
+    """Bias of tactical gyroscopes, (36), weighted over all positions.
+
+    Parameters
+    ----------
+    observations : n positions at rest
+    heading_sigma : how well z points north, rad; None where it points anywhere
+    as_printed : leave the Earth's rate in it
+
+    """
+    n = len(observations)
+    known: Array = np.zeros((n, 3))
+    unknown: Array = np.zeros((n, 3, 0))
+    if not as_printed:
+        known, unknown = _earth(observations, heading_sigma)
+    y = observations.mean[:, GYR] - known
+    fit = _with_nuisance(y, observations.covariance[:, GYR, GYR], unknown)
+    return _estimate(axes("gyr_bias"), fit, n)
+
+
+def bias_and_scale(observations: Observations, as_printed: bool = False) -> Estimate:
+    """Bias and scale factor of navigation gyroscopes: (45)-(48) for two positions.
+
+    More positions are solved by least squares. `as_printed` takes the reference as
+    printed in (40) and (41), to compare.
+
+    A scale factor that the Earth's rate gives to no better than `USEFUL` is left out,
+    and with it what the bias owes to it stays in the bias' uncertainty.
+    """
+    n = len(observations)
+    w = observations.earth_rates
+    if as_printed:
+        w = printed_earth_rate(observations) @ observations.mounting
+    y = observations.mean[:, GYR]
+    white = linear.whitener(observations.covariance[:, GYR, GYR])
+    ones = np.broadcast_to(np.eye(3), (n, 3, 3))
+    design = np.concatenate([ones, w[:, :, None] * np.eye(3)], axis=2)
+    fit = linear.fit(design, y, white)
+    names = (*axes("gyr_bias"), *axes("gyr_scale"))
+    out = _estimate(names, fit, n)
+    scale = np.array([name.startswith("gyr_scale") for name in out.names])
+    weak = scale & (np.sqrt(np.diag(out.covariance)) > USEFUL)
+    notes = []
+    missing = [n for n, d in zip(names, fit.determined, strict=True) if not d]
+    if missing:
+        notes.append(not_determined(missing, (), "the Earth's rate in these positions"))
+    if weak.any():
+        worst = np.sqrt(np.diag(out.covariance))[weak].max()
+        notes.append(
+            f"the Earth's rate gives the gyroscopes' scale factor only to "
+            f"±{100 * worst:.0f} % in these windows, so it is left out: average "
+            "longer, or integrate turns between the positions"
+        )
+    return replace(out.only(~weak), warnings=tuple(notes))
+
+
+def printed_earth_rate(observations: Observations) -> Array:
+    """Reference (40), (41) as printed, in procedure axes, (n, 3) rad/s; not for use."""
+    if observations.latitude is None:
+        return observations.earth_rates  # raises with the remedy
+    a, b = observations.angles
+    up, north = (EARTH_RATE * f(observations.latitude) for f in (np.sin, np.cos))
+    third = -up * np.sin(a) * np.sin(b) + north * np.cos(b)  # (41), sin for cos alpha
+    third = np.where((a == 0) & (b == 0), -up, third)  # (40)
+    second = up * np.cos(a) * np.cos(b) + north * np.sin(b)
+    return np.stack([up * np.sin(a), second, third], axis=1)
+
+
+def _earth(
+    observations: Observations, heading_sigma: float | None
+) -> tuple[Array, Array]:
+    """Part of the Earth's rate that is known, (n, 3), and the rest.
+
+    The rest is (n, 3, k): columns of unknown factors of mean 0 and variance 1.
+    """
+    phi = observations.latitude
+    if phi is None or not observations.oriented.all():
+        return _earth_unoriented(observations)
+    north = EARTH_RATE * np.cos(phi)
+    seen = observations.mounting.T @ turn(*observations.angles)  # to device axes
+    if heading_sigma is not None:
+        return observations.earth_rates, seen[:, :, [0]] * north * heading_sigma
+    down = np.array([0.0, -EARTH_RATE * np.sin(phi), 0.0])
+    return seen @ down, seen[:, :, [0, 2]] * north * np.sqrt(0.5)
+
+
+def _earth_unoriented(observations: Observations) -> tuple[Array, Array]:
+    """Earth's rate where only up is known, from the accelerometers, or not even that.
+
+    Each position then has a heading of its own, independent of the others.
+    """
+    n = len(observations)
+    known = np.zeros((n, 3))
+    spread = np.broadcast_to(np.eye(3) * EARTH_RATE / np.sqrt(3), (n, 3, 3))
+    phi = observations.latitude
+    if phi is not None and observations.has_acc:
+        nominal = observations.nominal
+        up = (observations.mean[:, ACC] - nominal.acc_bias) / nominal.acc_scale
+        up /= np.linalg.norm(up, axis=1, keepdims=True)
+        known = EARTH_RATE * np.sin(phi) * up
+        level = np.eye(3) - up[:, :, None] * up[:, None, :]
+        spread = level * EARTH_RATE * np.cos(phi) * np.sqrt(0.5)
+    unknown = np.zeros((n, 3, n, 3))
+    unknown[np.arange(n), :, np.arange(n)] = spread
+    return known, unknown.reshape(n, 3, 3 * n)
+
+
+def _with_nuisance(y: Array, covariance: Array, unknown: Array) -> linear.LinearFit:
+    """Weighted mean of y, (n, 3), with unknown factors folded into its covariance."""
+    n = len(y)
+    columns = unknown.reshape(3 * n, -1)
+    noise = columns @ columns.T
+    for i, block in enumerate(covariance):
+        noise[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += block
+    ones = np.tile(np.eye(3), (n, 1))
+    return linear.fit(ones[None], y.reshape(1, -1), linear.whitener(noise)[None])
+
+
+def _estimate(names: tuple[str, ...], fit: linear.LinearFit, n: int) -> Estimate:
+    residual = fit.residual[np.isfinite(fit.residual)]
+    rms = float(np.sqrt(np.mean(residual**2)))
+    whole = Estimate(
+        names, fit.values, fit.covariance, fit.chi2, fit.dof, rms,
+        fit.gain.reshape(len(names), n, 3),
+    )  # fmt: skip
+    return whole.only(fit.determined)

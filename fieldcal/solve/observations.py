@@ -1,0 +1,209 @@
+"""What every estimator is given: window averages and where they were taken.
+
+Means and covariances are in device axes, in `samples.CHANNELS` order; positions and
+angles are in procedure axes; ``mounting`` is P with procedure = P device, so that a
+reference vector v of the procedure is P^T v for the device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from fieldcal.calibration import Nominal
+from fieldcal.errors import InputError
+from fieldcal.frames import earth_rate, force
+from fieldcal.positions import Position, angles
+from fieldcal.samples import CHANNELS, UNITS, Array
+from fieldcal.windows import Average
+
+Grade = Literal["tactical", "navigation"]
+ACC, GYR = slice(0, 3), slice(3, 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Observations:
+    """Averages of n windows with what is known about each.
+
+    Attributes
+    ----------
+    positions : n positions, angles in rad
+    mean : (n, 6) m/s^2 and rad/s, device axes; a sensor not measured is nan throughout
+    covariance : (n, 6, 6) of the means
+    gravity : m/s^2
+    temperature : (n,) deg C, nan where unknown
+    time : (n,) middle of each window, s of device time, nan where unknown
+    latitude : rad; None where unknown
+    mounting : (3, 3) signed permutation, procedure = mounting @ device
+    grade : "navigation" when the gyroscopes see the Earth's rate
+    nominal : the calibration to start from
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit, gravity is not positive, or a number is missing.
+
+    """
+
+    positions: tuple[Position, ...]
+    mean: Array
+    covariance: Array
+    gravity: float
+    temperature: Array = field(default_factory=lambda: np.empty(0))
+    time: Array = field(default_factory=lambda: np.empty(0))
+    latitude: float | None = None
+    mounting: Array = field(default_factory=lambda: np.eye(3))
+    grade: Grade = "tactical"
+    nominal: Nominal = field(default_factory=Nominal)
+
+    def __post_init__(self) -> None:
+        n = len(self.positions)
+        for name in ("temperature", "time"):
+            if not np.size(getattr(self, name)):
+                object.__setattr__(self, name, np.full(n, np.nan))
+        self._check_shapes(n)
+        if not (np.isfinite(self.gravity) and self.gravity > 0):
+            raise InputError(
+                f"gravity is {self.gravity:g} m/s^2: give the local value, about 9.8, "
+                "or the latitude and height of the site"
+            )
+        self._check_numbers("accelerometers", ACC)
+        self._check_numbers("gyroscopes", GYR)
+
+    @classmethod
+    def of(
+        cls,
+        positions: Sequence[Position],
+        averages: Sequence[Average],
+        gravity: float,
+        *,
+        latitude: float | None = None,
+        mounting: Array | None = None,
+        grade: Grade = "tactical",
+        nominal: Nominal | None = None,
+    ) -> Observations:
+        """Gather the averages of windows; units and frames as in the attributes."""
+        if not averages:
+            raise InputError("there is no position with a window: take at least two")
+        return cls(
+            tuple(positions),
+            np.array([a.mean for a in averages]),
+            np.array([a.covariance for a in averages]),
+            gravity,
+            np.array([a.temperature for a in averages]),
+            np.array([(a.start + a.end) / 2 for a in averages]),
+            latitude,
+            np.eye(3) if mounting is None else mounting,
+            grade,
+            nominal or Nominal(),
+        )
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, rows: Sequence[int] | Array) -> Observations:
+        """Return the observations of some positions."""
+        rows = np.asarray(rows, dtype=int)
+        return Observations(
+            tuple(self.positions[i] for i in rows),
+            self.mean[rows],
+            self.covariance[rows],
+            self.gravity,
+            self.temperature[rows],
+            self.time[rows],
+            self.latitude,
+            self.mounting,
+            self.grade,
+            self.nominal,
+        )
+
+    @property
+    def has_acc(self) -> bool:
+        """Whether the accelerometers were measured."""
+        return bool(np.isfinite(self.mean[:, ACC]).all())
+
+    @property
+    def has_gyr(self) -> bool:
+        """Whether the gyroscopes were measured."""
+        return bool(np.isfinite(self.mean[:, GYR]).all())
+
+    @property
+    def angles(self) -> tuple[Array, Array]:
+        """Alpha and beta, (n,) rad each, nan where unknown."""
+        return angles(self.positions)
+
+    @property
+    def oriented(self) -> Array:
+        """Whether both angles of a position are known, (n,)."""
+        return np.array([p.oriented for p in self.positions], dtype=bool)
+
+    @property
+    def rotating(self) -> Array:
+        """Whether a position turns at a known rate, (n,)."""
+        return np.array([p.rate is not None for p in self.positions], dtype=bool)
+
+    @property
+    def forces(self) -> Array:
+        """Specific force at rest in device axes, (n, 3) m/s^2."""
+        seen: Array = force(*self.angles, self.gravity) @ self.mounting
+        return seen
+
+    @property
+    def earth_rates(self) -> Array:
+        """Earth's rate in device axes with z north, (n, 3) rad/s.
+
+        Raises
+        ------
+        InputError
+            If the latitude is not known.
+
+        """
+        if self.latitude is None:
+            raise InputError(
+                "the latitude is not known, so the Earth's rate cannot serve as the "
+                "reference of the gyroscopes: give the latitude of the site"
+            )
+        seen: Array = earth_rate(*self.angles, self.latitude) @ self.mounting
+        return seen
+
+    @property
+    def rates(self) -> Array:
+        """Known rates of a rate table in device axes, (n, 3) rad/s; 0 at rest."""
+        table = np.array([p.rate or (0.0, 0.0, 0.0) for p in self.positions])
+        seen: Array = table @ self.mounting
+        return seen
+
+    def _check_shapes(self, n: int) -> None:
+        shapes = {
+            "mean": (n, 6),
+            "covariance": (n, 6, 6),
+            "temperature": (n,),
+            "time": (n,),
+            "mounting": (3, 3),
+        }
+        for name, shape in shapes.items():
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise InputError(f"{name} is {found} where {n} positions need {shape}")
+        if n == 0:
+            raise InputError("there is no position: mark at least two")
+
+    def _check_numbers(self, sensor: str, three: slice) -> None:
+        mean, cov = self.mean[:, three], self.covariance[:, three, three]
+        bad = ~np.isfinite(mean)
+        if bad.all():
+            return
+        if bad.any():
+            row, axis = np.argwhere(bad)[0]
+            raise InputError(
+                f"position {row} ({self.positions[row].name}) has no mean of "
+                f"{CHANNELS[three][axis]}: take its window again or leave it out"
+            )
+        if not np.isfinite(cov).all() or (np.linalg.eigvalsh(cov) <= 0).any():
+            raise InputError(
+                f"the {sensor}' means have no uncertainty above 0 {UNITS[three][0]}: "
+                "a window of repeated equal values tells nothing about its noise"
+            )

@@ -92,7 +92,8 @@ def judge(wanted: Position, f: Array, gravity: float, held: Held | None) -> Arri
 
 
 def _force(position: Position, gravity: float) -> Array:
-    return forces([position], gravity)[0]
+    f: Array = forces([position], gravity)[0]
+    return f
 
 
 def _chord(a: Position, b: Position, gravity: float) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fieldcal.calibration import Nominal
 from fieldcal.description import Description
 from fieldcal.errors import FieldcalError, Moved, SessionError
 from fieldcal.samples import Block
@@ -40,7 +41,7 @@ def observations(
         latitude=about.latitude,
         mounting=about.mounting,
         grade="navigation" if about.grade == "navigation" else "tactical",
-        nominal=about.nominal,
+        nominal=Nominal(**{k: tuple(v.tolist()) for k, v in about.nominal.items()}),
     )
 
 

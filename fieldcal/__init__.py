@@ -1,3 +1,43 @@
-"""Recalibrate an inertial measurement unit in the field, with honest uncertainty."""
+"""Recalibrate an inertial measurement unit in the field, with honest uncertainty.
+
+A recorded session, solved and applied:
+
+    from fieldcal import Session, observe
+    from fieldcal.solve import solve
+
+    session = Session.open("bench-7")
+    calibration = solve(observe(session)[0])
+    true = calibration.apply(session.block)
+
+Names are loaded when they are first used, so that importing the package costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fieldcal.calibration import Calibration as Calibration
+    from fieldcal.driver import open_driver as open_driver
+    from fieldcal.observing import observe as observe
+    from fieldcal.positions import Position as Position
+    from fieldcal.samples import Block as Block
+    from fieldcal.session import Session as Session
+    from fieldcal.windows import average as average
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "Block": "samples",
+    "Calibration": "calibration",
+    "Position": "positions",
+    "Session": "session",
+    "average": "windows",
+    "observe": "observing",
+    "open_driver": "driver",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -1,0 +1,33 @@
+"""Biases that drift steadily.
+
+    U_i += d_i t,    W_i += d_i t
+
+t, s, since the session's start; d m/s^2/s and rad/s/s. Source: IEEE Std 952, rate ramp.
+
+>>> import numpy as np
+>>> x = Experience.at_rest(np.zeros(1), np.zeros(1), 9.8, since_start=np.array([60.0]))
+>>> BiasDrift().design(x)[0].diagonal()
+array([60., 60., 60., 60., 60., 60.])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.effects import NO_SHAPE, Experience, Sensor, six
+from fieldcal.samples import Array
+
+
+class BiasDrift(Sensor):
+    """Linear change of the biases."""
+
+    params = six("m/s^2/s", 1e-4, "rad/s/s", 5e-6)
+    covariate = "time"
+    decided_by = "the first position once more at the end"
+    source = "IEEE Std 952, rate ramp"
+
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """Time on every output."""
+        return np.eye(6) * x.since_start[:, None, None]

@@ -1,0 +1,35 @@
+"""Biases that jump at an instant.
+
+    U_i += s_i (t >= t_0),    W_i += s_i (t >= t_0)
+
+t_0 = at_s, device time, s; s m/s^2 and rad/s. Source: stress released, a supply
+switched, a range changed.
+
+>>> import numpy as np
+>>> x = Experience.at_rest(np.zeros(2), np.zeros(2), 9.8, t=np.array([9.0, 11.0]))
+>>> BiasStep().design(x, {"at_s": 10.0})[:, 0, 0]
+array([0., 1.])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.effects import NO_SHAPE, Experience, Sensor, Shape, six
+from fieldcal.samples import Array
+
+
+class BiasStep(Sensor):
+    """Jump of the biases."""
+
+    params = six("m/s^2", 5e-2, "rad/s", 2e-3)
+    shapes = (Shape("at_s", "s", -np.inf, np.inf),)
+    covariate = "time"
+    decided_by = "the position before the jump once more"
+    source = "stress released, a supply switched, a range changed"
+
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """One from the instant on, on every output."""
+        return np.eye(6) * (x.t >= shape["at_s"])[:, None, None]

@@ -1,0 +1,31 @@
+"""The gyroscopes see the Earth turn.
+
+    w = A(alpha, beta) Omega (0, -sin phi, cos phi)                              (39)
+
+w angular rate, rad/s, procedure axes; phi the latitude; no parameter. Left out of the
+simulation of tactical grade. Source: Avrutov and Pozniak 2023, (38), (39), with y down.
+
+>>> import numpy as np
+>>> pole = {"latitude": np.pi / 2, "position": np.zeros(1, int)}
+>>> x = Experience.at_rest(np.array([0.0]), np.array([0.0]), 9.8, **pole)
+>>> np.round(EarthRate().change(x, []).w * 1e5, 3) + 0.0  # straight up, y is down
+array([[ 0.   , -7.292,  0.   ]])
+"""
+
+from __future__ import annotations
+
+from fieldcal.effects import Experience, Motion, Values
+from fieldcal.frames import earth_rate_home
+
+
+class EarthRate(Motion):
+    """The Earth's rate."""
+
+    covariate = "gyroscope means turn with the position"
+    decided_by = "longer windows with the gyroscopes turned end for end"
+    source = "Avrutov and Pozniak 2023, (39); 15.04 deg/h"
+    order = -1
+
+    def change(self, x: Experience, values: Values) -> Experience:
+        """Add the Earth's rate to what turns with the device."""
+        return x.turned(base_rate=earth_rate_home(x.latitude))  # (39)

@@ -1,0 +1,34 @@
+"""Biases that differ between heating and cooling.
+
+    U_i += h_i dT/dt,    W_i += h_i dT/dt
+
+dT/dt, K/s, is the rate of the temperature; h m/s^2/(K/s) and rad/s/(K/s). Source:
+first-order lag of the sensor behind the thermometer, h = -coefficient x lag.
+
+>>> import numpy as np
+>>> x = Experience.at_rest(np.zeros(1), np.zeros(1), 9.8, heating=np.array([0.01]))
+>>> ThermalHysteresis().design(x)[0].diagonal()
+array([0.01, 0.01, 0.01, 0.01, 0.01, 0.01])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.effects import NO_SHAPE, Experience, Sensor, six
+from fieldcal.samples import Array
+
+
+class ThermalHysteresis(Sensor):
+    """Response of the biases to the rate of the temperature."""
+
+    params = six("m/s^2/(K/s)", 1.0, "rad/s/(K/s)", 2e-2)
+    covariate = "rate of the temperature"
+    decided_by = "the same temperature once heating and once cooling"
+    source = "first-order lag of 10 to 100 s with the temperature_bias sizes"
+
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """Rate of the temperature on every output."""
+        return np.eye(6) * x.heating[:, None, None]

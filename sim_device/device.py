@@ -1,0 +1,231 @@
+"""A virtual device: told to turn, it hands out the samples it would put out.
+
+Time runs by samples alone: `take` advances it, and what the device is told takes effect
+at the sample that comes next. Whatever the size of the blocks it is asked for, the same
+commands at the same device times give the same samples.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.errors import InputError
+from fieldcal.samples import Array, Block, concat
+from fieldcal.sim_device.body import Body
+from fieldcal.sim_device.chain import Chain, rows
+from fieldcal.sim_device.influences import outputs
+from fieldcal.sim_device.noise import Noise, Walk, stream
+from fieldcal.sim_device.profile import Profile
+from fieldcal.sim_device.rocking import Bump
+from fieldcal.sim_device.vocabulary import SIX
+
+PIECE = 4096
+"""Samples calculated at once: few enough to stay in the processor's cache."""
+
+LATENCY_S = 0.002
+JITTER_S = 0.001
+"""A sample reaches the host so much later: at least, and in the mean beyond that."""
+
+
+class VirtualDevice:
+    """A device with its own physics; angles in rad, times in s of its own clock.
+
+    Parameters
+    ----------
+    profile : what it conceals
+    seed : of everything that is random
+
+    """
+
+    def __init__(self, profile: Profile | None = None, seed: int = 0) -> None:
+        if seed < 0:
+            raise InputError(f"seed = {seed} must be 0 or more")
+        self.profile = profile or Profile()
+        self.seed = seed
+        self.rate = self.profile.sampling.rate_hz
+        self.sensing = Sensing(self.profile, seed)
+        self._arrival = stream(seed, "arrival")
+        self._tick = 0
+
+    @property
+    def body(self) -> Body:
+        """How it is held and moved."""
+        return self.sensing.body
+
+    @property
+    def time(self) -> float:
+        """Device time of the next sample, s."""
+        return self._tick / self.rate
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """Alpha and beta that it was last told to turn to, rad."""
+        return self.body.asked
+
+    @property
+    def busy_until(self) -> float:
+        """When the last turn it was told ends, s; -inf before any."""
+        return self.body.joints.busy_until * self.sensing.pace
+
+    def turn(self, alpha: float, beta: float, seconds: float | None = None) -> float:
+        """Turn to the angles; returns the device time at which that is done.
+
+        A turn that is told while another is under way follows it.
+
+        Raises
+        ------
+        InputError
+            If the angles or the duration are not finite, or the duration not above 0.
+
+        """
+        start = self.time / self.sensing.pace
+        _, end = self.body.turn(start, self._duration(seconds), (alpha, beta))
+        return end * self.sensing.pace
+
+    def spin(
+        self,
+        rate: tuple[float, float, float],
+        angles: tuple[float, float] | None = None,
+        seconds: float | None = None,
+    ) -> float:
+        """Run up to a constant rate about procedure axes, rad/s, as on a rate table.
+
+        Returns the device time from which on the rate is constant. `turn` ends it.
+
+        Raises
+        ------
+        InputError
+            As for `turn`.
+
+        """
+        start = self.time / self.sensing.pace
+        where = self.angles if angles is None else angles
+        _, end = self.body.spin(start, self._duration(seconds), where, rate)
+        return end * self.sensing.pace
+
+    def bump(
+        self, push: float = 2.0, tilt: float = np.deg2rad(0.5), seconds: float = 0.5
+    ) -> float:
+        """Bump the base now: peak m/s^2, rad, s; returns when it is over."""
+        if not (seconds > 0 and np.isfinite([push, tilt, seconds]).all()):
+            raise InputError(f"a bump lasts more than 0 s, not {seconds:g} s")
+        start = self.time / self.sensing.pace
+        self.body.bumps.append(Bump(start, seconds, push, tilt, np.deg2rad(30.0)))
+        return (start + seconds) * self.sensing.pace
+
+    def take(self, n: int) -> Block:
+        """Next `n` samples; fewer come where samples are dropped."""
+        pieces = [
+            self._piece(min(PIECE, n - first)) for first in range(0, max(n, 0), PIECE)
+        ]
+        return concat(pieces)
+
+    def concealed(self) -> dict[str, Any]:
+        """What a recalibration should find out, as JSON."""
+        return {**self.profile.concealed(), "seed": self.seed}
+
+    def _piece(self, n: int) -> Block:
+        seq = np.arange(self._tick, self._tick + n, dtype=float)
+        self._tick += n
+        t = seq / self.rate
+        true = t / self.sensing.pace
+        six, degrees = self.sensing.sense(true, np.ones(n, dtype=np.int64), t)
+        late = LATENCY_S + JITTER_S * self._arrival.standard_exponential(n)
+        host = np.maximum.accumulate(true + late)
+        block = Block.of(t, six[:3].T, six[3:].T, degrees, seq, host)
+        kept = self.sensing.chain.arrives(n)
+        return block if kept.all() else _only(block, kept)
+
+    def _duration(self, seconds: float | None) -> float:
+        value = self.profile.motion.turn_s if seconds is None else seconds
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"a turn takes more than 0 s, not {value:g} s")
+        return float(value)
+
+
+class Sensing:
+    """From instants to outputs: motion, sensors, noise and signal chain.
+
+    Attributes
+    ----------
+    body : how the device is held and moved
+    chain : what happens to its samples
+    pace : seconds of the device's clock in a true second
+
+    """
+
+    def __init__(self, profile: Profile, seed: int) -> None:
+        self.profile = profile
+        skew = profile.one("clock_skew")
+        self.pace = 1 + 1e-6 * skew["ppm"] if skew else 1.0
+        self.body = Body(profile, seed)
+        self.chain = Chain(profile, seed)
+        rate = profile.sampling.rate_hz
+        self._noise = Noise(profile.noise, rate, seed, _noise_ratio(profile))
+        walk = profile.one("random_walk")
+        size = np.array(walk.vector(SIX)) if walk else np.zeros(6)
+        self._walk = Walk(size, rate, stream(seed, "random_walk")) if walk else None
+        self._thermometer = stream(seed, "thermometer")
+        delay = profile.one("time_delay")
+        self._delay = delay["seconds"] if delay else 0.0
+
+    def sense(
+        self, true: Array, ticks: NDArray[np.int64], t: Array
+    ) -> tuple[Array, Array]:
+        """Outputs (6, n) and temperature (n,) °C at instants in true time.
+
+        Parameters
+        ----------
+        true : (n,) s of true time
+        ticks : (n,) how many periods of the sampling clock each took
+        t : (n,) s of the device's clock
+
+        """
+        clean = self.noiseless(true)
+        n = len(t)
+        noisy = clean + self._noise.white(n) + self._wander(ticks)
+        degrees = self.body.temperature(true)
+        degrees = degrees + self.profile.noise.temperature * (
+            self._thermometer.standard_normal(n)
+        )
+        return self.chain.passes(t, noisy), degrees
+
+    def noiseless(self, true: Array) -> Array:
+        """Outputs of the sensors without noise and signal chain, (6, n)."""
+        late = abs(self._delay)
+        vibration = self.body.vibration(true)
+        now = self._outputs(true, vibration)
+        if not late:
+            return now
+        before = self._outputs(true - late, vibration)
+        first, last = (now, before) if self._delay > 0 else (before, now)
+        return np.concatenate([first[:3], last[3:]])
+
+    def _outputs(self, t: Array, vibration: Array) -> Array:
+        life = self.body.life(t, vibration)
+        return outputs(self.profile.truth, self.profile.effects, life)
+
+    def _wander(self, ticks: NDArray[np.int64]) -> Array:
+        total = int(ticks.sum())
+        slow = self._noise.slow(total)
+        if self._walk is not None:
+            slow = slow + self._walk.draw(total)
+        if total == len(ticks):
+            return slow
+        picked: Array = slow[:, np.cumsum(ticks) - 1]
+        return picked
+
+
+def _only(block: Block, kept: NDArray[np.bool_]) -> Block:
+    columns = (block.acc, block.gyr, block.temperature, block.seq, block.t_host)
+    return Block.of(block.t[kept], *(column[kept] for column in columns))
+
+
+def _noise_ratio(profile: Profile) -> Array:
+    ratio = np.ones(6)
+    for effect in profile.every("noise_level"):
+        ratio[rows(effect.words["channel"])] *= effect["ratio"]
+    return ratio

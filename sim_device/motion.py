@@ -1,0 +1,165 @@
+"""What the device experiences while its base rocks and its joints turn.
+
+The frames follow each other from the local level to the device, each turned about an
+axis of the one before by an angle x(t) about the unit axis u:
+
+    navigation (East, down, north) -> heading -> tilt of the base -> rocking
+    -> alpha about z -> beta about x -> spin of a rate table -> signed device axes
+
+Attitude q, rate w and its derivative dw are handed down from frame to frame:
+
+    q  <- q (x) (cos x/2, u sin x/2)                                (m1)
+    w  <- into(w) + u x'                                            (m2)
+    dw <- into(dw) - u x' cross into(w) + u x''                     (m3)
+
+and what the sensors feel in the last one is
+
+    f = into(q, a - g) + dw cross r + w cross (w cross r)           (m4)
+    rate = w + into(q, W (0, -sin phi, cos phi))                    (m5)
+
+with g = (0, g, 0) pointing down, a the acceleration of the base, r the lever arm from
+the turning centre to the sensors, W the Earth's rate and phi the latitude. Coriolis
+terms of the Earth's rate (1e-5 m/s^2 in a turn) are left out. Source: rigid-body
+kinematics in turning frames, e.g. Goldstein, Classical Mechanics, chapter 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.samples import Array
+from fieldcal.sim_device.joints import ALPHA, BETA, SPIN, Swing
+from fieldcal.sim_device.quaternion import STILL, cross, into, multiply, turn
+
+X: Array = np.array([[1.0], [0.0], [0.0]])
+Y: Array = np.array([[0.0], [1.0], [0.0]])
+Z: Array = np.array([[0.0], [0.0], [1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class Angle:
+    """An angle with its first two derivatives at n instants; rad, rad/s, rad/s^2."""
+
+    x: Array
+    rate: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Rocking:
+    """The base rocks about a level axis: its unit vector (3, 1) and the angle."""
+
+    axis: Array
+    angle: Callable[[Array], Angle]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Attitude q (4, n), rate w (3, n) and its derivative, in the frame's own axes."""
+
+    q: Array
+    w: Array
+    dw: Array
+
+    @classmethod
+    def level(cls, n: int) -> Frame:
+        """Frame of the local level: East, down, north."""
+        zero = np.zeros((3, n))
+        return cls(STILL + np.zeros((4, n)), zero, zero)
+
+    def turned(self, axis: Array, angle: Angle) -> Frame:
+        """Next frame, turned by `angle` about `axis` of this one."""
+        step = turn(axis, angle.x)
+        w, about = into(step, self.w), axis * angle.rate
+        dw = into(step, self.dw) - cross(about, w) + axis * angle.acceleration
+        return Frame(multiply(self.q, step), w + about, dw)  # (m1) (m2) (m3)
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """Where and how the device is held, apart from the joints.
+
+    Attributes
+    ----------
+    gravity : m/s^2
+    earth : the Earth's rate in (East, down, north), (3, 1) rad/s; zero if not felt
+    base : attitude of the base against the local level, (4, 1)
+    axes : (3,) index and (3, 1) sign: procedure axis i is device axis index[i]
+    signs : see `axes`
+    lever : from the turning centre to the sensors, device axes, (3, 1) m
+
+    """
+
+    gravity: float
+    earth: Array
+    base: Array
+    axes: tuple[int, int, int]
+    signs: Array
+    lever: Array
+
+    def to_device(self, v: Array) -> Array:
+        """Components along the device's axes of a vector (3, n) in procedure axes."""
+        out = np.empty_like(v)
+        out[list(self.axes)] = self.signs * v
+        return out
+
+    def from_device(self, v: Array) -> Array:
+        """Components along procedure axes of a vector (3, n) in device axes."""
+        return self.signs * v[list(self.axes)]
+
+
+@dataclass(frozen=True, slots=True)
+class Felt:
+    """True specific force and angular rate at n instants, device axes.
+
+    Attributes
+    ----------
+    f : (3, n) m/s^2
+    w : (3, n) rad/s
+
+    """
+
+    f: Array
+    w: Array
+
+
+def carried(stand: Stand, rocking: Sequence[Rocking], t: Array, swing: Swing) -> Frame:
+    """Frame of the procedure axes at instants `t`, (n,) s."""
+    frame = Frame.level(len(t))
+    frame = Frame(stand.base + np.zeros_like(frame.q), frame.w, frame.dw)
+    for rock in rocking:
+        frame = frame.turned(rock.axis, rock.angle(t))
+    for axis, joint in ((Z, ALPHA), (X, BETA)):
+        frame = frame.turned(axis, _joint(swing, joint))
+    if np.any(swing.angle[SPIN]):
+        frame = frame.turned(swing.axis, _joint(swing, SPIN))
+    return frame
+
+
+def feel(stand: Stand, frame: Frame, acceleration: Array) -> Felt:
+    """What the sensors feel, with the base accelerated by (3, n) m/s^2, level axes."""
+    f = into(frame.q, acceleration - stand.gravity * Y)
+    if np.any(stand.lever):
+        arm = stand.from_device(stand.lever)
+        arm = arm + np.zeros_like(f)
+        f = f + cross(frame.dw, arm) + cross(frame.w, cross(frame.w, arm))  # (m4)
+    w = frame.w + into(frame.q, stand.earth + np.zeros_like(f))  # (m5)
+    return Felt(stand.to_device(f), stand.to_device(w))
+
+
+def base_attitude(heading: float, about_x: float, about_z: float) -> Array:
+    """Attitude (4, 1) of a base tilted about z, then about its x, off north by heading.
+
+    Positive heading: the base's z points west of north by so many rad, so that the
+    Earth's rate shows +cos(phi) sin(heading) on its x.
+    """
+    yaw = turn(Y, np.array([-heading]))
+    tilt = multiply(turn(Z, np.array([about_z])), turn(X, np.array([about_x])))
+    return multiply(yaw, tilt)
+
+
+def _joint(swing: Swing, i: int) -> Angle:
+    return Angle(swing.angle[i], swing.rate[i], swing.acceleration[i])

@@ -1,0 +1,268 @@
+"""Device files: a virtual device written down, and made from a session.toml.
+
+A device file has the tables of `Profile` under their names, `format = 1` on top, and
+``[effects.ID]`` with parameters, or ``[[effects.ID]]`` for what happens more than once.
+Of a session.toml its [nominal] becomes the truth and its [model] the effects.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal.errors import InputError
+from fieldcal.sim_device.chain import STANDARD_GRAVITY
+from fieldcal.sim_device.profile import Profile, Truth
+from fieldcal.sim_device.replay import Window
+from fieldcal.sim_device.vocabulary import CATALOGUE, Effect, effect
+
+FORMAT = 1
+
+_TABLES = {f.name: type(f.default) for f in fields(Profile) if f.name != "effects"}
+_ACCELERATION = {"g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
+_ANGULAR_RATE = {"deg/s": np.pi / 180, "mrad/s": 1e-3}
+
+
+def read(path: Path) -> Profile:
+    """Read a device file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read; names the file, the table and the key.
+
+    """
+    try:
+        return from_tables(_load(path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def read_session(path: Path) -> tuple[Profile, list[Window]]:
+    """Device and windows of a session.toml: what its simulation starts from.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or a position has no angles.
+
+    """
+    try:
+        return from_session(_load(path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def from_tables(tables: Mapping[str, Any]) -> Profile:
+    """Make the device of a parsed device file.
+
+    Raises
+    ------
+    InputError
+        Naming the table and the key.
+
+    """
+    known = ("format", *_TABLES, "effects")
+    for name in tables:
+        if name not in known:
+            raise InputError(
+                f"no table [{name}] in a device file; it has {_list(known)}"
+            )
+    if tables.get("format", FORMAT) != FORMAT:
+        raise InputError(f"format = {tables['format']!r}; this version reads {FORMAT}")
+    parts = {
+        name: _part(name, kind, _table(tables, name)) for name, kind in _TABLES.items()
+    }
+    return Profile(**parts, effects=_effects(_table(tables, "effects")))
+
+
+def from_session(tables: Mapping[str, Any]) -> tuple[Profile, list[Window]]:
+    """Device and windows of a parsed session.toml.
+
+    Raises
+    ------
+    InputError
+        Naming the table and the key, or the position without angles.
+
+    """
+    model = _table(tables, "model")
+    ids = model.get("effects", [])
+    mine = {
+        name: {k: v for k, v in _table(tables, name).items() if k in _names(kind)}
+        for name, kind in _TABLES.items()
+        if name in tables
+    }
+    mine["range"] = _range_in_si(tables, mine.get("range", {}))
+    mine["truth"] = {
+        "acc_bias": [0.0] * 3,
+        "acc_scale": [1.0] * 3,
+        "gyr_bias": [0.0] * 3,
+        "gyr_scale": [1.0] * 3,
+        **{k: v for k, v in _table(tables, "nominal").items() if k in _names(Truth)},
+    }
+    mine["effects"] = {id_: model.get(id_, {}) for id_ in ids}
+    rows = tables.get("position", [])
+    return from_tables(mine), [_window(i, row) for i, row in enumerate(rows)]
+
+
+def to_toml(profile: Profile) -> str:
+    """Text of a device file that `read` gives back the same."""
+    import tomli_w
+
+    tables: dict[str, Any] = {"format": FORMAT}
+    for name in _TABLES:
+        table = asdict(getattr(profile, name))
+        tables[name] = {k: _plain(v) for k, v in table.items() if v is not None}
+    effects: dict[str, list[dict[str, Any]]] = {}
+    for one in profile.effects:
+        effects.setdefault(one.id, []).append(_written(one))
+    tables["effects"] = {k: v[0] if len(v) == 1 else v for k, v in effects.items()}
+    return tomli_w.dumps(tables)
+
+
+def _load(path: Path) -> Mapping[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"is not TOML: {error}") from error
+
+
+def _table(tables: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = tables.get(name, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"{name} must be a table: write [{name}]")
+    return table
+
+
+def _names(kind: type[Any]) -> list[str]:
+    return [f.name for f in fields(kind)]
+
+
+def _list(names: Any) -> str:
+    return ", ".join(names)
+
+
+def _part(name: str, kind: type[Any], table: Mapping[str, Any]) -> Any:
+    types = {f.name: str(f.type) for f in fields(kind)}
+    for key in table:
+        if key not in types:
+            raise InputError(f"[{name}] has no key {key!r}; it has {_list(types)}")
+    return kind(
+        **{
+            key: _READERS[types[key]](f"[{name}] {key}", value)
+            for key, value in table.items()
+        }
+    )
+
+
+def _text(where: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{where} = {value!r} must be text in quotes")
+    return value
+
+
+def _number(where: str, value: Any) -> float:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not np.isfinite(value):
+        raise InputError(f"{where} = {value!r} must be a number")
+    return float(value)
+
+
+def _triad(where: str, value: Any) -> tuple[float, ...]:
+    values = value if isinstance(value, list) else [value] * 3
+    if len(values) != 3:
+        raise InputError(f"{where} = {value!r} must be three numbers, x y z, or one")
+    return tuple(_number(where, v) for v in values)
+
+
+def _axes(where: str, value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError(f'{where} = {value!r} must be like ["+x", "-z", "+y"]')
+    return tuple(_text(where, v) for v in value)
+
+
+def _points(where: str, value: Any) -> tuple[tuple[float, float], ...]:
+    if not isinstance(value, list) or not all(
+        isinstance(pair, list) and len(pair) == 2 for pair in value
+    ):
+        raise InputError(f"{where} = {value!r} must be like [[0.0, 21.0], [600.0, 30]]")
+    return tuple((_number(where, a), _number(where, b)) for a, b in value)
+
+
+_READERS: Mapping[str, Callable[[str, Any], Any]] = {
+    "str": _text,
+    "Grade": _text,
+    "float": _number,
+    "float | None": _number,
+    "Triad": _triad,
+    "Triad | None": _triad,
+    "tuple[str, str, str]": _axes,
+    "tuple[tuple[float, float], ...]": _points,
+}
+"""How a key is read, by the type that its dataclass declares."""
+
+
+def _effects(table: Mapping[str, Any]) -> tuple[Effect, ...]:
+    made = []
+    for id_, given in table.items():
+        for one in given if isinstance(given, list) else [given]:
+            if not isinstance(one, Mapping):
+                raise InputError(f"effects.{id_} must be a table: [effects.{id_}]")
+            made.append(effect(id_, one))
+    return tuple(made)
+
+
+def _written(one: Effect) -> dict[str, Any]:
+    """Parameters to write: the components of a vector that are not zero, and others."""
+    vector = CATALOGUE[one.id].vector
+    given = {k: v for k, v in one.numbers.items() if v or k not in vector}
+    if vector and not any(k in given for k in vector):
+        given[vector[0]] = 0.0
+    words = {k: v for k, v in one.words.items() if v}
+    return {**given, **words}
+
+
+def _range_in_si(
+    tables: Mapping[str, Any], given: Mapping[str, Any]
+) -> dict[str, float]:
+    """Full scale in SI; what has no unit of its own, as a volt, is left out."""
+    units = _table(tables, "units")
+    acc, gyr = units.get("acceleration", "m/s^2"), units.get("angular_rate", "rad/s")
+    factors = {
+        "acceleration": {"m/s^2": 1.0, **_ACCELERATION}.get(acc),
+        "angular_rate": {"rad/s": 1.0, **_ANGULAR_RATE}.get(gyr),
+    }
+    return {
+        key: _number(f"[range] {key}", value) * factor
+        for key, value in given.items()
+        if (factor := factors[key]) is not None
+    }
+
+
+def _window(i: int, row: Mapping[str, Any]) -> Window:
+    where = f"position {i}"
+    rate = row.get("rate_deg_s")
+    for key in ("start_s", "end_s", *(() if rate else ("alpha_deg", "beta_deg"))):
+        if key not in row:
+            raise InputError(f"{where} has no {key}: it cannot be simulated")
+    alpha, beta = (_number(where, row.get(k, 0.0)) for k in ("alpha_deg", "beta_deg"))
+    turning = _triad(where, rate if rate else [0.0] * 3)
+    return Window(
+        alpha=float(np.deg2rad(alpha)),
+        beta=float(np.deg2rad(beta)),
+        start=_number(where, row["start_s"]),
+        end=_number(where, row["end_s"]),
+        rate=tuple(np.deg2rad(turning).tolist()),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Lists for tuples, all the way down."""
+    return [_plain(v) for v in value] if isinstance(value, tuple) else value

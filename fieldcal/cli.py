@@ -15,6 +15,7 @@ from typing import Protocol, cast
 
 COMMANDS = {
     "run": ("recalibrate a device, at the console or headless", "run"),
+    "plan": ("choose positions and say what they will tell", "plan"),
     "solve": ("calibrate from a recorded session", "solve"),
     "import": ("make a session of a recording from elsewhere", "import_recording"),
     "sim": ("be a virtual device on a link", "sim"),

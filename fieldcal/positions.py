@@ -47,7 +47,8 @@ class Position:
         """Both angles in degrees, if known."""
         if self.alpha is None or self.beta is None:
             return None
-        return float(np.rad2deg(self.alpha)), float(np.rad2deg(self.beta))
+        alpha, beta = np.rad2deg([self.alpha, self.beta]).round(9).tolist()
+        return alpha, beta
 
 
 def angles(positions: Sequence[Position]) -> tuple[Array, Array]:

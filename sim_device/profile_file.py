@@ -112,7 +112,7 @@ def from_session(tables: Mapping[str, Any]) -> tuple[Profile, list[Window]]:
 
 def to_toml(profile: Profile) -> str:
     """Text of a device file that `read` gives back the same."""
-    import tomli_w
+    import tomlkit
 
     tables: dict[str, Any] = {"format": FORMAT}
     for name in _TABLES:
@@ -122,7 +122,7 @@ def to_toml(profile: Profile) -> str:
     for one in profile.effects:
         effects.setdefault(one.id, []).append(_written(one))
     tables["effects"] = {k: v[0] if len(v) == 1 else v for k, v in effects.items()}
-    return tomli_w.dumps(tables)
+    return tomlkit.dumps(tables)
 
 
 def _load(path: Path) -> Mapping[str, Any]:

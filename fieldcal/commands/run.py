@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.table import show
     from fieldcal.session import RESULT, Session
 
-    task = _task(args)
+    task = make_task(args)
     _check(task)
     with _link(args, task) as (driver, mover):
         found = _record(args, task, driver, mover)
@@ -98,7 +98,15 @@ def run(args: argparse.Namespace) -> int:
     return 0 if found.good else 1
 
 
-def _task(args: argparse.Namespace) -> Task:
+def make_task(args: argparse.Namespace) -> Task:
+    """What is to be done, from the options or a plan file.
+
+    Raises
+    ------
+    InputError
+        Naming what is wrong with the plan.
+
+    """
     from fieldcal import description
 
     options: Mapping[str, Any]

@@ -1,0 +1,180 @@
+"""`fieldcal plan`: which positions to take, and what to expect of them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldcal.commands.site import add_site, site_tables
+from fieldcal.errors import InputError, PlanError
+
+if TYPE_CHECKING:
+    from fieldcal.aliasing import Aliases
+    from fieldcal.planner import Grade
+    from fieldcal.positions import Position
+
+EXAMPLE = """\
+  fieldcal plan --noise tactical --positions 5 --minutes 5 -o plan.toml
+  fieldcal plan --set five
+  fieldcal run plan.toml --device "serial:/dev/ttyUSB0?format=witmotion"
+"""
+
+TURN = 10.0
+"""Time to turn the device and let it settle, s."""
+
+SHORTEST, LONGEST = 10.0, 60.0
+"""Averaging times worth planning for, s: noise below, disturbances and drift above."""
+
+PAPER = "the paper's five"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add("--positions", type=int, default=5, metavar="N", help="how many (default: 5)")
+    add("--minutes", type=float, default=5.0, help="time for all (default: 5)")
+    add("--alpha", type=float, default=45.0, metavar="DEG", help="limit (default: 45)")
+    add("--beta", type=float, default=5.0, metavar="DEG", help="limit (default: 5)")
+    add("--noise", default="tactical", choices=("consumer", "tactical", "navigation"))
+    add(
+        "--set",
+        choices=("two", "five", "wide", "six_faces"),
+        help="judge a known set instead of choosing positions",
+    )
+    add("-o", "--output", type=Path, metavar="FILE", help="write the plan for run")
+    add("--json", action="store_true", help="print one JSON object")
+    add_site(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    import numpy as np
+
+    from fieldcal import description, planner
+    from fieldcal.aliasing import aliases
+    from fieldcal.positions import FIVE, SETS
+
+    tables = {"format": description.FORMAT, **site_tables(args, "device")}
+    gravity = description.parse(tables).gravity
+    if not 0 <= args.beta <= 90 or not 0 < args.alpha <= 180:
+        raise PlanError("limits are 0 to 180° for α and 0 to 90° for β")
+    ladder = planner.Ladder(*np.deg2rad([args.alpha, args.beta]).tolist())
+    chosen = (
+        SETS[args.set]
+        if args.set
+        else planner.best_positions(args.positions, ladder, gravity)
+    )
+    seconds = _seconds(args.minutes, len(chosen))
+    grade = planner.GRADES[args.noise]
+    found = planner.expected(chosen, grade, seconds, gravity)
+    paper = planner.expected(FIVE, grade, seconds, gravity)
+    further = planner.extra_position(chosen, ladder, gravity)
+    with_it = planner.expected((*chosen, further), grade, seconds, gravity)
+    confused = aliases(chosen, gravity)
+    if args.output:
+        _write(args.output, tables, chosen, seconds)
+    if args.json:
+        out = _json(chosen, seconds, found, confused, further, with_it)
+        sys.stdout.write(json.dumps(out) + "\n")
+        return 0
+    _show(chosen, seconds, args.noise, grade, found, paper, with_it)
+    _tell(confused, further)
+    if args.output:
+        sys.stdout.write(f"written: {args.output}\n")
+    return 0
+
+
+def _seconds(minutes: float, n: int) -> float:
+    """Averaging time of each position within the budget, s."""
+    each = 60 * minutes / n - TURN
+    if each < SHORTEST:
+        raise PlanError(
+            f"{minutes:g} min for {n} positions leave {max(each, 0):.0f} s to average"
+            f" after {TURN:g} s to turn: allow"
+            f" {n * (SHORTEST + TURN) / 60:.1f} min or take fewer positions"
+        )
+    return float(min(LONGEST, round(each)))
+
+
+def _write(
+    path: Path, tables: Mapping[str, Any], chosen: Sequence[Position], seconds: float
+) -> None:
+    import tomlkit
+
+    if path.exists():
+        raise InputError(f"{path}: is there already; name another file")
+    run_table = {"procedure": "positions", "seconds": seconds}
+    whole = {**tables, "run": run_table, "position": [_table(p) for p in chosen]}
+    path.write_text(tomlkit.dumps(whole), encoding="utf-8")
+
+
+def _table(position: Position) -> dict[str, Any]:
+    alpha, beta = position.degrees or (0.0, 0.0)
+    return {"name": position.name, "alpha_deg": alpha, "beta_deg": beta}
+
+
+def _json(
+    chosen: Sequence[Position],
+    seconds: float,
+    found: Mapping[str, float],
+    confused: Aliases,
+    further: Position,
+    with_it: Mapping[str, float],
+) -> dict[str, Any]:
+    return {
+        "positions": [_table(p) for p in chosen],
+        "seconds": seconds,
+        "sigma": dict(found),
+        "hidden": list(confused.hidden),
+        "aliases": {name: list(others) for name, others in confused.pairs},
+        "extra_position": {**_table(further), "sigma": dict(with_it)},
+    }
+
+
+def _show(
+    chosen: Sequence[Position],
+    seconds: float,
+    noise: str,
+    grade: Grade,
+    found: Mapping[str, float],
+    paper: Mapping[str, float],
+    with_it: Mapping[str, float],
+) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    console.print(f"{len(chosen)} positions, {seconds:g} s each:")
+    for i, position in enumerate(chosen, start=1):
+        console.print(f"  {i}  {position.name}")
+    title = f"Expected ± 1σ ({noise}: {1e3 * grade.acc(seconds):.2f} mm/s² a mean)"
+    table = Table(title=title, title_justify="left")
+    for column in ("parameter", "this plan", PAPER, "one more", "unit"):
+        side = "left" if column in ("parameter", "unit") else "right"
+        table.add_column(column, justify="right" if side == "right" else "left")
+    for name in dict.fromkeys([*found, *paper]):
+        cells = [_cell(sigmas.get(name)) for sigmas in (found, paper, with_it)]
+        table.add_row(name, *cells, _unit(name))
+    console.print(table)
+
+
+def _cell(sigma: float | None) -> str:
+    return "not determined" if sigma is None else f"{sigma:.2g}"
+
+
+def _unit(name: str) -> str:
+    units = {"acc_bias": "m/s²", "acc_scale": "1", "gyr_bias": "rad/s"}
+    return units.get(name.partition(".")[0], "°")
+
+
+def _tell(confused: Aliases, further: Position) -> None:
+    say = sys.stdout.write
+    say(f"one more position worth most: {further.name}\n")
+    if confused.hidden:
+        say(f"goes into the calibration unseen: {', '.join(confused.hidden)}\n")
+    for name, others in confused.pairs:
+        say(f"{name} cannot be told from {' or '.join(others)}\n")

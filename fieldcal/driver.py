@@ -13,14 +13,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
 from time import monotonic
 from typing import ClassVar, Self
 
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
-from fieldcal.samples import Block
+from fieldcal.samples import Block, concat
 
 
 @dataclass(slots=True)
@@ -31,8 +31,11 @@ class Health:
     ----------
     samples : whole samples delivered
     bad : frames refused by their checksum or their form
-    skipped : bytes that belonged to no frame
+    skipped : bytes that belonged to no whole frame
     gaps : times that samples were missing between two others
+    missing : samples missing in those gaps, as far as the device's clock tells
+    repeated : samples dropped because their stamp was an old one
+    restarts : times that the device's clock began anew
 
     """
 
@@ -40,6 +43,9 @@ class Health:
     bad: int = 0
     skipped: int = 0
     gaps: int = 0
+    missing: int = 0
+    repeated: int = 0
+    restarts: int = 0
 
 
 class Driver(ABC):
@@ -64,8 +70,15 @@ class Driver(ABC):
     def close(self) -> None:
         """Release the link; safe to call twice."""
 
+    @property
+    def reconnecting(self) -> bool:
+        """True while the link is broken and the driver still tries to mend it."""
+        return False
+
     def blocks(self, timeout: float = 3.0) -> Iterator[Block]:
         """Yield blocks as they come.
+
+        A link that is being mended counts as no silence: the driver itself gives up.
 
         Raises
         ------
@@ -75,25 +88,42 @@ class Driver(ABC):
             If the link fails.
 
         """
-        deadline = monotonic() + timeout
+        deadline, before = monotonic() + timeout, replace(self.health)
         while True:
             block = self._receive(max(0.0, deadline - monotonic()))
             if block is not None and len(block):
-                deadline = monotonic() + timeout
+                deadline, before = monotonic() + timeout, replace(self.health)
                 yield block
+            elif self.reconnecting:
+                deadline = monotonic() + timeout
             elif monotonic() >= deadline:
-                raise DeviceSilent(self._silence(timeout))
+                raise DeviceSilent(self._silence(timeout, before))
 
-    def _silence(self, timeout: float) -> str:
-        if self.health.samples:
-            return f"{self.name} went silent for {timeout:g} s: check cable and power"
-        heard = self.health.skipped or self.health.bad
-        cause = (
-            "bytes come, but none that this format knows: check format and baud rate"
+    def drain(self) -> Block:
+        """Take what has queued up by now, so that the next block is from now on.
+
+        Raises
+        ------
+        DeviceError
+            If the link fails.
+
+        """
+        taken, deadline = [], monotonic() + 0.5
+        while monotonic() < deadline and (block := self._receive(0.0)) is not None:
+            taken.append(block)
+        return concat(taken)
+
+    def _silence(self, timeout: float, before: Health) -> str:
+        sent = "went silent" if self.health.samples else "has sent no sample"
+        heard = self.health.skipped - before.skipped + self.health.bad - before.bad
+        return f"{self.name} {sent} for {timeout:g} s: " + (
+            self._garbage()
             if heard
-            else "not a byte came: check cable, power and port"
+            else "not a byte came; check cable, power and port"
         )
-        return f"{self.name} has sent no sample in {timeout:g} s: {cause}"
+
+    def _garbage(self) -> str:
+        return "bytes come, but none that this format knows; check format and baud rate"
 
     def _receive(self, timeout: float) -> Block | None:
         try:

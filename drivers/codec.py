@@ -1,0 +1,120 @@
+"""What a serial wire format is: bytes in, samples out, no I/O and no clock.
+
+To add one, write drivers/protocols/<name>.py with a subclass of `Codec` named `Codec`;
+``format=<name>`` then finds it. What comes out does not depend on how the bytes were
+cut, except for the arrival times; memory is bounded by the longest frame.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import ClassVar
+
+import numpy as np
+
+from fieldcal.driver import Health
+from fieldcal.drivers import protocols
+from fieldcal.drivers.framing import Bytes, Candidates, Found, resolve
+from fieldcal.drivers.options import Options
+from fieldcal.drivers.reader import Chunk
+from fieldcal.errors import InputError
+from fieldcal.samples import Array, Block, concat
+
+
+class Codec(ABC):
+    """A decoder with a memory for what is not whole yet.
+
+    Attributes
+    ----------
+    bauds : rates such devices use, bit/s, the factory's first
+    health : what was decoded and refused so far
+
+    """
+
+    bauds: ClassVar[tuple[int, ...]] = (115200, 921600, 9600, 57600, 230400, 460800)
+
+    def __init__(self, options: Options) -> None:
+        self.health = Health()
+        self._rest = b""
+        self._arrivals: list[tuple[int, float]] = []
+        self._begin = 0
+
+    def feed(self, data: bytes, t_host: float = float("nan")) -> Block | None:
+        """Decode bytes that arrived at `t_host` s; None if no sample got whole."""
+        return self.feed_all([Chunk(t_host, data)])
+
+    def feed_all(self, chunks: Sequence[Chunk]) -> Block | None:
+        """Decode what arrived, in order; None if no sample got whole."""
+        blocks, since = [], 0
+        for i, chunk in enumerate(chunks):
+            if chunk.broken:
+                blocks.append(self._feed(chunks[since:i]))
+                self.reset()
+                since = i
+        blocks.append(self._feed(chunks[since:]))
+        whole = [block for block in blocks if block is not None and len(block)]
+        if not whole:
+            return None
+        block = whole[0] if len(whole) == 1 else concat(whole)
+        self.health.samples += len(block)
+        return block
+
+    def reset(self) -> None:
+        """Forget what is not whole: the link was away."""
+        self.health.skipped += len(self._rest)
+        self._begin += len(self._rest)
+        self._rest = b""
+
+    @abstractmethod
+    def scan(self, data: Bytes) -> Candidates:
+        """Say where frames may begin."""
+
+    @abstractmethod
+    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+        """Make samples of whole frames; `t_host` is the arrival of each one's end."""
+
+    def _feed(self, chunks: Sequence[Chunk]) -> Block | None:
+        if not chunks:
+            return None
+        data = b"".join([self._rest, *(chunk.data for chunk in chunks)])
+        end = self._begin + len(self._rest)
+        for chunk in chunks:
+            end += len(chunk.data)
+            self._arrivals.append((end, chunk.t_host))
+        array = np.frombuffer(data, np.uint8)
+        found = resolve(self.scan(array), len(data))
+        self.health.bad += found.bad
+        self.health.skipped += found.skipped
+        marks = np.array(self._arrivals)
+        late = np.searchsorted(marks[:, 0] - self._begin, found.ends)
+        block = None
+        if len(found.starts):
+            block = self.decode(array, found, marks[late, 1])
+        self._rest = data[found.rest :]
+        self._begin += found.rest
+        self._arrivals = [mark for mark in self._arrivals if mark[0] > self._begin]
+        return block
+
+
+def formats() -> list[str]:
+    """Names of the wire formats there are."""
+    return sorted(module.name for module in iter_modules(protocols.__path__))
+
+
+def open_codec(name: str, options: Options) -> Codec:
+    """Make the codec of a wire format.
+
+    Raises
+    ------
+    InputError
+        If there is no such format, or it refuses its options.
+
+    """
+    if name not in formats():
+        known = ", ".join(formats())
+        raise InputError(f"no wire format {name!r}: there are {known}")
+    codec: Codec = import_module(f"{protocols.__name__}.{name}").Codec(options)
+    return codec

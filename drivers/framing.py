@@ -1,0 +1,86 @@
+"""Find whole frames in a stretch of bytes, all at once.
+
+A frame is looked for at every byte: the first candidate whose check holds is taken, and
+the next is looked for behind it; after one whose check fails, at the next byte. That
+is a scan from left to right, and candidates that do not overlap need no scan.
+
+A candidate that is not all there yet is *open*. Nothing behind an open one is decided
+before it is, so the outcome does not depend on how the bytes were cut.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+Index = NDArray[np.integer[Any]]
+Mask = NDArray[np.bool_]
+
+
+class Candidates(NamedTuple):
+    """Where frames may begin, in order; `good` holds for an open one as well.
+
+    Attributes
+    ----------
+    starts, ends : (m,) byte numbers
+    good : (m,) the check holds, or the candidate is open
+    undecided : first byte that cannot be judged before more come
+
+    """
+
+    starts: Index
+    ends: Index
+    good: Mask
+    undecided: int
+
+
+class Found(NamedTuple):
+    """Whole frames, where the undecided rest begins, and what was refused."""
+
+    starts: Index
+    ends: Index
+    rest: int
+    bad: int
+    skipped: int
+
+
+def disjoint(starts: Index, ends: Index) -> Mask:
+    """Keep the first of those that overlap, from left to right, (m,)."""
+    keep = np.ones(len(starts), dtype=bool)
+    if np.any(starts[1:] < ends[:-1]):
+        free = 0
+        for i, (start, end) in enumerate(
+            zip(starts.tolist(), ends.tolist(), strict=True)
+        ):
+            if start < free:
+                keep[i] = False
+            else:
+                free = end
+    return keep
+
+
+def resolve(candidates: Candidates, size: int) -> Found:
+    """Take the frames in order out of `size` bytes.
+
+    >>> starts = np.array([0, 3, 11])
+    >>> good = np.array([True, True, True])
+    >>> resolve(Candidates(starts, starts + 11, good, 16), 16)[:3]
+    (array([0]), array([11]), 11)
+    """
+    starts, ends, good, undecided = candidates
+    first, last = starts[good], ends[good]
+    kept = disjoint(first, last)
+    first, last = first[kept], last[kept]
+    rest = min(size, max(undecided, int(last[-1]) if len(last) else 0))
+    if len(last) and last[-1] > size:
+        rest = int(first[-1])
+        first, last = first[:-1], last[:-1]
+    refused = starts[~good & (starts < rest)]
+    if len(last) and len(refused):
+        before = np.searchsorted(first, refused, side="right") - 1
+        refused = refused[(before < 0) | (refused >= last[before])]
+    skipped = rest - int(np.sum(last - first))
+    return Found(first, last, rest, len(refused), skipped)

@@ -1,0 +1,101 @@
+"""Options in an address: ``PORT?baud=115200&format=text``."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from math import isfinite
+from urllib.parse import parse_qsl
+
+from fieldcal.errors import InputError
+
+
+class Options:
+    """The options of one address, each taken once by name; `finish` refuses the rest.
+
+    Parameters
+    ----------
+    owner : what the options are for, as errors name it
+    query : what stands behind the question mark
+
+    """
+
+    def __init__(self, owner: str, query: str = "") -> None:
+        self._owner = owner
+        self._known: list[str] = []
+        try:
+            pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
+        except ValueError:
+            raise InputError(
+                f"{owner}: write options as name=value joined by &, not {query!r}"
+            ) from None
+        self._given = dict(pairs)
+
+    def text(self, name: str, default: str = "") -> str:
+        """Return the option as it was written."""
+        self._known.append(name)
+        return self._given.get(name, default)
+
+    def choice(self, name: str, choices: Collection[str], default: str) -> str:
+        """Return the option, one of `choices`.
+
+        Raises
+        ------
+        InputError
+            If it is none of them.
+
+        """
+        value = self.text(name, default)
+        if value not in choices:
+            known = ", ".join(choices)
+            raise InputError(f"{self._owner}: {name}={value} is none of {known}")
+        return value
+
+    def number(
+        self, name: str, default: float, low: float = 0.0, high: float = 1e9
+    ) -> float:
+        """Return the option as a number within [low, high].
+
+        Raises
+        ------
+        InputError
+            If it is no such number.
+
+        """
+        value = self.text(name)
+        if not value:
+            return default
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if not (isfinite(number) and low <= number <= high):
+            raise InputError(
+                f"{self._owner}: {name}={value} is no number from {low:g} to {high:g}"
+            )
+        return number
+
+    def finish(self) -> None:
+        """Refuse what nobody asked for.
+
+        Raises
+        ------
+        InputError
+            If an option is unknown here.
+
+        """
+        if strange := sorted(set(self._given) - set(self._known)):
+            known = ", ".join(sorted(set(self._known)))
+            raise InputError(
+                f"{self._owner} knows no option {strange[0]!r}: it takes {known}"
+            )
+
+
+def split(address: str, owner: str) -> tuple[str, Options]:
+    """Split an address into what is before the question mark, and its options.
+
+    >>> place, options = split("/dev/ttyUSB0?baud=9600", "serial")
+    >>> place, options.number("baud", 115200)
+    ('/dev/ttyUSB0', 9600.0)
+    """
+    place, _, query = address.partition("?")
+    return place, Options(owner, query)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import pi
 from types import MappingProxyType
 
-
 STANDARD_GRAVITY = 9.80665
 """What devices mean by 1 g, m/s^2."""
 

@@ -117,9 +117,7 @@ class Driver(ABC):
         sent = "went silent" if self.health.samples else "has sent no sample"
         heard = self.health.skipped - before.skipped + self.health.bad - before.bad
         return f"{self.name} {sent} for {timeout:g} s: " + (
-            self._garbage()
-            if heard
-            else "not a byte came; check cable, power and port"
+            self._garbage() if heard else "not a byte came; check cable, power and port"
         )
 
     def _garbage(self) -> str:

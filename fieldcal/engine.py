@@ -171,7 +171,7 @@ class Engine:
         """Wait until the device rests where it should; specific force there, (3,)."""
         stillness, resting = Stillness(), _Resting()
         began: float | None = None
-        told = ""
+        told = False
         for block in self._stream:
             began = block.t[0] if began is None else began
             stillness.add(block)
@@ -183,27 +183,22 @@ class Engine:
             reason = _reason(stillness.since, arrival)
             self._show("turning", hold, block, arrival, stillness.meter, reason)
             if arrival is None or f is None:
+                told = False
                 continue
             if arrival.ok and resting.seconds >= SETTLE:
                 return f
-            if (
-                not arrival.ok
-                and resting.seconds >= PATIENCE
-                and arrival.problem != told
-            ):
-                told = self._complain(hold, arrival, told)
+            if not arrival.ok and resting.seconds >= PATIENCE and not told:
+                self._complain(hold, arrival)
+                told = True
             waited = float(block.t[-1] - began)
             if not arrival.ok and self._give_up and waited > self._give_up:
                 raise WrongPosition(f"{hold.position.name}: {arrival.problem}")
         raise AssertionError("blocks() ends in an exception only")
 
-    def _complain(self, hold: Hold, arrival: Arrival, told: str) -> str:
-        """Say what is wrong once; the numbers in it change with the noise."""
-        cause = arrival.problem.partition(":")[0]
-        if cause != told.partition(":")[0]:
-            self._recorder.mark("wrong", position=hold.index, text=arrival.problem)
-            self._operator.tell(arrival.problem)
-        return arrival.problem
+    def _complain(self, hold: Hold, arrival: Arrival) -> None:
+        """Say that it rests at a wrong place: once for each rest."""
+        self._recorder.mark("wrong", position=hold.index, text=arrival.problem)
+        self._operator.tell(arrival.problem)
 
     def _average(self, hold: Hold) -> Average:
         window = Window()

@@ -1,0 +1,195 @@
+"""The engine on the virtual device: right when all goes well, and when it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fieldcal import description
+from fieldcal.driver import Driver, Health
+from fieldcal.engine import Engine, View
+from fieldcal.errors import CalibrationFailed, DeviceSilent, WrongPosition
+from fieldcal.plan import Hold, hold
+from fieldcal.positions import TWO, Position
+from fieldcal.procedures.holding import hold_all
+from fieldcal.recorder import Recorder
+from fieldcal.samples import Block
+from fieldcal.session import Session
+from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device.in_process import InProcess
+from fieldcal.windows import Average
+
+ABOUT = description.parse({"site": {"latitude_deg": 50.45, "height_m": 170.0}})
+
+
+@dataclass
+class Turner:
+    """Turns the virtual device, and slips on the way as it is told to."""
+
+    driver: InProcess
+    slips: list[tuple[float, float]] = field(default_factory=list)
+    bump_at: list[float] = field(default_factory=list)
+    told: list[str] = field(default_factory=list)
+    views: list[View] = field(default_factory=list)
+    late: Position | None = None
+    bumped: list[float] = field(default_factory=list)
+
+    def place(self, hold: Hold) -> None:
+        alpha, beta = hold.position.degrees or (0.0, 0.0)
+        if self.slips:
+            alpha, beta = self.slips.pop(0)
+            self.late = hold.position
+        self.driver.place(Position.deg(alpha, beta))
+
+    def tell(self, text: str) -> None:
+        self.told.append(text)
+        if self.late:
+            self.driver.place(self.late)
+            self.late = None
+
+    def show(self, view: View) -> None:
+        self.views.append(view)
+        if self.bump_at and view.elapsed > self.bump_at[0]:
+            self.bump_at.pop(0)
+            self.bumped.append(self.driver.device.time)
+            self.driver.device.bump()
+
+
+@dataclass
+class Bench:
+    """An engine with everything around it."""
+
+    folder: Path
+    turner: Turner
+    engine: Engine
+    recorder: Recorder
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        yield make(recorder, InProcess(VirtualDevice(seed=3)))
+
+
+def make(recorder: Recorder, driver: InProcess) -> Bench:
+    turner = Turner(driver)
+    engine = Engine(driver, turner, ABOUT, recorder, give_up=60.0)
+    return Bench(recorder.folder, turner, engine, recorder)
+
+
+def events(bench: Bench) -> list[str]:
+    bench.recorder.close()
+    return [m["event"] for m in Session.open(bench.folder).marks()]
+
+
+def test_windows_are_taken_after_the_turn_and_every_sample_is_recorded(
+    bench: Bench,
+) -> None:
+    first, second = bench.engine.run(hold_all(TWO, 12.0))
+    assert 12.0 <= first.end - first.start < 12.3
+    assert events(bench) == ["asked", "window", "asked", "window"]
+    block = Session.open(bench.folder).block
+    assert len(block) == bench.turner.driver.health.samples
+    inside = block.between(second.start, np.nextafter(second.end, np.inf))
+    np.testing.assert_allclose(inside.six.mean(axis=0), second.mean, atol=1e-9)
+    quiet = block.between(second.start - 1.0, second.start).gyr.std(axis=0).max()
+    assert quiet < 2 * inside.gyr.std(axis=0).max()
+
+
+def test_a_wrong_turn_is_said_before_anything_is_averaged(bench: Bench) -> None:
+    bench.turner.slips = [(0, 0), (-45, 5)]
+    averages = bench.engine.run(hold_all(TWO, 10.0))
+    wrong = [t for t in bench.turner.told if "wrong way" in t]
+    assert len(wrong) == 1 and "α is turned the wrong way" in wrong[0]
+    assert averages[1].mean[0] < 0, "the window must be from +45 degrees"
+    assert events(bench).count("window") == 2
+
+
+def test_a_position_never_reached_is_given_up(bench: Bench) -> None:
+    bench.turner.slips = [(0, 0), (30, 5)]
+    bench.turner.tell = bench.turner.told.append  # type: ignore[method-assign]
+    with pytest.raises(WrongPosition, match="turn it by"):
+        bench.engine.run(hold_all(TWO, 10.0))
+    assert events(bench) == ["asked", "window", "asked", "wrong"]
+
+
+def test_a_bump_rejects_the_window_and_it_is_taken_again(bench: Bench) -> None:
+    bench.turner.bump_at = [8.0]
+    average = bench.engine.run(hold_all(TWO[:1], 20.0))[0]
+    assert events(bench) == ["asked", "rejected", "told", "asked", "window"]
+    mark = [m for m in Session.open(bench.folder).marks() if m["event"] == "rejected"]
+    assert mark[0]["at_s"] == pytest.approx(bench.turner.bumped[0], abs=0.5)
+    assert average.start > mark[0]["at_s"]
+
+
+def test_who_never_holds_still_is_told_so_in_the_end(bench: Bench) -> None:
+    bench.turner.bump_at = [10.0] * 9
+    with pytest.raises(CalibrationFailed, match="without a disturbance in 5 tries"):
+        bench.engine.run(hold_all(TWO[:1], 30.0))
+
+
+def test_a_hold_ends_early_once_the_sigma_asked_for_is_reached(bench: Bench) -> None:
+    average: Average = bench.engine.run(hold(0, TWO[0], 120.0, sigma=5e-3))
+    assert average.end - average.start < 60.0
+    assert average.sigma[:3].max() <= 5e-3
+
+
+class Hiccup(InProcess):
+    """A link that loses two seconds of samples, once."""
+
+    lost = False
+
+    def receive(self, timeout: float) -> Block | None:
+        if not self.lost and self.device.time > 14.0:
+            self.lost = True
+            self.device.take(200)
+        return super().receive(timeout)
+
+
+def test_samples_missing_inside_a_window_reject_it(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        bench = make(recorder, Hiccup(VirtualDevice(seed=1)))
+        bench.engine.run(hold_all(TWO[:1], 20.0))
+    assert "no samples came between" in bench.turner.told[0]
+    assert events(bench).count("window") == 1
+
+
+class Dead(Driver):
+    """A device that says nothing."""
+
+    def __init__(self, address: str = "") -> None:
+        self.name, self.health = "dead device", Health()
+
+    def receive(self, timeout: float) -> Block | None:
+        return None
+
+    def close(self) -> None: ...
+
+    def blocks(self, timeout: float = 0.1):  # type: ignore[no-untyped-def]
+        return super().blocks(0.05)
+
+
+def test_a_silent_device_is_said_to_be_silent(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner = Turner(InProcess(VirtualDevice()))
+        engine = Engine(Dead(), turner, ABOUT, recorder)
+        with pytest.raises(DeviceSilent, match="dead device has sent no sample"):
+            engine.run(hold_all(TWO, 5.0))
+
+
+def test_the_operator_sees_where_the_device_is_and_how_far_the_average_is(
+    bench: Bench,
+) -> None:
+    bench.engine.run(hold_all(TWO, 10.0))
+    seen = [v for v in bench.turner.views if v.phase == "turning" and v.arrival]
+    last = seen[-1].arrival
+    assert last is not None and last.alpha_deg == pytest.approx(45, abs=2)
+    averaging = [v for v in bench.turner.views if v.phase == "averaging"]
+    assert averaging[-1].elapsed > averaging[0].elapsed
+    taken = [v for v in bench.turner.views if v.phase == "taken"]
+    assert len(taken) == 2 and np.isfinite(taken[0].sigma).all()
+    assert taken[0].rate_hz == pytest.approx(100, rel=0.01)

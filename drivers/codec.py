@@ -84,6 +84,7 @@ class Codec(ABC):
         for chunk in chunks:
             end += len(chunk.data)
             self._arrivals.append((end, chunk.t_host))
+        self.health.received += len(data) - len(self._rest)
         array = np.frombuffer(data, np.uint8)
         found = resolve(self.scan(array), len(data))
         self.health.bad += found.bad

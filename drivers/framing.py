@@ -84,3 +84,11 @@ def resolve(candidates: Candidates, size: int) -> Found:
         refused = refused[(before < 0) | (refused >= last[before])]
     skipped = rest - int(np.sum(last - first))
     return Found(first, last, rest, len(refused), skipped)
+
+
+def rows(data: Bytes, starts: Index, size: int) -> Bytes:
+    """Return the `size` bytes from each start, (m, size)."""
+    if len(starts) > 1 and starts[-1] - starts[0] == size * (len(starts) - 1):
+        if np.all(np.diff(starts) == size):
+            return data[starts[0] : starts[-1] + size].reshape(-1, size)
+    return np.lib.stride_tricks.sliding_window_view(data, size)[starts]

@@ -38,6 +38,9 @@ WITNESS = 0.005
 EARLY = 16
 """Intervals from which the period is first told."""
 
+PIECE = 4096
+"""Samples placed at once: a bound to what is looked at in vain."""
+
 _NAN = float("nan")
 
 
@@ -120,53 +123,62 @@ class Stamps:
 
     def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
         """Return times (n,), nan for a sample to drop; `stamps` nan where unknown."""
-        t = self._glide(stamps)
-        if t is None:
-            pairs = zip(stamps.tolist(), t_host.tolist(), strict=True)
-            return np.array([self._step(stamp, host) for stamp, host in pairs])
-        self._stamp, self._host = float(stamps[-1]), float(t_host[-1])
-        return t
+        parts: list[Array] = [np.empty(0)]
+        i = 0
+        while i < len(stamps):
+            quiet = self._glide(stamps[i : i + PIECE])
+            if len(quiet):
+                i += len(quiet)
+                self._stamp, self._host = float(stamps[i - 1]), float(t_host[i - 1])
+                parts.append(quiet)
+            few = slice(i, i + EARLY)
+            pairs = zip(stamps[few].tolist(), t_host[few].tolist(), strict=True)
+            parts.append(np.array([self._step(stamp, host) for stamp, host in pairs]))
+            i += EARLY
+        return np.concatenate(parts)
 
     def broken(self) -> None:
         """Do nothing: the stamps show the gap."""
 
-    def _glide(self, stamps: Array) -> Array | None:
-        """Place stamps among which nothing happens, all at once; else None."""
+    def _glide(self, stamps: Array) -> Array:
+        """Place at once the first stamps, as many as nothing happens among."""
         if self._count < EARLY:
-            return None
-        q, period = self._resolution, self._period
+            return stamps[:0]
         d = np.diff(stamps, prepend=self._stamp)
         least = 0.0 if self._coarse else 1e-12
-        if not (np.all(d >= least) and np.all(d < 1.5 * period)):
-            return None
-        if not q:
-            t: Array = stamps + self._offset
-            if not t[0] > self._t:
-                return None
-            self._count += len(t)
-            self._t = float(t[-1])
+        odd = np.flatnonzero(~((d >= least) & (d < 1.5 * self._period)))
+        s = stamps[: odd[0] if len(odd) else len(stamps)] + self._offset
+        if self._resolution:
+            return self._glide_coarse(s)
+        if len(s) and not s[0] > self._t:
+            return s[:0]
+        if len(s):
+            self._count += len(s)
+            self._t = float(s[-1])
             self._period = (self._t - self._first) / self._count
-            return t
-        return self._glide_coarse(stamps + self._offset)
+        return s
 
-    def _glide_coarse(self, stamps: Array) -> Array | None:
+    def _glide_coarse(self, stamps: Array) -> Array:
         q, period = self._resolution, self._period
         t, first, count = self._t, self._first, self._count
-        times = [t]
+        times: list[float] = []
         for s in stamps.tolist():
+            last = t
             t += period
             if t < s:
                 t = s
-            elif t > s + q:
-                t = s + q  # (1)
+            elif t > s + q:  # (1)
+                t = s + q
+                if t <= last:
+                    t = last + 0.01 * q
+                    if s + 4 * q <= last or not self._coarse:
+                        t = last
+                        break
             count += 1
             period = (t - first) / count
             times.append(t)
-        even = np.array(times)
-        if not np.all(np.diff(even) > 0):
-            return None
         self._t, self._count, self._period = t, count, period
-        return even[1:]
+        return np.array(times)
 
     @property
     def _coarse(self) -> bool:

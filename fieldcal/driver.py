@@ -29,6 +29,7 @@ class Health:
 
     Attributes
     ----------
+    received : bytes that came
     samples : whole samples delivered
     bad : frames refused by their checksum or their form
     skipped : bytes that belonged to no whole frame
@@ -39,6 +40,7 @@ class Health:
 
     """
 
+    received: int = 0
     samples: int = 0
     bad: int = 0
     skipped: int = 0
@@ -114,11 +116,15 @@ class Driver(ABC):
         return concat(taken)
 
     def _silence(self, timeout: float, before: Health) -> str:
-        sent = "went silent" if self.health.samples else "has sent no sample"
-        heard = self.health.skipped - before.skipped + self.health.bad - before.bad
-        return f"{self.name} {sent} for {timeout:g} s: " + (
-            self._garbage() if heard else "not a byte came; check cable, power and port"
-        )
+        now = self.health
+        sent = "went silent" if now.samples else "has sent no sample"
+        if now.received == before.received:
+            cause = "not a byte came; check cable, power and port"
+        elif now.skipped - before.skipped > (now.received - before.received) / 2:
+            cause = self._garbage()
+        else:
+            cause = "frames come, but no whole sample; check what the device is to send"
+        return f"{self.name} {sent} for {timeout:g} s: {cause}"
 
     def _garbage(self) -> str:
         return "bytes come, but none that this format knows; check format and baud rate"

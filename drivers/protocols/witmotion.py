@@ -1,0 +1,184 @@
+"""WitMotion WT901 and its kin: ``format=witmotion``.
+
+A frame is 11 bytes: 0x55, kind, four little-endian 16-bit words, and the low byte of
+the sum of the ten before it. Kinds used here:
+
+    0x50  year - 2000, month, day, hour, minute, second (a byte each), millisecond
+    0x51  acc x, y, z, full scale / 32768 each; temperature, 0.01 deg C
+    0x52  gyr x, y, z, full scale / 32768 each
+
+A cycle sends its kinds in ascending order, so a kind that does not ascend begins the
+next one. A sample is a 0x52 right behind the 0x51 of its cycle, less than two frames
+away: between two further apart the other halves of two cycles may have been lost.
+
+Time comes from the 0x50 of the cycle where the device sends them (1 ms, since midnight
+of the first day), else from ``rate=``, else from the arrivals. Source: WitMotion,
+WT901 data sheet v20-0702, section 5.1. A g is 9.80665 m/s^2 here.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.description import ACC_UNITS, GYR_UNITS
+from fieldcal.drivers.arrivals import choose
+from fieldcal.drivers.codec import Codec as Base
+from fieldcal.drivers.framing import Bytes, Candidates, Found, Mask, rows
+from fieldcal.drivers.options import Options
+from fieldcal.drivers.timebase import Stamps, Timebase
+from fieldcal.samples import Array, Block
+
+SIZE = 11
+TIME, ACC, GYR = 0x50, 0x51, 0x52
+
+FRAME = np.dtype(
+    [("sync", "u1"), ("kind", "u1"), ("words", "<i2", 4), ("sum", "u1")]
+    + [("t_host", "f8"), ("at", "i8")]
+)
+"""A frame, behind it the arrival of its last byte and where it stood in the stream."""
+
+SAMPLE = np.dtype(
+    [("acc", "f8", 3), ("gyr", "f8", 3), ("temperature", "f8")]
+    + [("stamp", "f8"), ("steps", "i8"), ("t_host", "f8")]
+)
+
+Frames: TypeAlias = NDArray[Any]
+Words: TypeAlias = NDArray[Any]
+Samples: TypeAlias = NDArray[Any]
+
+UNDECIDED = 3
+"""Samples without a stamp after which the device is taken to send none."""
+
+
+class Codec(Base):
+    """Decoder of 0x50, 0x51 and 0x52; options acc_range (g), gyr_range (deg/s), rate.
+
+    Further options are those of the time: see `choose`.
+    """
+
+    bauds = (115200, 9600, 921600, 230400, 460800, 57600, 38400, 19200)
+
+    def __init__(self, options: Options) -> None:
+        super().__init__(options)
+        acc = options.number("acc_range", 16.0, 1.0, 400.0)
+        gyr = options.number("gyr_range", 2000.0, 1.0, 40000.0)
+        self._acc = acc * ACC_UNITS["g"] / 32768
+        self._gyr = gyr * GYR_UNITS["deg/s"] / 32768
+        self._unstamped = choose(self.health, options)
+        self._timebase: Timebase | None = None
+        self._frames = np.empty(0, FRAME)
+        self._cycle = 0
+        self._paired: int | None = None
+        self._held = np.empty(0, SAMPLE)
+        self._day: int | None = None
+
+    def scan(self, data: Bytes) -> Candidates:
+        """Every 0x55 that a kind follows."""
+        at = np.flatnonzero(data[:-1] == 0x55)
+        kind = data[at + 1]
+        at = at[(kind >= TIME) & (kind <= 0x5F)]
+        whole = at[at + SIZE <= len(data)]
+        total = np.cumsum(data, dtype=np.uint8)
+        before = total[whole + SIZE - 2] - total[whole] + np.uint8(0x55)
+        good = np.ones(len(at), dtype=bool)
+        good[: len(whole)] = before == data[whole + SIZE - 1]
+        undecided = len(data) - (len(data) > 0 and int(data[-1]) == 0x55)
+        return Candidates(at, at + SIZE, good, undecided)
+
+    def reset(self) -> None:
+        """Forget half a frame and half a sample."""
+        super().reset()
+        self._frames = self._frames[:0]
+        self._paired = None
+        (self._timebase or self._unstamped).broken()
+
+    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+        """Put the halves of each sample together."""
+        frames = np.empty(len(found.starts), FRAME)
+        raw = frames.view(np.uint8).reshape(-1, FRAME.itemsize)
+        raw[:, :SIZE] = rows(data, found.starts, SIZE)
+        frames["t_host"] = t_host
+        frames["at"] = found.starts + self._begin
+        frames = np.concatenate([self._frames, frames])
+        old = len(self._frames)
+        fresh = ~_repeats(frames)
+        fresh[:old] = True
+        frames = frames[fresh]
+        self._frames = frames[-2:]
+        return self._deliver(self._pair(frames, old))
+
+    def _pair(self, frames: Frames, old: int) -> Samples:
+        """Samples whose second half is not among the first `old` frames."""
+        kind, far = frames["kind"], np.diff(frames["at"]) >= 3 * SIZE
+        begins = np.zeros(len(frames), dtype=np.int64)
+        begins[1:] = kind[1:] <= kind[:-1]
+        begins[:old] = 0
+        cycle = self._cycle + np.cumsum(begins)
+        near = np.zeros(len(frames), dtype=bool)
+        near[1:] = (kind[1:] == GYR) & (kind[:-1] == ACC) & ~far
+        near[:old] = False
+        at = np.flatnonzero(near)
+        self._cycle = int(cycle[-1])
+        samples = np.empty(len(at), SAMPLE)
+        words = frames["words"]
+        samples["acc"] = words[at - 1, :3] * self._acc
+        samples["gyr"] = words[at, :3] * self._gyr
+        samples["temperature"] = words[at - 1, 3] / 100
+        samples["t_host"] = frames["t_host"][at]
+        if len(at):
+            before = cycle[at[0]] - 1 if self._paired is None else self._paired
+            samples["steps"] = np.diff(cycle[at], prepend=before)
+            self._paired = int(cycle[at[-1]])
+        samples["stamp"] = np.nan
+        stamped = (at >= 2) & (kind[at - 2] == TIME) & ~far[at - 2]
+        samples["stamp"][stamped] = self._seconds(words[at[stamped] - 2])
+        return samples
+
+    def _seconds(self, words: Words) -> Array:
+        """Time in s since midnight of the first day, from words of 0x50, (n, 4)."""
+        year, month, day, hour, minute, second = (
+            words[:, :3].copy().view(np.uint8).astype(np.int64).T
+        )
+        months = np.datetime64("2000-01", "M") + (12 * year + month - 1)
+        days = months.astype("M8[D]").astype(np.int64) + day - 1
+        if self._day is None and len(days):
+            self._day = int(days[0])
+        clock = ((days - (self._day or 0)) * 24 + hour) * 60 + minute
+        seconds: Array = ((clock * 60 + second) * 1000 + words[:, 3]) * 1e-3
+        return seconds
+
+    def _deliver(self, samples: Samples) -> Block | None:
+        """Give samples their time, once it is known whether the device tells it."""
+        if self._timebase is None:
+            samples = np.concatenate([self._held, samples])
+            stamped = np.flatnonzero(~np.isnan(samples["stamp"]))
+            if len(stamped):
+                samples = samples[stamped[0] :]
+                self._timebase = Stamps(self.health, resolution=1e-3)
+            elif len(samples) >= UNDECIDED:
+                self._timebase = self._unstamped
+            else:
+                self._held = samples
+                return None
+        if not len(samples):
+            return None
+        host = samples["t_host"]
+        t = self._timebase.times(samples["stamp"], samples["steps"], host)
+        if np.isnan(t).any():
+            samples, t = samples[~np.isnan(t)], t[~np.isnan(t)]
+        temperature, host = samples["temperature"], samples["t_host"]
+        return Block.of(
+            t, samples["acc"], samples["gyr"], temperature, t_host=host.copy()
+        )
+
+
+def _repeats(frames: Frames) -> Mask:
+    """Frames that say word for word what the one before said, (n,)."""
+    again = np.zeros(len(frames), dtype=bool)
+    again[1:] = frames["kind"][1:] == frames["kind"][:-1]
+    for i in np.flatnonzero(again):
+        again[i] = np.array_equal(frames["words"][i], frames["words"][i - 1])
+    return again

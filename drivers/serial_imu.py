@@ -1,0 +1,114 @@
+"""An IMU on a serial port: ``serial:/dev/ttyUSB0?format=witmotion&baud=115200``.
+
+Options: ``format`` (a file of protocols/), ``baud``, ``reconnect`` (how long to try
+again after a hang-up, s; 0 for not at all), and those of the format. The port may also
+be a pty, or any URL that pyserial knows, such as ``socket://192.168.1.5:4001``.
+"""
+
+from __future__ import annotations
+
+import errno
+from time import monotonic
+from typing import ClassVar
+
+import serial
+
+from fieldcal.driver import Driver
+from fieldcal.drivers.codec import open_codec
+from fieldcal.drivers.options import split
+from fieldcal.drivers.reader import Reader
+from fieldcal.errors import DeviceError, InputError
+from fieldcal.samples import Block
+
+POLL = 0.1
+"""Longest wait for a byte before the reader looks whether it should end, s."""
+
+REASONS = {
+    errno.ENOENT: "there is no such port; plug it in, or see `fieldcal ports`",
+    errno.ENXIO: "nothing is plugged in there; see `fieldcal ports`",
+    errno.ENODEV: "nothing is plugged in there; see `fieldcal ports`",
+    errno.EIO: "the other end has hung up; start the device first",
+    errno.EACCES: "no permission; add yourself to the group that owns it (dialout)",
+    errno.EPERM: "no permission; add yourself to the group that owns it (dialout)",
+    errno.EBUSY: "another program has it open; close that first",
+    errno.EAGAIN: "another program has it open; close that first",
+    errno.ENOTTY: "this is no serial port; see `fieldcal ports`",
+    errno.EISDIR: "this is no serial port; see `fieldcal ports`",
+}
+
+
+class SerialPort:
+    """Bytes of a port, as a reader wants them.
+
+    Raises
+    ------
+    DeviceError
+        If the port cannot be opened.
+
+    """
+
+    def __init__(self, port: str, baud: int) -> None:
+        locked = {} if "://" in port else {"exclusive": True}
+        try:
+            self._serial = serial.serial_for_url(port, baud, timeout=POLL, **locked)
+        except ValueError as fault:
+            raise InputError(f"cannot open {port} at {baud} baud: {fault}") from fault
+        except Exception as fault:
+            # not only OSError: pyserial lets termios.error through
+            raise DeviceError(f"cannot open {port}: {reason(fault)}") from fault
+
+    def read(self) -> bytes:
+        """Return all that is there, waiting `POLL` seconds for the first byte."""
+        data: bytes = self._serial.read(max(1, self._serial.in_waiting))
+        return data
+
+    def close(self) -> None:
+        """Release the port."""
+        self._serial.close()
+
+
+class Imu(Driver):
+    """A serial port and the codec of what comes from it."""
+
+    faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)
+
+    def __init__(self, address: str) -> None:
+        port, options = split(address, "serial")
+        if not port:
+            raise InputError("serial: name a port, such as serial:/dev/ttyUSB0")
+        self.name = port
+        self._codec = open_codec(options.text("format", "witmotion"), options)
+        self.health = self._codec.health
+        baud = int(options.number("baud", self._codec.bauds[0], 50, 1e8))
+        patience = options.number("reconnect", 10.0, 0.0, 86400.0)
+        options.finish()
+        self._reader = Reader(port, lambda: SerialPort(port, baud), patience)
+
+    @property
+    def reconnecting(self) -> bool:
+        """True while the port is gone and is being tried again."""
+        return self._reader.reconnecting
+
+    def receive(self, timeout: float) -> Block | None:
+        """Return what has come, or None if nothing whole came in `timeout` seconds."""
+        deadline = monotonic() + timeout
+        while True:
+            chunks = self._reader.take(max(0.0, deadline - monotonic()))
+            block = self._codec.feed_all(chunks)
+            if block is not None or monotonic() >= deadline:
+                return block
+
+    def close(self) -> None:
+        """Release the port; safe to call twice."""
+        self._reader.close()
+
+
+def reason(fault: BaseException) -> str:
+    """Say why a port did not open, and what to do."""
+    link: BaseException | None = fault
+    while link is not None:
+        number = link.args[0] if link.args else None
+        if isinstance(number, int) and number in REASONS:
+            return REASONS[number]
+        link = link.__context__
+    return str(fault)

@@ -118,9 +118,10 @@ class ConsoleOperator:
 
     def _draw(self) -> None:
         if self._live:
-            self._live.update(self._screen(), refresh=True)
+            self._live.update(self.screen(), refresh=True)
 
-    def _screen(self) -> RenderableType:
+    def screen(self) -> RenderableType:
+        """What is shown now."""
         parts: list[RenderableType] = [self._instruction(), Text()]
         if self._view:
             parts += [*self._gauges(self._view), Text()]

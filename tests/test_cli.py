@@ -1,0 +1,121 @@
+"""The command line: help, usage and exit codes, without a device."""
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from fieldcal.cli import COMMANDS, main
+
+ZERO_G = "[site]\ngravity = 0.0\n"
+
+
+def fieldcal(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fieldcal", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_with_an_example_and_the_exit_codes(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([name, "--help"])
+    assert end.value.code == 0
+    said = capsys.readouterr().out
+    assert f"fieldcal {name}" in said.split("example", 1)[1]
+    assert "130  interrupted" in said
+
+
+def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in ([], ["--help"], ["--version"]):
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        assert end.value.code == 0
+    assert "fieldcal 0." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["fly"], ["solve"], ["solve", "x", "--method", "magic"], ["run", "five_position"]],
+)
+def test_wrong_usage_ends_with_2(arguments: Sequence[str]) -> None:
+    done = fieldcal(*arguments)
+    assert done.returncode == 2 and done.stderr and not done.stdout
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom fieldcal.cli import main\ntry:\n main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'pyarrow', 'rich', 'serial'} & set(sys.modules)\n"
+        "sys.exit(f'loaded {heavy}' if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def one_sentence(text: str) -> bool:
+    """Whether an error is one line that says something."""
+    lines = text.strip().splitlines()
+    return len(lines) == 1 and len(lines[0]) > 30 and "Traceback" not in text
+
+
+@pytest.mark.parametrize(
+    ("toml", "csv", "says"),
+    [
+        (ZERO_G, "t,ax,ay,az\n0,0,0,0\n", "gravity = 0 must be above 0"),
+        ("", "t,ax,ay,az\n0,0,0,0\n", "no [[position]]"),
+        (
+            "[[position]]\nalpha_deg = 0\nbeta_deg = 0\nstart_s = 0\nend_s = 9\n",
+            "t,ax,ay,az\n0,x,0,0\n",
+            "row 1, column ax: 'x' is not a number",
+        ),
+        (
+            "[[position]]\nalpha_deg = 0\nbeta_deg = 0\nstart_s = 50\nend_s = 59\n",
+            "t,ax,ay,az\n0,0,0,0\n1,0,0,0\n",
+            "no samples lie between 50 and 59 s",
+        ),
+    ],
+)
+def test_a_session_that_cannot_be_solved_is_said_so_in_one_sentence(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    toml: str,
+    csv: str,
+    says: str,
+) -> None:
+    (tmp_path / "session.toml").write_text(toml)
+    (tmp_path / "samples.csv").write_text(csv)
+    assert main(["solve", str(tmp_path)]) == 2
+    captured = capsys.readouterr()
+    assert says in captured.err and one_sentence(captured.err) and not captured.out
+    names = {p.name for p in tmp_path.iterdir()}
+    assert names == {"session.toml", "samples.csv"}
+
+
+@pytest.mark.parametrize(
+    ("plan", "says"),
+    [
+        ("[[position]]\nalpha_deg = 0.0\nbeta_deg = 0.0\n" * 2, "are the same"),
+        ("[[position]]\nalpha_deg = 0.0\nbeta_deg = 0.0\n", "are not enough"),
+        ("[run]\nseconds = -1\n", "seconds = -1 must be a number above 0"),
+        ("[run]\nprocedure = 'magic'\n", "'magic' is none of"),
+        ("run = 3\n", "write [run]"),
+        ("x = [", "is no plan file"),
+        (ZERO_G, "gravity = 0"),
+    ],
+)
+def test_a_wrong_plan_is_refused_before_anything_moves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], plan: str, says: str
+) -> None:
+    path = tmp_path / "plan.toml"
+    path.write_text(plan)
+    folder = tmp_path / "session"
+    call = ["run", str(path), "--device", "serial:/dev/null", "-o", str(folder)]
+    assert main(call) == 2
+    said = capsys.readouterr().err
+    assert says in said and one_sentence(said)
+    assert not folder.exists()

@@ -1,1 +1,10 @@
-"""Estimators: from window averages to parameters with their covariance."""
+"""Estimators: from window averages to parameters with their covariance.
+
+>>> from fieldcal.positions import FIVE
+>>> from fieldcal.solve import Observations, solve
+"""
+
+from fieldcal.solve.choose import solve
+from fieldcal.solve.observations import Observations
+
+__all__ = ["Observations", "solve"]

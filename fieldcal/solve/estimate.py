@@ -12,7 +12,7 @@ from fieldcal.calibration import Calibration, Method
 from fieldcal.errors import NotObservable
 from fieldcal.samples import Array
 from fieldcal.solve.linear import Mask
-from fieldcal.solve.observations import ACC, GYR, Observations
+from fieldcal.solve.observations import ACC, GYR, Index, Observations
 
 UNITS = {
     "acc_bias": "m/s^2",
@@ -73,6 +73,14 @@ class Estimate:
             covariance=self.covariance[np.ix_(rows, rows)],
             gain=None if self.gain is None else self.gain[rows],
         )
+
+    def spread(self, rows: Index, n: int) -> Estimate:
+        """Place the gain of some windows among all n."""
+        if self.gain is None:
+            return self
+        whole = np.zeros((len(self.names), n, 3))
+        whole[:, rows] = self.gain
+        return replace(self, gain=whole)
 
 
 def combine(

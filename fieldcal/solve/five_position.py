@@ -36,7 +36,7 @@ import numpy as np
 
 from fieldcal.errors import InputError, NotObservable
 from fieldcal.samples import Array
-from fieldcal.solve import linear
+from fieldcal.solve import linear, scatter
 from fieldcal.solve.design import RAD, Model, Tilt, ladder_remedy, predict
 from fieldcal.solve.estimate import Estimate, not_determined
 from fieldcal.solve.observations import ACC, Observations
@@ -125,6 +125,12 @@ def five_position(
         If no axis is determined.
 
     """
+    return scatter.absorb(
+        lambda seen: _estimate(seen, tilt, as_printed), observations, ACC, "positions"
+    )
+
+
+def _estimate(observations: Observations, tilt: Tilt, as_printed: bool) -> Estimate:
     each = axis_estimates(observations, tilt, as_printed)
     pick, names = _picked(each, tilt, observations.mounting)
     values = pick @ each.values

@@ -26,7 +26,7 @@ import numpy as np
 
 from fieldcal.frames import EARTH_RATE, turn
 from fieldcal.samples import Array
-from fieldcal.solve import linear
+from fieldcal.solve import linear, scatter
 from fieldcal.solve.estimate import Estimate, axes, not_determined
 from fieldcal.solve.observations import ACC, GYR, Observations
 
@@ -54,8 +54,12 @@ def bias(
     if not as_printed:
         known, unknown = _earth(observations, heading_sigma)
     y = observations.mean[:, GYR] - known
-    fit = _with_nuisance(y, observations.covariance[:, GYR, GYR], unknown)
-    return _estimate(axes("gyr_bias"), fit, n)
+
+    def run(seen: Observations) -> Estimate:
+        fit = _with_nuisance(y, seen.covariance[:, GYR, GYR], unknown)
+        return _estimate(axes("gyr_bias"), fit, n)
+
+    return scatter.absorb(run, observations, GYR, "gyroscopes' means")
 
 
 def bias_and_scale(observations: Observations, as_printed: bool = False) -> Estimate:
@@ -67,6 +71,15 @@ def bias_and_scale(observations: Observations, as_printed: bool = False) -> Esti
     A scale factor that the Earth's rate gives to no better than `USEFUL` is left out,
     and with it what the bias owes to it stays in the bias' uncertainty.
     """
+    return scatter.absorb(
+        lambda seen: _bias_and_scale(seen, as_printed),
+        observations,
+        GYR,
+        "gyroscopes' means",
+    )
+
+
+def _bias_and_scale(observations: Observations, as_printed: bool) -> Estimate:
     n = len(observations)
     w = observations.earth_rates
     if as_printed:

@@ -25,7 +25,7 @@ import numpy as np
 from fieldcal.errors import NotObservable
 from fieldcal.positions import Position, forces
 from fieldcal.samples import Array
-from fieldcal.solve import linear
+from fieldcal.solve import linear, scatter
 from fieldcal.solve.design import LADDER
 from fieldcal.solve.estimate import NO_DOF, Estimate, not_determined
 from fieldcal.solve.observations import ACC, GYR, Observations
@@ -131,7 +131,9 @@ def accelerometers(observations: Observations, products: bool = False) -> Estima
         f = forces(places, observations.gravity) @ observations.mounting
         return matrix(f, products)
 
-    return _solve(rows, observations, ACCELEROMETERS)
+    return scatter.absorb(
+        lambda seen: _solve(rows, seen, ACCELEROMETERS), observations, ACC, "positions"
+    )
 
 
 def gyroscopes(observations: Observations, products: bool = False) -> Estimate:
@@ -153,7 +155,9 @@ def gyroscopes(observations: Observations, products: bool = False) -> Estimate:
         rate = np.array([p.rate or (0.0, 0.0, 0.0) for p in places])
         return matrix(rate @ observations.mounting, products)
 
-    return _solve(rows, observations, GYROSCOPES)
+    return scatter.absorb(
+        lambda seen: _solve(rows, seen, GYROSCOPES), observations, GYR, "rates"
+    )
 
 
 def _solve(rows: Rows, observations: Observations, sensor: Sensor) -> Estimate:

@@ -29,6 +29,9 @@ Mask = NDArray[np.bool_]
 RCOND = 1e-7
 """Ratio of singular values below which a direction counts as not determined."""
 
+ROUNDING = 1e-12
+"""Length of a column, as a share of the longest, that counts as zero."""
+
 LEAK = 1e-4
 """Share of a null direction above which a parameter counts as not determined."""
 
@@ -89,7 +92,8 @@ def decompose(design: Array) -> tuple[Array, Mask, Array, Array]:
 
     """
     scale = np.linalg.norm(design, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
+    # sin(180°) is not quite zero: what is left of such a column is rounding
+    scale = np.where(scale > ROUNDING * scale.max(initial=0.0), scale, np.inf)
     # of few rows the full set of directions is needed to see the null space
     u, s, vt = np.linalg.svd(design / scale, full_matrices=True)
     rank = int((s > RCOND * max(float(s.max(initial=0.0)), 1e-300)).sum())

@@ -8,19 +8,22 @@ reference vector v of the procedure is P^T v for the device.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.calibration import Nominal
 from fieldcal.errors import InputError
 from fieldcal.frames import earth_rate, force
 from fieldcal.positions import Position, angles
 from fieldcal.samples import CHANNELS, UNITS, Array
+from fieldcal.solve.linear import Mask
 from fieldcal.windows import Average
 
 Grade = Literal["tactical", "navigation"]
+Index = NDArray[np.integer[Any]]
 ACC, GYR = slice(0, 3), slice(3, 6)
 
 
@@ -104,21 +107,23 @@ class Observations:
     def __len__(self) -> int:
         return len(self.positions)
 
-    def __getitem__(self, rows: Sequence[int] | Array) -> Observations:
+    def __getitem__(self, rows: Sequence[int] | Index) -> Observations:
         """Return the observations of some positions."""
         rows = np.asarray(rows, dtype=int)
-        return Observations(
-            tuple(self.positions[i] for i in rows),
-            self.mean[rows],
-            self.covariance[rows],
-            self.gravity,
-            self.temperature[rows],
-            self.time[rows],
-            self.latitude,
-            self.mounting,
-            self.grade,
-            self.nominal,
+        return replace(
+            self,
+            positions=tuple(self.positions[i] for i in rows),
+            mean=self.mean[rows],
+            covariance=self.covariance[rows],
+            temperature=self.temperature[rows],
+            time=self.time[rows],
         )
+
+    def scattered(self, channels: slice, spread: float) -> Observations:
+        """Return the same with variance spread^2 added to some channels."""
+        covariance = self.covariance.copy()
+        covariance[:, channels, channels] += spread**2 * np.eye(3)
+        return replace(self, covariance=covariance)
 
     @property
     def has_acc(self) -> bool:
@@ -136,12 +141,12 @@ class Observations:
         return angles(self.positions)
 
     @property
-    def oriented(self) -> Array:
+    def oriented(self) -> Mask:
         """Whether both angles of a position are known, (n,)."""
         return np.array([p.oriented for p in self.positions], dtype=bool)
 
     @property
-    def rotating(self) -> Array:
+    def rotating(self) -> Mask:
         """Whether a position turns at a known rate, (n,)."""
         return np.array([p.rate is not None for p in self.positions], dtype=bool)
 

@@ -1,0 +1,229 @@
+"""Which estimator fits the observations, and one call for all of them.
+
+    two known positions            two_position      (11)-(14)
+    more known positions           joint             with the tilt that the data prefer
+    rates of a table               least_squares     for the gyroscopes
+    positions without angles       scalar            |f| = g
+
+The gyroscopes' bias comes along from the same windows, and with the Earth's rate their
+scale factor where the grade is navigation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from fieldcal.calibration import Calibration, Method
+from fieldcal.errors import InputError, NotObservable
+from fieldcal.solve import closed_form, five_position, gyroscopes, least_squares, scalar
+from fieldcal.solve.design import Model, Tilt, ladder_remedy
+from fieldcal.solve.estimate import Estimate, combine, join
+from fieldcal.solve.joint import WRONG, joint
+from fieldcal.solve.observations import Observations
+
+METHODS = ("auto", "two_position", "five_position", "least_squares", "joint", "scalar")
+TILTS = ("auto", "none", "angle_offset", "base_tilt")
+
+USEFUL_TILT = 3.0
+"""A tilt less well known than this, degrees, is worse than what an eye sees."""
+
+CLEAR = 6.0
+"""Difference of chi2 from which one model of the tilt counts as the better one."""
+
+
+def solve(
+    observations: Observations,
+    method: Method | Literal["auto"] = "auto",
+    tilt: Tilt | Literal["auto"] = "auto",
+    cross: bool = False,
+    as_printed: bool = False,
+    level_sigma_deg: float | None = None,
+    heading_sigma_deg: float | None = None,
+) -> Calibration:
+    """Estimate the calibration from window averages.
+
+    Parameters
+    ----------
+    observations : n windows, see `Observations`
+    method : "auto" takes two_position for two known positions, joint for more, scalar
+        where angles are unknown; the method taken is named in the result
+    tilt : model of the base's tilt; "auto" estimates it where the positions show it
+    cross : estimate cross-coupling (non-orthogonality in the scalar method)
+    as_printed : closed forms with the misprints of the paper, to compare
+    level_sigma_deg : how level the base was made, about each level axis
+    heading_sigma_deg : how well z points north; not known for tactical grade if None
+
+    Raises
+    ------
+    InputError
+        If an argument is none of those listed.
+    NotObservable
+        If the positions determine no parameter.
+
+    >>> from fieldcal.positions import TWO
+    >>> mean = np.zeros((2, 6))
+    >>> mean[:, :3] = [[0.1, -9.81, 0.2], [-6.83672, -6.91037, 0.80457]]
+    >>> cov = np.tile(np.diag([1e-6] * 3 + [1e-10] * 3), (2, 1, 1))
+    >>> result = solve(Observations(TWO, mean, cov, gravity=9.81))
+    >>> result.method, np.round(result.vector("acc_scale")[0], 4).tolist()
+    ('two_position', [1.0, 1.0, 1.0])
+    """
+    if method not in METHODS or tilt not in TILTS:
+        raise InputError(
+            f"method {method!r} with tilt {tilt!r} is unknown: methods are "
+            f"{join(METHODS)}, tilts are {join(TILTS)}"
+        )
+    rows = np.flatnonzero(~observations.rotating)
+    still = observations[rows] if len(rows) else None
+    acc = None
+    chosen: Method = "least_squares"
+    if still is not None and still.has_acc:
+        chosen = _method(still) if method == "auto" else method
+        acc = _accelerometers(still, chosen, tilt, cross, as_printed, level_sigma_deg)
+        acc = acc.spread(rows, len(observations))
+    gyr = _gyroscopes(observations, heading_sigma_deg, as_printed)
+    good = acc is None or acc.dof <= 0 or acc.chi2 / acc.dof < WRONG
+    return combine(chosen, observations, acc, gyr, good=good)
+
+
+def _method(still: Observations) -> Method:
+    """Take the estimator that suits the positions."""
+    known = int(still.oriented.sum())
+    if known < len(still):
+        return "scalar"
+    return "two_position" if known == 2 else "joint"
+
+
+def _accelerometers(
+    still: Observations,
+    method: Method,
+    tilt: Tilt | Literal["auto"],
+    cross: bool,
+    as_printed: bool,
+    level: float | None,
+) -> Estimate:
+    """Run one method on the positions at rest."""
+    if as_printed and method not in ("two_position", "five_position"):
+        raise InputError(
+            f"the paper prints no {method} method: as printed are two_position and "
+            "five_position"
+        )
+    if method == "scalar":
+        return scalar.scalar(still, cross)
+    if method == "two_position":
+        if tilt in ("angle_offset", "base_tilt") or cross:
+            raise NotObservable(
+                "two positions give bias and scale factor only, not tilt or "
+                "cross-coupling: take five positions, each with another α or β"
+            )
+        return closed_form.two_position(still, np.deg2rad(level or 0.0), as_printed)
+    if method == "least_squares":
+        return least_squares.accelerometers(still)
+    if method == "five_position":
+        if tilt == "none":
+            raise InputError("the five-position method estimates the tilt: use joint")
+        if tilt == "auto" and not as_printed:
+            return _better(
+                [
+                    five_position.five_position(still, t)
+                    for t in ("angle_offset", "base_tilt")
+                ]
+            )
+        return five_position.five_position(
+            still, "base_tilt" if tilt == "base_tilt" else "angle_offset", as_printed
+        )
+    return _joint(still, tilt, cross, level)
+
+
+def _joint(
+    still: Observations, tilt: Tilt | Literal["auto"], cross: bool, level: float | None
+) -> Estimate:
+    """Joint estimate; "auto" takes the tilt that the data prefer, if they show one."""
+    if tilt == "none" and level:
+        return joint(still, Model("base_tilt", cross), level)
+    if tilt != "auto":
+        return joint(still, Model(tilt, cross), level)
+    both = [joint(still, Model(t, cross), level) for t in ("angle_offset", "base_tilt")]
+    usable = [e for e in both if _shows_tilt(e, cross)]
+    if usable:
+        return _better(usable)
+    if level:
+        return joint(still, Model("base_tilt", cross), level)
+    flat = joint(still, Model("none", cross))
+    wanted = np.ones(len(Model("angle_offset", cross).names), dtype=bool)
+    extra = ladder_remedy(still, wanted, Model("angle_offset", cross))
+    cure = f"; add {join(extra)} to find it" if extra else ""
+    note = f"these positions do not show the tilt, so the base is taken as level{cure}"
+    return replace(flat, warnings=(*flat.warnings, note))
+
+
+def _shows_tilt(estimate: Estimate, cross: bool) -> bool:
+    """Whether everything is determined, and the tilt well enough to be of use."""
+    if len(estimate.names) < len(Model("base_tilt", cross).names):
+        return False
+    tilt = [n.endswith("_deg") for n in estimate.names]
+    return bool((np.sqrt(np.diag(estimate.covariance))[tilt] < USEFUL_TILT).all())
+
+
+def _better(fits: list[Estimate]) -> Estimate:
+    """Take the model of the tilt that fits better.
+
+    Where the other one fits nearly as well, what the two differ by is in the
+    covariance, weighted by how likely the other is.
+    """
+    fits = sorted(fits, key=lambda e: e.chi2)
+    best = fits[0]
+    name = best.names[-1].partition(".")[0]
+    if len(fits) == 1:
+        return replace(best, warnings=(*best.warnings, f"the tilt is taken as {name}"))
+    other = fits[1]
+    noise = max(1.0, best.chi2 / best.dof) if best.dof else 1.0
+    ahead = (other.chi2 - best.chi2) / noise
+    weight = 1 / (1 + np.exp(min(ahead / 2, 50.0)))
+    # alpha0 turns about z and beta0 about x: the same angles in the other order
+    twin = np.append(other.values[:-2], other.values[:-3:-1])
+    apart = twin - best.values
+    rival = other.names[-1].partition(".")[0]
+    if ahead > CLEAR:
+        note = (
+            f"the tilt is taken as {name}: {rival} fits worse, by {ahead:.0f} in chi2"
+        )
+    else:
+        note = (
+            f"the tilt is taken as {name}, but these positions cannot tell it from "
+            f"{rival} (chi2 differs by {ahead:.1f}): the uncertainties cover both; "
+            f"more positions with both angles turned would tell"
+        )
+    return replace(
+        best,
+        covariance=best.covariance + weight * np.outer(apart, apart),
+        warnings=(*best.warnings, note),
+        extra={**best.extra, "tilt_chi2": {name: best.chi2, rival: other.chi2}},
+    )
+
+
+def _gyroscopes(
+    observations: Observations, heading_sigma_deg: float | None, as_printed: bool
+) -> Estimate | None:
+    """Gyroscopes by what their windows hold."""
+    if not observations.has_gyr:
+        return None
+    if observations.rotating.any():
+        return least_squares.gyroscopes(observations)
+    known = observations.oriented.all() and observations.latitude is not None
+    if observations.grade == "navigation" and known and len(observations) > 1:
+        return gyroscopes.bias_and_scale(observations, as_printed)
+    heading = (
+        None if heading_sigma_deg is None else float(np.deg2rad(heading_sigma_deg))
+    )
+    found = gyroscopes.bias(observations, heading, as_printed)
+    if observations.grade == "tactical":
+        return found
+    note = (
+        "the Earth's rate gives a scale factor only with two known positions and the "
+        "latitude: the gyroscopes have a bias only"
+    )
+    return replace(found, warnings=(*found.warnings, note))

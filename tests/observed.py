@@ -1,0 +1,120 @@
+"""What ideal devices would show, worked out apart from the estimators."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fieldcal.calibration import Nominal
+from fieldcal.gravity import gravity
+from fieldcal.positions import Position
+from fieldcal.samples import Array
+from fieldcal.solve import Observations
+from fieldcal.windows import Average
+
+G = 9.81
+OMEGA = 7.292115e-5
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+BIAS = np.array([0.12, -0.08, 0.21])
+SCALE = np.array([1.004, 0.997, 1.006])
+COUPLING = np.array([[0.0, -0.008, 0.002], [0.006, 0.0, 0.003], [-0.004, 0.007, 0.0]])
+GYR_BIAS = np.array([0.011, -0.032, 0.0021])
+
+
+def carried(alpha: float, beta: float, vector: Sequence[float]) -> Array:
+    """Components of a vector in a frame turned by alpha about z, beta about x."""
+    seen = Rotation.from_euler("z", -alpha).apply(vector)
+    return np.asarray(Rotation.from_euler("x", -beta).apply(seen))
+
+
+def force(
+    alpha: float, beta: float, offset: Sequence[float] = (0, 0),
+    base: Sequence[float] = (0, 0), g: float = G,
+) -> Array:  # fmt: skip
+    """Specific force at rest, angles in rad; the tilt is (alpha0, beta0) or (x, z)."""
+    home = carried(base[1], base[0], [0, -g, 0])
+    return carried(alpha + offset[0], beta + offset[1], home.tolist())
+
+
+def outputs(
+    positions: Sequence[Position],
+    *,
+    offset_deg: Sequence[float] = (0, 0),
+    base_deg: Sequence[float] = (0, 0),
+    mounting: Array | None = None,
+    bias: Array = BIAS,
+    scale: Array = SCALE,
+    coupling: Array | None = None,
+    g: float = G,
+) -> Array:
+    """Accelerometers' means without noise, (n, 3), device axes."""
+    p = np.eye(3) if mounting is None else mounting
+    offset, base = np.deg2rad(offset_deg).tolist(), np.deg2rad(base_deg).tolist()
+    m = np.diag(scale) + (0 if coupling is None else coupling)
+    rows = []
+    for at in positions:
+        assert at.alpha is not None and at.beta is not None
+        f = force(at.alpha, at.beta, offset, base, g)
+        rows.append(bias + m @ (p.T @ f))
+    return np.array(rows)
+
+
+def observe(
+    positions: Sequence[Position],
+    acc: Array,
+    *,
+    gyr: Array | None = None,
+    sigma: float = 1e-3,
+    sigma_gyr: float = 2e-5,
+    **known: Any,
+) -> Observations:
+    """Observations with white noise of known size in the windows."""
+    n = len(positions)
+    mean = np.full((n, 6), np.nan)
+    mean[:, :3] = acc
+    if gyr is not None:
+        mean[:, 3:] = gyr
+    cov = np.diag([sigma**2] * 3 + [sigma_gyr**2] * 3)
+    known.setdefault("gravity", G)
+    return Observations(tuple(positions), mean, np.tile(cov, (n, 1, 1)), **known)
+
+
+def practice(name: str) -> tuple[Observations, dict[str, Any]]:
+    """Load a practice session's windows and what it conceals."""
+    folder = SHARED / "practice" / name
+    if not folder.is_dir():
+        pytest.skip(f"practice sessions are not here: {folder}")
+    about = tomllib.loads((folder / "session.toml").read_text())
+    with gzip.open(folder / "samples.csv.gz", "rt") as file:
+        rows = csv.reader(file)
+        next(rows)
+        table = np.array(list(rows), dtype=float)
+    positions, averages = [], []
+    for p in about["position"]:
+        inside = (table[:, 0] >= p["start_s"]) & (table[:, 0] < p["end_s"])
+        six = table[inside, 1:7]
+        positions.append(Position.deg(p["alpha_deg"], p["beta_deg"]))
+        cov = np.cov(six.T) / len(six)
+        averages.append(
+            Average(six.mean(axis=0), cov, 24.0, len(six), p["start_s"], p["end_s"])
+        )
+    site = about["site"]
+    observations = Observations.of(
+        positions,
+        averages,
+        gravity(site["latitude_deg"], site["height_m"]),
+        latitude=float(np.deg2rad(site["latitude_deg"])),
+        nominal=Nominal(**{k: tuple(v) for k, v in about["nominal"].items()}),
+    )
+    answers = json.loads((folder.parent / "answers.json").read_text())[name]
+    return observations, answers

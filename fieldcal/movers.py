@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
-import socket
 import subprocess
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol, Self
 
 from fieldcal.errors import DeviceError
 from fieldcal.positions import Position
+from fieldcal.sim_device.remote import Remote
 
 
 class Mover(Protocol):
@@ -35,6 +36,10 @@ class VirtualDevice:
     ----------
     options : of ``fieldcal sim``
 
+    Attributes
+    ----------
+    port : path of its pseudo-terminal
+
     Raises
     ------
     DeviceError
@@ -43,48 +48,41 @@ class VirtualDevice:
     """
 
     def __init__(self, options: Sequence[str]) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="fieldcal-")
+        self._truth = Path(self._folder.name) / "truth.json"
         command = [sys.executable, "-m", "fieldcal", "sim", *options]
         self._process = subprocess.Popen(
-            command,
+            [*command, "--truth", str(self._truth)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {"PYTHONUNBUFFERED": "1"},
         )
-        self.port = self._line()
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            self._socket.settimeout(10.0)
-            self._socket.connect(self._line())
-        except OSError as error:
+            self.port = self._line()
+            self._remote = Remote(self._line())
+        except BaseException:
             self.close()
-            raise DeviceError(
-                f"the virtual device cannot be reached: {error}"
-            ) from error
-        self._replies = self._socket.makefile("r", encoding="utf-8")
+            raise
 
     def _line(self) -> str:
-        assert self._process.stdout is not None  # noqa: S101
-        line = self._process.stdout.readline().strip()
+        out = self._process.stdout
+        line = out.readline().strip() if out else ""
         if not line:
             _, said = self._process.communicate()
             last = said.strip().splitlines()[-1:] or ["it said nothing"]
             raise DeviceError(f"the virtual device did not start: {last[0]}")
         return line
 
+    @property
+    def truth(self) -> Mapping[str, Any]:
+        """What it conceals."""
+        truth: Mapping[str, Any] = json.loads(self._truth.read_text(encoding="utf-8"))
+        return truth
+
     def ask(self, **request: Any) -> dict[str, Any]:
         """Send a request to the control socket and return the reply."""
-        try:
-            self._socket.sendall(json.dumps(request).encode() + b"\n")
-            reply: dict[str, Any] = json.loads(self._replies.readline() or "{}")
-        except (OSError, ValueError) as error:
-            raise DeviceError(
-                f"the virtual device does not answer: {error}; start it again"
-            ) from error
-        if "error" in reply or not reply:
-            raise DeviceError(f"the virtual device refuses: {reply.get('error', '')}")
-        return reply
+        return self._remote.ask(**request)
 
     def turn(self, position: Position) -> None:
         """Begin to turn to a position."""
@@ -94,14 +92,15 @@ class VirtualDevice:
 
     def close(self) -> None:
         """End the process; safe to call twice."""
+        if hasattr(self, "_remote"):
+            self._remote.close()
         self._process.terminate()
         try:
             self._process.communicate(timeout=5.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.communicate()
-        if hasattr(self, "_socket"):
-            self._socket.close()
+        self._folder.cleanup()
 
     def __enter__(self) -> Self:
         return self

@@ -89,11 +89,12 @@ def run(args: argparse.Namespace) -> int:
     _check(task)
     with _link(args, task) as (driver, mover):
         found = _record(args, task, driver, mover)
+        truth = getattr(mover, "truth", None)
     written = Session.open(task.folder).write_json(RESULT, found.to_json())
     if args.json:
         sys.stdout.write(json.dumps(found.to_json()) + "\n")
     else:
-        show(found)
+        show(found, truth)
         sys.stdout.write(f"recorded: {task.folder}\nwritten:  {written}\n")
     return 0 if found.good else 1
 
@@ -212,7 +213,10 @@ def _virtual(args: argparse.Namespace, task: Task) -> list[str]:
 
     site = task.about
     options = ["--serial", VIRTUAL_FORMAT, "--speed", args.speed, "--seed", args.seed]
-    options += ["--latitude", str(site.latitude_deg), "--height", str(site.height_m)]
+    options += [f"--latitude={site.latitude_deg}", f"--height={site.height_m}"]
+    options += [f"--mounting={','.join(site.axes)}", f"--grade={site.grade}"]
+    if "gravity" in site.raw.get("site", {}):
+        options.append(f"--gravity={site.gravity}")
     return options + shlex.split(args.virtual)
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import IO
+from collections.abc import Mapping
+from typing import IO, Any
 
 from fieldcal.calibration import Calibration
 
@@ -33,31 +34,70 @@ def number(value: float, sigma: float) -> tuple[str, str]:
     return f"{value:.{digits}f}", f"{sigma:.{digits}f}"
 
 
-def show(calibration: Calibration, out: IO[str] | None = None) -> None:
-    """Print the table, the fit, the verdict and the warnings."""
+def show(
+    calibration: Calibration,
+    truth: Mapping[str, Any] | None = None,
+    out: IO[str] | None = None,
+) -> None:
+    """Print the table, the fit, the verdict and the warnings.
+
+    Parameters
+    ----------
+    calibration : to show
+    truth : what a virtual device conceals, shown beside it
+    out : standard output, unless given
+
+    """
     from rich.console import Console
     from rich.table import Table
 
     console = Console(file=out, highlight=False)
     table = Table(title="Calibration", title_justify="left")
-    for column in ("parameter", "", "value", "± 1σ", "unit"):
-        right = column in ("value", "± 1σ")
+    columns = ["parameter", "", "value", "± 1σ", "unit"]
+    columns += ["concealed", "off by"] if truth else []
+    for column in columns:
+        right = column in ("value", "± 1σ", "concealed", "off by")
         table.add_column(column, justify="right" if right else "left", no_wrap=True)
-    rows = zip(calibration.names, calibration.values, calibration.sigma, strict=True)
+    concealed = _flat(truth or {})
     before = ""
+    rows = zip(calibration.names, calibration.values, calibration.sigma, strict=True)
     for (name, value, sigma), unit in zip(rows, calibration.units, strict=True):
         group, _, component = name.partition(".")
         if before and group != before:
             table.add_section()
         title = TITLES.get(group, group) if group != before else ""
-        table.add_row(title, component, *number(value, sigma), unit)
+        cells = [title, component, *number(value, sigma), unit]
+        if name in concealed:
+            true = concealed[name]
+            cells += [number(true, sigma)[0], f"{(value - true) / sigma:+.1f} σ"]
+        table.add_row(*cells)
         before = group
     console.print(table)
-    console.print(_fit(calibration))
+    _tell(console, calibration)
+
+
+def _tell(console: Any, calibration: Calibration) -> None:
+    def line(text: str) -> None:
+        console.print(text, markup=False, soft_wrap=True)
+
+    line(_fit(calibration))
     for warning in calibration.warnings:
-        console.print(f"! {warning}", markup=False)
-    verdict = "good" if calibration.good else "BAD: do not use these numbers"
-    console.print(f"verdict: {verdict}", markup=False)
+        line(f"! {warning}")
+    good = "good" if calibration.good else "BAD: do not use these numbers"
+    line(f"verdict: {good}")
+
+
+def _flat(truth: Mapping[str, Any]) -> dict[str, float]:
+    """Concealed values by the full names of a calibration."""
+    flat = {
+        f"{group}.{axis}": float(value)
+        for group in ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+        for axis, value in zip("xyz", truth.get(group, ()), strict=False)
+    }
+    for group, parameters in truth.get("effects", {}).items():
+        if isinstance(parameters, Mapping):
+            flat |= {f"{group}.{k}": float(v) for k, v in parameters.items()}
+    return flat
 
 
 def _fit(calibration: Calibration) -> str:

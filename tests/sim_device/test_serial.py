@@ -105,7 +105,7 @@ def test_the_samples_are_those_of_the_device_at_any_speed(
 
     tilt = effect("base_tilt", {"about_x_deg": -1, "about_z_deg": 0.5})
     twin = VirtualDevice(VirtualDevice().profile.having(tilt), seed=7)
-    twin.turn(*np.deg2rad([30.0, 5.0]), at=1.0)
+    twin.turn(np.deg2rad(30.0), np.deg2rad(5.0), at=1.0)
     block = concat([twin.take(1) for _ in range(600)])
     np.testing.assert_array_equal(ms, np.arange(0, 6000, 10))
     np.testing.assert_array_equal(got, np.rint(block.six / LSB))
@@ -138,7 +138,7 @@ def test_a_fast_device_waits_for_its_reader(sims: list[Sim]) -> None:
         assert remote.ask(status=True)["time_s"] == 0.0
         port = sim.open()
         ms, _ = words(read(port, 100 * SAMPLE))
-        stopped = []
+        stopped: list[float] = []
         while len(stopped) < 3 or stopped[-1] != stopped[-3]:
             stopped.append(remote.ask(status=True)["time_s"])
             select.select([], [], [], 0.05)

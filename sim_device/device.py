@@ -70,10 +70,17 @@ class VirtualDevice:
         """When the last turn it was told ends, s; -inf before any."""
         return self.body.joints.busy_until * self.sensing.pace
 
-    def turn(self, alpha: float, beta: float, seconds: float | None = None) -> float:
+    def turn(
+        self,
+        alpha: float,
+        beta: float,
+        seconds: float | None = None,
+        at: float | None = None,
+    ) -> float:
         """Turn to the angles; returns the device time at which that is done.
 
-        A turn that is told while another is under way follows it.
+        The turn begins with the next sample, or at a device time `at` still to come; a
+        turn that is told while another is under way or to come follows it.
 
         Raises
         ------
@@ -81,8 +88,7 @@ class VirtualDevice:
             If the angles or the duration are not finite, or the duration not above 0.
 
         """
-        start = self.time / self.sensing.pace
-        _, end = self.body.turn(start, self._duration(seconds), (alpha, beta))
+        _, end = self.body.turn(self._start(at), self._duration(seconds), (alpha, beta))
         return end * self.sensing.pace
 
     def spin(
@@ -90,6 +96,7 @@ class VirtualDevice:
         rate: tuple[float, float, float],
         angles: tuple[float, float] | None = None,
         seconds: float | None = None,
+        at: float | None = None,
     ) -> float:
         """Run up to a constant rate about procedure axes, rad/s, as on a rate table.
 
@@ -101,9 +108,8 @@ class VirtualDevice:
             As for `turn`.
 
         """
-        start = self.time / self.sensing.pace
         where = self.angles if angles is None else angles
-        _, end = self.body.spin(start, self._duration(seconds), where, rate)
+        _, end = self.body.spin(self._start(at), self._duration(seconds), where, rate)
         return end * self.sensing.pace
 
     def bump(
@@ -138,6 +144,15 @@ class VirtualDevice:
         block = Block.of(t, six[:3].T, six[3:].T, degrees, seq, host)
         kept = self.sensing.chain.arrives(n)
         return block if kept.all() else _only(block, kept)
+
+    def _start(self, at: float | None) -> float:
+        """True time of the next sample, or of a device time to come."""
+        start = self.time if at is None else at
+        if not start >= self.time:
+            raise InputError(
+                f"at {start:g} s nothing can begin any more: it is {self.time:g} s"
+            )
+        return start / self.sensing.pace
 
     def _duration(self, seconds: float | None) -> float:
         value = self.profile.motion.turn_s if seconds is None else seconds

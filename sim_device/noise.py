@@ -26,6 +26,9 @@ from fieldcal.sim_device.profile import NoiseFigures, Triad
 FLICKER_TAU = 4.0 ** np.arange(8)
 """Correlation times of the terms of 1/f noise, s."""
 
+BLOCK = 64
+"""Ticks of the sampling clock that a Gauss-Markov process is calculated in."""
+
 
 def stream(seed: int, name: str) -> np.random.Generator:
     """Random numbers for one purpose, apart from those of every other."""
@@ -50,7 +53,14 @@ class Walk:
 
 
 class GaussMarkov:
-    """Bias (n2) that wanders within its standard deviation `size` (6,)."""
+    """Bias (n2) that wanders within its standard deviation `size` (6,).
+
+    The recursion runs in blocks of `BLOCK` ticks counted from the start, side by side,
+
+        x_(b, j) = y_(b, j) + c^(j+1) x_(b-1, last),  y_(b, j) = c y_(b, j-1) + drive
+
+    so that the values do not depend on the pieces they are drawn in.
+    """
 
     def __init__(
         self, size: Array, tau: float, rate: float, rng: np.random.Generator
@@ -58,20 +68,28 @@ class GaussMarkov:
         self._keep = float(np.exp(-1 / (rate * tau)))
         self._step = size * np.sqrt(1 - self._keep**2)
         self._rng = rng
-        self._state = self._keep * size * rng.standard_normal((1, 6))
+        self._last: Array = size * rng.standard_normal(6)
+        self._ready: Array = np.empty((0, 6))
 
     def draw(self, n: int) -> Array:
         """Next `n` values, (6, n)."""
-        from scipy.signal import lfilter
+        lacking = n - len(self._ready)
+        if lacking > 0:
+            more = self._more(-(-lacking // BLOCK))
+            self._ready = np.concatenate([self._ready, more])
+        values, self._ready = self._ready[:n], self._ready[n:]
+        return values.T
 
-        drive: Array = self._step * self._rng.standard_normal((n, 6))
-        if not n:
-            return drive.T
-        values, self._state = lfilter(
-            [1.0], [1.0, -self._keep], drive, axis=0, zi=self._state
-        )  # (n2)
-        path: Array = np.asarray(values).T
-        return path
+    def _more(self, blocks: int) -> Array:
+        """Whole blocks, (blocks * BLOCK, 6)."""
+        x: Array = self._step * self._rng.standard_normal((blocks, BLOCK, 6))
+        for j in range(1, BLOCK):
+            x[:, j] += self._keep * x[:, j - 1]  # (n2)
+        fading = self._keep ** np.arange(1, BLOCK + 1)[:, None]
+        for block in x:
+            block += fading * self._last
+            self._last = block[-1].copy()
+        return x.reshape(-1, 6)
 
 
 class Noise:

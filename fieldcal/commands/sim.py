@@ -1,0 +1,255 @@
+"""`fieldcal sim`: be a virtual device on a link, moved by a script or by keys."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldcal.errors import InputError
+
+if TYPE_CHECKING:
+    from fieldcal.sim_device.profile import Profile
+    from fieldcal.sim_device.stream import Stream, Watched
+
+HELP = "be a virtual device on a link"
+
+EXAMPLE = """\
+  fieldcal sim --serial witmotion
+  fieldcal sim --serial "text?separator=semicolon&checksum=xor" --speed 20
+  fieldcal sim --base-tilt=-1,0.5 --with cross_coupling:k12=0.003,k21=-0.002
+"""
+
+INTERRUPTED = 130
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument_group("link").add_argument
+    add(
+        "--serial",
+        metavar="FORMAT",
+        default="witmotion",
+        help="wire format of the pty: witmotion or text, with options as in"
+        ' "text?separator=tab&columns=t,ax,ay,az" (default: witmotion)',
+    )
+    add("--port-link", type=Path, metavar="PATH", help="symbolic link to the pty")
+    add(
+        "--control",
+        type=Path,
+        metavar="PATH",
+        help="socket that takes orders (default: a new one, printed behind the port)",
+    )
+    add(
+        "--speed",
+        default="1",
+        metavar="X",
+        help="device time against the clock, or max: as fast as it is read (default:"
+        " 1; any other waits for the reader)",
+    )
+    add("--duration", type=float, metavar="S", help="end after so much device time")
+    add(
+        "--steps",
+        default="22.5,2.5",
+        metavar="A,B",
+        help="steps of the arrow keys in alpha and beta, deg (default: 22.5,2.5)",
+    )
+    _add_device(parser)
+
+
+def _add_device(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "device", "A list that begins with a minus is written as in --acc-bias=-0.3,0,0"
+    )
+    add = group.add_argument
+    add("--profile", type=Path, metavar="FILE", help="device file to start from")
+    add(
+        "--with",
+        dest="effects",
+        action="append",
+        default=[],
+        metavar="ID:PARAM=VALUE,…",
+        help="conceal an effect; may be given several times",
+    )
+    add("--seed", type=int, default=1, metavar="N", help="of all noise (default: 1)")
+    add("--rate", type=float, metavar="HZ", help="samples a second")
+    add("--grade", choices=("tactical", "navigation"))
+    add("--latitude", type=float, metavar="DEG")
+    add("--height", type=float, metavar="M", help="above the ellipsoid")
+    add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
+    add("--mounting", metavar="X,Y,Z", help="as in +x,-z,+y")
+    add("--turn-time", type=float, metavar="S", help="duration of a turn")
+    add("--base-tilt", metavar="X,Z", help="of the base, about x and z, deg")
+    add("--angle-offset", metavar="A,B", help="zeros of the joints, deg")
+    add("--acc-bias", metavar="X,Y,Z", help="m/s^2")
+    add("--acc-scale", metavar="X,Y,Z")
+    add("--gyr-bias", metavar="X,Y,Z", help="rad/s")
+    add("--gyr-scale", metavar="X,Y,Z")
+    add("--acc-noise", metavar="X,Y,Z", help="white, of a sample, m/s^2")
+    add("--gyr-noise", metavar="X,Y,Z", help="white, of a sample, rad/s")
+    add("--truth", type=Path, metavar="FILE", help="write what is concealed, as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command: run until told to stop, or interrupted."""
+    from fieldcal.sim_device.control import Control
+    from fieldcal.sim_device.device import VirtualDevice
+    from fieldcal.sim_device.line_faults import LineFaults
+    from fieldcal.sim_device.link_serial import SerialLink
+    from fieldcal.sim_device.orders import carry_out
+    from fieldcal.sim_device.stream import Stream
+    from fieldcal.sim_device.wire import open_wire
+
+    wire = open_wire(args.serial)
+    device = VirtualDevice(_profile(args), args.seed)
+    speed, duration = _speed(args.speed), _duration(args.duration)
+    steps = _numbers("--steps", args.steps, 2)
+    if args.truth:
+        _write(args.truth, device.concealed())
+    try:
+        with contextlib.ExitStack() as stack:
+            stack.enter_context(_interruptible())
+            faults = LineFaults(args.seed)
+            link = SerialLink(wire, faults, args.port_link)
+            stack.callback(link.close)
+            stream = Stream(device, link, faults, speed, duration, _say)
+            control = Control(lambda order: carry_out(stream, order), args.control)
+            stack.callback(control.close)
+            _say(link.address)
+            _say(str(control.path))
+            keys = stack.enter_context(_keys(stream, (steps[0], steps[1])))
+            stream.run(control, *keys)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return 0
+
+
+def _profile(args: argparse.Namespace) -> Profile:
+    """Return the device of the file, or the default, as the options change it."""
+    from dataclasses import replace
+
+    from fieldcal.sim_device import profile_file
+    from fieldcal.sim_device.profile import Profile
+    from fieldcal.sim_device.vocabulary import Effect, effect, parse
+
+    profile = profile_file.read(args.profile) if args.profile else Profile()
+    tables: dict[str, dict[str, Any]] = {
+        "device": {"grade": args.grade},
+        "sampling": {"rate_hz": args.rate},
+        "site": {
+            "latitude_deg": args.latitude,
+            "height_m": args.height,
+            "gravity": args.gravity,
+        },
+        "frame": {"mounting": args.mounting and tuple(args.mounting.split(","))},
+        "motion": {"turn_s": args.turn_time},
+        "truth": _triads(args, ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")),
+        "noise": {
+            name.removesuffix("_noise"): value
+            for name, value in _triads(args, ("acc_noise", "gyr_noise")).items()
+        },
+    }
+    more: list[Effect] = []
+    for option, id_, names in (
+        ("base_tilt", "base_tilt", ("about_x_deg", "about_z_deg")),
+        ("angle_offset", "angle_offset", ("alpha0_deg", "beta0_deg")),
+    ):
+        if text := getattr(args, option):
+            values = _numbers(f"--{option.replace('_', '-')}", text, 2)
+            more.append(effect(id_, dict(zip(names, values, strict=True))))
+    changes: dict[str, Any] = {}
+    for table, values_ in tables.items():
+        given = {key: value for key, value in values_.items() if value is not None}
+        changes[table] = replace(getattr(profile, table), **given)
+    effects = (*profile.effects, *more, *map(parse, args.effects))
+    return replace(profile, **changes, effects=effects)
+
+
+def _triads(args: argparse.Namespace, names: tuple[str, ...]) -> dict[str, Any]:
+    """Values of options of three numbers, None where not given."""
+    return {
+        name: text and _numbers(f"--{name.replace('_', '-')}", text, 3)
+        for name in names
+        for text in [getattr(args, name)]
+    }
+
+
+def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count or not all(map(math.isfinite, values)):
+        example = ",".join("1.5 0 -2".split()[:count])
+        raise InputError(
+            f"{option} {text!r} must be {count} numbers, as in {option}={example}"
+        )
+    return values
+
+
+def _speed(text: str) -> float:
+    if text == "max":
+        return math.inf
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = math.nan
+    if not (math.isfinite(speed) and speed > 0):
+        raise InputError(f"--speed {text!r} must be a number above 0, or max")
+    return speed
+
+
+def _duration(seconds: float | None) -> float:
+    if seconds is None:
+        return math.inf
+    if not seconds > 0:
+        raise InputError(f"--duration {seconds:g} s must be above 0 s")
+    return seconds
+
+
+def _write(path: Path, concealed: dict[str, Any]) -> None:
+    try:
+        path.write_text(json.dumps(concealed, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[None]:
+    """Treat being terminated, or losing the terminal, like an interrupt."""
+
+    def interrupt(number: int, frame: object) -> None:
+        for kind in kinds:
+            signal.signal(kind, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    kinds = (signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(kind, interrupt) for kind in kinds]
+    try:
+        yield
+    finally:
+        for kind, handler in zip(kinds, before, strict=True):
+            signal.signal(kind, handler)
+
+
+@contextlib.contextmanager
+def _keys(stream: Stream, steps: tuple[float, float]) -> Iterator[list[Watched]]:
+    """Listen to the keys, if there is somebody at a terminal."""
+    if not sys.stdin.isatty():
+        yield []
+        return
+    from fieldcal.sim_device.keys import Keys
+
+    with Keys(stream, steps, sys.stdin.fileno()) as keys:
+        yield [keys]

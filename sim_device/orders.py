@@ -1,0 +1,147 @@
+"""What a virtual device does when it is told to, by a script or by keys."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fieldcal.errors import InputError
+from fieldcal.sim_device.line_faults import KINDS
+from fieldcal.sim_device.vocabulary import AXES
+
+if TYPE_CHECKING:
+    from fieldcal.sim_device.stream import Stream
+
+Reply = dict[str, Any]
+
+
+def carry_out(stream: Stream, request: Mapping[str, Any]) -> Reply:
+    """Do what one request says; the keys are those of the control socket.
+
+    Raises
+    ------
+    InputError
+        If it is not understood; nothing has happened then.
+
+    """
+    if len(request) != 1 or (name := next(iter(request))) not in _ORDERS:
+        raise InputError(
+            f"a request has one key of {', '.join(_ORDERS)}, not {', '.join(request)}"
+        )
+    given = request[name]
+    if isinstance(given, Mapping):
+        values = dict(given)
+    elif given in (True, None):
+        values = {}
+    else:
+        raise InputError(f'{name} takes an object, as in {{"{name}": {{}}}}')
+    time = stream.device.time
+    return {"time_s": time, **_ORDERS[name](stream, values)}
+
+
+def _turn(stream: Stream, given: dict[str, Any]) -> Reply:
+    where = _angles(stream, given)
+    at, seconds = _optional(given, "at_s"), _optional(given, "seconds")
+    _nothing_else("turn", given, ("alpha_deg", "beta_deg", "seconds", "at_s"))
+    return {"until_s": stream.device.turn(*where, seconds=seconds, at=at)}
+
+
+def _spin(stream: Stream, given: dict[str, Any]) -> Reply:
+    where = _angles(stream, given)
+    at, seconds = _optional(given, "at_s"), _optional(given, "seconds")
+    rate = given.pop("rate_deg_s", None)
+    if not isinstance(rate, list) or len(rate) != len(AXES):
+        raise InputError("spin needs rate_deg_s, three numbers about x, y, z")
+    x, y, z = (_number({"rate_deg_s": r}, "rate_deg_s", 0.0) for r in rate)
+    _nothing_else("spin", given, ("rate_deg_s", "alpha_deg", "beta_deg", "seconds"))
+    turning = (math.radians(x), math.radians(y), math.radians(z))
+    return {"until_s": stream.device.spin(turning, where, seconds, at)}
+
+
+def _bump(stream: Stream, given: dict[str, Any]) -> Reply:
+    push, tilt = _number(given, "push", 2.0), _number(given, "tilt_deg", 0.5)
+    seconds = _number(given, "seconds", 0.5)
+    _nothing_else("bump", given, ("push", "tilt_deg", "seconds"))
+    return {"until_s": stream.device.bump(push, math.radians(tilt), seconds)}
+
+
+def _fault(stream: Stream, given: dict[str, Any]) -> Reply:
+    quiet = _number(given, "silence_s", 0.0)
+    away = _number(given, "hangup_s", 0.0)
+    if min(quiet, away) < 0:
+        raise InputError("silence_s and hangup_s must be 0 or more")
+    _nothing_else("fault", given, ("silence_s", "hangup_s", *KINDS), KINDS)
+    if not (quiet or away or given):
+        raise InputError(f"fault needs one of silence_s, hangup_s, {', '.join(KINDS)}")
+    if given:
+        stream.faults.order(given)
+    until = [stream.silence(quiet)] if quiet else []
+    until += [stream.hang_up(away)] if away else []
+    return {"until_s": max(until, default=stream.device.time)}
+
+
+def _status(stream: Stream, given: dict[str, Any]) -> Reply:
+    _nothing_else("status", given, ())
+    device = stream.device
+    alpha, beta = np.rad2deg(device.angles)
+    return {
+        "alpha_deg": float(alpha),
+        "beta_deg": float(beta),
+        "moving": device.time < device.busy_until,
+        "attached": stream.link.attached(),
+        "port": stream.link.address,
+        "pending_bytes": stream.link.pending,
+    }
+
+
+def _stop(stream: Stream, given: dict[str, Any]) -> Reply:
+    _nothing_else("stop", given, ())
+    stream.stop()
+    return {"stopped": True}
+
+
+_ORDERS: Mapping[str, Callable[[Stream, dict[str, Any]], Reply]] = {
+    "turn": _turn,
+    "spin": _spin,
+    "bump": _bump,
+    "fault": _fault,
+    "status": _status,
+    "stop": _stop,
+}
+
+
+def _angles(stream: Stream, given: dict[str, Any]) -> tuple[float, float]:
+    """Angles asked for, rad; one that is not given stays as it is."""
+    now = np.rad2deg(stream.device.angles)
+    alpha = _number(given, "alpha_deg", float(now[0]))
+    beta = _number(given, "beta_deg", float(now[1]))
+    return math.radians(alpha), math.radians(beta)
+
+
+def _optional(given: dict[str, Any], name: str) -> float | None:
+    return _number(given, name, 0.0) if name in given else None
+
+
+def _number(given: dict[str, Any], name: str, default: float) -> float:
+    if name not in given:
+        return default
+    value = given.pop(name)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not math.isfinite(value):
+        raise InputError(f"{name} must be a number, not {value!r}")
+    return float(value)
+
+
+def _nothing_else(
+    name: str,
+    left: Mapping[str, Any],
+    takes: tuple[str, ...],
+    may: tuple[str, ...] = (),
+) -> None:
+    for key in left:
+        if key not in may:
+            some = ", ".join(takes) or "nothing"
+            raise InputError(f"{name} does not take {key!r}; it takes {some}")

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,20 @@ from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.errors import InputError
 from fieldcal.samples import Array, Block, concat
+
+ENOUGH = 3
+"""Samples that make a format likely."""
+
+LIKELY = 0.25
+"""Score from which a format is named."""
+
+
+class Likeness(NamedTuple):
+    """How well bytes fit a format, 0 to 1, the options it takes, samples found."""
+
+    score: float
+    query: str
+    samples: int
 
 
 class Codec(ABC):
@@ -68,6 +82,23 @@ class Codec(ABC):
         self._begin += len(self._rest)
         self._rest = b""
 
+    @classmethod
+    def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
+        """Judge whether bytes that came in so many seconds are of this format."""
+        return cls.decoded(data)
+
+    @classmethod
+    def decoded(cls, data: bytes, query: str = "") -> Likeness | None:
+        """Judge bytes by the share that decodes with these options."""
+        declared = f"{query}&rate=1" if query else "rate=1"
+        codec = cls(Options("probe", declared))
+        codec.feed(data, 0.0)
+        health = codec.health
+        if health.samples < ENOUGH:
+            return None
+        share = 1 - health.skipped / health.received
+        return Likeness(share, query, health.samples)
+
     @abstractmethod
     def scan(self, data: Bytes) -> Candidates:
         """Say where frames may begin."""
@@ -100,6 +131,16 @@ class Codec(ABC):
         return block
 
 
+def recognise(data: bytes, seconds: float) -> tuple[str, Likeness] | None:
+    """Name the format that bytes fit best, and how well; None if they fit none."""
+    found = []
+    for name in formats():
+        like = codec_class(name).likeness(data, seconds)
+        if like is not None and like.score > LIKELY:
+            found.append((name, like))
+    return max(found, key=lambda pair: pair[1].score, default=None)
+
+
 def formats() -> list[str]:
     """Names of the wire formats there are."""
     return sorted(module.name for module in iter_modules(protocols.__path__))
@@ -114,8 +155,13 @@ def open_codec(name: str, options: Options) -> Codec:
         If there is no such format, or it refuses its options.
 
     """
+    return codec_class(name)(options)
+
+
+def codec_class(name: str) -> type[Codec]:
+    """Return the class of a wire format; InputError if there is none."""
     if name not in formats():
         known = ", ".join(formats())
         raise InputError(f"no wire format {name!r}: there are {known}")
-    codec: Codec = import_module(f"{protocols.__name__}.{name}").Codec(options)
+    codec: type[Codec] = import_module(f"{protocols.__name__}.{name}").Codec
     return codec

@@ -66,7 +66,7 @@ class Reader:
         name: str,
         connect: Callable[[], Source],
         patience: float,
-        limit: int = 1 << 22,
+        limit: int = 1 << 20,
     ) -> None:
         self._name, self._connect = name, connect
         self._patience, self._limit = patience, limit

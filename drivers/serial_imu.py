@@ -14,14 +14,17 @@ from typing import ClassVar
 import serial
 
 from fieldcal.driver import Driver
-from fieldcal.drivers.codec import open_codec
+from fieldcal.drivers.codec import open_codec, recognise
 from fieldcal.drivers.options import split
-from fieldcal.drivers.reader import Reader
+from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Block
 
 POLL = 0.1
 """Longest wait for a byte before the reader looks whether it should end, s."""
+
+HEARD, RECENT = 4096, 1 << 14
+"""Chunks and bytes kept to tell what it is that comes, if it is not the format."""
 
 REASONS = {
     errno.ENOENT: "there is no such port; plug it in, or see `fieldcal ports`",
@@ -77,7 +80,9 @@ class Imu(Driver):
         if not port:
             raise InputError("serial: name a port, such as serial:/dev/ttyUSB0")
         self.name = port
-        self._codec = open_codec(options.text("format", "witmotion"), options)
+        self._format = options.text("format", "witmotion")
+        self._codec = open_codec(self._format, options)
+        self._heard: list[Chunk] = []
         self.health = self._codec.health
         baud = int(options.number("baud", self._codec.bauds[0], 50, 1e8))
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
@@ -95,12 +100,28 @@ class Imu(Driver):
         while True:
             chunks = self._reader.take(max(0.0, deadline - monotonic()))
             block = self._codec.feed_all(chunks)
-            if block is not None or monotonic() >= deadline:
+            if block is not None:
+                self._heard = []
                 return block
+            self._heard = [*self._heard, *chunks][-HEARD:]
+            if monotonic() >= deadline:
+                return None
 
     def close(self) -> None:
         """Release the port; safe to call twice."""
         self._reader.close()
+
+    def _garbage(self) -> str:
+        data = b"".join(chunk.data for chunk in self._heard)[-RECENT:]
+        known = recognise(data, self._heard[-1].t_host - self._heard[0].t_host)
+        if known is None:
+            return (
+                "bytes come, but no format that is known; check the baud rate, or ask "
+                f"`fieldcal ports --probe {self.name}`"
+            )
+        name, like = known
+        query = f"&{like.query}" if like.query else ""
+        return f"these are no {self._format} bytes; try format={name}{query}"
 
 
 def reason(fault: BaseException) -> str:

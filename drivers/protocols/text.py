@@ -5,7 +5,7 @@ t, seq, ax … gz, temperature is passed over), between ``separator``: a charact
 comma, semicolon, tab, space. Units are ``t_unit`` (s, ms, us, ns), ``acc_unit`` and
 ``gyr_unit`` as in session.toml. ``checksum=xor`` asks each line for the two hexadecimal
 digits behind ``*`` that NMEA 0183 has: the exclusive or of all between ``$`` and ``*``.
-``prefix=$IMU`` passes over lines that begin otherwise.
+``prefix=IMU`` passes over lines that begin otherwise; a ``$`` is no part of it.
 
 Headers and comments (lines that begin with a letter or one of # % ; / ") and blank
 lines are passed over, any other line that is not whole is refused. Without a checksum
@@ -25,6 +25,8 @@ import numpy as np
 from fieldcal.description import ACC_UNITS, GYR_UNITS
 from fieldcal.drivers.arrivals import choose
 from fieldcal.drivers.codec import Codec as Base
+from fieldcal.drivers.codec import Likeness
+from fieldcal.drivers.columns import guess
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.timebase import Stamps, Timebase
@@ -68,7 +70,7 @@ class Codec(Base):
         super().__init__(options)
         self._names = options.text("columns", DEFAULT).split(",")
         self._separator = _separator(options)
-        prefix = options.text("prefix")
+        prefix = options.text("prefix").lstrip("$!")
         prefix += chr(self._separator) if prefix else ""
         self._prefix = np.frombuffer(prefix.encode(), np.uint8)
         self._checked = options.choice("checksum", ("none", "xor"), "none") == "xor"
@@ -98,6 +100,16 @@ class Codec(Base):
             raise InputError(
                 f"columns={','.join(self._names)}: name ax,ay,az or gx,gy,gz or both"
             )
+
+    @classmethod
+    def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
+        """Judge bytes by how their lines look; the columns are guessed."""
+        query = guess(data, seconds)
+        if query is None:
+            return None
+        like = cls.decoded(data, query)
+        # lines of numbers may also be a format of their own
+        return like and Likeness(0.5 * like.score, query, like.samples)
 
     def scan(self, data: Bytes) -> Candidates:
         """Every line that has ended."""
@@ -142,8 +154,10 @@ class Codec(Base):
         n = len(self._prefix)
         if not n:
             return np.ones(len(starts), dtype=bool)
-        padded = np.concatenate([data, np.zeros(n, np.uint8)])
-        begin = np.lib.stride_tricks.sliding_window_view(padded, n)[starts]
+        padded = np.concatenate([data, np.zeros(n + 1, np.uint8)])
+        begin = np.lib.stride_tricks.sliding_window_view(padded, n)[
+            starts + DOLLAR[data[starts]]
+        ]
         ours: Mask = (begin == self._prefix).all(axis=1)
         return ours
 
@@ -168,7 +182,7 @@ class Codec(Base):
             good &= (data[stop] == STAR) & (
                 HEX[high] * 16 + HEX[low] == _xor(data, starts, stop)
             )
-        body = starts + len(self._prefix)
+        body = starts + DOLLAR[data[starts]] + len(self._prefix)
         good &= _between(STRANGE[data], body, stop) == 0
         good &= self._fields(data, body, stop) == len(self._names)
         return good
@@ -190,9 +204,10 @@ class Codec(Base):
         text[tail[tail < ends - 1]] = SPACE
         for i in range(1, 1 + CHECK * self._checked):
             text[tail - i] = SPACE
+        head = starts + DOLLAR[text[starts]]
         text[starts[DOLLAR[text[starts]]]] = SPACE
         for i in range(len(self._prefix)):
-            text[starts + i] = SPACE
+            text[head + i] = SPACE
         if np.any(starts[1:] != ends[:-1]):
             keep = np.zeros(len(text) + 1, dtype=np.int8)
             np.add.at(keep, starts, 1)

@@ -1,0 +1,90 @@
+"""Listen to a port: which device answers, at which rate, in which format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from time import monotonic
+from typing import NamedTuple
+
+from fieldcal.drivers.codec import codec_class, formats, recognise
+from fieldcal.drivers.serial_imu import SerialPort
+from fieldcal.errors import DeviceError
+
+SILENT = 2
+"""Baud rates at which not a byte came, after which there is no device."""
+
+ENOUGH = 4000
+"""Bytes after which a format shows."""
+
+
+class Finding(NamedTuple):
+    """What was heard on a port.
+
+    Attributes
+    ----------
+    port : its path
+    url : address that opens it, empty if no format was known
+    format : name of the format, empty if none was known
+    baud : rate at which it was known, 0 if none
+    rate_hz : samples a second, as they arrived
+    says : one sentence
+
+    """
+
+    port: str
+    url: str
+    format: str
+    baud: int
+    rate_hz: float
+    says: str
+
+
+def bauds() -> list[int]:
+    """Baud rates to try: what most formats use first."""
+    ranked: dict[int, float] = {}
+    for name in formats():
+        for rank, baud in enumerate(codec_class(name).bauds):
+            ranked[baud] = ranked.get(baud, 0.0) + 1 / (1 + rank)
+    return sorted(ranked, key=lambda baud: -ranked[baud])
+
+
+def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> Finding:
+    """Listen at one baud rate after the other, at most so many seconds each."""
+    heard = silent = 0
+    for baud in bauds() if rates is None else rates:
+        try:
+            data, took = _listen(port, baud, seconds)
+        except (DeviceError, OSError) as fault:
+            return Finding(port, "", "", 0, 0.0, str(fault))
+        heard += len(data)
+        silent += not data
+        if silent >= SILENT and not heard:
+            break
+        known = recognise(data, took)
+        if known is not None:
+            name, like = known
+            query = f"&{like.query}" if like.query else ""
+            url = f"serial:{port}?format={name}&baud={baud}{query}"
+            rate = like.samples / took
+            says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
+            return Finding(port, url, name, baud, rate, says)
+    says = (
+        "bytes come, but no format that is known"
+        if heard
+        else "nothing comes; is the device powered and sending?"
+    )
+    return Finding(port, "", "", 0, 0.0, says)
+
+
+def _listen(port: str, baud: int, seconds: float) -> tuple[bytes, float]:
+    """Bytes of a port, and how long they took."""
+    link = SerialPort(port, baud)
+    try:
+        data, begin = bytearray(), monotonic()
+        took = 0.0
+        while took < seconds and not (len(data) > ENOUGH and took > seconds / 4):
+            data += link.read()
+            took = monotonic() - begin
+        return bytes(data), took
+    finally:
+        link.close()

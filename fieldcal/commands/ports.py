@@ -1,0 +1,86 @@
+"""`fieldcal ports`: what is plugged in, and with --probe, what it speaks."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+EXAMPLE = """\
+  fieldcal ports
+  fieldcal ports --probe
+  fieldcal ports --probe /dev/ttyUSB0
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add("port", nargs="*", metavar="PORT", help="only these; a pty may be one")
+    add("--probe", action="store_true", help="listen which device answers, and how")
+    add(
+        "--seconds",
+        type=float,
+        default=1.0,
+        metavar="S",
+        help="listen so long at each baud rate (default: 1)",
+    )
+    add("--baud", type=int, action="append", metavar="N", help="try only this rate")
+    add("--json", action="store_true", help="print one JSON object instead of a table")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    ports = _named(args.port) if args.port else _plugged_in()
+    if args.probe:
+        from fieldcal.drivers.probe import probe
+
+        for port in ports:
+            sys.stderr.write(f"listening to {port['port']} ...\n")
+            found = probe(port["port"], args.seconds, args.baud)
+            port["answer"] = found._asdict()
+    if args.json:
+        sys.stdout.write(json.dumps({"ports": ports}) + "\n")
+    elif ports:
+        _show(ports, args.probe)
+    else:
+        sys.stdout.write("no serial port is plugged in\n")
+    asked = args.probe and args.port
+    return 3 if asked and not all(port["answer"]["url"] for port in ports) else 0
+
+
+def _plugged_in() -> list[dict[str, Any]]:
+    from serial.tools.list_ports import comports
+
+    return [_described(port) for port in sorted(comports())]
+
+
+def _named(names: list[str]) -> list[dict[str, Any]]:
+    known = {port["port"]: port for port in _plugged_in()}
+    return [known.get(name, {"port": name, "what": "", "serial": ""}) for name in names]
+
+
+def _described(port: Any) -> dict[str, Any]:
+    """What the system knows of a port."""
+    usb = f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None else ""
+    parts = (port.manufacturer, port.product or port.description, usb)
+    what = " ".join(part for part in parts if part and part != "n/a")
+    return {"port": port.device, "what": what, "serial": port.serial_number or ""}
+
+
+def _show(ports: list[dict[str, Any]], probed: bool) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, soft_wrap=True)
+    table = Table("port", "what it is", "serial number")
+    if probed:
+        table.add_column("what it says")
+    for port in ports:
+        row = [port["port"], port["what"] or "?", port["serial"] or "?"]
+        table.add_row(*row, *([port["answer"]["says"]] if probed else []))
+    console.print(table)
+    for port in ports:
+        if probed and port["answer"]["url"]:
+            console.print(f"to use it: {port['answer']['url']}", markup=False)

@@ -15,20 +15,14 @@ from collections.abc import Callable
 from threading import Condition, Thread
 from typing import NamedTuple, Protocol
 
+from fieldcal.driver import host_clock
 from fieldcal.errors import DeviceError
-
-_STARTED = time.time() - time.monotonic()
 
 BATCH = 0.02
 """Shortest time between two deliveries, s: a batch costs the same however long."""
 
 RETRY = 0.1
 """Time between two attempts to open a broken link again, s."""
-
-
-def host_clock() -> float:
-    """Host time in s since 1970 that is never set back."""
-    return _STARTED + time.monotonic()
 
 
 class Chunk(NamedTuple):

@@ -16,11 +16,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
-from time import monotonic
+from time import monotonic, time
 from typing import ClassVar, Self
 
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.samples import Block, concat
+
+_STARTED = time() - monotonic()
+
+
+def host_clock() -> float:
+    """Host time in s since 1970 that is never set back; what `Block.t_host` counts."""
+    return _STARTED + monotonic()
 
 
 @dataclass(slots=True)

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 
 from fieldcal.arrival import Arrival, Held, judge
 from fieldcal.description import Description
-from fieldcal.driver import Driver, Health
+from fieldcal.driver import Driver, Health, host_clock
 from fieldcal.errors import FieldcalError, Moved, WrongPosition
 from fieldcal.plan import Hold, Note, Plan, Step
 from fieldcal.recorder import Recorder
@@ -35,6 +36,9 @@ SETTLE = 1.5
 
 PATIENCE = 3.0
 """Rest at a wrong place before that is said, s: a person stops in between."""
+
+PIECE = 0.1
+"""Longest stretch of samples that is looked at as one, s."""
 
 GAP = 0.5
 """Longest time without samples inside a window, s."""
@@ -158,7 +162,7 @@ class Engine:
             self._recorder.append(block)
             if len(block) > 1:
                 self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
-            yield block
+            yield from _pieces(block)
 
     def _force(self, block: Block) -> Array:
         """Mean specific force in procedure axes by the nominal calibration, (3,)."""
@@ -172,7 +176,10 @@ class Engine:
         stillness, resting = Stillness(), _Resting()
         began: float | None = None
         told = False
+        asked = host_clock()
         for block in self._stream:
+            if block.t_host[-1] < asked:
+                continue  # it waited in the link: where the device was before
             began = block.t[0] if began is None else began
             stillness.add(block)
             resting.add(block, stillness.since)
@@ -180,7 +187,7 @@ class Engine:
             if resting.seconds > 0:
                 f = self._force(resting.block)
                 arrival = judge(hold.position, f, self._about.gravity, self._held)
-            reason = _reason(stillness.since, arrival)
+            reason = _reason(stillness.since, arrival, resting.seconds)
             self._show("turning", hold, block, arrival, stillness.meter, reason)
             if arrival is None or f is None:
                 told = False
@@ -274,6 +281,15 @@ class Engine:
         self._operator.show(view)
 
 
+def _pieces(block: Block) -> Iterator[Block]:
+    """Cut a block, so that what the engine does is independent of how samples come."""
+    edges = np.arange(block.t[0] + PIECE, block.t[-1], PIECE)
+    rows = [0, *np.searchsorted(block.t, edges).tolist(), len(block)]
+    for first, last in pairwise(rows):
+        if last > first:
+            yield block[first:last]
+
+
 class _Resting:
     """The last second of samples since the device came to rest."""
 
@@ -295,11 +311,11 @@ class _Resting:
         return concat(self._blocks)
 
 
-def _reason(still_since: float | None, arrival: Arrival | None) -> str:
+def _reason(still_since: float | None, arrival: Arrival | None, resting: float) -> str:
     if still_since is None:
         return "moving: waiting for it to rest"
     if arrival is not None and not arrival.ok:
-        return arrival.problem
+        return arrival.problem if resting >= PATIENCE else "waiting for the turn"
     return "settling"
 
 

@@ -92,7 +92,8 @@ def run(args: argparse.Namespace) -> int:
         truth = getattr(mover, "truth", None)
     written = Session.open(task.folder).write_json(RESULT, found.to_json())
     if args.json:
-        sys.stdout.write(json.dumps(found.to_json()) + "\n")
+        concealed = {"virtual": truth} if truth else {}
+        sys.stdout.write(json.dumps({**found.to_json(), **concealed}) + "\n")
     else:
         show(found, truth)
         sys.stdout.write(f"recorded: {task.folder}\nwritten:  {written}\n")

@@ -9,14 +9,14 @@ from typing import IO, Any
 from fieldcal.calibration import Calibration
 
 TITLES = {
-    "acc_bias": "accelerometer bias",
-    "acc_scale": "accelerometer scale factor",
-    "gyr_bias": "gyroscope bias",
-    "gyr_scale": "gyroscope scale factor",
-    "cross_coupling": "accelerometer cross-coupling",
-    "gyro_cross_coupling": "gyroscope cross-coupling",
-    "angle_offset": "angle offset of the joints",
-    "base_tilt": "tilt of the base",
+    "acc_bias": "acc bias",
+    "acc_scale": "acc scale factor",
+    "gyr_bias": "gyro bias",
+    "gyr_scale": "gyro scale factor",
+    "cross_coupling": "acc cross-coupling",
+    "gyro_cross_coupling": "gyro cross-coupling",
+    "angle_offset": "joints' offset",
+    "base_tilt": "base tilt",
 }
 
 
@@ -53,7 +53,7 @@ def show(
 
     console = Console(file=out, highlight=False)
     table = Table(title="Calibration", title_justify="left")
-    columns = ["parameter", "", "value", "± 1σ", "unit"]
+    columns = ["parameter", "value", "± 1σ", "unit"]
     columns += ["concealed", "off by"] if truth else []
     for column in columns:
         right = column in ("value", "± 1σ", "concealed", "off by")
@@ -65,8 +65,8 @@ def show(
         group, _, component = name.partition(".")
         if before and group != before:
             table.add_section()
-        title = TITLES.get(group, group) if group != before else ""
-        cells = [title, component, *number(value, sigma), unit]
+        label = component.replace("_deg", "").replace("_", " ")
+        cells = [f"{TITLES.get(group, group)} {label}", *number(value, sigma), unit]
         if name in concealed:
             true = concealed[name]
             cells += [number(true, sigma)[0], f"{(value - true) / sigma:+.1f} σ"]

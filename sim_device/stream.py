@@ -54,6 +54,7 @@ class Stream:
     device, link, faults : what runs
     speed : device seconds in a second; inf for as fast as the host takes it
     duration : device time at which it ends, s
+    once : whether it ends when a host that has listened goes
     announce : told the address whenever there is a new one
 
     """
@@ -65,10 +66,12 @@ class Stream:
         faults: LineFaults,
         speed: float = 1.0,
         duration: float = math.inf,
+        once: bool = False,
         announce: Callable[[str], None] = lambda address: None,
     ) -> None:
         self.device, self.link, self.faults = device, link, faults
         self._speed, self._duration, self._announce = speed, duration, announce
+        self._once, self._heard = once, False
         self._silent_until = self._away_until = -math.inf
         self._ends = False
         self._origin = 0.0
@@ -103,9 +106,17 @@ class Stream:
             for listener in listeners:
                 listener.serve()
             self.link.pump()
+            self._notice()
             if not self._ends:
                 self._go_on()
         self.link.linger(LINGER_S)
+
+    def _notice(self) -> None:
+        """Notice a host that comes, or that goes by itself."""
+        if self.link.attached():
+            self._heard = True
+        elif self._heard and self._once and not self._away:
+            self._ends = True
 
     @property
     def _away(self) -> bool:
@@ -125,6 +136,7 @@ class Stream:
         block = self.device.take(n)
         if was_away and not self._away:
             self.link.come_back()
+            self._heard = False
             self._announce(self.link.address)
         elif not silent and not was_away and self._room():
             self.link.send(block)

@@ -53,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="device time against the clock, or max: as fast as it is read (default:"
         " 1; any other waits for the reader)",
     )
+    add("--once", action="store_true", help="end when the reader goes")
     add("--duration", type=float, metavar="S", help="end after so much device time")
     add(
         "--steps",
@@ -118,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
             faults = LineFaults(args.seed)
             link = SerialLink(wire, faults, args.port_link)
             stack.callback(link.close)
-            stream = Stream(device, link, faults, speed, duration, _say)
+            stream = Stream(device, link, faults, speed, duration, args.once, _say)
             control = Control(lambda order: carry_out(stream, order), args.control)
             stack.callback(control.close)
             _say(link.address)

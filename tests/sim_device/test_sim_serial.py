@@ -203,6 +203,33 @@ def test_silence_garbage_and_hanging_up(sims: list[Sim]) -> None:
         os.close(port)
 
 
+def test_it_can_end_with_its_reader(sims: list[Sim], tmp_path: Path) -> None:
+    link = tmp_path / "imu"
+    sim = start(sims, "--once", "--speed", "50", "--port-link", str(link))
+    port = sim.open()
+    read(port, 5 * SAMPLE)
+    os.close(port)
+    assert sim.ended() == (0, "")
+    assert not link.is_symlink()
+
+
+def test_a_device_from_a_file_on_a_text_line(sims: list[Sim], tmp_path: Path) -> None:
+    profile = tmp_path / "device.toml"
+    profile.write_text(
+        "[sampling]\nrate_hz = 50\n[truth]\nacc_bias = [0, 0, 1]\n"
+        "[effects.quantisation]\nacc = 0.5\n"
+    )
+    sim = start(
+        sims,
+        *("--profile", str(profile), "--serial", "text?columns=seq,az&separator=tab"),
+        *("--speed", "max", "--acc-noise=0,0,0", "--duration", "1", "--rate", "25"),
+    )
+    port = sim.open()
+    lines = read(port, 10**6).decode().splitlines()
+    os.close(port)
+    assert lines == [f"{seq}\t1" for seq in range(25)]
+
+
 def test_orders_that_are_none_are_refused_and_do_nothing(sims: list[Sim]) -> None:
     sim = start(sims)
     with Remote(sim.control) as remote:

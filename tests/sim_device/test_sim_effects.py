@@ -1,0 +1,413 @@
+"""Each effect that can be given, by what it adds: with it less without it, same seed.
+
+Values are worked out by hand for a place with g = 10 m/s^2 and turns whose sine is 0.6
+and cosine 0.8, so that the device at rest feels f = 10 (-0.6, -0.64, 0.48).
+"""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fieldcal import frames
+from fieldcal.errors import InputError
+from fieldcal.samples import Array, Block
+from fieldcal.sim_device import Profile, VirtualDevice
+from fieldcal.sim_device.chain import Chain
+from fieldcal.sim_device.profile import (
+    ONE,
+    ZERO,
+    Climate,
+    Identity,
+    NoiseFigures,
+    Sampling,
+    Site,
+    Truth,
+)
+from fieldcal.sim_device.vocabulary import CATALOGUE, parse
+
+A = float(np.arcsin(0.6))
+RATE = (0.1, 0.2, -0.3)
+QUIET = NoiseFigures(
+    ZERO, ZERO, acc_instability=ZERO, gyr_instability=ZERO, temperature=0.0
+)
+PLAIN = Profile(
+    site=Site(gravity=10.0),
+    sampling=Sampling(100.0),
+    truth=Truth(ZERO, ONE, ZERO, ONE),
+    noise=QUIET,
+    temperature=Climate(ramp_k_s=0.01, self_heating_k=0.0),
+)
+
+EXAMPLES = {
+    "cross_coupling": "k12=0.01,k31=0.02",
+    "gyro_cross_coupling": "s12=0.01",
+    "gyro_scale": "s3=0.01",
+    "quadratic": "x=1e-3,z=-1e-3",
+    "cubic": "y=1e-5",
+    "scale_asymmetry": "x=0.01,z=0.01",
+    "pendulous_products": "l11=1e-4,l22=1e-4,l33=1e-4",
+    "g_sensitivity": "g11=1e-4,g23=1e-4",
+    "g2_sensitivity": "x=1e-5",
+    "gyro_products": "p11=0.1,p22=0.1,p33=0.1",
+    "base_tilt": "about_x_deg=2,about_z_deg=-3",
+    "angle_offset": "alpha0_deg=1,beta0_deg=-2",
+    "angle_scale": "alpha=0.01,beta=-0.02",
+    "angle_setting": "sigma_deg=0.3",
+    "gravity_error": "relative=0.001",
+    "earth_rate": "",
+    "heading_error": "psi_deg=30",
+    "sway": "amplitude_deg=0.5,hz=0.2",
+    "mounting": "axes=+y-x+z,unit=g",
+    "temperature_bias": "ax=0.003,gz=-2e-4",
+    "temperature_scale": "y=1e-4",
+    "thermal_hysteresis": "az=0.5,gx=0.01",
+    "warm_up": "ay=0.01,gx=1e-3,tau_s=50",
+    "bias_drift": "ax=1e-4,gy=1e-6",
+    "bias_step": "az=0.02,gz=-1e-3,at_s=60",
+    "random_walk": "ax=1e-3,gz=1e-5",
+    "settling": "ax=-0.03,gy=1e-3,tau_s=4",
+    "lever_arm": "x=0.1,z=-0.2",
+    "vibration_rectification": "x=1e-3,level=0.5",
+    "hum": "ay=0.05,gx=1e-3,hz=50.25,phase_deg=90",
+    "bump": "at_s=61.7,for_s=0.8",
+    "time_delay": "seconds=0.02",
+    "quantisation": "acc=0.25,gyr=0.01",
+    "saturation": "channel=ay,limit=5",
+    "stuck": "channel=ax,from_s=2,to_s=3",
+    "dropped": "fraction=0.1",
+    "clock_skew": "ppm=500",
+    "decode_fault": "channel=ax,kind=low_byte_signed",
+    "noise_level": "channel=ay,ratio=3",
+}
+
+
+def told(id_: str) -> Profile:
+    return PLAIN.having(parse(f"{id_}:{EXAMPLES[id_]}"))
+
+
+def at_rest(profile: Profile) -> Block:
+    """100 s at the turns, the last sample being that of 100 s."""
+    device = VirtualDevice(profile, 9)
+    device.turn(A, A, 0.05)
+    return device.take(10_001)
+
+
+def turning(profile: Profile) -> Block:
+    """The last second of a steady turn at `RATE`."""
+    device = VirtualDevice(profile, 9)
+    device.take(round(100 * device.spin(RATE, seconds=1.0)))
+    return device.take(100)
+
+
+def added(id_: str) -> Array:
+    """What the effect adds after 100 s at rest, (6,)."""
+    return at_rest(told(id_)).six[-1] - at_rest(PLAIN).six[-1]
+
+
+def test_every_effect_has_an_example() -> None:
+    assert set(EXAMPLES) == set(CATALOGUE)
+
+
+def test_every_effect_of_the_catalogue_can_be_given(shared: Path) -> None:
+    text = (shared / "design" / "effects.md").read_text()
+    rows = re.findall(r"^\| `(\w+)`.*?\|.*?\|(.*?)\|", text, re.MULTILINE)
+    assert {id_ for id_, _ in rows} == set(CATALOGUE)
+    for id_, parameters in rows:
+        for name in re.findall(
+            r"\b(?:[a-z]+_\w+|ppm|hz|tau_s|axes|unit)\b", parameters
+        ):
+            assert name in CATALOGUE[id_].names, (id_, name)
+
+
+@pytest.mark.parametrize("id_", CATALOGUE)
+def test_every_effect_shows_somewhere(id_: str) -> None:
+    noise = replace(QUIET, acc=(0.01,) * 3)
+    plain = replace(PLAIN, noise=noise)
+    if id_ == "heading_error":
+        plain = replace(plain, device=Identity(grade="navigation"))
+    profile = plain.having(parse(f"{id_}:{EXAMPLES[id_]}"))
+    with_, without = (
+        (lambda d: (d.turn(A, A, 1.0), d.take(7000))[1])(VirtualDevice(p, 4))
+        for p in (profile, plain)
+    )
+    if len(with_) == len(without):
+        host = with_.t_host - without.t_host
+        assert np.any(with_.six != without.six) or np.any(np.abs(host) > 1e-4)
+
+
+F = 10 * np.array([-0.6, -0.64, 0.48])
+
+
+@pytest.mark.parametrize(
+    ("id_", "expected"),
+    [
+        ("cross_coupling", [0.01 * -6.4, 0, 0.02 * -6, 0, 0, 0]),
+        ("quadratic", [0.036, 0, -0.02304, 0, 0, 0]),
+        ("cubic", [0, -0.00262144, 0, 0, 0, 0]),
+        ("scale_asymmetry", [0.06, 0, 0.048, 0, 0, 0]),
+        ("pendulous_products", [0.00384, -0.003072, -0.00288, 0, 0, 0]),
+        ("g_sensitivity", [0, 0, 0, -6e-4, 4.8e-4, 0]),
+        ("g2_sensitivity", [0, 0, 0, 3.6e-4, 0, 0]),
+        ("gravity_error", [-0.006, -0.0064, 0.0048, 0, 0, 0]),
+        ("temperature_bias", [0.003, 0, 0, 0, 0, -2e-4]),
+        ("temperature_scale", [0, -6.4e-4, 0, 0, 0, 0]),
+        ("thermal_hysteresis", [0, 0, 0.005, 1e-4, 0, 0]),
+        ("warm_up", [0, 0.01 * np.exp(-2), 0, 1e-3 * np.exp(-2), 0, 0]),
+        ("bias_drift", [0.01, 0, 0, 0, 1e-4, 0]),
+        ("bias_step", [0, 0, 0.02, 0, 0, -1e-3]),
+        ("hum", [0, 0.05, 0, 1e-3, 0, 0]),
+        ("gyro_scale", [0] * 6),
+        ("gyro_cross_coupling", [0] * 6),
+        ("gyro_products", [0] * 6),
+        ("lever_arm", [0] * 6),
+        ("time_delay", [0] * 6),
+        ("bump", [0] * 6),
+    ],
+)
+def test_what_is_added_at_rest_after_100_s_and_1_k(
+    id_: str, expected: list[float]
+) -> None:
+    np.testing.assert_allclose(added(id_), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("id_", "expected"),
+    [
+        ("gyro_cross_coupling", [0.002, 0, 0]),
+        ("gyro_scale", [0, 0, -0.003]),
+        ("gyro_products", [0.002, -0.006, -0.003]),
+    ],
+)
+def test_what_is_added_to_a_steady_rate(id_: str, expected: list[float]) -> None:
+    more = turning(told(id_)).gyr - turning(PLAIN).gyr
+    np.testing.assert_allclose(more, np.tile(expected, (100, 1)), atol=1e-12)
+
+
+def test_the_base_is_tilted_before_the_joints_turn() -> None:
+    tilt = frames.turn(np.deg2rad(-3), np.deg2rad(2))
+    expected = frames.turn(A, A) @ tilt @ frames.force_home(10.0)
+    np.testing.assert_allclose(at_rest(told("base_tilt")).acc[-1], expected)
+
+
+def test_offsets_and_scales_of_the_joints_move_their_angles() -> None:
+    offset = frames.force(A + np.deg2rad(1), A - np.deg2rad(2), 10.0)
+    np.testing.assert_allclose(at_rest(told("angle_offset")).acc[-1], offset)
+    scaled = frames.force(A * 1.01, A * 0.98, 10.0)
+    np.testing.assert_allclose(at_rest(told("angle_scale")).acc[-1], scaled)
+    home = VirtualDevice(told("angle_offset")).take(1).acc[0]
+    np.testing.assert_allclose(
+        home, frames.force(np.deg2rad(1), np.deg2rad(-2), 10.0), atol=1e-12
+    )
+
+
+def test_angles_are_set_a_little_off_every_time() -> None:
+    device = VirtualDevice(told("angle_setting"), 1)
+    found = []
+    for _ in range(300):
+        device.turn(A, A, 0.02)
+        device.take(3)
+        found.append(frames.angles_of(device.take(1).acc[0]))
+    off = np.rad2deg(np.array(found) - A)
+    assert np.abs(off.mean(axis=0)).max() < 4 * 0.3 / np.sqrt(300)
+    np.testing.assert_allclose(off.std(axis=0), 0.3, rtol=0.15)
+
+
+def test_the_earth_rate_and_a_heading_error() -> None:
+    latitude = np.deg2rad(PLAIN.site.latitude_deg)
+    felt = frames.turn(A, A) @ frames.earth_rate_home(latitude)
+    np.testing.assert_allclose(added("earth_rate")[3:], felt, atol=1e-15)
+    psi = np.deg2rad(30)
+    base = frames.EARTH_RATE * np.array(
+        [
+            np.cos(latitude) * np.sin(psi),
+            -np.sin(latitude),
+            np.cos(latitude) * np.cos(psi),
+        ]
+    )
+    plain = replace(PLAIN, device=Identity(grade="navigation"))
+    turned = at_rest(plain.having(parse("heading_error:psi_deg=30")))
+    np.testing.assert_allclose(turned.gyr[-1], frames.turn(A, A) @ base, atol=1e-15)
+    np.testing.assert_allclose(turned.acc[-1], F)
+
+
+def test_sway_is_a_line_in_the_force_and_in_quadrature_in_the_rate() -> None:
+    effect = parse("sway:amplitude_deg=0.5,hz=0.2,azimuth_deg=0,phase_deg=30")
+    block = VirtualDevice(PLAIN.having(effect)).take(1000)
+    pulse, x = 0.4 * np.pi, np.deg2rad(0.5)
+    angle = x * np.sin(pulse * block.t + np.pi / 6)
+    rate = x * pulse * np.cos(pulse * block.t + np.pi / 6)
+    zero = np.zeros(1000)
+    f = np.stack([zero, -10 * np.cos(angle), 10 * np.sin(angle)], axis=1)
+    np.testing.assert_allclose(block.acc, f, atol=1e-12)
+    np.testing.assert_allclose(block.gyr, np.stack([rate, zero, zero], 1), atol=1e-12)
+
+
+def test_a_wrong_mounting_and_a_wrong_unit() -> None:
+    # procedure x is device +y, procedure y is device -x
+    block = at_rest(told("mounting"))
+    np.testing.assert_allclose(block.acc[-1], np.array([6.4, -6, 4.8]) / 9.80665)
+    np.testing.assert_array_equal(block.gyr[-1], 0)
+    spun = turning(PLAIN.having(parse("mounting:axes=+x+y-z,unit=deg/s")))
+    np.testing.assert_allclose(spun.gyr[0], np.rad2deg([0.1, 0.2, 0.3]))
+
+
+def test_settling_fades_from_the_end_of_the_turn() -> None:
+    blocks = []
+    for profile in (told("settling"), PLAIN):
+        device = VirtualDevice(profile)
+        device.take(500)
+        assert device.turn(A, A, 2.0) == 7.0
+        blocks.append(device.take(2000).six)
+    more = blocks[0] - blocks[1]
+    np.testing.assert_allclose(more[0], 0, atol=1e-12)
+    np.testing.assert_allclose(more[200], [-0.03, 0, 0, 0, 1e-3, 0], atol=1e-12)
+    np.testing.assert_allclose(more[600, 0], -0.03 / np.e)
+    assert np.abs(np.diff(more, axis=0)).max() < 2e-4
+
+
+def test_a_bias_step_comes_at_its_instant() -> None:
+    with_, without = at_rest(told("bias_step")), at_rest(PLAIN)
+    more = (with_.six - without.six)[:, 2]
+    np.testing.assert_array_equal(with_.t[more != 0][0], 60.0)
+
+
+def test_gyroscopes_that_are_late_show_what_was() -> None:
+    moving = []
+    for text in ("time_delay:seconds=0.02", "time_delay:seconds=-0.02", ""):
+        device = VirtualDevice(PLAIN.having(parse(text)) if text else PLAIN)
+        device.turn(1.0, 0.0, 2.0)
+        moving.append(device.take(300))
+    late, early, plain = moving
+    np.testing.assert_array_equal(late.acc, plain.acc)
+    np.testing.assert_allclose(late.gyr[2:], plain.gyr[:-2], atol=1e-14)
+    np.testing.assert_array_equal(early.gyr, plain.gyr)
+    np.testing.assert_allclose(early.acc[2:], plain.acc[:-2], atol=1e-14)
+
+
+def test_vibration_is_rectified_by_its_variance() -> None:
+    def shaken(x: float) -> Array:
+        effect = parse(f"vibration_rectification:x={x},level=0.5")
+        device = VirtualDevice(PLAIN.having(effect), 3)
+        levels = []
+        for _ in range(20):
+            device.turn(0, 0, 0.01)
+            device.take(2)
+            levels.append(device.take(500).acc[:, 0])
+        return np.array(levels)
+
+    plain, rectified = shaken(1e-12), shaken(0.01)
+    scatter = plain.std(axis=1)
+    assert scatter.max() < 0.55 and scatter.max() > 3 * scatter.min()
+    shift = (rectified - plain).mean(axis=1)
+    np.testing.assert_allclose(shift, 0.01 * (plain**2).mean(axis=1), rtol=1e-6)
+
+
+def test_a_bump_is_a_push_without_velocity_and_leaves_the_device_where_it_was() -> None:
+    with_, without = at_rest(told("bump")), at_rest(PLAIN)
+    more = with_.six - without.six
+    when = with_.t[np.abs(more).max(axis=1) > 1e-9]
+    assert 61.7 <= when.min() < 61.73 and 62.47 < when.max() < 62.5
+    assert np.abs(more[:, :3]).max() > 1.5
+    tilt_only = told("bump").effects[0]
+    still = parse("bump:at_s=61.7,for_s=0.8,tilt_deg=0")
+    assert tilt_only["tilt_deg"] == 0.5
+    pushed = at_rest(PLAIN.having(still)).acc - without.acc
+    assert np.linalg.norm(pushed, axis=1).max() == pytest.approx(2.0, rel=1e-3)
+    np.testing.assert_allclose(pushed.sum(axis=0) / 100, 0, atol=1e-3)
+
+
+def test_a_skewed_clock_shows_against_the_host() -> None:
+    block = VirtualDevice(told("clock_skew"), 2).take(100_000)
+    slope = np.polyfit(block.t_host, block.t, 1)[0]
+    assert slope - 1 == pytest.approx(500e-6, abs=1e-6)
+    np.testing.assert_allclose(np.diff(block.t), 0.01)
+    assert (np.diff(block.t_host) >= 0).all() and (
+        block.t_host > block.t / 1.0005
+    ).all()
+
+
+def test_noise_is_louder_where_it_is_said() -> None:
+    profile = replace(PLAIN, noise=replace(QUIET, acc=(0.01,) * 3, gyr=(0.001,) * 3))
+    loud = profile.having(parse("noise_level:channel=ay,ratio=3"))
+    ratio = VirtualDevice(loud, 1).take(500).six.std(axis=0) / (
+        VirtualDevice(profile, 1).take(500).six.std(axis=0)
+    )
+    np.testing.assert_allclose(ratio, [1, 3, 1, 1, 1, 1], rtol=1e-9)
+
+
+def passed(text: str, row: list[float], channel: int = 0) -> list[float]:
+    """What becomes of a channel's values in the signal chain, 1 s apart."""
+    x = np.zeros((6, len(row)))
+    x[channel] = row
+    chain = Chain(PLAIN.having(parse(text)), 0)
+    got: list[float] = chain.passes(np.arange(len(row), dtype=float), x)[
+        channel
+    ].tolist()
+    return got
+
+
+def test_the_signal_chain() -> None:
+    assert passed("quantisation:acc=0.25", [0.1, 0.13, -0.4]) == [0, 0.25, -0.5]
+    assert passed("quantisation:acc=0.25", [0.1], channel=3) == [0.1]
+    assert passed("quantisation:gyr=0.5", [0.4], channel=5) == [0.5]
+    assert passed("saturation:channel=acc,limit=5", [7, -7, 3]) == [5, -5, 3]
+    assert passed("saturation:channel=gz,limit=5", [7], channel=5) == [5]
+    stuck = "stuck:channel=ax,from_s=1,to_s=4"
+    assert passed(stuck, [1, 2, 3, 4, 5]) == [1, 2, 2, 2, 5]
+    assert passed("mounting:unit=mrad/s", [0.5], channel=4) == [500]
+
+
+def test_the_full_scale_of_the_device_clips() -> None:
+    profile = replace(PLAIN, range=replace(PLAIN.range, acceleration=6.0))
+    np.testing.assert_allclose(at_rest(profile).acc[-1], [-6, -6, 4.8])
+
+
+def test_wrongly_decoded_words() -> None:
+    def decoded(kind: str, words: list[float]) -> list[float]:
+        return passed(f"decode_fault:channel=ax,kind={kind},full_scale=32768", words)
+
+    assert decoded("low_byte_signed", [100, 200, -100, 256]) == [100, -56, -356, 256]
+    assert decoded("bytes_swapped", [0x0102, 1, -2]) == [0x0201, 256, -257]
+    assert decoded("wrapped", [32767, 32768, -32769]) == [32767, -32768, 32767]
+    # +-16 g: 200 words
+    lsb = 16 * 9.80665 / 32768
+    plain = passed("decode_fault:channel=ax,kind=low_byte_signed", [200 * lsb])
+    assert plain == pytest.approx([-56 * lsb])
+    at_home = "decode_fault:channel=ay,kind=wrapped"
+    assert passed(at_home, [-10.0], channel=1) == pytest.approx([6.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("voodoo:x=1", "no effect is called 'voodoo'; the device knows cross_coup"),
+        ("quadratic:w=1", "quadratic has no parameter 'w'; it takes x, y, z"),
+        ("quadratic", "needs at least one of x, y, z"),
+        ("hum:ax=1", "hum needs hz"),
+        ("hum:ax=1,hz=0", "hz must be above 0"),
+        ("hum:ax=1,hz=nan", "hz must be a number"),
+        ("hum:ax=one,hz=5", "ax must be a number, not 'one'"),
+        ("hum:ax=1,hz", "is not PARAMETER=VALUE"),
+        ("hum:ax=1,ax=2,hz=1", "gives ax twice"),
+        ("stuck:from_s=1,to_s=2", "stuck needs channel"),
+        ("stuck:channel=bx,from_s=1,to_s=2", "channel must be ax"),
+        ("mounting:axes=xyz", "axes must be like"),
+        ("mounting:axes=+x+x+y", "not three signed axes"),
+        ("dropped:fraction=1", "below 1"),
+        ("heading_error:psi_deg=3", "Earth's rate only"),
+        ("earth_rate:x=1", "it takes no parameter"),
+    ],
+)
+def test_what_cannot_be_given_is_refused(text: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        VirtualDevice(PLAIN.having(parse(text)))
+
+
+def test_only_what_can_happen_twice_is_given_twice() -> None:
+    two = PLAIN.having(parse("hum:ax=1,hz=5"), parse("hum:ax=1,hz=6"))
+    assert len(two.every("hum")) == 2
+    with pytest.raises(InputError, match="quadratic is given twice"):
+        PLAIN.having(parse("quadratic:x=1"), parse("quadratic:y=1"))

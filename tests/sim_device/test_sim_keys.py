@@ -1,0 +1,84 @@
+"""A person at the keys, through a terminal."""
+
+import io
+import os
+import pty
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device.keys import Keys
+from fieldcal.sim_device.line_faults import LineFaults
+from fieldcal.sim_device.link_serial import SerialLink
+from fieldcal.sim_device.stream import Stream
+from fieldcal.sim_device.wire import open_wire
+
+LEFT, RIGHT, UP, DOWN = b"\x1b[D", b"\x1b[C", b"\x1b[A", b"\x1b[B"
+
+
+@pytest.fixture
+def terminal() -> Iterator[tuple[int, int]]:
+    """The person's side and the program's side."""
+    person, program = pty.openpty()
+    yield person, program
+    os.close(person)
+    os.close(program)
+
+
+@pytest.fixture
+def stream() -> Iterator[Stream]:
+    faults = LineFaults(1)
+    link = SerialLink(open_wire("witmotion"), faults)
+    yield Stream(VirtualDevice(), link, faults, speed=np.inf)
+    link.close()
+
+
+def test_keys_turn_bump_and_quit(stream: Stream, terminal: tuple[int, int]) -> None:
+    person, program = terminal
+    screen = io.StringIO()
+    device = stream.device
+    with Keys(stream, (22.5, 2.5), program, screen) as keys:
+        os.write(person, RIGHT + RIGHT + LEFT + UP + DOWN + DOWN + b"?b")
+        keys.serve()
+        np.testing.assert_allclose(np.rad2deg(device.angles), [22.5, -2.5])
+        assert device.busy_until == 24.0
+        assert len(device.body.bumps) == 1
+        device.take(2500)
+        os.write(person, b"h")
+        keys.serve()
+        assert device.angles == (0.0, 0.0)
+        keys.serve()
+        os.write(person, b"q")
+        keys.serve()
+    stream.run()
+    shown = screen.getvalue()
+    assert "quit" in shown
+    assert "turning to α = 22.5°, β = -2.5°   nobody listens" in shown
+    assert "25.0 s   turning to α = 0°, β = 0°" in shown
+
+
+def test_the_terminal_is_as_before_when_it_ends(terminal: tuple[int, int]) -> None:
+    import termios
+
+    person, program = terminal
+    before = termios.tcgetattr(program)
+    sim = subprocess.Popen(
+        [sys.executable, "-m", "fieldcal", "sim"],
+        stdin=program,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert sim.stdout is not None and sim.stderr is not None
+    assert sim.stdout.readline().startswith("/dev/")
+    assert "quit" in sim.stderr.readline()
+    os.write(person, UP + b"q")
+    _, said = sim.communicate(timeout=20)
+    assert sim.returncode == 0
+    assert re.search("β = (2.5|0)°", said)
+    assert termios.tcgetattr(program) == before

@@ -1,0 +1,216 @@
+"""Device files: what is written is read back; what cannot be is said."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldcal.errors import InputError
+from fieldcal.sim_device import profile_file
+from fieldcal.sim_device.profile import (
+    Climate,
+    FullScale,
+    Handling,
+    Identity,
+    Mounting,
+    NoiseFigures,
+    Profile,
+    Sampling,
+    Site,
+    Truth,
+)
+from fieldcal.sim_device.vocabulary import CATALOGUE, Effect, parse
+
+number = st.floats(-1e3, 1e3)
+positive = st.floats(1e-9, 1e3)
+triad = st.tuples(number, number, number)
+sizes = st.tuples(*[st.floats(0, 10)] * 3)
+words = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+
+
+def of_id(id_: str) -> st.SearchStrategy[Effect]:
+    entry = CATALOGUE[id_]
+    given_words = {
+        "channel": st.sampled_from(["ax", "gz", "acc"]),
+        "kind": st.just("wrapped"),
+        "axes": st.sampled_from(["+x+y+z", "-z+x-y", ""]),
+        "unit": st.sampled_from(["g", "deg/s", ""]),
+    }
+    ranged = {"fraction": 0.5, "relative": 0.01, "seconds": 0.02}
+    numbers = {
+        n: st.just(ranged[n]) if n in ranged else positive for n in entry.numbers
+    }
+    numbers |= dict.fromkeys(entry.vector, number)
+    return st.builds(
+        Effect,
+        st.just(id_),
+        st.fixed_dictionaries(numbers),
+        st.fixed_dictionaries({n: given_words[n] for n in entry.words}),
+    )
+
+
+effects = st.lists(
+    st.sampled_from(sorted(set(CATALOGUE) - {"heading_error"})).flatmap(of_id),
+    max_size=6,
+    unique_by=lambda effect: effect.id,
+)
+profiles = st.builds(
+    Profile,
+    st.builds(Identity, words, words, st.sampled_from(["tactical", "navigation"])),
+    st.builds(Sampling, positive),
+    st.builds(Site, st.floats(-90, 90), number, st.none() | positive),
+    st.builds(Mounting, st.sampled_from([("+x", "+y", "+z"), ("+x", "-z", "+y")])),
+    st.builds(FullScale, st.none() | positive, st.none() | positive),
+    st.builds(Truth, triad, triad, triad, triad),
+    st.builds(NoiseFigures, sizes, sizes, st.none() | sizes, st.none() | sizes),
+    st.builds(
+        Climate,
+        number,
+        points=st.lists(number, unique=True, max_size=4).map(
+            lambda times: tuple((t, 20.0) for t in sorted(times))
+        ),
+    ),
+    st.builds(Handling, positive, number, number),
+    effects.map(tuple),
+)
+
+
+@given(profiles)
+def test_what_is_written_is_read_back(profile: Profile) -> None:
+    import tomllib
+
+    tables = tomllib.loads(profile_file.to_toml(profile))
+    back = profile_file.from_tables(tables)
+    assert replace(back, effects=()) == replace(profile, effects=())
+    by_id = {e.id: e.parameters for e in back.effects}
+    assert by_id == {e.id: e.parameters for e in profile.effects}
+
+
+def test_what_happens_twice_is_written_twice(tmp_path: Path) -> None:
+    profile = Profile().having(parse("hum:ax=1,hz=5"), parse("hum:ax=1,hz=6"))
+    path = tmp_path / "device.toml"
+    path.write_text(profile_file.to_toml(profile))
+    assert profile_file.read(path) == profile
+    assert path.read_text().count("[[effects.hum]]") == 2
+
+
+def test_a_file_says_only_what_differs(tmp_path: Path) -> None:
+    path = tmp_path / "device.toml"
+    path.write_text(
+        """
+        [noise]
+        acc = 0.01
+        [truth]
+        acc_bias = [0.1, 0, -1]
+        [effects.mounting]
+        axes = ["+x", "-z", "+y"]
+        [effects.earth_rate]
+        """
+    )
+    profile = profile_file.read(path)
+    assert profile.noise.acc == (0.01, 0.01, 0.01)
+    assert profile.truth.acc_bias == (0.1, 0.0, -1.0)
+    assert profile.truth.acc_scale == Truth().acc_scale
+    mounting = profile.one("mounting")
+    assert mounting is not None and mounting.words["axes"] == "+x-z+y"
+    assert profile.feels_earth
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[nois]\n", r"no table \[nois\].*noise"),
+        ("[noise]\nacce = 1\n", r"\[noise\] has no key 'acce'; it has acc"),
+        ("[noise]\nacc = [1, 2]\n", "three numbers"),
+        ("[noise]\nacc = -1\n", "must be 0 or more"),
+        ("[sampling]\nrate_hz = 0\n", "rate_hz = 0 must be above 0"),
+        ("[sampling]\nrate_hz = true\n", "must be a number"),
+        ("[truth]\nacc_bias = [1, nan, 2]\n", "must be a number"),
+        ("[device]\nname = 3\n", "must be text"),
+        ("[device]\ngrade = 'toy'\n", "neither tactical nor"),
+        ("[site]\nlatitude_deg = 100\n", "latitude"),
+        ("[frame]\nmounting = ['+x', '+y']\n", "must be like"),
+        ("[frame]\nmounting = ['+x', '+y', '-z']\n", "left-handed"),
+        ("[temperature]\npoints = [[0, 1], [0, 2]]\n", "time order"),
+        ("[temperature]\npoints = [1]\n", "must be like"),
+        ("[effects.voodoo]\n", "no effect is called 'voodoo'"),
+        ("[effects]\nhum = 3\n", "must be a table"),
+        ("noise = 3\n", "must be a table"),
+        ("format = 9\n", "this version reads 1"),
+        ("= 3\n", "is not TOML"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "device.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"(?s)device.toml: .*{says}"):
+        profile_file.read(path)
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        profile_file.read(tmp_path / "none.toml")
+
+
+SESSION = """
+format = 1
+[device]
+name = "unit"
+grade = "navigation"
+colour = "grey"
+[sampling]
+rate_hz = 50.0
+[units]
+acceleration = "g"
+[range]
+acceleration = 2.0
+angular_rate = 5.0
+[site]
+latitude_deg = 10.0
+height_m = 5.0
+[frame]
+mounting = ["+x", "-z", "+y"]
+[nominal]
+acc_bias = [0.1, 0.2, 0.3]
+[model]
+effects = ["base_tilt", "earth_rate"]
+[model.base_tilt]
+about_x_deg = 1.0
+[[position]]
+alpha_deg = 30.0
+beta_deg = 5.0
+start_s = 3.0
+end_s = 33.0
+[[position]]
+rate_deg_s = [0.0, 90.0, 0.0]
+start_s = 40.0
+end_s = 50.0
+"""
+
+
+def test_a_session_makes_a_device_and_a_schedule(tmp_path: Path) -> None:
+    path = tmp_path / "session.toml"
+    path.write_text(SESSION)
+    profile, windows = profile_file.read_session(path)
+    assert profile.truth.acc_bias == (0.1, 0.2, 0.3)
+    assert profile.truth.acc_scale == (1.0, 1.0, 1.0)
+    assert profile.sampling.rate_hz == 50.0 and profile.device.grade == "navigation"
+    assert profile.range.acceleration == pytest.approx(2 * 9.80665)
+    assert profile.range.angular_rate == 5.0
+    assert [e.id for e in profile.effects] == ["base_tilt", "earth_rate"]
+    assert np.rad2deg(windows[0].alpha) == pytest.approx(30)
+    assert (windows[0].start, windows[0].end, windows[1].start) == (3.0, 33.0, 40.0)
+    np.testing.assert_allclose(windows[1].rate, [0, np.pi / 2, 0])
+
+
+@pytest.mark.parametrize("gone", ["alpha_deg = 30.0", "start_s = 3.0"])
+def test_a_session_without_angles_or_times_cannot_be_simulated(
+    tmp_path: Path, gone: str
+) -> None:
+    path = tmp_path / "session.toml"
+    path.write_text(SESSION.replace(gone, "", 1))
+    with pytest.raises(InputError, match="position 0 has no"):
+        profile_file.read_session(path)

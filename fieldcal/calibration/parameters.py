@@ -9,15 +9,14 @@ parameter that was not determined is absent; none is filled in.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
+from fieldcal.calibration.correction import corrected, spread
 from fieldcal.errors import InputError
-from fieldcal.samples import Array
-
-FORMAT = 1
+from fieldcal.samples import Array, Block
 
 Method = Literal["two_position", "five_position", "least_squares", "joint", "scalar"]
 
@@ -129,51 +128,87 @@ class Calibration:
     def _pick(self, numbers: Array, name: str) -> float:
         return float(numbers[self.names.index(name)]) if name in self.names else np.nan
 
+    def accelerometers(self, nominal: Nominal | None = None) -> tuple[Array, Array]:
+        """Bias (3,) and matrix (3, 3) of U = bias + matrix f.
+
+        What was not determined is nan, or the nominal value where that is given; a
+        cross-coupling that was not determined is 0.
+        """
+        three = (np.nan,) * 3
+        bias = nominal.acc_bias if nominal else three
+        scale = nominal.acc_scale if nominal else three
+        return self._linear("acc", "cross_coupling", bias, scale)
+
+    def gyroscopes(self, nominal: Nominal | None = None) -> tuple[Array, Array]:
+        """Bias (3,) and matrix (3, 3) of W = bias + matrix w, like `accelerometers`."""
+        three = (np.nan,) * 3
+        bias = nominal.gyr_bias if nominal else three
+        scale = nominal.gyr_scale if nominal else three
+        return self._linear("gyr", "gyro_cross_coupling", bias, scale)
+
+    def _linear(
+        self,
+        sensor: str,
+        cross: str,
+        nominal_bias: Sequence[float],
+        nominal_scale: Sequence[float],
+    ) -> tuple[Array, Array]:
+        bias, _ = self.vector(f"{sensor}_bias")
+        scale, _ = self.vector(f"{sensor}_scale")
+        bias = np.where(np.isfinite(bias), bias, nominal_bias)
+        matrix = np.diag(np.where(np.isfinite(scale), scale, nominal_scale))
+        for part in self.components(cross):
+            matrix[int(part[1]) - 1, int(part[2]) - 1] = self.value(f"{cross}.{part}")
+        return bias, matrix
+
+    def apply(self, block: Block, nominal: Nominal | None = None) -> Block:
+        """Return the block with bias, scale factor and cross-coupling taken out.
+
+        Parameters
+        ----------
+        block : raw samples, device axes
+        nominal : values for what was not determined; bias 0 and scale 1 if not given
+
+        """
+        start = nominal or Nominal()
+        return replace(
+            block,
+            acc=corrected(block.acc, *self.accelerometers(start)),
+            gyr=corrected(block.gyr, *self.gyroscopes(start)),
+        )
+
+    def uncertainty_of(self, block: Block, nominal: Nominal | None = None) -> Array:
+        """Standard uncertainty that the calibration leaves in `apply`, (n, 6).
+
+        Parameters as in `apply`. A nominal value counts as exact, and the noise of the
+        samples is not in it.
+        """
+        start = nominal or Nominal()
+        parts = [
+            spread(values, *model, self.names, self.covariance, sensor)
+            for sensor, values, model in (
+                ("acc", block.acc, self.accelerometers(start)),
+                ("gyr", block.gyr, self.gyroscopes(start)),
+            )
+        ]
+        return np.hstack(parts)
+
     def to_json(self) -> dict[str, Any]:
         """Return the object of ``result.json``; numbers not determined are null."""
-        return {
-            "format": FORMAT,
-            "method": self.method,
-            "verdict": "good" if self.good else "bad",
-            "warnings": list(self.warnings),
-            "parameters": {g: self._group_json(g) for g in self.groups},
-            "covariance": {
-                "names": list(self.names),
-                "matrix": np.asarray(self.covariance).tolist(),
-            },
-            "fit": {
-                "chi2": _number(self.chi2),
-                "dof": self.dof,
-                "rms": _number(self.rms),
-                "unit": "m/s^2",
-            },
-            **self.info,
-        }
+        from fieldcal.calibration.document import to_json
 
-    def _group_json(self, group: str) -> dict[str, Any]:
-        values, sigmas = self.vector(group)
-        first = next(i for i, n in enumerate(self.names) if n.startswith(group + "."))
-        units = {u for n, u in zip(self.names, self.units, strict=True)
-                 if n.startswith(group + ".")}  # fmt: skip
-        out: dict[str, Any] = {
-            "value": [_number(v) for v in values],
-            "sigma": [_number(s) for s in sigmas],
-            "unit": self.units[first],
-        }
-        if group not in COMPONENTS:
-            out["names"] = list(self.components(group))
-        if len(units) > 1:
-            out["units"] = [
-                u for n, u in zip(self.names, self.units, strict=True)
-                if n.startswith(group + ".")
-            ]  # fmt: skip
-        return out
+        return to_json(self)
 
+    @classmethod
+    def from_json(cls, document: Any) -> Calibration:
+        """Read the object of ``result.json``.
 
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+        Raises
+        ------
+        InputError
+            If it is not one; the text names the key.
 
+        """
+        from fieldcal.calibration.document import from_json
 
-def names_of(group: str, components: Sequence[str] = ("x", "y", "z")) -> list[str]:
-    """Full names of a group's components."""
-    return [f"{group}.{part}" for part in components]
+        return from_json(document)

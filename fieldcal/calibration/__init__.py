@@ -1,0 +1,11 @@
+"""What a calibration is: parameters with their covariance, applied, compared, kept."""
+
+from fieldcal.calibration.comparison import Comparison, compare
+from fieldcal.calibration.parameters import (
+    COMPONENTS,
+    Calibration,
+    Method,
+    Nominal,
+)
+
+__all__ = ["COMPONENTS", "Calibration", "Comparison", "Method", "Nominal", "compare"]

@@ -1,0 +1,98 @@
+"""Whether two calibrations of a device differ by more than their uncertainties.
+
+    d = a - b,  C = C_a + C_b,  z_i = d_i / sqrt(C_ii),  chi2 = d^T C^-1 d
+
+for the parameters that both have. The two are taken as independent, which calibrations
+from different recordings are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fieldcal.errors import InputError
+from fieldcal.samples import Array
+
+if TYPE_CHECKING:
+    from fieldcal.calibration.parameters import Calibration
+
+SIGNIFICANT = 3.0
+"""Standard uncertainties from which a single difference counts as one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Differences of two calibrations.
+
+    Attributes
+    ----------
+    names : (k,) parameters that both have
+    difference, sigma : (k,) first less second, and its standard uncertainty
+    chi2, dof : of all differences together
+    chance : probability of such a chi2 if nothing has changed
+    only_first, only_second : parameters that one of them lacks
+
+    """
+
+    names: tuple[str, ...]
+    difference: Array
+    sigma: Array
+    chi2: float
+    dof: int
+    chance: float
+    only_first: tuple[str, ...]
+    only_second: tuple[str, ...]
+
+    @property
+    def z(self) -> Array:
+        """Each difference in standard uncertainties, (k,)."""
+        return self.difference / self.sigma
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Parameters that differ by more than `SIGNIFICANT`."""
+        return tuple(
+            n for n, z in zip(self.names, self.z, strict=True) if abs(z) > SIGNIFICANT
+        )
+
+
+def compare(first: Calibration, second: Calibration) -> Comparison:
+    """Compare two calibrations, parameter by parameter and as a whole.
+
+    Raises
+    ------
+    InputError
+        If they have no parameter in common, or one in different units.
+
+    """
+    from scipy.special import gammaincc
+
+    common = [n for n in first.names if n in second.names]
+    if not common:
+        raise InputError("the two calibrations have no parameter in common")
+    i = [first.names.index(n) for n in common]
+    j = [second.names.index(n) for n in common]
+    for name, a, b in zip(common, i, j, strict=True):
+        if first.units[a] != second.units[b]:
+            raise InputError(
+                f"{name} is in {first.units[a]} here and in {second.units[b]} there"
+            )
+    d = first.values[i] - second.values[j]
+    c = first.covariance[np.ix_(i, i)] + second.covariance[np.ix_(j, j)]
+    sigma = np.sqrt(np.diag(c))
+    # scaled, so that rad/s and m/s^2 do not make it look singular
+    z = d / sigma
+    chi2 = float(z @ np.linalg.solve(c / np.outer(sigma, sigma), z))
+    return Comparison(
+        tuple(common),
+        d,
+        sigma,
+        chi2,
+        len(common),
+        float(gammaincc(len(common) / 2, chi2 / 2)),
+        tuple(n for n in first.names if n not in common),
+        tuple(n for n in second.names if n not in common),
+    )

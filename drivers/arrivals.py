@@ -23,8 +23,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from fieldcal.driver import Health
-from fieldcal.drivers.options import Options
-from fieldcal.drivers.timebase import Rate, Timebase
 from fieldcal.samples import Array
 
 LEARN = 1.0
@@ -127,12 +125,6 @@ class Arrivals:
         self._noise += 0.02 * (min(error**2, 9 * spread) - self._noise)
         self._noise = max(self._noise, 1e-8)
         return 0
-
-
-def choose(health: Health, options: Options) -> Timebase:
-    """Time of a device without a clock: from option ``rate`` in Hz, or arrivals."""
-    rate = options.number("rate", 0.0, 1e-3, 1e6)
-    return Rate(health, rate) if rate else Arrivals(health)
 
 
 def _batches(steps: Array, t_host: Array) -> Iterator[tuple[Array, float]]:

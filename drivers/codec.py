@@ -20,6 +20,7 @@ from fieldcal.drivers import protocols
 from fieldcal.drivers.framing import Bytes, Candidates, Found, resolve
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
+from fieldcal.drivers.timebase import Timebase
 from fieldcal.errors import InputError
 from fieldcal.samples import Array, Block, concat
 
@@ -106,6 +107,26 @@ class Codec(ABC):
     @abstractmethod
     def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
         """Make samples of whole frames; `t_host` is the arrival of each one's end."""
+
+    def _timed(
+        self,
+        clock: Timebase,
+        six: Array,
+        temperature: Array,
+        t_host: Array,
+        stamps: Array,
+        seq: Array | None = None,
+        steps: Array | None = None,
+    ) -> Block | None:
+        """Give samples their time; those with an old stamp are left out."""
+        if not len(six):
+            return None
+        steps = np.ones(len(six)) if steps is None else steps
+        seq = np.full(len(six), np.nan) if seq is None else seq
+        t = clock.times(stamps, steps, t_host)
+        new = ~np.isnan(t)
+        columns = (six[:, :3], six[:, 3:], temperature, seq, t_host)
+        return Block.of(t[new], *(column[new] for column in columns))
 
     def _feed(self, chunks: Sequence[Chunk]) -> Block | None:
         if not chunks:

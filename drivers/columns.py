@@ -50,6 +50,8 @@ def guess(data: bytes, seconds: float) -> str | None:
         return None
     separator, values = table
     named = _names(values, seconds)
+    if "ax" not in named[0]:
+        return None
     if separator != ",":
         named.insert(1, f"separator={SEPARATORS[separator]}")
     return "&".join(named + options)

@@ -13,8 +13,8 @@ host saw.
 
 Rate (`Rate`). t_k = k / rate, k counting also the samples known to be missing.     (2)
 
-All in s. Symbols: k sample number, T period, q resolution. `Arrivals` is beside this in
-arrivals.py.
+All in s. Symbols: k sample number, T period, q resolution. `Arrivals` is beside this,
+and `Clock` chooses.
 """
 
 from __future__ import annotations

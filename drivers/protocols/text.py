@@ -23,13 +23,12 @@ from string import ascii_letters, hexdigits
 import numpy as np
 
 from fieldcal.description import ACC_UNITS, GYR_UNITS
-from fieldcal.drivers.arrivals import choose
+from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.columns import guess
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.timebase import Stamps, Timebase
 from fieldcal.errors import InputError
 from fieldcal.samples import CHANNELS, Array, Block
 
@@ -83,11 +82,8 @@ class Codec(Base):
         bits = options.number("t_bits", counter, 0, 64)
         coarse = 1e-3 if unit == "ms" else 0.0
         resolution = options.number("t_resolution", coarse, 0, 1)
-        unstamped = choose(self.health, options)
         span = 2**bits * self._t_unit if bits else float("inf")
-        self._timebase: Timebase = (
-            Stamps(self.health, resolution, span) if "t" in self._names else unstamped
-        )
+        self._clock = Clock(self.health, options, resolution, span)
         self._whole = self._checked
         self._seq: float | None = None
         self._check()
@@ -134,7 +130,7 @@ class Codec(Base):
         super().reset()
         self._whole = self._checked
         self._seq = None
-        self._timebase.broken()
+        self._clock.broken()
 
     def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
         """Make samples of well-formed lines."""
@@ -241,15 +237,11 @@ class Codec(Base):
         unknown = np.full(len(values), np.nan)
         seq = column.get("seq", unknown)
         stamps = column.get("t", unknown) * self._t_unit
-        t = self._timebase.times(stamps, self._steps(seq), t_host)
-        new = ~np.isnan(t)
-        if not new.any():
-            return None
         six = np.column_stack([column.get(name, unknown) for name in CHANNELS])
-        six *= self._scale
-        temperature = column.get("temperature", unknown)
-        rows = (six[:, :3], six[:, 3:], temperature, seq, t_host)
-        return Block.of(t[new], *(row[new] for row in rows))
+        temperature, steps = column.get("temperature", unknown), self._steps(seq)
+        return self._timed(
+            self._clock, six * self._scale, temperature, t_host, stamps, seq, steps
+        )
 
     def _steps(self, seq: Array) -> Array:
         """Periods since the sample before, from the counter where it is one, (n,)."""

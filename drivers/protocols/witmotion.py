@@ -24,11 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import ACC_UNITS, GYR_UNITS
-from fieldcal.drivers.arrivals import choose
+from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Mask, rows
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.timebase import Stamps, Timebase
 from fieldcal.samples import Array, Block
 
 SIZE = 11
@@ -54,10 +53,7 @@ UNDECIDED = 3
 
 
 class Codec(Base):
-    """Decoder of 0x50, 0x51 and 0x52; options acc_range (g), gyr_range (deg/s), rate.
-
-    Further options are those of the time: see `choose`.
-    """
+    """Decoder of 0x50 to 0x52; options acc_range (g), gyr_range (deg/s), rate (Hz)."""
 
     bauds = (115200, 9600, 921600, 230400, 460800, 57600, 38400, 19200)
 
@@ -67,8 +63,8 @@ class Codec(Base):
         gyr = options.number("gyr_range", 2000.0, 1.0, 40000.0)
         self._acc = acc * ACC_UNITS["g"] / 32768
         self._gyr = gyr * GYR_UNITS["deg/s"] / 32768
-        self._unstamped = choose(self.health, options)
-        self._timebase: Timebase | None = None
+        self._clock = Clock(self.health, options, resolution=1e-3)
+        self._decided = False
         self._frames = np.empty(0, FRAME)
         self._cycle = 0
         self._paired: int | None = None
@@ -93,7 +89,7 @@ class Codec(Base):
         super().reset()
         self._frames = self._frames[:0]
         self._paired = None
-        (self._timebase or self._unstamped).broken()
+        self._clock.broken()
 
     def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
         """Put the halves of each sample together."""
@@ -152,26 +148,23 @@ class Codec(Base):
 
     def _deliver(self, samples: Samples) -> Block | None:
         """Give samples their time, once it is known whether the device tells it."""
-        if self._timebase is None:
+        if not self._decided:
             samples = np.concatenate([self._held, samples])
             stamped = np.flatnonzero(~np.isnan(samples["stamp"]))
             if len(stamped):
                 samples = samples[stamped[0] :]
-                self._timebase = Stamps(self.health, resolution=1e-3)
-            elif len(samples) >= UNDECIDED:
-                self._timebase = self._unstamped
-            else:
+            elif len(samples) < UNDECIDED:
                 self._held = samples
                 return None
-        if not len(samples):
-            return None
-        host = samples["t_host"]
-        t = self._timebase.times(samples["stamp"], samples["steps"], host)
-        if np.isnan(t).any():
-            samples, t = samples[~np.isnan(t)], t[~np.isnan(t)]
-        temperature, host = samples["temperature"], samples["t_host"]
-        return Block.of(
-            t, samples["acc"], samples["gyr"], temperature, t_host=host.copy()
+            self._decided = True
+        six = np.hstack([samples["acc"], samples["gyr"]])
+        return self._timed(
+            self._clock,
+            six,
+            samples["temperature"],
+            samples["t_host"].copy(),
+            samples["stamp"],
+            steps=samples["steps"],
         )
 
 

@@ -6,7 +6,7 @@ READY := .venv/.ready
 .PHONY: demo test lint bench setup clean
 
 demo: $(READY)
-	@$(BIN)/fieldcal demo
+	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
 
 test: $(READY)
 	$(BIN)/python -m pytest -q

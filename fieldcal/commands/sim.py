@@ -139,7 +139,9 @@ def _profile(args: argparse.Namespace) -> Profile:
     from fieldcal.sim_device.profile import Profile
     from fieldcal.sim_device.vocabulary import Effect, effect, parse
 
-    profile = profile_file.read(args.profile) if args.profile else Profile()
+    # a real device always feels the Earth; a device file says for itself what it has
+    default = Profile(effects=(effect("earth_rate", {}),))
+    profile = profile_file.read(args.profile) if args.profile else default
     tables: dict[str, dict[str, Any]] = {
         "device": {"grade": args.grade},
         "sampling": {"rate_hz": args.rate},

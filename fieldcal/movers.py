@@ -52,7 +52,7 @@ class VirtualDevice:
         self._truth = Path(self._folder.name) / "truth.json"
         command = [sys.executable, "-m", "fieldcal", "sim", *options]
         self._process = subprocess.Popen(
-            [*command, "--truth", str(self._truth)],
+            [*command, "--once", "--truth", str(self._truth)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

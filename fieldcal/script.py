@@ -22,13 +22,13 @@ class ScriptOperator:
     Parameters
     ----------
     mover : who turns
-    out : where the lines go
+    out : where the lines go; standard error if not given
 
     """
 
-    def __init__(self, mover: Mover, out: IO[str] = sys.stderr) -> None:
+    def __init__(self, mover: Mover, out: IO[str] | None = None) -> None:
         self._mover = mover
-        self._out = out
+        self._out = out or sys.stderr
         self._shown: tuple[str, int, int] = ("", -1, -1)
 
     def place(self, hold: Hold) -> None:

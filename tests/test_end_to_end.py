@@ -1,0 +1,220 @@
+"""Two processes and a pty between them: the main job, and everything that breaks it."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic, sleep, time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fieldcal.cli import main
+from fieldcal.movers import VirtualDevice
+from fieldcal.session import Session
+from fieldcal.solve import Observations
+
+BASE = [sys.executable, "-m", "fieldcal", "run"]
+TILTED = "--virtual=--base-tilt=1,-1"
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*BASE, *arguments], capture_output=True, text=True, check=False, timeout=120
+    )
+
+
+@pytest.fixture(scope="module")
+def recalibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any, str]:
+    folder = tmp_path_factory.mktemp("run") / "session"
+    done = run(
+        *("five_position", "--headless", TILTED, "--speed", "max", "--seed", "5"),
+        *("--json", "-o", str(folder)),
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout), done.stderr
+
+
+def test_five_positions_find_what_the_virtual_device_conceals(
+    recalibrated: tuple[Path, Any, str],
+) -> None:
+    _, result, _ = recalibrated
+    assert result["method"] == "joint" and result["verdict"] == "good"
+    truth = {**result["virtual"], "base_tilt": [1.0, -1.0]}
+    for group in ("acc_bias", "acc_scale", "gyr_bias", "base_tilt"):
+        found = result["parameters"][group]
+        pull = np.subtract(found["value"], truth[group]) / np.array(found["sigma"])
+        assert np.abs(pull).max() < 4.5, group
+    assert max(result["parameters"]["base_tilt"]["sigma"]) < 0.1
+
+
+def test_progress_is_json_lines_on_standard_error(
+    recalibrated: tuple[Path, Any, str],
+) -> None:
+    events = [json.loads(line)["event"] for line in recalibrated[2].splitlines()]
+    assert events.count("place") >= 5 and events.count("taken") == 5
+
+
+def test_solving_the_recorded_session_gives_the_same_numbers(
+    recalibrated: tuple[Path, Any, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, result, _ = recalibrated
+    assert main(["solve", str(folder), "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    for group, found in result["parameters"].items():
+        other = again["parameters"][group]
+        np.testing.assert_allclose(
+            other["value"], found["value"], rtol=1e-9, atol=1e-12
+        )
+        np.testing.assert_allclose(other["sigma"], found["sigma"], rtol=1e-6)
+
+
+def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
+    done = run(
+        *("two_position", "--headless", "--virtual", "--speed", "max", "--json"),
+        *("-o", str(tmp_path / "s")),
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["method"] == "two_position"
+    found = result["parameters"]["acc_bias"]
+    off = np.subtract(found["value"], result["virtual"]["acc_bias"])
+    assert (np.abs(off) < 4.5 * np.array(found["sigma"])).all()
+
+
+def test_killed_at_any_moment_the_session_holds_all_but_the_last_quarter_second(
+    tmp_path: Path,
+) -> None:
+    rng = np.random.default_rng(2)
+    for attempt in range(4):
+        folder = tmp_path / str(attempt)
+        process = subprocess.Popen(
+            [*BASE, "five_position", "--headless", TILTED, "--speed", "20"]
+            + ["-o", str(folder)],
+            stderr=subprocess.DEVNULL,
+        )
+        _wait_for(folder / "samples.arrows")
+        sleep(rng.uniform(0.5, 3.0))
+        killed = time()
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        session = Session.open(folder)
+        block = session.block
+        assert "cut off" in session.warnings[0]
+        assert (np.diff(block.t) > 0).all()
+        # what waited in the reader at the kill had not reached the recorder yet
+        assert killed - block.t_host[-1] < 0.5
+        code = main(["solve", str(folder)])
+        assert code in (0, 1, 2)
+
+
+def _wait_for(path: Path, seconds: float = 30.0) -> None:
+    deadline = monotonic() + seconds
+    while not path.exists() or path.stat().st_size < 5000:
+        assert monotonic() < deadline, f"{path} did not appear"
+        sleep(0.02)
+
+
+def test_an_interrupted_run_ends_with_130_and_keeps_what_was_recorded(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "s"
+    process = subprocess.Popen(
+        [*BASE, "five_position", "--headless", TILTED, "--speed", "20"]
+        + ["-o", str(folder)],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    _wait_for(folder / "samples.arrows")
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=20)
+    assert process.returncode == 130 and "interrupted" in said
+    assert "what was recorded is kept" in said
+    session = Session.open(folder)
+    assert len(session.block) > 0 and not session.warnings
+
+
+@contextmanager
+def talking(what: bytes) -> Iterator[str]:
+    """A pty on which something talks for ever, 100 times a second."""
+    ours, theirs = pty.openpty()
+    done = threading.Event()
+
+    def talk() -> None:
+        while not done.wait(0.01):
+            if what:
+                os.write(ours, what)
+
+    thread = threading.Thread(target=talk)
+    thread.start()
+    try:
+        yield os.ttyname(theirs)
+    finally:
+        done.set()
+        thread.join()
+        os.close(ours)
+        os.close(theirs)
+
+
+def device_error(
+    port: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> tuple[int, str]:
+    code = main(
+        ["run", "two_position", "--headless", "--device", f"serial:{port}"]
+        + ["-o", str(folder)]
+    )
+    lines = capsys.readouterr().err.strip().splitlines()
+    return code, lines[-1]
+
+
+def test_a_port_that_is_not_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, said = device_error("/dev/ttyNOWHERE", tmp_path / "s", capsys)
+    assert code == 3 and "/dev/ttyNOWHERE" in said and "no such port" in said.lower()
+    assert not (tmp_path / "s").exists()
+
+
+def test_a_port_that_says_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with talking(b"") as port:
+        code, said = device_error(f"{port}?format=witmotion", tmp_path / "s", capsys)
+    assert code == 3 and "check" in said
+    assert (tmp_path / "s" / "session.toml").exists()
+
+
+def test_a_port_that_says_nothing_sensible(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with talking(bytes(range(128, 160))) as port:
+        code, said = device_error(f"{port}?format=witmotion", tmp_path / "s", capsys)
+    assert code == 3 and ("format" in said or "baud" in said)
+
+
+def test_a_device_that_goes_silent_keeps_what_it_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "s"
+    with VirtualDevice(["--serial", "witmotion", "--speed", "20"]) as device:
+        threading.Timer(1.5, lambda: device.ask(fault={"silence_s": 1e6})).start()
+        code, said = device_error(f"{device.port}?format=witmotion", folder, capsys)
+    assert code == 3 and "silent" in said
+    assert len(Session.open(folder).block) > 500
+
+
+def test_observations_of_zero_gravity_are_refused() -> None:
+    from fieldcal.errors import InputError
+    from fieldcal.positions import TWO
+
+    with pytest.raises(InputError, match="gravity is 0"):
+        Observations(TWO, np.zeros((2, 6)), np.tile(np.eye(6), (2, 1, 1)), 0.0)

@@ -12,8 +12,8 @@ from fieldcal.errors import InputError
 from fieldcal.samples import Array
 from fieldcal.sim_device import earth
 from fieldcal.sim_device.influences import Life
-from fieldcal.sim_device.joints import Joints
-from fieldcal.sim_device.motion import Frame, Stand, base_attitude, carried, feel
+from fieldcal.sim_device.joints import Joints, Swing
+from fieldcal.sim_device.motion import Felt, Frame, Stand, base_attitude, carried, feel
 from fieldcal.sim_device.noise import stream
 from fieldcal.sim_device.profile import Profile, mounting_axes
 from fieldcal.sim_device.rocking import Bump, Sway
@@ -86,16 +86,24 @@ class Body:
 
     def life(self, t: Array, vibration: Array) -> Life:
         """What the sensors live through at ascending instants, (n,) s."""
+        swing = self.joints.at(t)
+        felt = self._felt(t[:1] if self._still(t, swing) else t)
+        f, w = (np.broadcast_to(v, (3, len(t))) for v in (felt.f, felt.w))
+        degrees, warming = course(self.profile.temperature, t)
+        warmth = degrees - self._start_temperature
+        return Life(t, f, w, warmth, warming, swing.since, swing.progress, vibration)
+
+    def _felt(self, t: Array) -> Felt:
         push = np.zeros((3, len(t)))
         for bump in self.bumps:
             push = push + bump.acceleration(t)
-        felt = feel(self._stand, self.frame(t), push)
-        swing = self.joints.at(t)
-        degrees, warming = course(self.profile.temperature, t)
-        warmth = degrees - self._start_temperature
-        return Life(
-            t, felt.f, felt.w, warmth, warming, swing.since, swing.progress, vibration
-        )
+        return feel(self._stand, self.frame(t), push)
+
+    def _still(self, t: Array, swing: Swing) -> bool:
+        """Whether nothing moves at any of the instants, so that one stands for all."""
+        turned = swing.angle != swing.angle[:, :1]
+        shaken = any(b.start <= t[-1] and not b.over(t[0]) for b in self.bumps)
+        return not (self._sways or shaken or swing.rate.any() or turned.any())
 
     def temperature(self, t: Array) -> Array:
         """Temperature of the sensors, (n,) °C."""

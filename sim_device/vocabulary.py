@@ -94,7 +94,7 @@ CATALOGUE: Mapping[str, _Entry] = {
     "angle_scale": _Entry(("alpha", "beta")),
     "angle_setting": _Entry(numbers={"sigma_deg": None}),
     "gravity_error": _Entry(numbers={"relative": None}),
-    "earth_rate": _Entry(),
+    "earth_rate": _Entry(repeats=True),
     "heading_error": _Entry(numbers={"psi_deg": None}),
     "sway": _Entry(
         numbers={

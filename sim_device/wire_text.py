@@ -5,7 +5,7 @@ r"""Text: each sample a line of numbers, ``text?columns=…&separator=…&checks
 ``acc_unit`` m/s^2, g or mg; ``gyr_unit`` rad/s, deg/s or mrad/s; ``digits`` significant
 digits of a sensor's value. ``checksum=xor`` puts ``$`` before a line and ``*`` behind
 it, with the exclusive or of all between them in two hexadecimal digits, as NMEA 0183
-has it; ``prefix=IMU`` a word before the first number. Lines end in CR LF.
+has it; ``prefix=$IMU`` a word before the first number. Lines end in CR LF.
 """
 
 from __future__ import annotations
@@ -63,7 +63,9 @@ class Encoder(Wire):
             if name not in known:
                 raise InputError(f"no column {name!r}; there are {', '.join(known)}")
         parts = [known[name] for name in self._columns]
-        first = [self.chosen["prefix"]] if self.chosen["prefix"] else []
+        prefix = self.chosen["prefix"]
+        self._start = "$" if self._checked or prefix.startswith("$") else ""
+        first = [word] if (word := prefix.removeprefix("$")) else []
         self._line = self._separator.join(first + parts)
 
     def encode(self, block: Block) -> bytes:
@@ -81,5 +83,6 @@ class Encoder(Wire):
 
     def _ended(self, line: str) -> str:
         if not self._checked:
-            return f"{line}\r\n"
-        return f"${line}*{reduce(xor, line.encode('ascii', 'replace'), 0):02X}\r\n"
+            return f"{self._start}{line}\r\n"
+        check = reduce(xor, line.encode("ascii", "replace"), 0)
+        return f"{self._start}{line}*{check:02X}\r\n"

@@ -104,8 +104,8 @@ def turning(profile: Profile) -> Block:
 
 def added(id_: str) -> Array:
     """What the effect adds after 100 s at rest, (6,)."""
-    difference: Array = at_rest(told(id_)).six[-1] - at_rest(PLAIN).six[-1]
-    return difference
+    more: Array = at_rest(told(id_)).six[-1] - at_rest(PLAIN).six[-1]
+    return more
 
 
 def test_every_effect_has_an_example() -> None:

@@ -11,6 +11,7 @@ from fieldcal.errors import InputError
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device import Profile, VirtualDevice, earth
 from fieldcal.sim_device.joints import Joints
+from fieldcal.sim_device.motion import Rocking
 from fieldcal.sim_device.profile import (
     ONE,
     ZERO,
@@ -21,6 +22,7 @@ from fieldcal.sim_device.profile import (
     Sampling,
     Truth,
 )
+from fieldcal.sim_device.rocking import Bump, Sway
 from fieldcal.sim_device.vocabulary import parse
 
 PERFECT = Profile(
@@ -93,6 +95,35 @@ def test_the_rate_felt_while_base_and_joints_move_adds_up_too() -> None:
     )  # fmt: skip
     got = followed(moving.gyr, 1000.0)
     assert (got.inv() * expected).magnitude() < 1e-6
+
+
+@pytest.mark.parametrize(
+    "rocking",
+    [Sway(0.02, 0.7, 0.3, 1.0).rocking(), Bump(1.0, 0.6, 2.0, 0.02, 0.5).rocking()],
+)
+def test_rates_of_the_rocking_base_are_derivatives_of_its_angle(
+    rocking: Rocking,
+) -> None:
+    t = np.arange(0.9, 1.8, 1e-4)
+    angle = rocking.angle(t)
+    assert np.abs(angle.x).max() == pytest.approx(0.02, rel=0.01)
+    rate = np.gradient(angle.x, t)
+    acceleration = np.gradient(angle.rate, t)
+    np.testing.assert_allclose(angle.rate[1:-1], rate[1:-1], atol=1e-5)
+    np.testing.assert_allclose(angle.acceleration[1:-1], acceleration[1:-1], atol=1e-3)
+
+
+def test_a_device_with_a_fast_clock_turns_when_its_clock_says() -> None:
+    virtual = device("clock_skew:ppm=50000")
+    virtual.take(1000)
+    assert virtual.turn(1.0, 0.0, 2.0) == pytest.approx(1.0 + 2.0 * 1.05)
+    assert virtual.busy_until == pytest.approx(3.1)
+    block = virtual.take(4000)
+    moving = block.t[np.abs(block.gyr[:, 2]) > 1e-12]
+    assert moving[0] == pytest.approx(1.0, abs=0.01)
+    assert moving[-1] == pytest.approx(3.1, abs=0.01)
+    assert virtual.spin((0, 1.0, 0), seconds=2.0, at=6.0) == pytest.approx(8.1)
+    assert virtual.bump(seconds=1.0) == pytest.approx(5.0 + 1.05)
 
 
 def test_a_turn_starts_and_ends_at_rest_and_peaks_at_15_8_of_its_mean_rate() -> None:

@@ -15,8 +15,9 @@ import pytest
 
 from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Array, concat
-from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.remote import Remote
+from fieldcal.sim_device.vocabulary import effect
 
 LSB = np.array([16 * 9.80665 / 32768] * 3 + [np.deg2rad(2000) / 32768] * 3)
 SAMPLE = 33
@@ -101,10 +102,8 @@ def test_the_samples_are_those_of_the_device_at_any_speed(
         ms, got = words(read(port, 10**6))
         os.close(port)
     assert sim.ended() == (0, "")
-    from fieldcal.sim_device.vocabulary import effect
-
     tilt = effect("base_tilt", {"about_x_deg": -1, "about_z_deg": 0.5})
-    twin = VirtualDevice(VirtualDevice().profile.having(tilt), seed=7)
+    twin = VirtualDevice(Profile().having(effect("earth_rate", {}), tilt), seed=7)
     twin.turn(np.deg2rad(30.0), np.deg2rad(5.0), at=1.0)
     block = concat([twin.take(1) for _ in range(600)])
     np.testing.assert_array_equal(ms, np.arange(0, 6000, 10))
@@ -167,6 +166,7 @@ def test_it_can_be_told_to_stop(sims: list[Sim], tmp_path: Path) -> None:
         sims,
         *("--truth", str(truth), "--control", str(tmp_path / "orders")),
         *("--acc-bias=0.1,-0.2,0.3", "--with", "dropped:fraction=0.1"),
+        *("--with", "earth_rate"),
     )
     assert sim.control == str(tmp_path / "orders")
     with Remote(sim.control) as remote:
@@ -175,7 +175,7 @@ def test_it_can_be_told_to_stop(sims: list[Sim], tmp_path: Path) -> None:
     assert not (tmp_path / "orders").exists()
     concealed = json.loads(truth.read_text())
     assert concealed["acc_bias"] == [0.1, -0.2, 0.3]
-    assert concealed["effects"] == {"dropped": {"fraction": 0.1}}
+    assert concealed["effects"]["dropped"] == {"fraction": 0.1}
 
 
 def test_silence_garbage_and_hanging_up(sims: list[Sim]) -> None:
@@ -183,7 +183,9 @@ def test_silence_garbage_and_hanging_up(sims: list[Sim]) -> None:
     with Remote(sim.control) as remote:
         port = sim.open()
         read(port, 10 * SAMPLE)
-        until = remote.ask(fault={"silence_s": 2})["until_s"]
+        reply = remote.ask(fault={"silence_s": 2})
+        until = reply["until_s"]
+        assert until == pytest.approx(reply["time_s"] + 2)
         data = read(port, 2500 * SAMPLE)
         ms, _ = words(data)
         gaps = np.diff(ms)

@@ -60,9 +60,11 @@ def test_text_with_checksum() -> None:
     assert wire.encode(SAMPLE) == b"$A,7,25.00*%02X\r\n" % (
         0x41 ^ 0x2C ^ 0x37 ^ 0x2C ^ 0x32 ^ 0x35 ^ 0x2E ^ 0x30 ^ 0x30
     )
-    short = open_wire("text?columns=seq,ay&checksum=xor&prefix=A&acc_unit=g&digits=1")
+    short = open_wire("text?columns=seq,ay&checksum=xor&prefix=$A&acc_unit=g&digits=1")
     # 41^2c^37^2c^2d^31 = 6a
     assert short.encode(SAMPLE) == b"$A,7,-1*6A\r\n"
+    plain = open_wire("text?columns=seq&prefix=$A")
+    assert plain.encode(SAMPLE) == b"$A,7\r\n"
 
 
 def test_text_separator_order_and_time_unit() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from fieldcal.driver import Health
 from fieldcal.drivers import protocols
 from fieldcal.drivers.framing import Bytes, Candidates, Found, resolve
+from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.drivers.timebase import Timebase
@@ -111,21 +112,27 @@ class Codec(ABC):
     def _timed(
         self,
         clock: Timebase,
-        six: Array,
-        temperature: Array,
+        raw: Raw | None,
         t_host: Array,
-        stamps: Array,
-        seq: Array | None = None,
         steps: Array | None = None,
     ) -> Block | None:
-        """Give samples their time; those with an old stamp are left out."""
-        if not len(six):
+        """Give samples their time; those with an old stamp are left out.
+
+        Parameters
+        ----------
+        clock : what tells the time
+        raw : the samples, in order; `which` numbers the frames they ended with
+        t_host : arrivals of the frames, s
+        steps : (m,) periods since the sample before; 1 if not given
+
+        """
+        if raw is None or not len(raw.six):
             return None
-        steps = np.ones(len(six)) if steps is None else steps
-        seq = np.full(len(six), np.nan) if seq is None else seq
-        t = clock.times(stamps, steps, t_host)
+        ones = np.ones(len(raw.six))
+        arrived = t_host[raw.which]
+        t = clock.times(raw.stamps, ones if steps is None else steps, arrived)
         new = ~np.isnan(t)
-        columns = (six[:, :3], six[:, 3:], temperature, seq, t_host)
+        columns = (raw.six[:, :3], raw.six[:, 3:], raw.temperature, raw.seq, arrived)
         return Block.of(t[new], *(column[new] for column in columns))
 
     def _feed(self, chunks: Sequence[Chunk]) -> Block | None:

@@ -10,6 +10,7 @@ before it is, so the outcome does not depend on how the bytes were cut.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,6 +85,41 @@ def resolve(candidates: Candidates, size: int) -> Found:
         refused = refused[(before < 0) | (refused >= last[before])]
     skipped = rest - int(np.sum(last - first))
     return Found(first, last, rest, len(refused), skipped)
+
+
+def headed(
+    data: Bytes,
+    sync: bytes,
+    head: int,
+    longest: int,
+    size: Callable[[Bytes, Index], Index],
+    check: Callable[[Bytes, Index, Index], Mask],
+) -> Candidates:
+    """Look for frames that begin with two bytes and say how long they are.
+
+    Parameters
+    ----------
+    data : the bytes
+    sync : the two bytes
+    head : bytes of the header, up to the length
+    longest : longest frame that is taken for one, bytes
+    size : from bytes and starts to the sizes of the frames, (m,)
+    check : from bytes, starts and ends of whole frames to whether their check holds
+
+    """
+    starts = np.flatnonzero(data[:-1] == sync[0])
+    starts = starts[data[starts + 1] == sync[1]]
+    padded = np.concatenate([data, np.zeros(head, np.uint8)])
+    ends = starts + size(padded, starts)
+    cut = starts + head > len(data)
+    ends[cut] = len(data) + 1
+    possible = cut | (ends - starts <= longest)
+    starts, ends = starts[possible], ends[possible]
+    good = np.ones(len(starts), dtype=bool)
+    whole = np.flatnonzero(ends <= len(data))
+    good[whole] = check(data, starts[whole], ends[whole])
+    half = len(data) > 0 and int(data[-1]) == sync[0]
+    return Candidates(starts, ends, good, len(data) - half)
 
 
 def rows(data: Bytes, starts: Index, size: int) -> Bytes:

@@ -74,6 +74,15 @@ class Options:
             )
         return number
 
+    def fixed(self, **values: str) -> Options:
+        """Return these options with some that cannot be chosen."""
+        for name in values:
+            if name in self._given:
+                raise InputError(f"{self._owner}: {name} is fixed in this format")
+        other = Options(self._owner)
+        other._given, other._known = {**self._given, **values}, self._known
+        return other
+
     def finish(self) -> None:
         """Refuse what nobody asked for.
 

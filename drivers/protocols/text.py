@@ -28,7 +28,9 @@ from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.columns import guess
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask
+from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
+from fieldcal.drivers.sequence import Sequence
 from fieldcal.errors import InputError
 from fieldcal.samples import CHANNELS, Array, Block
 
@@ -85,7 +87,7 @@ class Codec(Base):
         span = 2**bits * self._t_unit if bits else float("inf")
         self._clock = Clock(self.health, options, resolution, span)
         self._whole = self._checked
-        self._seq: float | None = None
+        self._seq = Sequence()
         self._check()
 
     def _check(self) -> None:
@@ -129,7 +131,7 @@ class Codec(Base):
         """Forget half a line, and distrust the next."""
         super().reset()
         self._whole = self._checked
-        self._seq = None
+        self._seq.broken()
         self._clock.broken()
 
     def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
@@ -238,17 +240,10 @@ class Codec(Base):
         seq = column.get("seq", unknown)
         stamps = column.get("t", unknown) * self._t_unit
         six = np.column_stack([column.get(name, unknown) for name in CHANNELS])
-        temperature, steps = column.get("temperature", unknown), self._steps(seq)
-        return self._timed(
-            self._clock, six * self._scale, temperature, t_host, stamps, seq, steps
-        )
-
-    def _steps(self, seq: Array) -> Array:
-        """Periods since the sample before, from the counter where it is one, (n,)."""
-        before = seq[0] - 1 if self._seq is None else self._seq
-        steps = np.diff(seq, prepend=before)
-        self._seq = float(seq[-1])
-        return np.where((steps >= 1) & (steps < 1e6), steps, 1).astype(np.int64)
+        temperature = column.get("temperature", unknown)
+        which = np.arange(len(values))
+        raw = Raw(which, six * self._scale, temperature, stamps, seq)
+        return self._timed(self._clock, raw, t_host, self._seq.steps(seq))
 
 
 def _separator(options: Options) -> int:

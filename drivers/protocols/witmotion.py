@@ -27,6 +27,7 @@ from fieldcal.description import ACC_UNITS, GYR_UNITS
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Mask, rows
+from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.samples import Array, Block
 
@@ -158,14 +159,15 @@ class Codec(Base):
                 return None
             self._decided = True
         six = np.hstack([samples["acc"], samples["gyr"]])
-        return self._timed(
-            self._clock,
+        n = len(six)
+        raw = Raw(
+            np.arange(n),
             six,
             samples["temperature"],
-            samples["t_host"].copy(),
             samples["stamp"],
-            steps=samples["steps"],
+            np.full(n, np.nan),
         )
+        return self._timed(self._clock, raw, samples["t_host"], samples["steps"])
 
 
 def _repeats(frames: Frames) -> Mask:

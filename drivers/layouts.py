@@ -1,0 +1,114 @@
+"""Take fields out of many frames at once, where most frames look alike.
+
+A device that sends one kind of message sends the same fields at the same places again
+and again. So the fields of one frame are looked up byte by byte, and taken from all the
+frames whose layout is the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.drivers.framing import Bytes, Found, Index, rows
+from fieldcal.samples import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the fields of a frame are.
+
+    Attributes
+    ----------
+    fields : by key, first byte and length in the frame
+    marks : the bytes that say so: the same in every frame of this layout
+
+    """
+
+    fields: Mapping[int, tuple[int, int]]
+    marks: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Alike:
+    """Frames of one layout.
+
+    Attributes
+    ----------
+    which : (m,) their numbers among all the frames
+    frames : (m, bytes)
+    fields : by key, first byte and length
+
+    """
+
+    which: Index
+    frames: Bytes
+    fields: Mapping[int, tuple[int, int]]
+
+    def numbers(self, key: int | None, kind: str, n: int) -> Array:
+        """First n numbers of a field as dtype `kind`, (m, n); nan if there is none."""
+        if key is None or key not in self.fields:
+            return np.full((len(self.frames), n), np.nan)
+        first, _ = self.fields[key]
+        size = n * np.dtype(kind).itemsize
+        field = np.ascontiguousarray(self.frames[:, first : first + size])
+        return field.view(kind).astype(float)
+
+    def first_of(self, keys: tuple[int, ...]) -> int | None:
+        """Return the first of the keys that these frames have."""
+        return next((key for key in keys if key in self.fields), None)
+
+
+class Raw(NamedTuple):
+    """Samples as frames carry them, without a common time.
+
+    Attributes
+    ----------
+    which : (m,) numbers of the frames
+    six : (m, 6) acc m/s^2, gyr rad/s
+    temperature : (m,) deg C
+    stamps : (m,) s, the device's own
+    seq : (m,) the device's counter
+
+    """
+
+    which: Index
+    six: Array
+    temperature: Array
+    stamps: Array
+    seq: Array
+
+
+def in_order(parts: Iterable[Raw]) -> Raw | None:
+    """Join samples of several layouts in the order of their frames."""
+    some = list(parts)
+    if not some:
+        return None
+    joined = [np.concatenate(column) for column in zip(*some, strict=True)]
+    order = np.argsort(joined[0], kind="stable")
+    return Raw(*(column[order] for column in joined))
+
+
+Walk = Callable[[bytes], Layout | None]
+
+
+def alike(data: Bytes, found: Found, walk: Walk) -> Iterator[Alike]:
+    """Sort frames by layout; those that `walk` knows no layout for are left out."""
+    left = np.arange(len(found.starts))
+    lengths = found.ends - found.starts
+    while len(left):
+        first = left[0]
+        size = int(lengths[first])
+        layout = walk(data[found.starts[first] : found.ends[first]].tobytes())
+        if layout is None:
+            left = left[1:]
+            continue
+        same = left[lengths[left] == size]
+        frames = rows(data, found.starts[same], size)
+        marks = list(layout.marks)
+        match = (frames[:, marks] == frames[0, marks]).all(axis=1)
+        yield Alike(same[match], frames[match], layout.fields)
+        left = np.setdiff1d(left, same[match], assume_unique=True)

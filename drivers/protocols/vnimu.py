@@ -1,0 +1,32 @@
+"""VectorNav's text line $VNIMU: ``format=vnimu``.
+
+    $VNIMU,MagX,MagY,MagZ,AccelX,AccelY,AccelZ,GyroX,GyroY,GyroZ,Temp,Pressure*hh
+
+in m/s^2, rad/s, deg C; uncompensated, without a time: ``rate=``, or the arrivals.
+Source: VectorNav UM001, asynchronous output type IMU measurements.
+"""
+
+from __future__ import annotations
+
+from fieldcal.drivers.codec import Likeness
+from fieldcal.drivers.options import Options
+from fieldcal.drivers.protocols.text import Codec as Lines
+
+
+class Codec(Lines):
+    """Decoder of lines with these columns."""
+
+    bauds = (115200, 921600, 230400, 460800, 57600, 128000)
+
+    def __init__(self, options: Options) -> None:
+        fixed = options.fixed(
+            columns="-,-,-,ax,ay,az,gx,gy,gz,temperature,-",
+            prefix="VNIMU",
+            checksum="xor",
+        )
+        super().__init__(fixed)
+
+    @classmethod
+    def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
+        """Judge whether bytes are such lines."""
+        return cls.decoded(data)

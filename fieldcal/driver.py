@@ -79,6 +79,10 @@ class Driver(ABC):
     def close(self) -> None:
         """Release the link; safe to call twice."""
 
+    def host_time(self) -> float:
+        """Now, in s of the clock that stamps `Block.t_host`."""
+        return host_clock()
+
     @property
     def reconnecting(self) -> bool:
         """True while the link is broken and the driver still tries to mend it."""

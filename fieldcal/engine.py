@@ -20,7 +20,7 @@ import numpy as np
 
 from fieldcal.arrival import Arrival, Held, judge
 from fieldcal.description import Description
-from fieldcal.driver import Driver, Health, host_clock
+from fieldcal.driver import Driver, Health
 from fieldcal.errors import FieldcalError, Moved, WrongPosition
 from fieldcal.plan import Hold, Note, Plan, Step
 from fieldcal.recorder import Recorder
@@ -176,7 +176,7 @@ class Engine:
         stillness, resting = Stillness(), _Resting()
         began: float | None = None
         told = False
-        asked = host_clock()
+        asked = self._driver.host_time()
         for block in self._stream:
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before

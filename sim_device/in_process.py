@@ -45,6 +45,10 @@ class InProcess(Driver):
         self.health.samples += len(block)
         return block
 
+    def host_time(self) -> float:
+        """The device's own time: nothing waits between it and the reader."""
+        return self.device.time
+
     def close(self) -> None:
         """Nothing to release."""
 

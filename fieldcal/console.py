@@ -17,10 +17,10 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from fieldcal.engine import View
 from fieldcal.movers import Mover
 from fieldcal.plan import Hold
 from fieldcal.positions import Position
+from fieldcal.view import View
 
 FRAMES = 8.0
 """Drawings a second."""
@@ -148,7 +148,8 @@ class ConsoleOperator:
         if view.phase == "turning":
             for name, seen, wanted in _angles(view):
                 grid.add_row(name, _inclinometer(seen, wanted))
-            grid.add_row("waits for", view.reason)
+            told = view.reason and view.reason in self._said
+            grid.add_row("waits for", "the turn: see below" if told else view.reason)
         else:
             left = max(0.0, view.hold.seconds - view.elapsed)
             bar = ProgressBar(

@@ -12,24 +12,22 @@ and its average goes back to the plan.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from fieldcal.arrival import Arrival, Held, judge
 from fieldcal.description import Description
-from fieldcal.driver import Driver, Health
+from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, WrongPosition
 from fieldcal.plan import Hold, Note, Plan, Step
 from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block, concat
+from fieldcal.view import Operator, Phase, View
 from fieldcal.windows import Average, Stillness, Window
 
 R = TypeVar("R")
-
-Phase = Literal["turning", "averaging", "taken"]
 
 SETTLE = 1.5
 """Rest before a window begins, s: a joint that was just let go of still creeps."""
@@ -42,50 +40,6 @@ PIECE = 0.1
 
 GAP = 0.5
 """Longest time without samples inside a window, s."""
-
-
-@dataclass(frozen=True, slots=True)
-class View:
-    """What there is to show now.
-
-    Attributes
-    ----------
-    phase : what the engine waits for
-    hold : the step being carried out
-    arrival : where the device is, None while it cannot be told
-    stillness : present motion over the limit for rest; below 1 is still
-    elapsed : s of device time averaged so far
-    sigma : (6,) standard error reached so far, nan before there is one
-    reason : why it waits, empty when it does not
-    rate_hz : samples a second of device time
-    temperature : deg C, nan where unknown
-    health : of the link
-
-    """
-
-    phase: Phase
-    hold: Hold
-    arrival: Arrival | None
-    stillness: float
-    elapsed: float
-    sigma: Array
-    reason: str
-    rate_hz: float
-    temperature: float
-    health: Health
-
-
-class Operator(Protocol):
-    """Whoever moves the device: a person at a console, a script, a virtual device."""
-
-    def place(self, hold: Hold) -> None:
-        """Ask for a position, or begin to turn there; return at once."""
-
-    def tell(self, text: str) -> None:
-        """Show a sentence that must not be missed."""
-
-    def show(self, view: View) -> None:
-        """Show the state; called for every block, must not take long."""
 
 
 class Engine:

@@ -8,8 +8,10 @@ out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from fieldcal.calibration import Nominal
+from fieldcal import __version__
+from fieldcal.calibration import Calibration, Nominal
 from fieldcal.description import Description
 from fieldcal.errors import FieldcalError, Moved, SessionError
 from fieldcal.samples import Block
@@ -43,6 +45,12 @@ def observations(
         grade="navigation" if about.grade == "navigation" else "tactical",
         nominal=Nominal(**{k: tuple(v.tolist()) for k, v in about.nominal.items()}),
     )
+
+
+def with_provenance(calibration: Calibration, about: Description) -> Calibration:
+    """The calibration with the device it belongs to and the software that made it."""
+    origin = {"device": dict(about.device), "software": f"fieldcal {__version__}"}
+    return replace(calibration, info={**calibration.info, **origin})
 
 
 def observe(session: Session) -> tuple[Observations, tuple[str, ...]]:

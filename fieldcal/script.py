@@ -8,9 +8,9 @@ from typing import IO, Any
 
 import numpy as np
 
-from fieldcal.engine import View
 from fieldcal.movers import Mover
 from fieldcal.plan import Hold
+from fieldcal.view import View
 
 EVERY = 5.0
 """Time between two lines of progress, s of device time."""

@@ -11,10 +11,10 @@ from rich.console import Console
 from fieldcal.arrival import Arrival
 from fieldcal.console import ConsoleOperator
 from fieldcal.driver import Health
-from fieldcal.engine import Phase, View
 from fieldcal.movers import Nobody
 from fieldcal.plan import Hold
 from fieldcal.positions import FIVE
+from fieldcal.view import Phase, View
 
 HOLD = Hold(1, FIVE[1], 30.0)
 

@@ -11,7 +11,7 @@ import pytest
 
 from fieldcal import description
 from fieldcal.driver import Driver, Health
-from fieldcal.engine import Engine, View
+from fieldcal.engine import Engine
 from fieldcal.errors import CalibrationFailed, DeviceSilent, WrongPosition
 from fieldcal.plan import Hold, hold
 from fieldcal.positions import TWO, Position
@@ -21,6 +21,7 @@ from fieldcal.samples import Block
 from fieldcal.session import Session
 from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.in_process import InProcess
+from fieldcal.view import View
 from fieldcal.windows import Average
 
 ABOUT = description.parse({"site": {"latitude_deg": 50.45, "height_m": 170.0}})

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.errors import FieldcalError, InputError, PlanError
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.description import Description
     from fieldcal.driver import Driver
-    from fieldcal.engine import Operator
     from fieldcal.movers import Mover
+    from fieldcal.view import Operator
 
 PROCEDURES = ("two_position", "five_position", "positions")
 
@@ -225,6 +225,7 @@ def _record(
     args: argparse.Namespace, task: Task, driver: Driver, mover: Mover
 ) -> Calibration:
     from fieldcal.engine import Engine
+    from fieldcal.observing import with_provenance
     from fieldcal.recorder import Recorder
 
     plan = import_module(f"fieldcal.procedures.{task.procedure}").plan
@@ -243,7 +244,7 @@ def _record(
                 sys.stderr.write(f"what was recorded is kept in {task.folder}\n")
                 raise
         recorder.mark("finished", verdict="good" if found.good else "bad")
-    return cast("Calibration", found)
+    return with_provenance(found, task.about)
 
 
 @contextlib.contextmanager

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from fieldcal.commands.table import show
-    from fieldcal.observing import observe
+    from fieldcal.observing import observe, with_provenance
     from fieldcal.session import RESULT, Session
     from fieldcal.solve import solve
 
@@ -57,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
         as_printed=args.as_printed,
     )
     found = replace(found, warnings=(*warnings, *found.warnings))
+    found = with_provenance(found, session.about)
     path = session.write_json(RESULT, found.to_json())
     if args.json:
         for warning in found.warnings:

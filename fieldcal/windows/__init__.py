@@ -4,6 +4,14 @@ from fieldcal.windows.limits import Limits
 from fieldcal.windows.mean import Average
 from fieldcal.windows.stillness import Stillness
 from fieldcal.windows.stretches import still_stretches
-from fieldcal.windows.window import Window, average
+from fieldcal.windows.window import Noise, Window, average
 
-__all__ = ["Average", "Limits", "Stillness", "Window", "average", "still_stretches"]
+__all__ = [
+    "Average",
+    "Limits",
+    "Noise",
+    "Stillness",
+    "Window",
+    "average",
+    "still_stretches",
+]

@@ -17,9 +17,13 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.samples import Array, Block
+from fieldcal.windows.trend import line
 
 CELL = 0.1
 """Length of a cell, s."""
+
+_CHUNK = 8192
+"""Samples summed at a time, so that what is in hand stays in the processor's cache."""
 
 _GRACE = 1e-5
 """Part of a cell by which a time may miss its edge through rounding."""
@@ -33,6 +37,7 @@ class Cells:
     n : samples taken in
     start, end : first and last instant, s of device time; nan before the first sample
     origin : (6,) what the sums are taken about: the first value of each channel
+    finest : (6,) smallest change from one value to the next but none, SI
 
     """
 
@@ -40,6 +45,7 @@ class Cells:
         self.n = 0
         self.start = self.end = np.nan
         self.origin = np.full(6, np.nan)
+        self.finest = np.full(6, np.inf)
         self._last = np.full((1, 6), np.nan)
         self._size = 0
         self._index = np.zeros(64, dtype=np.int64)
@@ -50,8 +56,10 @@ class Cells:
 
     def add(self, block: Block) -> None:
         """Take in the samples of a block that follows the last one."""
-        if not len(block):
-            return
+        for first in range(0, len(block), _CHUNK):
+            self._add(block[first : first + _CHUNK])
+
+    def _add(self, block: Block) -> None:
         x = self._centred(block)
         if not self.n:
             self.start = float(block.t[0])
@@ -59,13 +67,15 @@ class Cells:
         self.end = float(block.t[-1])
         step = np.diff(np.vstack([self._last, x]), axis=0)
         self._last = x[-1:]
+        size = np.abs(step)
+        self.finest = np.fmin(self.finest, np.where(size > 0, size, np.inf).min(axis=0))
         index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
         self._accumulate(index, _rows(x, step, block.temperature))
 
     def _centred(self, block: Block) -> Array:
-        six = block.six
+        six = np.where(np.isfinite(block.six), block.six, np.nan)
         for channel in np.flatnonzero(np.isnan(self.origin)):
-            known = np.flatnonzero(np.isfinite(six[:, channel]))
+            known = np.flatnonzero(~np.isnan(six[:, channel]))
             if known.size:
                 self.origin[channel] = six[known[0], channel]
         centred: Array = six - self.origin
@@ -109,6 +119,40 @@ class Cells:
         return _ratio(sums[:, 12:18], 2 * sums[:, 18:24])
 
     @property
+    def steady(self) -> Array:
+        """Means as `means`, (m, 6), alike in variance and with none missing.
+
+        The mean of a cell with fewer values than usual is drawn towards a line through
+        the others as far as it varies more; where none is, it lies on the line.
+        """
+        counts, means = self.counts, self.means
+        usual = np.median(counts, axis=0)
+        trust = np.sqrt(np.minimum(1.0, counts / np.where(usual > 0, usual, 1.0)))
+        if (trust == 1.0).all():
+            return means
+        laid = line(_held(means))
+        steady: Array = laid + trust * np.where(counts > 0, means - laid, 0.0)
+        return steady
+
+    @property
+    def spacing(self) -> float:
+        """Device time from one cell to the next on average, s."""
+        span = self._index[self._size - 1] - self._index[0] + 1
+        return float(CELL * span / self._size)
+
+    @property
+    def noise(self) -> Array:
+        """Standard deviation of the short-lag noise, (6,); nan where unknown."""
+        total = self._sums[: self._size].sum(axis=0)
+        return np.sqrt(_ratio(total[12:18], 2 * total[18:24]))
+
+    @property
+    def resolution(self) -> Array:
+        """Finest change seen on any axis of the same sensor, (6,); 0 where none."""
+        finest = np.repeat(self.finest.reshape(2, 3).min(axis=1), 3)
+        return np.where(np.isfinite(finest), finest, 0.0)
+
+    @property
     def mean(self) -> Array:
         """Mean of all values, (6,); nan where not measured."""
         total = self._sums[: self._size].sum(axis=0)
@@ -140,3 +184,12 @@ def _ratio(sums: Array, counts: Array) -> Array:
     unknown = np.full(sums.shape, np.nan)
     ratio: Array = np.divide(sums, counts, out=unknown, where=counts > 0)
     return ratio
+
+
+def _held(means: Array) -> Array:
+    """Means with the one before where one is missing, 0 before the first."""
+    known = np.isfinite(means)
+    row = np.maximum.accumulate(
+        np.where(known, np.arange(len(means))[:, None], 0), axis=0
+    )
+    return np.nan_to_num(np.take_along_axis(means, row, axis=0))

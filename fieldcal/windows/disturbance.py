@@ -1,119 +1,98 @@
-"""Whether a window was disturbed: at what instant, on which axis, by how much.
+"""What disturbs a window: a push, a step, a shake, each over its usual size by noise.
 
-    y_i                                    means of cells, i = 1 .. m
-    u_k,i = mean of 2^k cells from cell i                    running mean of level k
-    a_k   = median |u_k,i+2^k - u_k,i| / (0.6745 sqrt(2))    robust Allan deviation
-    s_k^2 = sum over j >= k of a_j^2 / 2                     spread about the mean
-    z_k,i = (u_k,i - median y) / s_k
+y_i are the means of m cells, u_k,i their running means over 2^k cells, s_k and a_k the
+noise of module `quiet`, l_i a robust straight line through y.
 
-Differences of neighbours know nothing of a step or a lean but at its edge, so a_k is
-the device's own noise even in a window that was disturbed. Levels too long to be
-measured in the window are continued from the shorter ones. The sum over the levels is
-exact for any stationary noise (Haar analysis of variance; white noise: s_k = a_k).
+    push     z_k,i = |u_k,i - running mean of l| / s_k                           (1)
+    step     z_k,i = |u_k,i+2^k - u_k,i| / (sqrt(2) a_k)                         (2)
+    shake    z_k,i = sqrt(2^k) (mean of 2^k of q^(1/3) - median) / spread        (3)
+
+The line lets the slow drift of a device that warms up pass: it widens the error of the
+mean but is no disturbance. A step tilts the line and so hides from (1), but not from
+(2), for which such a drift is too slow. What shakes and comes back to where it was
+shows in the short-lag noise q of the cells, whose cube root is close to normal (Wilson
+and Hilferty 1931).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from fieldcal.errors import Moved
-from fieldcal.samples import CHANNELS, Array
-from fieldcal.windows.cells import CELL
+from fieldcal.samples import Array
+from fieldcal.windows.quiet import NORMAL, Quiet, running
+from fieldcal.windows.trend import line
 
-LEVELS = 8
-"""Durations looked for: 0.1 s to 12.8 s, each twice the one before."""
+Kind = Literal["push", "step", "shake"]
 
-THRESHOLD = 6.5
-"""Deviation, in spreads of the noise, that noise alone does not reach."""
-
-_NORMAL = 0.6745 * np.sqrt(2.0)
+SHAKE_LEVELS = 4
+"""Durations looked for in the short-lag noise: 0.1 s to 0.8 s."""
 
 
 @dataclass(frozen=True, slots=True)
-class Deviation:
-    """The largest deviation of a window from its own middle.
+class Statistic:
+    """One kind of disturbance at one duration, at n instants on c channels.
 
     Attributes
     ----------
-    ratio : deviation as part of what is allowed; above 1 is a disturbance
-    cell : first cell of the deviation
-    level : its duration is 2^level cells
-    channel : index in `CHANNELS`
-    size, noise : the deviation and its standard deviation by noise, SI
+    kind : what is looked for
+    cells : its duration
+    size : (n, c) what is seen, SI
+    noise : (c,) its usual size, SI
+    z : (n, c) departure over spread, (1) to (3)
 
     """
 
-    ratio: float
-    cell: int
-    level: int
-    channel: int
-    size: float
-    noise: float
+    kind: Kind
+    cells: int
+    size: Array
+    noise: Array
+    z: Array
 
-    def error(self, times: Array) -> Moved:
-        """Return the error that tells the operator."""
-        axis = CHANNELS[self.channel]
-        unit = "m/s²" if self.channel < 3 else "rad/s"
-        at = float(times[self.cell])
-        text = (
-            f"disturbed {at - times[0]:.1f} s into the window on {axis}: "
-            f"{CELL * 2**self.level:.1f} s of {self.size:+.2g} ± {self.noise:.1g} "
-            f"{unit}, {abs(self.size) / self.noise:.0f} times the noise; hold still, "
-            "the window starts again"
+
+def pushes(means: Array, noise: Quiet, least: Array) -> list[Statistic]:
+    """Deviations of cell means (m, c) from the line, (1).
+
+    `least` (c,) is the least that a spread can be, SI.
+    """
+    levels = zip(running(means - line(means)), noise.spread, strict=False)
+    return [
+        Statistic("push", 2**k, u, s, np.abs(u) / _no_less(s, least))
+        for k, (u, s) in enumerate(levels)
+    ]
+
+
+def steps(means: Array, noise: Quiet, least: Array) -> list[Statistic]:
+    """Changes between neighbouring running means, (2)."""
+    levels = zip(running(means), np.sqrt(2.0) * noise.allan, strict=False)
+    tests = []
+    for k, (u, s) in enumerate(levels):
+        change = u[2**k :] - u[: -(2**k)]
+        tests.append(
+            Statistic("step", 2**k, change, s, np.abs(change) / _no_less(s, least))
         )
-        return Moved(text, at, axis)
+    return tests
 
 
-def largest_deviation(means: Array) -> Deviation | None:
-    """Return the most significant deviation in cell means (m, 6); None in too few."""
-    if len(means) < 2:
-        return None
-    filled = _filled(means)
-    sums = np.vstack([np.zeros((1, 6)), np.cumsum(filled, axis=0)])
-    levels = [k for k in range(LEVELS) if 2**k <= len(means) // 2]
-    running = [(sums[2**k :] - sums[: -(2**k)]) / 2**k for k in levels]
-    spread = _spread(running)
-    middle = np.median(filled, axis=0)
-    best: Deviation | None = None
-    for k in levels:
-        deviation = running[k] - middle
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.nan_to_num(np.abs(deviation) / (THRESHOLD * spread[k]))
-        i, c = np.unravel_index(np.argmax(ratio), ratio.shape)
-        if best is None or ratio[i, c] > best.ratio:
-            best = Deviation(
-                float(ratio[i, c]),
-                int(i),
-                k,
-                int(c),
-                float(deviation[i, c]),
-                float(spread[k][c]),
-            )
-    return best
+def shakes(short: Array, least: Array) -> list[Statistic]:
+    """Excess of the short-lag noise (m, c), a variance, over its usual size, (3)."""
+    root = np.cbrt(short)
+    centred = root - np.median(root, axis=0)
+    usual = np.median(np.abs(centred), axis=0) / NORMAL
+    spread = _no_less(usual, np.cbrt(least**2))
+    noise = np.sqrt(np.median(short, axis=0))
+    sizes = [np.sqrt(np.maximum(q, 0.0)) for q in running(short, SHAKE_LEVELS)]
+    return [
+        Statistic("shake", 2**k, size, noise, u * np.sqrt(2.0**k) / spread)
+        for k, (u, size) in enumerate(
+            zip(running(centred, SHAKE_LEVELS), sizes, strict=True)
+        )
+    ]
 
 
-def _spread(running: list[Array]) -> list[Array]:
-    """Spread (6,) of the running means of each level about the mean, by noise."""
-    allan: list[Array] = []
-    for k, u in enumerate(running):
-        pairs = u[2**k :] - u[: -(2**k)]
-        if k and len(u) < 10 * 2**k:
-            allan.append(allan[-1] / np.sqrt(2))
-        else:
-            allan.append(np.median(np.abs(pairs), axis=0) / _NORMAL)
-    beyond = allan[-1] ** 2 / 2
-    variance = []
-    for a in reversed(allan):
-        beyond = beyond + a**2 / 2
-        variance.append(beyond)
-    return [np.sqrt(v) for v in reversed(variance)]
-
-
-def _filled(means: Array) -> Array:
-    """Cell means with the value before where one is missing, zeros where all are."""
-    known = np.isfinite(means)
-    row = np.where(known, np.arange(len(means))[:, None], 0)
-    last = np.maximum.accumulate(row, axis=0)
-    return np.nan_to_num(np.take_along_axis(means, last, axis=0))
+def _no_less(spread: Array, least: Array) -> Array:
+    """Spread, infinite where there is none: what never varies cannot be judged."""
+    bounded = np.maximum(spread, least)
+    return np.where(bounded > 0, bounded, np.inf)

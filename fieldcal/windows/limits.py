@@ -11,22 +11,28 @@ from fieldcal.samples import Array
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Bounds of sanity on the noise itself; stillness is judged against the noise.
-
-    A device on a running vehicle or in a hand stays below them, one that is being
-    carried about does not.
+    """Bounds of sanity; stillness itself is judged against the device's own noise.
 
     Attributes
     ----------
-    acc : m/s^2, largest standard deviation of 0.1 s means of a device at rest
-    gyr : rad/s, likewise
+    acc, gyr : m/s^2, rad/s: largest standard deviation of 0.1 s means at rest, which a
+        device on a running vehicle or in a hand stays below
+    acc_drift, gyr_drift : m/s^2, rad/s: largest steady change over a window, which a
+        device that warms up stays below
 
     """
 
     acc: float = 0.5
     gyr: float = 0.1
+    acc_drift: float = 0.1
+    gyr_drift: float = 0.01
 
     @property
-    def six(self) -> Array:
-        """Bound of each channel, (6,)."""
+    def noise(self) -> Array:
+        """Bound on the noise of each channel, (6,)."""
         return np.repeat([self.acc, self.gyr], 3)
+
+    @property
+    def drift(self) -> Array:
+        """Bound on the drift of each channel, (6,)."""
+        return np.repeat([self.acc_drift, self.gyr_drift], 3)

@@ -1,26 +1,193 @@
 """The covariance of a mean whose noise is not white, from the window's own data.
 
-y_b                               means of consecutive batches, b = 1 .. B
-C = 1 / (B (B - 1)) * sum (y_b - y)(y_b - y)'     covariance of the mean
+    I_j = |sum y_i exp(-i 2 pi f_j t_i)|^2 / m            periodogram of m cell means
+    S   = w g                                             level w times a shape g
+    g   = 1 / (1 + (f/c)^2) + k/f    or    1 + (r/f)^2                           (1)
+    log p(g | I) = log p(g) - sum log g_j - n log Q,  Q = sum I_j / g_j          (2)
+    v(g) = 1 - (d/2)(3 - 4 exp(-1/d) + exp(-2/d)) + 4 ln2 k T,  d = 1/(2 pi c T) (3)
+    v(g) = 1 + (4/3) (pi r T)^2                                                  (4)
+    var  = sum over g of p(g | I) * Q / (n - 1) * v(g) / m                       (5)
+
+The noise is white, low-passed with the corner c, flicker with the knee k, or a random
+walk with the knee r, Hz. How likely each shape is, the data say: Whittle's likelihood
+with the level w integrated out (2). The variance (5) is that of the mean averaged over
+the shapes, so what the window is too short to know widens it. (3) and (4) are the Allan
+variance at the length T of the window in units of white noise: the error stated is
+that by which the mean of the next window would differ, over sqrt(2). For white and
+low-passed noise that is the standard error. Flicker and random walk also wander at
+frequencies below 1/T, and nothing in the window shows that part; a knee below about
+3/T hides in the white noise and is seen by several windows of a device together, which
+is why the shapes learnt from one window can be handed to the next.
+
+A channel whose noise is less than half its resolution q has an error that averaging
+does not lower, and that is added:
+
+    sum over h = 1, 2, .. of (q / (pi h))^2 / 2 * exp(-4 pi^2 h^2 s^2 / q^2)     (6)
+
+Sources: Whittle 1953; IEEE 952-1997 annex C (Allan variances); Widrow and Kollar 2008
+(quantisation, s is the noise before rounding).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from fieldcal.samples import Array
 
-BATCHES = 24
-"""Batches a window is cut into."""
+BAND = 2.5
+"""Highest frequency the noise at f = 0 is learnt from, Hz."""
+
+_FEWEST = 8
+"""Frequencies that are used even when they reach beyond the band."""
+
+_LINE = 8.0
+"""Power over that of its neighbours at which a frequency is a line, not noise."""
+
+_BESIDE = 10
+"""Neighbours to either side."""
+
+CORNERS = (np.inf, 2.4, 1.2, 0.6, 0.3, 0.15)
+KNEES = (0.0, 0.02, 0.06, 0.2, 0.6, 2.0, 6.0)
+WALKS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+"""Corners c, knees k and r of the shapes, Hz."""
+
+PRIOR_LOWPASS = 0.08
+PRIOR_FLICKER = 0.035
+PRIOR_WALK = 0.003
+"""What is expected of a device nothing is known of; the rest is white noise."""
 
 
-def covariance_of_mean(means: Array) -> Array:
-    """Covariance (6, 6) of the mean of cell means (m, 6), nan where not measured."""
-    measured = np.isfinite(means).any(axis=0)
-    centred = np.where(np.isfinite(means), means - np.nanmean(means, axis=0), 0.0)
-    count = min(BATCHES, len(means))
-    batches = np.array([part.mean(axis=0) for part in np.array_split(centred, count)])
-    spread = np.cov(batches.T) / count if count > 1 else np.full((6, 6), np.nan)
-    known = np.outer(measured, measured)
-    covariance: Array = np.where(known, spread, np.nan)
-    return covariance
+@dataclass(frozen=True, slots=True)
+class Shapes:
+    """The family of spectra: (s,) corner, knee and walk of each, Hz, and log prior."""
+
+    corner: Array
+    knee: Array
+    walk: Array
+    log_prior: Array
+
+    def at(self, f: Array) -> Array:
+        """Spectra over white noise at the frequencies f (n,), Hz: (s, n), (1)."""
+        low = 1 / (1 + (f / self.corner[:, None]) ** 2)
+        g: Array = low + self.knee[:, None] / f + (self.walk[:, None] / f) ** 2  # (1)
+        return g
+
+    def variance(self, seconds: float) -> Array:
+        """Variance of a mean over white noise, (s,), (3) and (4)."""
+        d = 1 / (2 * np.pi * self.corner * seconds)
+        # exp(-1/d) is 0 for white noise, where d is 0
+        once, twice = (np.exp(-h * 2 * np.pi * self.corner * seconds) for h in (1, 2))
+        markov = 1 - d / 2 * (3 - 4 * once + twice)  # (3)
+        flicker = 4 * np.log(2) * self.knee * seconds  # (3)
+        walk = 4 / 3 * (np.pi * self.walk * seconds) ** 2  # (4)
+        total: Array = markov + flicker + walk
+        return total
+
+
+def _family() -> Shapes:
+    rows = []
+    for (a, c), (b, k) in product(enumerate(CORNERS), enumerate(KNEES)):
+        low = PRIOR_LOWPASS / (len(CORNERS) - 1) if a else 1 - PRIOR_LOWPASS
+        slow = PRIOR_FLICKER / (len(KNEES) - 1) if b else 1 - PRIOR_FLICKER
+        rows.append((c, k, 0.0, (1 - PRIOR_WALK) * low * slow))
+    rows += [(np.inf, 0.0, r, PRIOR_WALK / len(WALKS)) for r in WALKS]
+    corner, knee, walk, prior = np.array(rows).T
+    return Shapes(corner, knee, walk, np.log(prior))
+
+
+SHAPES = _family()
+
+
+def log_likelihood(power: Array, shape: Array) -> tuple[Array, Array]:
+    """Return log p(I | g) (s, c) and Q (s, c) of (2) for power (n, c), shape (s, n)."""
+    q = (1 / shape) @ power
+    level = np.log(np.where(q > 0, q, 1.0))
+    log_likelihood: Array = -np.log(shape).sum(axis=1)[:, None] - len(power) * level
+    return log_likelihood, q  # (2)
+
+
+def transform(means: Array, spacing: float) -> tuple[Array, Array]:
+    """Frequencies (n,), Hz, and Fourier sums (n, c) over sqrt(m) of cells (m, c)."""
+    m = len(means)
+    top = max(BAND * spacing * m, _FEWEST)
+    last = int(min(top, (m - 1) // 2))
+    f = np.arange(1, last + 1) / (m * spacing)
+    return f, np.fft.rfft(means, axis=0)[1 : last + 1] / np.sqrt(m)
+
+
+def without_lines(power: Array) -> Array:
+    """Power (n, c) with lines cut down to the most that noise shows beside them.
+
+    Hum and sway average out and must not pass for noise. The lowest frequencies stay
+    as they are: a drift is no line.
+    """
+    if len(power) <= 2 * _BESIDE:
+        return power
+    around = np.pad(power, ((_BESIDE, _BESIDE), (0, 0)), mode="reflect")
+    local = np.lib.stride_tricks.sliding_window_view(around, 2 * _BESIDE + 1, axis=0)
+    cut: Array = np.minimum(power, _LINE / np.log(2) * np.median(local, axis=-1))
+    cut[:4] = power[:4]
+    return cut
+
+
+@dataclass(frozen=True, slots=True)
+class MeanError:
+    """How well the mean of a window of c channels is known.
+
+    Attributes
+    ----------
+    covariance : (c, c) of the mean, SI squared
+    doubled : (c,) standard error that a window twice as long would have
+    seen : (s, c) log likelihood of the shapes, earlier windows included
+
+    """
+
+    covariance: Array
+    doubled: Array
+    seen: Array
+
+
+def error_of_mean(
+    means: Array, spacing: float, before: Array | None = None
+) -> MeanError:
+    """Error of the mean of cell means (m, c), m >= 3, no nan.
+
+    `spacing` is the device time from cell to cell, s; `before` the `seen` (s, c) of
+    earlier windows. Correlations are those of the whitened noise in the band.
+    """
+    m = len(means)
+    f, sums = transform(means - means.mean(axis=0), spacing)
+    shape = SHAPES.at(f)
+    seen, q = log_likelihood(without_lines(np.abs(sums) ** 2), shape)
+    seen = seen if before is None else seen + before
+    weight = np.exp(_relative(seen + SHAPES.log_prior[:, None]))
+    weight = weight / weight.sum(axis=0)
+    level = weight * q / max(1, len(f) - 1)
+    once, twice = (
+        np.sqrt(level.T @ SHAPES.variance(h * m * spacing) / (h * m)) for h in (1, 2)
+    )  # (5)
+    white = sums / np.sqrt(shape.T @ weight)
+    cross = (white.T @ white.conj()).real
+    size = np.sqrt(np.diag(cross))
+    scale = once / np.where(size > 0, size, 1.0)
+    return MeanError(cross * np.outer(scale, scale), twice, _relative(seen))
+
+
+def _relative(log_likelihood: Array) -> Array:
+    relative: Array = log_likelihood - log_likelihood.max(axis=0)
+    return relative
+
+
+def rounding_variance(resolution: Array, noise: Array) -> Array:
+    """Variance, (c,), of a mean of values rounded to `resolution`, (6).
+
+    `noise` is the standard deviation of the values before rounding.
+    """
+    h = np.arange(1.0, 6.0)[:, None]
+    q = np.where(resolution > 0, resolution, 1.0)
+    lines = (q / (np.pi * h)) ** 2 / 2 * np.exp(-((2 * np.pi * h * noise / q) ** 2))
+    total: Array = np.where(resolution > 0, lines.sum(axis=0), 0.0)  # (6)
+    return total

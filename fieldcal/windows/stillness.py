@@ -60,7 +60,7 @@ class Stillness:
         noise = np.sqrt(np.nan_to_num(short).mean(axis=0))
         self._quiet = np.minimum(self._quiet, np.where(noise > 0, noise, np.inf))
         spread = np.nan_to_num(np.ptp(np.nan_to_num(means), axis=0))
-        allowed = np.minimum(TIMES * np.nan_to_num(self._quiet), self._limits.six)
+        allowed = np.minimum(TIMES * np.nan_to_num(self._quiet), self._limits.noise)
         self.meter = float(np.max(spread / np.where(allowed > 0, allowed, np.inf)))
         if self.meter > 1:
             self.since = None

@@ -2,34 +2,75 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fieldcal.errors import InputError, Moved
-from fieldcal.samples import CHANNELS, Array, Block
-from fieldcal.windows.cells import Cells
-from fieldcal.windows.disturbance import largest_deviation
+from fieldcal.samples import Array, Block
+from fieldcal.windows.cells import CELL, Cells
 from fieldcal.windows.limits import Limits
-from fieldcal.windows.longrun import covariance_of_mean
+from fieldcal.windows.longrun import MeanError, error_of_mean, rounding_variance
 from fieldcal.windows.mean import Average
+from fieldcal.windows.quiet import Quiet
+from fieldcal.windows.verdict import Verdict, judge
 
-SOONEST = 3.0
-"""Shortest stretch whose own noise is known well enough to judge it, s."""
+FEWEST = 10
+"""Cells a window must have for its mean to have an error: 1 s of samples."""
+
+SETTLED = 15.0
+"""Device time before which nothing is said of what more time would bring, s."""
+
+WORTH = 0.9
+"""Part to which twice the time must lower the error to be worth it (white: 0.71)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """What a window taught about the noise of the device, for the next one.
+
+    Attributes
+    ----------
+    quiet : how much it wanders at rest
+    seen : (s, 6) log likelihood of the shapes of its spectrum
+
+    """
+
+    quiet: Quiet
+    seen: Array
 
 
 class Window:
     """A window of device time over which the device should be still.
 
     Feed it with `add`; every property holds for the samples so far, and none depends
-    on how they were cut into blocks.
+    on how they were cut into blocks. `noise` of a window that was good sharpens the
+    next one of the same device.
+
+    >>> import numpy as np
+    >>> rng = np.random.default_rng(0)
+    >>> t = np.arange(3000) / 100
+    >>> acc = [0.0, -9.81, 0.0] + 0.02 * rng.standard_normal((3000, 3))
+    >>> window = Window()
+    >>> for k in range(0, 3000, 50):
+    ...     window.add(Block.of(t[k : k + 50], acc[k : k + 50]))
+    >>> window.moved is None, window.n, f"{window.sigma[1]:.5f} m/s^2"
+    (True, 3000, '0.00039 m/s^2')
     """
 
-    def __init__(self, limits: Limits | None = None) -> None:
+    def __init__(
+        self, limits: Limits | None = None, noise: Noise | None = None
+    ) -> None:
         self._limits = limits or Limits()
+        self._before = noise
         self._cells = Cells()
+        self._error: MeanError | None = None
+        self._verdict: Verdict | None = None
 
     def add(self, block: Block) -> None:
         """Take in the block that follows; costs as much as the block is long."""
         self._cells.add(block)
+        self._error = self._verdict = None
 
     @property
     def n(self) -> int:
@@ -47,64 +88,70 @@ class Window:
         return self._cells.mean
 
     @property
-    def sigma(self) -> Array:
-        """Standard error of the mean so far, (6,); nan while too short to know."""
-        return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance of the mean so far, (6, 6)."""
-        return covariance_of_mean(self._cells.means)
-
-    @property
     def temperature(self) -> float:
         """Mean temperature so far, deg C; nan where unknown."""
         return self._cells.temperature
 
     @property
+    def sigma(self) -> Array:
+        """Standard error of the mean so far, (6,); nan in the first second."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the mean so far, (6, 6); nan in the first second."""
+        if len(self._cells) < FEWEST:
+            return np.full((6, 6), np.nan)
+        covariance = self._mean_error().covariance + np.diag(self._rounding())
+        known = np.isfinite(self._cells.means).mean(axis=0)
+        share = np.where(known > 0, known, np.nan)
+        widened: Array = covariance / np.outer(share, share)
+        return widened
+
+    @property
+    def meter(self) -> float:
+        """Motion in the last second as part of what is allowed: above 1 it moves."""
+        return self._judged().present
+
+    @property
     def motion(self) -> float:
-        """Largest deviation so far, as part of what is allowed: above 1 it moved."""
-        worst = largest_deviation(self._cells.means)
-        return worst.ratio if worst else 0.0
+        """Largest departure so far as part of what is allowed: above 1 it moved."""
+        return self._judged().worst.ratio
 
     @property
     def moved(self) -> Moved | None:
         """The disturbance, if there was one; None while the window is good."""
-        if self.elapsed < SOONEST:
-            return self._beyond_limits()
-        worst = largest_deviation(self._cells.means)
-        if worst and worst.ratio > 1:
-            return worst.error(self._cells.times)
-        return self._beyond_limits()
+        worst = self._judged().worst
+        return worst.error(self._cells.start) if worst.ratio > 1 else None
 
-    def _beyond_limits(self) -> Moved | None:
-        means = self._cells.means
-        if len(means) < 2:
-            return None
-        over = np.nan_to_num(np.nanstd(means, axis=0)) / self._limits.six
-        channel = int(np.argmax(over))
-        if over[channel] <= 1:
-            return None
-        axis = CHANNELS[channel]
-        return Moved(
-            f"moving on {axis}, {over[channel]:.1f} times what can be noise; put the "
-            "device down, the window starts again",
-            float(self._cells.times[int(np.argmax(np.abs(means[:, channel])))]),
-            axis,
-        )
+    @property
+    def noise(self) -> Noise | None:
+        """What is known of the noise for the window after this one, if anything."""
+        quiet = self._judged().quiet
+        return Noise(quiet, self._mean_error().seen) if quiet else self._before
 
-    def done(self, target: float | None) -> str | None:
+    def done(self, target: float | None = None) -> str | None:
         """Return why averaging can stop before its time, as a sentence, or None.
 
         `target` is the standard error wanted of each accelerometer mean, m/s^2.
         """
-        reached = float(np.max(np.nan_to_num(self.sigma[:3], nan=np.inf)))
-        if target is None or reached > target:
+        sigma = self.sigma[:3]
+        if target is not None and np.nanmax(sigma, initial=0.0) <= target:
+            return (
+                f"each accelerometer mean is known to {np.nanmax(sigma):.2g} m/s², "
+                f"{target:.2g} m/s² was wanted"
+            )
+        if self.elapsed < SETTLED or not np.isfinite(sigma).any():
             return None
-        return (
-            f"the means are known to {reached:.2g} m/s² after {self.elapsed:.0f} s, "
-            f"{target:.2g} m/s² was wanted"
-        )
+        twice = np.sqrt(self._mean_error().doubled ** 2 + self._rounding())[:3]
+        open_ = np.isfinite(sigma) & (sigma > (target or 0.0))
+        if (twice[open_] > WORTH * sigma[open_]).all():
+            return (
+                f"the bias wanders as much as is averaged out: {np.nanmax(sigma):.2g} "
+                f"m/s² is reached, and {2 * self.elapsed:.0f} s would give "
+                f"{twice.max():.2g} m/s²"
+            )
+        return None
 
     def average(self) -> Average:
         """Return the mean and its error.
@@ -112,29 +159,43 @@ class Window:
         Raises
         ------
         Moved
-            If the window was disturbed.
+            If the window was disturbed; with the instant and the axis.
         InputError
-            If there are fewer than two cells of samples.
+            If it is too short for its mean to have an error.
 
         """
-        if len(self._cells) < 2:
+        if len(self._cells) < FEWEST:
             raise InputError(
-                f"a window of {self.n} samples in {self.elapsed:.2g} s is too short to "
-                "average: take at least 0.2 s"
+                f"a window of {self.n} samples over {self.elapsed:.2g} s is too short "
+                f"for its mean to have an error: take {FEWEST * CELL:g} s or more"
             )
         if moved := self.moved:
             raise moved
-        return Average(
-            self.mean,
-            self.covariance,
-            self.temperature,
-            self.n,
-            self._cells.start,
-            self._cells.end,
-        )
+        start, end = self._cells.start, self._cells.end
+        return Average(self.mean, self.covariance, self.temperature, self.n, start, end)
+
+    def _judged(self) -> Verdict:
+        if self._verdict is None:
+            before = self._before.quiet if self._before else None
+            self._verdict = judge(self._cells, self._limits, before)
+        return self._verdict
+
+    def _mean_error(self) -> MeanError:
+        if self._error is None:
+            before = self._before.seen if self._before else None
+            self._error = error_of_mean(self._cells.steady, self._cells.spacing, before)
+        return self._error
+
+    def _rounding(self) -> Array:
+        resolution = self._cells.resolution
+        sampled = np.nan_to_num(self._cells.noise)
+        before = np.sqrt(np.maximum(sampled**2 - resolution**2 / 12, 0.0))
+        return rounding_variance(resolution, before)
 
 
-def average(block: Block, limits: Limits | None = None) -> Average:
+def average(
+    block: Block, limits: Limits | None = None, noise: Noise | None = None
+) -> Average:
     """Average a window of samples.
 
     Raises
@@ -142,9 +203,9 @@ def average(block: Block, limits: Limits | None = None) -> Average:
     Moved
         If the window was disturbed; with the instant and the axis.
     InputError
-        If it is too short to have an error.
+        If it is too short for its mean to have an error.
 
     """
-    window = Window(limits)
+    window = Window(limits, noise)
     window.add(block)
     return window.average()

@@ -1,0 +1,167 @@
+"""The verdict on a window so far: still, or moved, when, on which axis and how."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fieldcal.errors import Moved
+from fieldcal.samples import CHANNELS, Array
+from fieldcal.windows.cells import CELL, Cells
+from fieldcal.windows.disturbance import Kind, Statistic, pushes, shakes, steps
+from fieldcal.windows.limits import Limits
+from fieldcal.windows.quiet import Quiet, quiet
+from fieldcal.windows.trend import line
+
+THRESHOLD = 5.8
+"""Departure over its spread that noise alone does not reach in a long window."""
+
+EARLY = 8.0
+"""The threshold is twice as high in a window this long, s, for lack of data."""
+
+FEWEST = 30
+"""Cells whose own noise is known well enough to judge them."""
+
+_COARSE = 0.6
+"""Noise, in steps of the resolution, below which the rounding shows."""
+
+_PRESENT = 10
+"""Cells that are the present."""
+
+_HOLD = "hold still, the window starts again"
+
+
+@dataclass(frozen=True, slots=True)
+class Departure:
+    """Where and by how much a window departs most from rest.
+
+    Attributes
+    ----------
+    ratio : departure over what is allowed; above 1 is a disturbance
+    kind : what it looks like
+    channel : index in `CHANNELS`
+    at, seconds : start, s of device time, and duration, s
+    size, noise : departure and its standard deviation by noise, SI
+
+    """
+
+    ratio: float
+    kind: Kind | Literal["drift", "noise"]
+    channel: int
+    at: float
+    seconds: float
+    size: float
+    noise: float
+
+    def error(self, start: float) -> Moved:
+        """Return the error for a window that began at `start`, s of device time."""
+        axis = CHANNELS[self.channel]
+        unit = "m/s²" if self.channel < 3 else "rad/s"
+        size = f"{self.size:+.2g} ± {self.noise:.1g} {unit}"
+        scatter = f"{self.size:.2g} {unit}"
+        when = f"disturbed {self.at - start:.1f} s into the window on {axis}"
+        times = f"{abs(self.size) / self.noise:.0f} times the noise"
+        says = {
+            "push": f"{when}: a {self.seconds:.1f} s push of {size}, {times}",
+            "step": f"{when}: a lasting change of {size}, {times}",
+            "shake": f"{when}: shaken for {self.seconds:.1f} s by {scatter}, {times}",
+            "drift": f"creeping on {axis}: {size} over the window",
+            "noise": f"moving on {axis} by {scatter}, which no device at rest does",
+        }
+        return Moved(f"{says[self.kind]}; {_HOLD}", self.at, axis)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What the samples so far say.
+
+    Attributes
+    ----------
+    worst : the largest departure so far
+    present : the largest ratio of the last second
+    quiet : the noise, for the window that follows
+
+    """
+
+    worst: Departure
+    present: float
+    quiet: Quiet | None
+
+
+def judge(cells: Cells, limits: Limits, before: Quiet | None = None) -> Verdict:
+    """Judge the samples so far by their own noise and that of the windows before."""
+    if len(cells) < FEWEST:
+        scatter = np.nan_to_num(cells.means).std(axis=0)
+        return Verdict(_beyond_noise(cells, scatter, limits), 0.0, before)
+    means = cells.steady
+    noise = quiet(means, before)
+    allowed = THRESHOLD * (1 + (EARLY / (CELL * noise.cells)) ** 2)
+    tests = _tests(cells, means, noise, allowed)
+    worst = [_worst(cells, test, allowed) for test in tests]
+    worst.append(_beyond_drift(cells, means, noise, limits))
+    worst.append(_beyond_noise(cells, noise.spread[0], limits))
+    recent = [test.z[-_PRESENT:].max() for test in tests if test.cells < _PRESENT]
+    return Verdict(
+        max(worst, key=lambda departure: departure.ratio),
+        float(max(recent) / allowed),
+        noise,
+    )
+
+
+def _tests(cells: Cells, means: Array, noise: Quiet, allowed: float) -> list[Statistic]:
+    coarse = np.nan_to_num(cells.noise) < _COARSE * cells.resolution
+    least = np.where(coarse, cells.resolution, 0.0) / allowed
+    short = np.nan_to_num(cells.short)
+    return (
+        pushes(means, noise, least) + steps(means, noise, least) + shakes(short, least)
+    )
+
+
+def _worst(cells: Cells, test: Statistic, allowed: float) -> Departure:
+    first, channel = divmod(int(np.argmax(test.z)), test.z.shape[1])
+    cell = first + test.cells if test.kind == "step" else first
+    return Departure(
+        float(test.z[first, channel] / allowed),
+        test.kind,
+        channel,
+        float(cells.times[cell]),
+        CELL * test.cells,
+        float(test.size[first, channel]),
+        float(test.noise[channel]),
+    )
+
+
+def _beyond_drift(
+    cells: Cells, means: Array, noise: Quiet, limits: Limits
+) -> Departure:
+    """Change over the window, allowed for what noise can pretend."""
+    laid = line(means)
+    change = laid[-1] - laid[0]
+    ratio = np.abs(change) / (limits.drift + THRESHOLD * noise.allan[-1])
+    channel = int(np.argmax(ratio))
+    return Departure(
+        float(ratio[channel]),
+        "drift",
+        channel,
+        float(cells.times[0]),
+        cells.end - cells.start,
+        float(change[channel]),
+        float(noise.allan[-1][channel]),
+    )
+
+
+def _beyond_noise(cells: Cells, scatter: Array, limits: Limits) -> Departure:
+    ratio = scatter / limits.noise
+    channel = int(np.argmax(ratio))
+    means = np.abs(np.nan_to_num(cells.means[:, channel]))
+    return Departure(
+        float(ratio[channel]),
+        "noise",
+        channel,
+        float(cells.times[int(np.argmax(means))]) if len(means) else np.nan,
+        CELL,
+        float(scatter[channel]),
+        float(limits.noise[channel]),
+    )

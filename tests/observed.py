@@ -118,3 +118,29 @@ def practice(name: str) -> tuple[Observations, dict[str, Any]]:
     )
     answers = json.loads((folder.parent / "answers.json").read_text())[name]
     return observations, answers
+
+
+def motionless(t: Array, acc: Array, gyr: Array, seconds: float = 1.5) -> list[Average]:
+    """Averages of the stretches in which gyroscopes and accelerometers are quiet.
+
+    Written apart from `fieldcal.windows`: half a second whose spread is within eight
+    times that of the quietest tenth is quiet, a tenth of a second is cut off the ends.
+    """
+    six = np.hstack([acc, gyr])
+    width = int(round(0.5 / np.median(np.diff(t))))
+    view = np.lib.stride_tricks.sliding_window_view(six, width, axis=0)
+    spread = view.std(axis=-1)
+    calm = (spread < 8 * np.quantile(spread, 0.1, axis=0)).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], calm.astype(int), [0]])))
+    cut = width // 5
+    found = []
+    for a, b in zip(edges[::2], edges[1::2] + width - 1, strict=True):
+        first, last = a + cut, b - cut
+        if t[last - 1] - t[first] < seconds:
+            continue
+        cells = six[first : first + (last - first) // cut * cut]
+        cells = cells.reshape(-1, cut, 6).mean(axis=1)
+        cov = np.cov(cells.T) / len(cells)
+        mean = six[first:last].mean(axis=0)
+        found.append(Average(mean, cov, np.nan, last - first, t[first], t[last - 1]))
+    return found

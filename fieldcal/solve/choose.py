@@ -11,6 +11,7 @@ scale factor where the grade is navigation.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
@@ -19,7 +20,7 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.errors import InputError, NotObservable
 from fieldcal.solve import closed_form, five_position, gyroscopes, least_squares, scalar
-from fieldcal.solve.design import Model, Tilt, ladder_remedy
+from fieldcal.solve.design import Model, Tilt, ladder_remedy, loosely_set
 from fieldcal.solve.estimate import Estimate, combine, join
 from fieldcal.solve.joint import WRONG, joint
 from fieldcal.solve.observations import Observations
@@ -42,6 +43,7 @@ def solve(
     as_printed: bool = False,
     level_sigma_deg: float | None = None,
     heading_sigma_deg: float | None = None,
+    angle_sigma_deg: float = 0.0,
 ) -> Calibration:
     """Estimate the calibration from window averages.
 
@@ -53,8 +55,10 @@ def solve(
     tilt : model of the base's tilt; "auto" estimates it where the positions show it
     cross : estimate cross-coupling (non-orthogonality in the scalar method)
     as_printed : closed forms with the misprints of the paper, to compare
-    level_sigma_deg : how level the base was made, about each level axis
+    level_sigma_deg : how level the base was made, about each level axis; the tilt is
+        then that of the base, within this
     heading_sigma_deg : how well z points north; not known for tactical grade if None
+    angle_sigma_deg : how well the angles of each position are set, position by position
 
     Raises
     ------
@@ -76,6 +80,8 @@ def solve(
             f"method {method!r} with tilt {tilt!r} is unknown: methods are "
             f"{join(METHODS)}, tilts are {join(TILTS)}"
         )
+    if angle_sigma_deg:
+        observations = loosely_set(observations, angle_sigma_deg)
     rows = np.flatnonzero(~observations.rotating)
     still = observations[rows] if len(rows) else None
     acc = None
@@ -142,16 +148,17 @@ def _joint(
     still: Observations, tilt: Tilt | Literal["auto"], cross: bool, level: float | None
 ) -> Estimate:
     """Joint estimate; "auto" takes the tilt that the data prefer, if they show one."""
-    if tilt == "none" and level:
+    if level and tilt in ("auto", "none"):
         return joint(still, Model("base_tilt", cross), level)
     if tilt != "auto":
         return joint(still, Model(tilt, cross), level)
-    both = [joint(still, Model(t, cross), level) for t in ("angle_offset", "base_tilt")]
-    usable = [e for e in both if _shows_tilt(e, cross)]
+    usable = []
+    for name in ("angle_offset", "base_tilt"):
+        with suppress(NotObservable):
+            found = joint(still, Model(name, cross))
+            usable += [found] if _shows_tilt(found, cross) else []
     if usable:
         return _better(usable)
-    if level:
-        return joint(still, Model("base_tilt", cross), level)
     flat = joint(still, Model("none", cross))
     wanted = np.ones(len(Model("angle_offset", cross).names), dtype=bool)
     extra = ladder_remedy(still, wanted, Model("angle_offset", cross))

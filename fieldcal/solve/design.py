@@ -17,7 +17,7 @@ are evaluated at once; the planner calls them before anything is measured.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -182,6 +182,23 @@ def design(
     return predict(
         model, positions, gravity, p, model.start if x is None else x
     )[1]  # fmt: skip
+
+
+def loosely_set(observations: Observations, sigma_deg: float) -> Observations:
+    """Observations whose angles are uncertain, independently in each position.
+
+    The error of an angle acts along the derivative of the force by it; that is added to
+    the accelerometers' covariance. Positions without known angles stay as they are.
+    """
+    known = np.flatnonzero(observations.oriented)
+    places = [observations.positions[i] for i in known]
+    _, by_angle = tilted_forces(
+        "angle_offset", places, observations.gravity, observations.mounting, np.zeros(2)
+    )
+    moved = sigma_deg * np.array(observations.nominal.acc_scale)[:, None] * by_angle
+    covariance = observations.covariance.copy()
+    covariance[known, :3, :3] += moved @ np.swapaxes(moved, -1, -2)
+    return replace(observations, covariance=covariance)
 
 
 def ladder_remedy(

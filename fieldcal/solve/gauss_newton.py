@@ -22,7 +22,7 @@ from fieldcal.solve.design import Model, predict
 
 Predict = Callable[[Array], tuple[Array, Array]]
 STEPS = 30
-SMALL = 1e-7
+SMALL = 1e-4
 """Step, in units of the standard uncertainty, from which the fit counts as done."""
 
 
@@ -74,7 +74,12 @@ def model_of(
 
 
 def solve(
-    model: Predict, y: Array, white: Array, start: Array, prior: Array | None = None
+    model: Predict,
+    y: Array,
+    white: Array,
+    start: Array,
+    prior: Array | None = None,
+    steps: int = STEPS,
 ) -> Fit:
     """Fit parameters to means.
 
@@ -85,6 +90,7 @@ def solve(
     white : (..., n, 3, 3) inverse Cholesky factors
     start : (p,) or (..., p)
     prior : (p,) standard uncertainty about 0; inf where nothing is known
+    steps : at most this many
 
     """
     batch = y.shape[:-2]
@@ -92,7 +98,7 @@ def solve(
     held = np.full(x.shape[-1], np.inf) if prior is None else prior
     rows, r = _weighted(model, y, white, x, held)
     cost = (r**2).sum(axis=-1)
-    for _ in range(STEPS):
+    for _ in range(steps):
         basis, back = _decompose(rows)
         z = np.swapaxes(basis, -1, -2) @ r[..., None]
         step = (back @ z)[..., 0]

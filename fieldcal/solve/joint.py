@@ -97,6 +97,8 @@ def estimate(
         fresh = robust.certain(doubt, found)
         if not (left and fresh.any()):
             break
+        flagged = fresh.any(axis=-1)
+        fresh[flagged] = _culprit(of, y[flagged], white[flagged], first, prior)
         found = found | fresh
         white = np.where(fresh[..., None, None], white / robust.WORSE[-1], white)
     moved = (fit.back @ doubt.shift[..., None])[..., 0]
@@ -109,6 +111,25 @@ def estimate(
         fit.dof - 3 * found.sum(axis=-1),
         fit,
     )
+
+
+def _culprit(
+    of: gauss_newton.Predict, y: Array, white: Array, start: Array, prior: Array | None
+) -> linear.Mask:
+    """The position of each fit without which the others agree best, (..., n).
+
+    A gross error bends the fit so far that its linear updates point at the wrong one;
+    these are whole fits.
+    """
+    n = y.shape[-2]
+    chi2 = []
+    for i in range(n):
+        without = white.copy()
+        without[..., i, :, :] /= robust.WORSE[-1]
+        # the right one converges at once, the others need not converge
+        chi2.append(gauss_newton.solve(of, y, without, start, prior, steps=5).chi2)
+    best = np.argmin(chi2, axis=0)
+    return np.asarray(np.arange(n) == best[..., None])
 
 
 def joint(

@@ -13,8 +13,9 @@ M_i = (I - c P_i)^-1:
 in the coordinates of Q, d the channels of a position. The answer is the mean over all
 hypotheses by their probability, its covariance that of the mixture: the spread between
 the hypotheses is in it, so the interval is wide while it is not clear which holds, and
-a position that is bad for certain has no weight left. Where the other positions cannot
-check one, its hypothesis changes nothing. Source: the update formulas of weighted least
+a position that is bad for certain has no weight left. Directions of a position that no
+other position checks are left out of its hypothesis: nothing speaks for or against it.
+Source: the update formulas of weighted least
 squares (Cook and Weisberg 1982, 2.1) with Bayesian averaging of the mean-shift model.
 """
 
@@ -32,6 +33,9 @@ PRIOR = 5e-3
 
 WORSE = np.array([4.0, 16.0, 64.0, 1e3, 1e5])
 """How many times the stated uncertainty a bad position may be off, equally probable."""
+
+UNCHECKED = 0.999
+"""Leverage of a direction of a position from which no other position checks it."""
 
 CERTAIN = 0.99
 """Probability from which a position is taken as bad and loses its weight."""
@@ -64,27 +68,37 @@ def doubt(basis: Array, residual: Array, prior: float = PRIOR) -> Doubt:
     prior : probability of a position to be bad
 
     """
-    d, rank = basis.shape[-2:]
-    hat = basis @ np.swapaxes(basis, -1, -2)
-    c = 1 - 1 / WORSE**2
-    m = np.linalg.inv(np.eye(d) - c[:, None, None] * hat[..., None, :, :])
-    mr = (m @ residual[..., None, :, None])[..., 0]  # (..., n, k, d)
-    fall = c * (mr * residual[..., None, :]).sum(axis=-1)
-    evidence = fall / 2 + np.linalg.slogdet(m)[1] / 2 - d * np.log(WORSE)
-    odds = np.log(prior / (1 - prior) / len(WORSE)) + evidence
+    rank = basis.shape[-1]
+    back = np.swapaxes(basis, -1, -2)
+    share, along = np.linalg.eigh(basis @ back)
+    checked = share < UNCHECKED
+    c = 1 - 1 / WORSE[:, None] ** 2
+    gain = 1 / (1 - c * np.where(checked, share, 0.0)[..., None, :])  # (..., n, k, d)
+    odd = (np.swapaxes(along, -1, -2) @ residual[..., None])[..., None, :, 0]
+    evidence = checked[..., None, :] * (
+        c * gain * odd**2 / 2 + np.log(gain) / 2 - np.log(WORSE)[:, None]
+    )
+    odds = np.log(prior / (1 - prior) / len(WORSE)) + evidence.sum(axis=-1)
     top = np.maximum(odds.max(axis=(-2, -1), keepdims=True), 0.0)
     weight = np.exp(odds - top)
     weight /= np.exp(-top) + weight.sum(axis=(-2, -1), keepdims=True)
-    back = np.swapaxes(basis, -1, -2)
-    moves = -c[:, None] * (back[..., None, :, :] @ mr[..., None])[..., 0]
-    shift = (weight[..., None] * moves).sum(axis=(-3, -2))
-    middle = c[:, None, None] * m + c[:, None, None] ** 2 * (
-        mr[..., :, None] * mr[..., None, :]
-    )
-    spread = (weight[..., None, None] * middle).sum(axis=-3)
-    added = (back @ spread @ basis).sum(axis=-3)
+    # everything per direction of a position, in the coordinates of its hat matrix
+    weigh = weight[..., None] * checked[..., None, :]
+    reach = back @ along
+    moved = c * gain * odd
+    shift = -(reach @ (weigh * moved).sum(axis=-2)[..., None])[..., 0].sum(axis=-2)
+    moments = (weight[..., None, None] * _outer(moved * checked[..., None, :])).sum(-3)
+    moments[..., range(moments.shape[-1]), range(moments.shape[-1])] += (
+        weigh * c * gain
+    ).sum(axis=-2)
+    added = (reach @ moments @ np.swapaxes(reach, -1, -2)).sum(axis=-3)
     covariance = np.eye(rank) + added - shift[..., :, None] * shift[..., None, :]
     return Doubt(weight.sum(axis=-1), shift, covariance)
+
+
+def _outer(v: Array) -> Array:
+    product: Array = v[..., :, None] * v[..., None, :]
+    return product
 
 
 def certain(found: Doubt, already: Mask) -> Mask:

@@ -3,10 +3,11 @@
 A vector u that is fixed outside, seen from a body that turns at w, obeys
 
     du/dt = -w x u,   u(t) = F(t) u(0),   F = ... E_2 E_1,   E_k = exp(-[q_k x])
-    q_k = h (w_k + w_k+1) / 2 + h^2 (w_k x w_k+1) / 12
+    q_k = h (13 (w_k + w_k+1) - w_k-1 - w_k+2) / 24 + h^2 (w_k x w_k+1) / 12
 
-for a rate that is linear in each step h; the second term is what two axes turning in
-turn (coning) leave after a cycle. A change dw of the rates turns the result by
+in steps h; the second term is what two axes turning in turn (coning) leave after a
+cycle. Where steps are unequal, and at the ends, the mean of two rates is taken. A
+change dw of the rates turns the result by
 
     du = u x s,   s = sum_k B_k dw_k h,   B_k = F(end) F(k)^T
 
@@ -21,6 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.samples import Array
+
+EVEN = 0.05
+"""Largest difference of neighbouring steps, as a share, that counts as none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +49,22 @@ class Turn:
 def integrate(t: Array, w: Array) -> Turn:
     """Integrate rates (k + 1, 3) at instants t (k + 1,), s."""
     h = np.diff(t)[:, None]
-    rate = (w[:-1] + w[1:]) / 2
+    rate = _mean_rate(h[:, 0], w)
     angle = h * rate + h**2 / 12 * np.cross(w[:-1], w[1:])
     until = _products(exponential(-angle))
     whole = until[-1]
     # to the middle of a step, since that is where its mean rate acts
     half = until @ exponential(angle / 2)
     return Turn(whole, whole @ np.swapaxes(half, -1, -2), rate, h[:, 0])
+
+
+def _mean_rate(h: Array, w: Array) -> Array:
+    """Mean rate of each step, from the cubic through four samples where it fits."""
+    mean = (w[:-1] + w[1:]) / 2
+    even = np.ptp(np.stack([h[:-2], h[1:-1], h[2:]]), axis=0) < EVEN * h[1:-1]
+    cubic = (13 * (w[1:-2] + w[2:-1]) - w[:-3] - w[3:]) / 24
+    mean[1:-1] = np.where(even[:, None], cubic, mean[1:-1])
+    return np.asarray(mean)
 
 
 def exponential(angle: Array) -> Array:

@@ -34,6 +34,7 @@ NAMES = (
     *axes("acc_bias"), *axes("acc_scale"),
     *(f"cross_coupling.k{i + 1}{j + 1}" for i, j in UPPER),
 )  # fmt: skip
+FEW = {1: "one degree of freedom", 2: "two degrees of freedom"}
 STEPS = 50
 SMALL = 1e-8
 """Relative step from which the fit counts as done."""
@@ -89,9 +90,10 @@ def scalar(observations: Observations, cross: bool = False) -> Estimate:
     free = np.arange(9) < (9 if cross else 6)
     notes = []
     if cross:
-        kept = _known(_fit(observations, free))
+        whole = _fit(observations, free)
+        kept = _known(whole)
         if not kept[6:].all():
-            notes.append(_hidden(len(observations), kept))
+            notes.append(_hidden(observations, kept, whole.dof))
             free = kept
     found = scatter.absorb(
         lambda seen: _estimate(_fit(seen, free)), observations, ACC, "norms"
@@ -231,17 +233,19 @@ def _rms(values: Array) -> float | None:
     return float(np.sqrt(np.mean(known**2))) if len(known) else None
 
 
-def _hidden(n: int, kept: linear.Mask) -> str:
-    missing = [NAMES[i] for i in range(6, 9) if not kept[i]]
-    pairs = [f"{'xyz'[i]} and {'xyz'[j]}" for i, j in UPPER]
-    cure = join([pairs[i - 6] for i in range(6, 9) if not kept[i]])
-    verb = "are" if len(missing) > 1 else "is"
-    why = "each axis up and down alone cannot show it"
-    if n < 9:
-        why = f"{n} norms cannot carry 9 parameters"
+def _hidden(observations: Observations, kept: linear.Mask, dof: int) -> str:
+    """Say which couplings these orientations do not show, and which would."""
+    hidden = [i for i in range(6, 9) if not kept[i]]
+    between = [f"{'xyz'[i]} and {'xyz'[j]}" for i, j in (UPPER[h - 6] for h in hidden)]
+    why = "axes held up and down alone cannot show it"
+    if len(observations) < 9:
+        why = f"{len(observations)} norms cannot carry 9 parameters"
+    elif dof in FEW:
+        why += f" (and all nine would leave {FEW[dof]})"
     return (
-        f"{join(missing)} {verb} not determined, {why}: add positions with gravity "
-        f"half way between {cure}"
+        f"{join([NAMES[i] for i in hidden])} {'are' if hidden[1:] else 'is'} not "
+        f"determined, {why}: add positions with gravity half way between "
+        f"{join(between)}"
     )
 
 
@@ -257,9 +261,9 @@ def _orientations(determined: linear.Mask) -> str:
 def _few(dof: int) -> list[str]:
     if dof <= 0:
         return [NO_DOF]
-    if dof == 1:
-        return [
-            "one degree of freedom: the residual says nothing about the fit; add "
-            "positions in other orientations"
-        ]
-    return []
+    if dof not in FEW:
+        return []
+    return [
+        f"{FEW[dof]}: the residual says nothing about the fit; add positions in other "
+        "orientations"
+    ]

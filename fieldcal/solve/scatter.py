@@ -24,6 +24,10 @@ from fieldcal.solve.observations import Observations
 UNLIKELY = 0.01
 """Probability of a larger chi2 from which the scatter counts as beyond the noise."""
 
+STEPS = 40
+CLOSE = 1e-3
+"""Relative error of chi2 at which the extra scatter counts as found."""
+
 NORMAL = 1.959963984540054
 """97.5 % point of the normal distribution."""
 
@@ -105,12 +109,14 @@ def extra(chi2: Callable[[float], float], dof: int, typical: float) -> float:
     typical : standard uncertainty of the means, where the search starts
 
     """
-    if dof <= 0 or chi2(0.0) <= dof:
+    if dof <= 0:
         return 0.0
-    low, high = 0.0, typical
-    while chi2(high) > dof and high < 1e6 * typical:
-        low, high = high, 2 * high
-    for _ in range(12):
-        middle = (low + high) / 2
-        low, high = (middle, high) if chi2(middle) > dof else (low, middle)
-    return (low + high) / 2
+    # where all means are alike, chi2 goes as 1 / (typical^2 + t^2): one step is exact
+    floor = typical**2
+    variance = floor
+    for _ in range(STEPS):
+        ratio = chi2(float(np.sqrt(variance - floor))) / dof
+        variance = max(floor, variance * ratio)
+        if abs(ratio - 1) < CLOSE or variance == floor:
+            break
+    return float(np.sqrt(variance - floor))

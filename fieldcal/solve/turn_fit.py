@@ -148,7 +148,7 @@ class Problem:
             turn = integrate(t, (output - x[:3]) @ inverse.T)
             first = self.before[i]
             reached = turn.whole @ self.rests.up[first]
-            level = _level(self.rests.up[first + 1])
+            level = level_axes(self.rests.up[first + 1])
             r[i] = level @ (reached - self.rests.up[first + 1])
             by_up[i, :, first] = level @ turn.whole
             by_up[i, :, first + 1] = -level
@@ -192,6 +192,6 @@ def _by_parameter(turn: Turn, inverse: Array) -> Array:
     return -np.column_stack([whole, *entries])
 
 
-def _level(up: Array) -> Array:
+def level_axes(up: Array) -> Array:
     """Two unit vectors at right angles to `up` and to each other, (2, 3)."""
     return np.asarray(np.linalg.svd(up[None])[2][1:])

@@ -15,6 +15,7 @@ from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.keys import Keys
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link_serial import SerialLink
+from fieldcal.sim_device.orders import carry_out
 from fieldcal.sim_device.stream import Stream
 from fieldcal.sim_device.wire import open_wire
 
@@ -60,6 +61,37 @@ def test_keys_turn_bump_and_quit(stream: Stream, terminal: tuple[int, int]) -> N
     assert "quit" in shown
     assert "turning to α = 22.5°, β = -2.5°   nobody listens" in shown
     assert "25.0 s   turning to α = 0°, β = 0°" in shown
+
+
+def test_orders_and_keys_do_the_same(stream: Stream) -> None:
+    carry_out(stream, {"bump": {"push": 1.5, "tilt_deg": 2.0, "seconds": 0.4}})
+    bump = stream.device.body.bumps[-1]
+    assert (bump.push, bump.seconds) == (1.5, 0.4)
+    assert np.rad2deg(bump.tilt) == pytest.approx(2.0)
+    carry_out(stream, {"turn": {"alpha_deg": 10.0}})
+    carry_out(stream, {"turn": {"beta_deg": 2.0}})
+    np.testing.assert_allclose(np.rad2deg(stream.device.angles), [10, 2])
+
+
+def test_what_a_reader_left_is_not_for_the_next_one() -> None:
+    device = VirtualDevice()
+    link = SerialLink(open_wire("text?columns=seq"), LineFaults(1))
+    port = os.open(link.port, os.O_RDWR | os.O_NOCTTY)
+    while not link.pending:
+        link.send(device.take(1000))
+        link.pump()
+    os.close(port)
+    link.pump()
+    assert not link.attached() and not link.pending
+    port = os.open(link.port, os.O_RDWR | os.O_NOCTTY)
+    device.take(1)
+    first = int(device.time * device.rate)
+    link.send(device.take(3))
+    link.pump()
+    assert os.read(port, 100).split() == [b"%d" % (first + k) for k in range(3)]
+    os.close(port)
+    link.close()
+    link.close()
 
 
 def test_the_terminal_is_as_before_when_it_ends(terminal: tuple[int, int]) -> None:

@@ -1,5 +1,7 @@
 """The virtual device's motion against truths worked out another way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -134,6 +136,17 @@ def test_a_turn_starts_and_ends_at_rest_and_peaks_at_15_8_of_its_mean_rate() -> 
     assert gyr.max() == pytest.approx(15 / 8 * 0.5)
 
 
+def test_a_turn_between_two_samples_is_a_jump() -> None:
+    virtual = device()
+    virtual.take(3)
+    virtual.turn(ALPHA, BETA, 0.0004, at=0.0052)
+    block = virtual.take(10)
+    assert not block.gyr.any()
+    np.testing.assert_allclose(block.acc[2], [0, -PERFECT.gravity, 0], atol=1e-12)
+    expected = frames.force(ALPHA, BETA, PERFECT.gravity)
+    np.testing.assert_allclose(block.acc[3], expected, atol=1e-12)
+
+
 def test_a_turn_told_in_a_turn_follows_it() -> None:
     virtual = device()
     assert virtual.turn(1.0, 0.0, 2.0) == 2.0
@@ -145,18 +158,23 @@ def test_a_turn_told_in_a_turn_follows_it() -> None:
     np.testing.assert_allclose(block.acc[-1, 0], 0, atol=1e-12)
 
 
-def test_lever_arm_is_the_acceleration_of_where_the_sensors_are() -> None:
-    arm = np.array([0.3, -0.2, 0.1])
-    plain, _ = turned()
-    levered, _ = turned("lever_arm:x=0.3,y=-0.2,z=0.1")
-    virtual = device()
+@pytest.mark.parametrize("names", [("+x", "+y", "+z"), ("-z", "+x", "-y")])
+def test_lever_arm_is_the_acceleration_of_where_the_sensors_are(
+    names: tuple[str, str, str],
+) -> None:
+    profile = replace(PERFECT, frame=Mounting(names))
+    to_procedure = frames.mounting_matrix(names)
+    arm = to_procedure @ [0.3, -0.2, 0.1]
+    plain, _ = turned(profile=profile)
+    levered, _ = turned("lever_arm:x=0.3,y=-0.2,z=0.1", profile=profile)
+    virtual = device(profile=profile)
     virtual.turn(ALPHA, BETA)
     t = plain.t
     attitude = Rotation.from_quat(virtual.body.frame(t).q.T, scalar_first=True)
     place = attitude.apply(arm)
     acceleration = np.gradient(np.gradient(place, t, axis=0), t, axis=0)
     expected = attitude.inv().apply(acceleration)
-    got = levered.acc - plain.acc
+    got = (levered.acc - plain.acc) @ to_procedure.T
     assert np.abs(got).max() > 0.05
     np.testing.assert_allclose(got[3:-3], expected[3:-3], atol=2e-6)
 

@@ -51,15 +51,15 @@ class Found(NamedTuple):
 def disjoint(starts: Index, ends: Index) -> Mask:
     """Keep the first of those that overlap, from left to right, (m,)."""
     keep = np.ones(len(starts), dtype=bool)
-    if np.any(starts[1:] < ends[:-1]):
-        free = 0
-        for i, (start, end) in enumerate(
-            zip(starts.tolist(), ends.tolist(), strict=True)
-        ):
-            if start < free:
-                keep[i] = False
-            else:
-                free = end
+    clashes = np.flatnonzero(starts[1:] < ends[:-1]) + 1
+    done = 0
+    for clash in clashes.tolist():
+        if clash <= done:
+            continue
+        free, done = ends[clash - 1], clash
+        while done < len(starts) and starts[done] < free:
+            keep[done] = False
+            done += 1
     return keep
 
 

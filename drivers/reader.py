@@ -88,7 +88,7 @@ class Reader:
         with self._changed:
             pause = min(deadline, self._delivered + BATCH) - time.monotonic()
             if pause > 0:
-                self._changed.wait_for(lambda: self._ended, pause)
+                self._changed.wait_for(lambda: self._ended or self._plenty, pause)
             self._changed.wait_for(
                 lambda: self._chunks or self._ended, deadline - time.monotonic()
             )
@@ -107,6 +107,10 @@ class Reader:
             self._closing = True
             self._changed.notify_all()
         self._thread.join()
+
+    @property
+    def _plenty(self) -> bool:
+        return self._held >= self._limit // 4
 
     @property
     def _ended(self) -> bool:

@@ -1,9 +1,10 @@
 """The time of each sample: from the device's stamps, its rate, or else its arrivals.
 
 Stamps (`Stamps`). A stamp s_k is the device's time cut to a resolution q, so the true
-time lies in [s_k, s_k + q). With T the mean interval so far,
+time lies in [s_k, s_k + q). With T the mean interval so far, renewed now and then, and
+k counted from there,
 
-    t_k = min(max(t_(k-1) + T, s_k), s_k + q)                               (1)
+    t_k = u + k T,  u = min(max(u, s_k - k T), s_k + q - k T)               (1)
 
 is within q of the truth, and as even as the stamps allow; for q = 0 it is the stamp. A
 counter is unwrapped first: where it falls by more than half its span, a span is added.
@@ -13,8 +14,8 @@ host saw.
 
 Rate (`Rate`). t_k = k / rate, k counting also the samples known to be missing.     (2)
 
-All in s. Symbols: k sample number, T period, q resolution. `Arrivals` is beside this,
-and `Clock` chooses.
+All in s. Symbols: k sample number, T period, q resolution, u phase. `Arrivals` is
+beside this, and `Clock` chooses.
 """
 
 from __future__ import annotations
@@ -38,8 +39,11 @@ WITNESS = 0.005
 EARLY = 16
 """Intervals from which the period is first told."""
 
-PIECE = 4096
-"""Samples placed at once: a bound to what is looked at in vain."""
+RENEW = 1024
+"""Most samples after which the period is told anew."""
+
+CREEP = 0.01
+"""Share of the resolution that time goes on by where many samples share a stamp."""
 
 _NAN = float("nan")
 
@@ -120,17 +124,19 @@ class Stamps:
         self._t = self._stamp = self._host = self._period = _NAN
         self._first, self._count = 0.0, 0
         self._early: list[float] = []
+        self._phase, self._k0, self._renewal = _NAN, 0, EARLY
 
     def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
         """Return times (n,), nan for a sample to drop; `stamps` nan where unknown."""
         parts: list[Array] = [np.empty(0)]
         i = 0
         while i < len(stamps):
-            quiet = self._glide(stamps[i : i + PIECE])
+            quiet = self._glide(stamps[i : i + RENEW])
             if len(quiet):
                 i += len(quiet)
                 self._stamp, self._host = float(stamps[i - 1]), float(t_host[i - 1])
                 parts.append(quiet)
+                continue
             few = slice(i, i + EARLY)
             pairs = zip(stamps[few].tolist(), t_host[few].tolist(), strict=True)
             parts.append(np.array([self._step(stamp, host) for stamp, host in pairs]))
@@ -144,41 +150,36 @@ class Stamps:
         """Place at once the first stamps, as many as nothing happens among."""
         if self._count < EARLY:
             return stamps[:0]
+        stamps = stamps[: self._renewal - self._count]
         d = np.diff(stamps, prepend=self._stamp)
         least = 0.0 if self._coarse else 1e-12
         odd = np.flatnonzero(~((d >= least) & (d < 1.5 * self._period)))
         s = stamps[: odd[0] if len(odd) else len(stamps)] + self._offset
-        if self._resolution:
-            return self._glide_coarse(s)
-        if len(s) and not s[0] > self._t:
+        if not len(s):
+            return s
+        t, phase = self._even(s) if self._resolution else (s, self._phase)
+        if not (t[0] > self._t and np.all(t[1:] > t[:-1])):
             return s[:0]
-        if len(s):
-            self._count += len(s)
-            self._t = float(s[-1])
-            self._period = (self._t - self._first) / self._count
-        return s
+        self._phase, self._t = phase, float(t[-1])
+        self._count += len(t)
+        self._renew()
+        return t
 
-    def _glide_coarse(self, stamps: Array) -> Array:
-        q, period = self._resolution, self._period
-        t, first, count = self._t, self._first, self._count
-        times: list[float] = []
-        for s in stamps.tolist():
-            last = t
-            t += period
-            if t < s:
-                t = s
-            elif t > s + q:  # (1)
-                t = s + q
-                if t <= last:
-                    t = last + 0.01 * q
-                    if s + 4 * q <= last or not self._coarse:
-                        t = last
-                        break
-            count += 1
-            period = (t - first) / count
-            times.append(t)
-        self._t, self._count, self._period = t, count, period
-        return np.array(times)
+    def _even(self, s: Array) -> tuple[Array, float]:
+        """Return times of coarse stamps, and the phase at the last, (1)."""
+        q, phase, i = self._resolution, self._phase, 0
+        k = self._count + 1 - self._k0 + np.arange(len(s))
+        low = s - k * self._period
+        phases = np.empty(len(s))
+        while i < len(s):
+            out = np.flatnonzero((phase < low[i:]) | (phase > low[i:] + q))
+            stop = i + int(out[0]) if len(out) else len(s)
+            phases[i:stop] = phase
+            if stop < len(s):
+                phase = float(min(max(phase, low[stop]), low[stop] + q))
+                phases[stop] = phase
+            i = stop + 1
+        return phases + k * self._period, phase
 
     @property
     def _coarse(self) -> bool:
@@ -187,7 +188,8 @@ class Stamps:
 
     def _step(self, stamp: float, host: float) -> float:
         if stamp != stamp:
-            return self._advance(self._t + self._period)
+            k = self._count + 1 - self._k0
+            return self._advance(self._later(self._phase + k * self._period))
         if self._t != self._t:
             self._begin(stamp, host)
             return self._t
@@ -196,47 +198,62 @@ class Stamps:
         s = stamp + self._offset
         if self._restarted(s, host):
             return self._restart(stamp, host)
-        t = self._place(s, stamp == self._stamp)
-        if t == t:
-            self._stamp, self._host = stamp, host
-        return self._advance(t)
+        late = 4 * self._resolution if self._coarse else self._resolution
+        if s + late <= self._t or (stamp == self._stamp and not self._coarse):
+            self._health.repeated += 1
+            return _NAN
+        self._stamp, self._host = stamp, host
+        return self._advance(self._place(s))
 
     def _begin(self, stamp: float, host: float) -> None:
         self._t = self._first = stamp + self._offset
-        self._count, self._early = 0, []
+        self._count, self._renewal, self._early = 0, EARLY, []
         self._stamp, self._host = stamp, host
+        self._anchor()
 
-    def _place(self, s: float, same: bool) -> float:
-        """Time of a sample stamped `s`, nan if that is an old stamp."""
-        q = self._resolution
-        late = 4 * q if self._coarse else q
-        if s + late <= self._t or (same and not self._coarse):
-            self._health.repeated += 1
-            return _NAN
-        expected = self._t + self._period
-        t = min(max(expected, s), s + q) if expected == expected else s  # (1)
-        return t if t > self._t else self._t + 0.01 * q
+    def _place(self, s: float) -> float:
+        """Time of a sample stamped `s`, (1)."""
+        q, k = self._resolution, self._count + 1 - self._k0
+        if not q or self._period != self._period:
+            return self._later(s)
+        low = s - k * self._period
+        self._phase = min(max(self._phase, low), low + q)
+        return self._later(self._phase + k * self._period)
+
+    def _later(self, t: float) -> float:
+        """Return `t`, or a time just behind the last if it is none."""
+        return t if not t <= self._t else self._t + CREEP * self._resolution
 
     def _advance(self, t: float) -> float:
         if t != t:
             return t
         d, self._t = t - self._t, t
-        if self._count < EARLY:
-            self._count += 1
+        self._count += 1
+        if self._count <= EARLY:
             self._early.append(d)
             self._period = float(np.median(self._early))
+            self._anchor()
             if self._count == EARLY:
                 self._count = sum(max(1, round(d / self._period)) for d in self._early)
-                self._period = (t - self._first) / self._count
-            return t
-        steps = 1
-        if d > 1.5 * self._period + self._resolution:
-            steps = round(d / self._period)
+                self._renewal = self._count
+        elif d > 1.5 * self._period + self._resolution:
+            lost = round(d / self._period) - 1
             self._health.gaps += 1
-            self._health.missing += steps - 1
-        self._count += steps
-        self._period = (t - self._first) / self._count
+            self._health.missing += lost
+            self._count += lost
+            self._anchor()
+        self._renew()
         return t
+
+    def _renew(self) -> None:
+        """Tell the period anew when it is time."""
+        if self._count >= max(EARLY, self._renewal):
+            self._period = (self._t - self._first) / self._count
+            self._renewal = self._count + min(self._count, RENEW)
+            self._anchor()
+
+    def _anchor(self) -> None:
+        self._phase, self._k0 = self._t, self._count
 
     def _restarted(self, s: float, host: float) -> bool:
         leap = s - self._t

@@ -18,7 +18,7 @@ WT901 data sheet v20-0702, section 5.1. A g is 9.80665 m/s^2 here.
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from fieldcal.description import ACC_UNITS, GYR_UNITS
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
-from fieldcal.drivers.framing import Bytes, Candidates, Found, Mask, rows
+from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, rows
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.samples import Array, Block
@@ -34,20 +34,26 @@ from fieldcal.samples import Array, Block
 SIZE = 11
 TIME, ACC, GYR = 0x50, 0x51, 0x52
 
-FRAME = np.dtype(
-    [("sync", "u1"), ("kind", "u1"), ("words", "<i2", 4), ("sum", "u1")]
-    + [("t_host", "f8"), ("at", "i8")]
-)
-"""A frame, behind it the arrival of its last byte and where it stood in the stream."""
-
 SAMPLE = np.dtype(
-    [("acc", "f8", 3), ("gyr", "f8", 3), ("temperature", "f8")]
-    + [("stamp", "f8"), ("steps", "i8"), ("t_host", "f8")]
+    [("six", "f8", 6), ("temperature", "f8"), ("stamp", "f8")]
+    + [("steps", "f8"), ("t_host", "f8")]
 )
 
-Frames: TypeAlias = NDArray[Any]
 Words: TypeAlias = NDArray[Any]
 Samples: TypeAlias = NDArray[Any]
+
+
+class Frames(NamedTuple):
+    """Frames (n, 11), where they stood in the stream, and when they were all there."""
+
+    raw: Bytes
+    at: Index
+    t_host: Array
+
+    def only(self, which: slice | Mask) -> Frames:
+        """Return some of them."""
+        return Frames(self.raw[which].copy(), self.at[which], self.t_host[which])
+
 
 UNDECIDED = 3
 """Samples without a stamp after which the device is taken to send none."""
@@ -66,7 +72,8 @@ class Codec(Base):
         self._gyr = gyr * GYR_UNITS["deg/s"] / 32768
         self._clock = Clock(self.health, options, resolution=1e-3)
         self._decided = False
-        self._frames = np.empty(0, FRAME)
+        none = np.empty((0, SIZE), np.uint8)
+        self._frames = Frames(none, np.empty(0, np.int64), np.empty(0))
         self._cycle = 0
         self._paired: int | None = None
         self._held = np.empty(0, SAMPLE)
@@ -88,50 +95,50 @@ class Codec(Base):
     def reset(self) -> None:
         """Forget half a frame and half a sample."""
         super().reset()
-        self._frames = self._frames[:0]
+        self._frames = self._frames.only(slice(0))
         self._paired = None
         self._clock.broken()
 
     def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
         """Put the halves of each sample together."""
-        frames = np.empty(len(found.starts), FRAME)
-        raw = frames.view(np.uint8).reshape(-1, FRAME.itemsize)
-        raw[:, :SIZE] = rows(data, found.starts, SIZE)
-        frames["t_host"] = t_host
-        frames["at"] = found.starts + self._begin
-        frames = np.concatenate([self._frames, frames])
-        old = len(self._frames)
-        fresh = ~_repeats(frames)
-        fresh[:old] = True
-        frames = frames[fresh]
-        self._frames = frames[-2:]
-        return self._deliver(self._pair(frames, old))
+        old = self._frames
+        frames = Frames(
+            np.concatenate([old.raw, rows(data, found.starts, SIZE)]),
+            np.concatenate([old.at, found.starts + self._begin]),
+            np.concatenate([old.t_host, t_host]),
+        )
+        again = _repeats(frames.raw)
+        again[: len(old.at)] = False
+        if again.any():
+            frames = frames.only(~again)
+        self._frames = frames.only(slice(-2, None))
+        return self._deliver(self._pair(frames, len(old.at)))
 
     def _pair(self, frames: Frames, old: int) -> Samples:
         """Samples whose second half is not among the first `old` frames."""
-        kind, far = frames["kind"], np.diff(frames["at"]) >= 3 * SIZE
-        begins = np.zeros(len(frames), dtype=np.int64)
+        kind, far = frames.raw[:, 1], np.diff(frames.at) >= 3 * SIZE
+        begins = np.zeros(len(kind), dtype=np.int64)
         begins[1:] = kind[1:] <= kind[:-1]
         begins[:old] = 0
         cycle = self._cycle + np.cumsum(begins)
-        near = np.zeros(len(frames), dtype=bool)
+        near = np.zeros(len(kind), dtype=bool)
         near[1:] = (kind[1:] == GYR) & (kind[:-1] == ACC) & ~far
         near[:old] = False
         at = np.flatnonzero(near)
         self._cycle = int(cycle[-1])
         samples = np.empty(len(at), SAMPLE)
-        words = frames["words"]
-        samples["acc"] = words[at - 1, :3] * self._acc
-        samples["gyr"] = words[at, :3] * self._gyr
-        samples["temperature"] = words[at - 1, 3] / 100
-        samples["t_host"] = frames["t_host"][at]
+        first = _words(frames.raw, at - 1)
+        samples["six"][:, :3] = first[:, :3] * self._acc
+        samples["six"][:, 3:] = _words(frames.raw, at)[:, :3] * self._gyr
+        samples["temperature"] = first[:, 3] / 100
+        samples["t_host"] = frames.t_host[at]
         if len(at):
             before = cycle[at[0]] - 1 if self._paired is None else self._paired
             samples["steps"] = np.diff(cycle[at], prepend=before)
             self._paired = int(cycle[at[-1]])
         samples["stamp"] = np.nan
         stamped = (at >= 2) & (kind[at - 2] == TIME) & ~far[at - 2]
-        samples["stamp"][stamped] = self._seconds(words[at[stamped] - 2])
+        samples["stamp"][stamped] = self._seconds(_words(frames.raw, at[stamped] - 2))
         return samples
 
     def _seconds(self, words: Words) -> Array:
@@ -158,11 +165,10 @@ class Codec(Base):
                 self._held = samples
                 return None
             self._decided = True
-        six = np.hstack([samples["acc"], samples["gyr"]])
-        n = len(six)
+        n = len(samples)
         raw = Raw(
             np.arange(n),
-            six,
+            samples["six"],
             samples["temperature"],
             samples["stamp"],
             np.full(n, np.nan),
@@ -170,10 +176,15 @@ class Codec(Base):
         return self._timed(self._clock, raw, samples["t_host"], samples["steps"])
 
 
-def _repeats(frames: Frames) -> Mask:
+def _words(raw: Bytes, which: Index) -> Words:
+    """The four words of some frames, (m, 4)."""
+    return np.ascontiguousarray(raw[which, 2:10]).view("<i2")
+
+
+def _repeats(raw: Bytes) -> Mask:
     """Frames that say word for word what the one before said, (n,)."""
-    again = np.zeros(len(frames), dtype=bool)
-    again[1:] = frames["kind"][1:] == frames["kind"][:-1]
+    again = np.zeros(len(raw), dtype=bool)
+    again[1:] = raw[1:, 1] == raw[:-1, 1]
     for i in np.flatnonzero(again):
-        again[i] = np.array_equal(frames["words"][i], frames["words"][i - 1])
+        again[i] = np.array_equal(raw[i], raw[i - 1])
     return again

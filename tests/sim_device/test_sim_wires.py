@@ -82,7 +82,7 @@ def test_formats_are_found_by_their_file() -> None:
 @pytest.mark.parametrize(
     ("spec", "says"),
     [
-        ("morse", "no wire format 'morse'.*text, witmotion"),
+        ("morse", "no wire format 'morse'.*text.*witmotion"),
         ("../x", "no wire format"),
         ("witmotion?rate=3", "no option 'rate'"),
         ("witmotion?acc_range=none", "must be a number above 0"),

@@ -1,0 +1,151 @@
+"""Each serial format against the bare read of the same pty, as ratios in one run."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time, sleep
+from typing import IO
+
+import numpy as np
+
+from fieldcal.driver import open_driver
+from fieldcal.drivers.codec import formats
+from fieldcal.drivers.serial_imu import SerialPort
+from fieldcal.samples import Block
+from fieldcal.sim_device.wire import open_wire
+
+SAMPLES = 300_000
+"""Five minutes at 1 kHz: enough for the throughput to settle."""
+
+RUNS = 5
+GOALS = {"text": 0.1, "vnimu": 0.1}
+BINARY = 0.3
+WATCHED = 5.0
+"""Time over which the share of the processor is taken, s."""
+
+SENDER = """
+import os, sys, tty
+data = open(sys.argv[1], "rb").read()
+ours, theirs = os.openpty()
+tty.setraw(theirs)
+print(os.ttyname(theirs), flush=True)
+for _ in sys.stdin:
+    left = memoryview(data)
+    while left:
+        left = left[os.write(ours, left):]
+"""
+
+
+def stream(name: str) -> bytes:
+    """Bytes of the samples, one after the other."""
+    rng = np.random.default_rng(1)
+    sent = Block.of(
+        np.arange(SAMPLES) / 1000,
+        rng.normal(0, 10, (SAMPLES, 3)),
+        rng.normal(0, 1, (SAMPLES, 3)),
+        rng.normal(25, 1, SAMPLES),
+        np.arange(SAMPLES, dtype=float),
+    )
+    return open_wire(name).encode(sent)
+
+
+@contextmanager
+def sender(data: bytes) -> Iterator[tuple[str, IO[str]]]:
+    """Another process that sends the bytes over a pty, once for each order."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder, "stream")
+        file.write_bytes(data)
+        command = [sys.executable, "-c", SENDER, str(file)]
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as process:
+            told, orders = process.stdout, process.stdin
+            if told is None or orders is None:
+                raise AssertionError
+            yield told.readline().strip(), orders
+            orders.close()
+
+
+def go(orders: IO[str]) -> float:
+    """Let the sender send; returns the time."""
+    orders.write("\n")
+    orders.flush()
+    return perf_counter()
+
+
+def bare(path: str, orders: IO[str], size: int) -> float:
+    """Seconds to read so many bytes and drop them."""
+    port = SerialPort(path, 115200)
+    began, left = go(orders), size
+    while left:
+        left -= len(port.read())
+    port.close()
+    return perf_counter() - began
+
+
+def driven(url: str, orders: IO[str]) -> tuple[float, int]:
+    """Seconds until the samples are there, and how many are missing."""
+    with open_driver(url) as imu:
+        began, got = go(orders), 0
+        last = 1 if "text" in url else 0  # a first line without a checksum is dropped
+        for block in imu.blocks(3.0):
+            got += len(block)
+            if got >= SAMPLES - last:
+                return perf_counter() - began, SAMPLES - last - got
+    raise AssertionError
+
+
+def share(name: str) -> float:
+    """Share of a processor that a device at 1 kHz takes, in real time."""
+    command = [sys.executable, "-m", "fieldcal", "sim", "--serial", name]
+    command += ["--rate", "1000", "--once"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
+        if sim.stdout is None:
+            raise AssertionError
+        path = sim.stdout.readline().strip()
+        with open_driver(f"serial:{path}?{TOLD.get(name, '')}format={name}") as imu:
+            for _ in imu.blocks():
+                break
+            began, spent, n = perf_counter(), process_time(), imu.health.samples
+            for _ in imu.blocks():
+                if perf_counter() - began > WATCHED:
+                    break
+            took, spent = perf_counter() - began, process_time() - spent
+            heard = (imu.health.samples - n) / took
+            if not 900 < heard < 1100:
+                print(f"! {name}: {heard:.0f} samples a second instead of 1000")
+        sim.terminate()
+    sleep(0.1)
+    return spent / took
+
+
+TOLD = {"vnimu": "rate=1000&"}
+"""Options that a format needs."""
+
+
+def main() -> None:
+    """Print bare and decoded throughput, their ratio, and the load at 1 kHz."""
+    print(
+        f"{'format':10} {'bare':>9} {'driver':>9} {'':>10}  ratio  goal  lost  at 1 kHz"
+    )
+    for name in formats():
+        data = stream(name)
+        with sender(data) as (path, orders):
+            url = f"serial:{path}?{TOLD.get(name, '')}format={name}"
+            reads, runs = [], []
+            for _ in range(RUNS):  # in turn: other load on the machine meets both
+                reads.append(bare(path, orders, len(data)))
+                runs.append(driven(url, orders))
+        raw, took = median(reads), median(seconds for seconds, _ in runs)
+        lost = max(n for _, n in runs)
+        goal, load = GOALS.get(name, BINARY), share(name)
+        size, rate = len(data) / 1e6, SAMPLES / took / 1e3
+        print(
+            f"{name:10} {size / raw:4.0f} MB/s {size / took:4.0f} MB/s {rate:6.0f} k/s"
+            f"  {raw / took:5.2f}  {goal:4.1f}  {lost:4d}"
+            f"  {100 * load:4.1f} % of a core, {1 / load:.0f} devices"
+        )

@@ -43,9 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--still",
         type=float,
-        default=2.0,
+        default=1.0,
         metavar="S",
-        help="shortest still stretch that counts as a position, s (default: 2)",
+        help="shortest still stretch that counts as a position, s (default: 1)",
     )
     add_site(parser)
 

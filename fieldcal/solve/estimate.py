@@ -43,7 +43,8 @@ class Estimate:
     names : (p,) full names, ``group.component``
     values, covariance : (p,), (p, p); only what was determined
     chi2, dof : of the residual
-    rms : root mean square residual, unit of the sensor
+    rms : root mean square residual, unit of the sensor; weighted as in the fit where
+        the windows differ
     gain : (p, n, 3) derivative of the values by the sensor's means; None if unknown
     warnings : what the user must know
     extra : figures that belong to the method

@@ -221,7 +221,7 @@ def _estimate(fit: NormFit) -> Estimate:
         notes.append(_orientations(fit.determined))
     whole = Estimate(
         NAMES, fit.x, fit.covariance, fit.chi2, fit.dof,
-        float(np.sqrt(np.mean(fit.residual**2))),
+        float(np.sqrt(np.average(fit.residual**2, weights=fit.sigma**-2))),
         fit.gain[:, :, None] * fit.along, tuple(notes),
         {"left_out_rms": _rms(fit.left_out)},
     )  # fmt: skip

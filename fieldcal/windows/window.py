@@ -136,7 +136,7 @@ class Window:
         `target` is the standard error wanted of each accelerometer mean, m/s^2.
         """
         sigma = self.sigma[:3]
-        if target is not None and np.nanmax(sigma, initial=0.0) <= target:
+        if target is not None and np.max(sigma) <= target:
             return (
                 f"each accelerometer mean is known to {np.nanmax(sigma):.2g} m/s², "
                 f"{target:.2g} m/s² was wanted"

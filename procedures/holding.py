@@ -30,7 +30,7 @@ def _steady(
         try:
             return (yield from hold(index, position, seconds, sigma))
         except Moved as moved:
-            yield from note(str(moved))
+            yield from note(f"{moved}; hold still, the window starts again")
     raise CalibrationFailed(
         f"{position.name}: no window of {seconds:g} s without a disturbance in {TRIES}"
         " tries; fix the device better, shelter it from the wind, then start again"

@@ -135,6 +135,19 @@ class Cells:
         return steady
 
     @property
+    def whole(self) -> int:
+        """Cells that are complete: all, or all but the last while it fills."""
+        if self._size < 2:
+            return self._size
+        filled = self.counts[-1].max() >= 0.9 * np.median(self.counts.max(axis=1))
+        return self._size if filled else self._size - 1
+
+    @property
+    def steps(self) -> Array:
+        """Successive differences in each cell, (m, 6)."""
+        return self._sums[: self._size, 18:24]
+
+    @property
     def spacing(self) -> float:
         """Device time from one cell to the next on average, s."""
         span = self._index[self._size - 1] - self._index[0] + 1

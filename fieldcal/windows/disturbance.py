@@ -11,11 +11,12 @@ The line lets the slow drift of a device that warms up pass: it widens the error
 mean but is no disturbance. A step tilts the line and so hides from (1), but not from
 (2), for which such a drift is too slow. What shakes and comes back to where it was
 shows in the short-lag noise q of the cells, whose cube root is close to normal (Wilson
-and Hilferty 1931).
+and Hilferty 1931). Apart from these, a channel may be stuck at one value.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -29,6 +30,12 @@ Kind = Literal["push", "step", "shake"]
 
 SHAKE_LEVELS = 4
 """Durations looked for in the short-lag noise: 0.1 s to 0.8 s."""
+
+_HEAVY = 1.3
+"""Widening for short-lag noise of a low-passed sensor, whose tail is heavier."""
+
+STUCK_CELLS, STUCK_VALUES = 10, 20
+"""Cells and values of a run that noise of a step of the resolution never repeats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,20 +83,49 @@ def steps(means: Array, noise: Quiet, least: Array) -> list[Statistic]:
     return tests
 
 
-def shakes(short: Array, least: Array) -> list[Statistic]:
-    """Excess of the short-lag noise (m, c), a variance, over its usual size, (3)."""
+def shakes(short: Array, number: Array, least: Array) -> list[Statistic]:
+    """Excess of the short-lag noise (m, c), a variance, over its usual size, (3).
+
+    `number` (m, c) tells from how many differences each is; few of them count less.
+    """
     root = np.cbrt(short)
-    centred = root - np.median(root, axis=0)
-    usual = np.median(np.abs(centred), axis=0) / NORMAL
+    most = np.maximum(np.median(number, axis=0), 1.0)
+    centred = np.sqrt(np.minimum(1.0, number / most)) * (root - np.median(root, axis=0))
+    usual = _HEAVY * np.median(np.abs(centred), axis=0) / NORMAL
     spread = _no_less(usual, np.cbrt(least**2))
     noise = np.sqrt(np.median(short, axis=0))
-    sizes = [np.sqrt(np.maximum(q, 0.0)) for q in running(short, SHAKE_LEVELS)]
+    levels = zip(
+        running(centred, SHAKE_LEVELS), running(short, SHAKE_LEVELS), strict=True
+    )
     return [
-        Statistic("shake", 2**k, size, noise, u * np.sqrt(2.0**k) / spread)
-        for k, (u, size) in enumerate(
-            zip(running(centred, SHAKE_LEVELS), sizes, strict=True)
+        Statistic(
+            "shake",
+            2**k,
+            np.sqrt(np.maximum(q, 0.0)),
+            noise,
+            u * np.sqrt(2.0**k) / spread,
         )
+        for k, (u, q) in enumerate(levels)
     ]
+
+
+def repeats(
+    short: Array, number: Array, channels: Iterable[int]
+) -> list[tuple[int, int, int]]:
+    """Runs of cells in which one of the channels that have noise repeats one value.
+
+    `short`, `number` (m, c) as for `shakes`. Each run is (channel, first cell, one past
+    the last).
+    """
+    runs = []
+    for channel in channels:
+        same = (short[:, channel] == 0) & (number[:, channel] > 0)
+        edges = np.flatnonzero(np.diff(same.astype(int), prepend=0, append=0))
+        for first, end in edges.reshape(-1, 2).tolist():
+            long = end - first >= STUCK_CELLS
+            if long and number[first:end, channel].sum() >= STUCK_VALUES:
+                runs.append((int(channel), first, end))
+    return runs
 
 
 def _no_less(spread: Array, least: Array) -> Array:

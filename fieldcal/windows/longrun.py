@@ -55,8 +55,8 @@ WALKS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Corners c, knees k and r of the shapes, Hz."""
 
 PRIOR_LOWPASS = 0.08
-PRIOR_FLICKER = 0.035
-PRIOR_WALK = 0.003
+PRIOR_FLICKER = 0.03
+PRIOR_WALK = 0.002
 """What is expected of a device nothing is known of; the rest is white noise."""
 
 

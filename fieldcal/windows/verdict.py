@@ -10,7 +10,7 @@ import numpy as np
 from fieldcal.errors import Moved
 from fieldcal.samples import CHANNELS, Array
 from fieldcal.windows.cells import CELL, Cells
-from fieldcal.windows.disturbance import Kind, Statistic, pushes, shakes, steps
+from fieldcal.windows.disturbance import Kind, Statistic, pushes, repeats, shakes, steps
 from fieldcal.windows.limits import Limits
 from fieldcal.windows.quiet import Quiet, quiet
 from fieldcal.windows.trend import line
@@ -30,8 +30,6 @@ _COARSE = 0.6
 _PRESENT = 10
 """Cells that are the present."""
 
-_HOLD = "hold still, the window starts again"
-
 
 @dataclass(frozen=True, slots=True)
 class Departure:
@@ -48,7 +46,7 @@ class Departure:
     """
 
     ratio: float
-    kind: Kind | Literal["drift", "noise"]
+    kind: Kind | Literal["drift", "noise", "stuck"]
     channel: int
     at: float
     seconds: float
@@ -60,17 +58,22 @@ class Departure:
         axis = CHANNELS[self.channel]
         unit = "m/s²" if self.channel < 3 else "rad/s"
         size = f"{self.size:+.2g} ± {self.noise:.1g} {unit}"
-        scatter = f"{self.size:.2g} {unit}"
         when = f"disturbed {self.at - start:.1f} s into the window on {axis}"
-        times = f"{abs(self.size) / self.noise:.0f} times the noise"
+        noise = f"where the noise is {self.noise:.1g} {unit}"
+        if self.noise > 0:
+            noise = f"{abs(self.size) / self.noise:.0f} times the noise"
         says = {
-            "push": f"{when}: a {self.seconds:.1f} s push of {size}, {times}",
-            "step": f"{when}: a lasting change of {size}, {times}",
-            "shake": f"{when}: shaken for {self.seconds:.1f} s by {scatter}, {times}",
+            "push": f"{when}: a {self.seconds:.1f} s push of {size}, {noise}",
+            "step": f"{when}: a lasting change of {size}, {noise}",
+            "shake": f"{when}: shaken for {self.seconds:.1f} s by {self.size:.2g} "
+            f"{unit}, {noise}",
             "drift": f"creeping on {axis}: {size} over the window",
-            "noise": f"moving on {axis} by {scatter}, which no device at rest does",
+            "noise": f"moving on {axis} by {self.size:.2g} {unit}, which no device at "
+            "rest does",
+            "stuck": f"{axis} repeats one value for {self.seconds:.1f} s from "
+            f"{self.at - start:.1f} s into the window: its sensor is stuck",
         }
-        return Moved(f"{says[self.kind]}; {_HOLD}", self.at, axis)
+        return Moved(says[self.kind], self.at, axis)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,14 +95,15 @@ class Verdict:
 
 def judge(cells: Cells, limits: Limits, before: Quiet | None = None) -> Verdict:
     """Judge the samples so far by their own noise and that of the windows before."""
-    if len(cells) < FEWEST:
-        scatter = np.nan_to_num(cells.means).std(axis=0)
+    m = cells.whole
+    if m < FEWEST:
+        scatter = np.nan_to_num(cells.means[:m]).std(axis=0) if m else np.zeros(6)
         return Verdict(_beyond_noise(cells, scatter, limits), 0.0, before)
-    means = cells.steady
+    means = cells.steady[:m]
     noise = quiet(means, before)
     allowed = THRESHOLD * (1 + (EARLY / (CELL * noise.cells)) ** 2)
     tests = _tests(cells, means, noise, allowed)
-    worst = [_worst(cells, test, allowed) for test in tests]
+    worst = [_worst(cells, test, allowed) for test in tests] + _stuck(cells)
     worst.append(_beyond_drift(cells, means, noise, limits))
     worst.append(_beyond_noise(cells, noise.spread[0], limits))
     recent = [test.z[-_PRESENT:].max() for test in tests if test.cells < _PRESENT]
@@ -111,12 +115,34 @@ def judge(cells: Cells, limits: Limits, before: Quiet | None = None) -> Verdict:
 
 
 def _tests(cells: Cells, means: Array, noise: Quiet, allowed: float) -> list[Statistic]:
+    m = len(means)
     coarse = np.nan_to_num(cells.noise) < _COARSE * cells.resolution
     least = np.where(coarse, cells.resolution, 0.0) / allowed
-    short = np.nan_to_num(cells.short)
-    return (
-        pushes(means, noise, least) + steps(means, noise, least) + shakes(short, least)
-    )
+    return [
+        *pushes(means, noise, least),
+        *steps(means, noise, least),
+        *shakes(np.nan_to_num(cells.short[:m]), cells.steps[:m], least),
+    ]
+
+
+def _stuck(cells: Cells) -> list[Departure]:
+    """Runs of one value, where the axes of a sensor are noisier than its resolution."""
+    sampled = np.nan_to_num(cells.noise)
+    sensor = np.repeat(np.median(sampled.reshape(2, 3), axis=1), 3)
+    noisy = np.flatnonzero(np.maximum(sampled, sensor) > cells.resolution)
+    runs = repeats(np.nan_to_num(cells.short), cells.steps, noisy)
+    return [
+        Departure(
+            np.inf,
+            "stuck",
+            channel,
+            float(cells.times[first]),
+            float(cells.times[end - 1] + CELL - cells.times[first]),
+            0.0,
+            float(sampled[channel]),
+        )
+        for channel, first, end in runs
+    ]
 
 
 def _worst(cells: Cells, test: Statistic, allowed: float) -> Departure:

@@ -1,0 +1,205 @@
+"""The windowed averager on known noise: pulls, false rejections, disturbances caught.
+
+A pull is (mean - mean of the next window) / sqrt(sigma^2 + sigma_next^2): the error
+stated is that by which the next window would differ. For flicker and random walk that
+is all a window can know; the knees are relative to white noise of the same device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from time import perf_counter
+
+import numpy as np
+from scipy.signal import butter, lfilter
+
+from fieldcal.errors import Moved
+from fieldcal.samples import Array, Block
+from fieldcal.windows import Noise, Window, average
+
+SEEDS = 1000
+ACC, GYR = 0.05, 0.002
+GRAVITY = np.array([0.0, -9.81, 0.0])
+UNIT = np.repeat([ACC, GYR], 3)
+DISTURBED = 5.0
+"""Size of the disturbance, in standard deviations of the raw noise, for 0.5 s."""
+
+Source = Callable[[np.random.Generator, int, float], Array]
+"""Noise of unit variance or about, (n, 6), from a generator, n and the rate in Hz."""
+
+
+def white(rng: np.random.Generator, n: int, _: float) -> Array:
+    """Nothing but white noise."""
+    return rng.standard_normal((n, 6))
+
+
+def markov(phi: float) -> Source:
+    """AR(1) noise, x_i = phi x_(i-1) + e_i."""
+
+    def source(rng: np.random.Generator, n: int, _: float) -> Array:
+        e = rng.standard_normal((n + 500, 6)) * np.sqrt(1 - phi**2)
+        x: Array = lfilter([1], [1, -phi], e, axis=0)[500:]
+        return x
+
+    return source
+
+
+def low_passed(corner_hz: float) -> Source:
+    """White noise behind a second-order Butterworth filter, as in most sensors."""
+
+    def source(rng: np.random.Generator, n: int, rate: float) -> Array:
+        b, a = butter(2, 2 * corner_hz / rate)
+        lead = int(10 * rate / corner_hz)
+        x: Array = lfilter(b, a, rng.standard_normal((n + lead, 6)), axis=0)[lead:]
+        return x / x.std()
+
+    return source
+
+
+def coloured(knee_hz: float, slope: int) -> Source:
+    """White noise and f^-slope noise that are equal at the knee; nothing below 1/4 n."""
+
+    def source(rng: np.random.Generator, n: int, rate: float) -> Array:
+        f = np.fft.rfftfreq(4 * n, 1 / rate)[1:]
+        size = np.sqrt((1 + (knee_hz / f) ** slope) * 2 * n)[:, None]
+        parts = rng.standard_normal((2, len(f), 6)) * size / np.sqrt(2)
+        spectrum = np.vstack(
+            [np.zeros((1, 6)), (parts[0] + 1j * parts[1]) * np.sqrt(2)]
+        )
+        return np.fft.irfft(spectrum, 4 * n, axis=0)[:n]
+
+    return source
+
+
+def humming(hz: float, amplitude: float) -> Source:
+    """White noise and a line."""
+
+    def source(rng: np.random.Generator, n: int, rate: float) -> Array:
+        phase = 2 * np.pi * (hz * np.arange(n)[:, None] / rate + rng.random(6))
+        return white(rng, n, rate) + amplitude * np.sin(phase)
+
+    return source
+
+
+KINDS: dict[str, Source] = {
+    "white": white,
+    "low-pass 20 Hz": low_passed(20),
+    "low-pass 5 Hz": low_passed(5),
+    "AR(1) 0.5": markov(0.5),
+    "AR(1) 0.8": markov(0.8),
+    "AR(1) 0.95": markov(0.95),
+    "hum 50.1 Hz": humming(50.1, 3.0),
+    "sway 1.9 Hz": humming(1.9, 1.0),
+    "flicker 0.03 Hz": coloured(0.03, 1),
+    "flicker 0.3 Hz": coloured(0.3, 1),
+    "flicker 1 Hz": coloured(1.0, 1),
+    "random walk 0.01 Hz": coloured(0.01, 2),
+}
+
+MILD = ("white", "low-pass 20 Hz", "low-pass 5 Hz", "AR(1) 0.5", "flicker 0.03 Hz")
+
+
+def block_of(noise: Array, rate: float) -> Block:
+    """A device at rest with this noise in units of its own."""
+    six = noise * UNIT
+    return Block.of(np.arange(len(six)) / rate, GRAVITY + six[:, :3], six[:, 3:])
+
+
+def draws(kind: str, seconds: float, rate: float, windows: int) -> Iterator[Array]:
+    """Noise of as many windows, each by its own seed."""
+    for seed in range(windows):
+        rng = np.random.default_rng([seed, int(seconds), int(rate)])
+        yield KINDS[kind](rng, round(seconds * rate), rate)
+
+
+def pulls(kind: str, seconds: float, rate: float, known: bool = False) -> Array:
+    """Pulls of SEEDS channels; `known`: with the noise of four windows before."""
+    found = []
+    n = round(seconds * rate)
+    lead = 4 if known else 0
+    for x in draws(kind, (lead + 2) * seconds, rate, SEEDS // 6 + 1):
+        noise: Noise | None = None
+        windows = []
+        for k in range(lead + 2):
+            window = Window(noise=noise)
+            window.add(block_of(x[k * n : (k + 1) * n], rate))
+            noise = window.noise if k < lead else noise
+            windows.append(window)
+        a, b = windows[-2:]
+        found.append((b.mean - a.mean) / np.hypot(a.sigma, b.sigma))
+    return np.concatenate(found)
+
+
+def rejected(kind: str, seconds: float, rate: float, size: float, where: str) -> float:
+    """Share of windows rejected when a disturbance of this size lasts 0.5 s."""
+    count = 0
+    n, long = round(seconds * rate), round(0.5 * rate)
+    for seed, x in enumerate(draws(kind, seconds, rate, SEEDS)):
+        rng = np.random.default_rng(seed)
+        first = {"start": 0, "end": n - long}.get(where, int(rng.integers(n - long)))
+        x[first : first + long, rng.integers(6)] += size * x.std()
+        count += moved(block_of(x, rate))
+    return count / SEEDS
+
+
+def moved(block: Block) -> bool:
+    """Whether the window is rejected."""
+    try:
+        average(block)
+    except Moved:
+        return True
+    return False
+
+
+def watched(kind: str, seconds: float, rate: float) -> float:
+    """Share of windows of noise alone rejected when looked at every second."""
+    count = 0
+    for x in draws(kind, seconds, rate, SEEDS):
+        block, window = block_of(x, rate), Window()
+        for second in range(int(seconds)):
+            window.add(block.between(second, second + 1))
+            if window.moved:
+                count += 1
+                break
+    return count / SEEDS
+
+
+def main() -> None:
+    """Print the tables."""
+    began = perf_counter()
+    print(f"pulls of {SEEDS} means at 100 Hz: standard deviation, share beyond 1.96")
+    print(f"{'':22s}{'30 s':>14s}{'60 s':>14s}{'30 s, fifth window':>20s}")
+    for kind in KINDS:
+        columns = [
+            pulls(kind, 30, 100),
+            pulls(kind, 60, 100),
+            pulls(kind, 30, 100, True),
+        ]
+        cells = [f"{p.std():.2f} {np.mean(abs(p) > 1.96):6.1%}" for p in columns]
+        print(f"{kind:22s}{cells[0]:>14s}{cells[1]:>14s}{cells[2]:>20s}", flush=True)
+    print(f"\nwindows of 6 channels rejected, of {SEEDS}, noise alone | {DISTURBED:g}")
+    print("sigma of the raw noise for 0.5 s on one channel anywhere, at start, at end")
+    for rate, seconds, kinds in (
+        (50.0, 30.0, MILD),
+        (100.0, 60.0, MILD),
+        (200.0, 30.0, ("white",)),
+        (1000.0, 30.0, ("white",)),
+    ):
+        for kind in kinds:
+            alone = rejected(kind, seconds, rate, 0.0, "")
+            caught = [
+                rejected(kind, seconds, rate, DISTURBED, where)
+                for where in ("", "start", "end")
+            ]
+            shares = "  ".join(f"{share:7.1%}" for share in caught)
+            print(
+                f"{rate:5g} Hz {seconds:3g} s {kind:18s}{alone:7.1%} | {shares}",
+                flush=True,
+            )
+    alone = watched("white", 30, 50)
+    print(f"   50 Hz  30 s white, looked at every second {alone:7.1%}")
+    print(f"{perf_counter() - began:.0f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -143,7 +143,8 @@ class Reader:
 
     def _put(self, chunk: Chunk) -> None:
         with self._changed:
-            self._changed.wait_for(lambda: self._held < self._limit or self._closing)
+            if self._held >= self._limit:
+                self._changed.wait_for(lambda: not self._held or self._closing)
             self._chunks.append(chunk)
             self._held += len(chunk.data)
             self._changed.notify_all()

@@ -85,10 +85,13 @@ class Codec(Base):
         kind = data[at + 1]
         at = at[(kind >= TIME) & (kind <= 0x5F)]
         whole = at[at + SIZE <= len(data)]
-        total = np.cumsum(data, dtype=np.uint8)
-        before = total[whole + SIZE - 2] - total[whole] + np.uint8(0x55)
         good = np.ones(len(at), dtype=bool)
-        good[: len(whole)] = before == data[whole + SIZE - 1]
+        if len(whole):
+            raw = rows(data, whole, SIZE)
+            total = raw[:, 0].copy()
+            for i in range(1, SIZE - 1):
+                total += raw[:, i]
+            good[: len(whole)] = total == raw[:, -1]
         undecided = len(data) - (len(data) > 0 and int(data[-1]) == 0x55)
         return Candidates(at, at + SIZE, good, undecided)
 

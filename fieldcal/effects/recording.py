@@ -66,6 +66,7 @@ class Fault:
     rows : (m,) samples of the channel that are not to be used
     size : departure, in the channel's unit
     sigma : significance, in standard deviations
+    mended : (n, 6) outputs put right, where they can be
 
     """
 
@@ -77,3 +78,38 @@ class Fault:
     rows: Rows = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     size: float = 0.0
     sigma: float = np.inf
+    mended: Array | None = None
+
+
+def runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """First and one past the last of each run of True, (m, 2).
+
+    >>> runs(np.array([False, True, True, False, True])).tolist()
+    [[1, 3], [4, 5]]
+    """
+    padded = np.concatenate([[False], flags, [False]]).astype(np.int8)
+    steps = np.diff(padded)
+    return np.column_stack([np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)])
+
+
+def lsb_of(values: Array) -> float:
+    """Step of the grid that values lie on, 0 where they lie on none.
+
+    >>> round(lsb_of(np.array([0.5, 1.25, -0.25, 1.0])), 12)
+    0.25
+    """
+    some = values[np.isfinite(values)][:20_000]
+    distinct = np.unique(some)
+    gaps = np.diff(distinct)
+    gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]
+    if len(gaps) < 2:
+        return 0.0
+    step = float(gaps.min())
+    for _ in range(3):  # the grid's own step is the mean over many, not one difference
+        steps = gaps / step
+        whole = np.round(steps)
+        if np.abs(steps - whole).max() > 0.1 + 0.02 * whole.max() ** 0.5:
+            return 0.0
+        step = float(gaps.sum() / whole.sum())
+    off = np.abs(gaps / step - np.round(gaps / step))
+    return step if off.max() < 0.05 else 0.0

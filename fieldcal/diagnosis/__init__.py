@@ -1,0 +1,6 @@
+"""What physics a simulation leaves out of a recording.
+
+Samples are checked (`chain`), cleaned of lines (`spectrum`) and reduced to block means
+(`reduce`); hypotheses from the catalogue are compared by their evidence (`select`) in
+one fit (`fit`), turns between positions tell the rest (`turning`).
+"""

@@ -1,0 +1,154 @@
+"""The signal chain first: physics fitted to a broken chain is nonsense.
+
+What can be put right is put right (axes, units, bytes), what cannot is left out (stuck,
+clipped, bumped), and the rest is remembered (lost samples, the clock, coarse steps).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.description import Description
+from fieldcal.diagnosis.noise import white
+from fieldcal.diagnosis.reduce import rate_of, spans
+from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
+from fieldcal.frames import earth_rate_home, force_home
+from fieldcal.positions import angles
+from fieldcal.samples import CHANNELS, Array, Block
+
+MENDING = ("mounting", "decode_fault")
+MASKING = ("saturation", "stuck", "bump")
+NOTING = ("quantisation", "dropped", "clock_skew", "noise_level")
+
+CLIPPED = 1e-3
+"""Part of a window at the rail that makes its mean useless."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A recording after the checks of its chain.
+
+    Attributes
+    ----------
+    block : samples put right
+    usable : (n, 6) samples that can be used
+    faults : what was found, by the effect's id
+
+    """
+
+    block: Block
+    usable: NDArray[np.bool_]
+    faults: tuple[tuple[str, Fault], ...]
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """What was found and has a name in the catalogue, each once."""
+        return tuple(dict.fromkeys(i for i, fault in self.faults if fault.values))
+
+
+def check(block: Block, about: Description) -> Checked:
+    """Look for every fault of the chain, and act on what is found."""
+    usable = np.isfinite(block.six)
+    faults: list[tuple[str, Fault]] = []
+    for name in MENDING:
+        for fault in _find(name, block, usable, about):
+            faults.append((name, fault))
+            if fault.mended is not None:
+                six = _mended(block, fault)
+                block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
+    for name in MASKING:
+        for fault in _find(name, block, usable, about):
+            if name == "saturation" and _is_stuck(fault, faults):
+                continue
+            faults.append((name, fault))
+            _mask(name, fault, usable, spans(block, about))
+    for name in NOTING:
+        faults += [(name, fault) for fault in _find(name, block, usable, about)]
+    return Checked(block, usable, tuple(_once(faults)))
+
+
+def _find(
+    name: str, block: Block, usable: NDArray[np.bool_], about: Description
+) -> list[Fault]:
+    effect = catalogue()[name]
+    if not isinstance(effect, Chain):
+        raise TypeError(f"{name} is no effect on samples")
+    return effect.find(recording(block, usable, about))
+
+
+def _mended(block: Block, fault: Fault) -> Array:
+    if fault.mended is None:
+        return block.six
+    if "channel" not in fault.values:
+        return fault.mended
+    six, c = block.six, CHANNELS.index(fault.channel)
+    six[:, c] = fault.mended[:, c]
+    return six
+
+
+def _mask(
+    name: str, fault: Fault, usable: NDArray[np.bool_], windows: NDArray[np.intp]
+) -> None:
+    if name == "bump":
+        usable[fault.rows] = False
+        return
+    c = CHANNELS.index(fault.channel)
+    usable[fault.rows, c] = False
+    if name == "saturation":
+        for first, last in windows:
+            inside = (fault.rows >= first) & (fault.rows < last)
+            if inside.sum() > CLIPPED * (last - first):
+                usable[first:last, c] = False
+
+
+def _is_stuck(fault: Fault, faults: list[tuple[str, Fault]]) -> bool:
+    return any(n == "stuck" and f.channel == fault.channel for n, f in faults)
+
+
+def _once(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault]]:
+    """Without runs of equal values that are the rail of a clipped channel."""
+    clipped = {
+        f.channel: {int(r) for r in f.rows} for n, f in faults if n == "saturation"
+    }
+    return [
+        (n, f)
+        for n, f in faults
+        if not (
+            n == "stuck" and clipped.get(f.channel, set()) >= {int(r) for r in f.rows}
+        )
+    ]
+
+
+def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Recording:
+    """What the checks look at."""
+    windows, rate = spans(block, about), rate_of(block)
+    six = np.where(usable, block.six, np.nan)
+    pieces = [six[a:b] for a, b in windows if b > a]
+    noise = white(pieces, rate) if pieces else np.full(6, np.nan)
+    if about.positions:
+        alpha, beta = angles(about.positions)
+    else:
+        alpha = beta = np.array([np.nan])
+    x = Experience.at_rest(
+        alpha,
+        beta,
+        about.gravity,
+        base_force=force_home(about.gravity),
+        base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
+        mounting=about.mounting,
+        latitude=about.latitude,
+    )
+    limits = [about.limits.get(k, np.nan) for k in ("acceleration", "angular_rate")]
+    return Recording(
+        block=replace(block, acc=six[:, :3], gyr=six[:, 3:]),
+        windows=windows,
+        x=x,
+        scale=np.concatenate([about.nominal["acc_scale"], about.nominal["gyr_scale"]]),
+        bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
+        noise=noise,
+        limits=np.array(limits),
+        rate_hz=about.rate_hz or np.nan,
+    )

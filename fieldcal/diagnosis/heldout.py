@@ -1,0 +1,135 @@
+"""How well a model predicts what it has not seen.
+
+Each position in turn is left out, the rest fitted, and the position predicted from
+that; with fewer than three windows, stretches of time are left out instead. Where a
+position's angles are free or random, what they make up for does not count against the
+prediction. Random parts that reach from the rest into what is left out (a walk) predict
+it as far as they do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.model import Term
+from fieldcal.diagnosis.reduce import Rows
+from fieldcal.diagnosis.whiten import covariance
+from fieldcal.samples import Array
+
+FOLDS = 12
+STRETCHES = 5
+CELLS = (0.0, 0.1, 0.25, 0.5, 1.0)
+"""Parts of a window over which residuals are averaged before their rms is taken."""
+
+
+def held_out(bench: Bench, terms: Sequence[Term], fit: Fit) -> Array:
+    """Residuals of rows predicted from the others, (n, 6); nan where none can be."""
+    by_position = _residuals(bench, terms, fit, _positions(bench.rows))
+    if np.isfinite(by_position).any():
+        return by_position
+    return _residuals(bench, terms, fit, _stretches(bench.rows))
+
+
+def _positions(rows: Rows) -> NDArray[np.intp]:
+    held, index = np.unique(rows.x.position, return_inverse=True)
+    if len(held) < 3:
+        return np.zeros(len(index), dtype=np.intp)
+    fold: NDArray[np.intp] = (index % FOLDS).astype(np.intp)
+    return fold
+
+
+def _stretches(rows: Rows) -> NDArray[np.intp]:
+    out = np.zeros(len(rows.x), dtype=np.intp)
+    for p in np.unique(rows.x.position):
+        inside = np.flatnonzero(rows.x.position == p)
+        for i, part in enumerate(np.array_split(inside, STRETCHES)):
+            out[part] = i
+    return out
+
+
+def _residuals(
+    bench: Bench, terms: Sequence[Term], fit: Fit, fold: NDArray[np.intp]
+) -> Array:
+    rows, out = bench.rows, np.full(bench.rows.y.shape, np.nan)
+    if fold.max() == 0:
+        return out
+    base = [not n.startswith("aside") for n in fit.names]
+    for i in np.unique(fold):
+        left = fold == i
+        rest = bench.but(
+            rows=replace(rows, sd=np.where(left[:, None], np.nan, rows.sd))
+        )
+        seen = rest.fit(terms, fit)
+        if (fit.determined & ~seen.determined)[base].any():
+            continue
+        apart = rows.y - seen.state.predict(rows.x)
+        apart = apart - _reached(bench, left, apart)
+        out[left] = _turned_off(bench, seen, left, apart)[left]
+    return np.where(rows.used, out, np.nan)
+
+
+def _reached(bench: Bench, left: NDArray[np.bool_], apart: Array) -> Array:
+    """What random parts carry over from the rows that were seen."""
+    rows, out = bench.rows, np.zeros_like(apart)
+    for c in {p.channel for p in bench.errors.parts}:
+        seen = ~left & rows.used[:, c]
+        shared = covariance(rows, bench.errors, c)
+        own = shared[np.ix_(seen, seen)] + np.diag(rows.sd[seen, c] ** 2)
+        out[left, c] = shared[np.ix_(left, seen)] @ np.linalg.solve(own, apart[seen, c])
+    return out
+
+
+def _turned_off(bench: Bench, fit: Fit, left: NDArray[np.bool_], apart: Array) -> Array:
+    """Without what small turns of the positions left out make up for."""
+    if not bench.free and not bench.errors.setting:
+        return apart
+    prior = 1.0 if bench.free else bench.errors.setting
+    turned, out = bench.aside(fit.state), apart.copy()
+    for p in np.unique(bench.rows.x.position[left]):
+        at = left & (bench.rows.x.position == p)
+        use = bench.rows.used & at[:, None]
+        columns = turned[:, :, 2 * p : 2 * p + 2]
+        a = columns[use] / bench.rows.sd[use][:, None]
+        z = apart[use] / bench.rows.sd[use]
+        turns = np.linalg.solve(a.T @ a + np.eye(2) / prior**2, a.T @ z)
+        out[at] -= (columns @ turns)[at]
+    return out
+
+
+def cells(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Means over parts of the windows.
+
+    Returns
+    -------
+    mean : (m, 6) weighted mean residuals; nan where there is none
+    sd : (m, 6) their standard deviation from white noise
+    position : (m,)
+
+    """
+    means, sds, position = [], [], []
+    for p in np.unique(rows.x.position):
+        at = np.flatnonzero(rows.x.position == p)
+        cuts = np.unique(np.round(np.array(CELLS) * len(at)).astype(int))
+        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+            part = at[a:b]
+            use = np.isfinite(residual[part]) & rows.used[part]
+            weight = np.where(use, 1 / np.where(use, rows.sd[part], 1.0) ** 2, 0.0)
+            total = weight.sum(axis=0)
+            some = np.where(total > 0, total, np.nan)
+            means.append((weight * np.nan_to_num(residual[part])).sum(axis=0) / some)
+            sds.append(1 / np.sqrt(some))
+            position.append(p)
+    return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
+
+
+def rms(rows: Rows, residual: Array) -> Array:
+    """Root mean square of the cells' residuals, (6,); nan where there is none."""
+    mean, _, _ = cells(rows, residual)
+    count = np.isfinite(mean).sum(axis=0)
+    squares = np.nansum(mean**2, axis=0)
+    return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))

@@ -1,0 +1,87 @@
+"""White noise of the samples, from short-lag differences inside windows.
+
+With means over m consecutive samples, the Allan variance times m,
+
+    s^2(m) = m <(mean_{k+1} - mean_k)^2> / 2
+
+is the variance of one sample for white noise, whatever m. What is wanted is the level
+that a mean over a second obeys; shorter m are pooled in as long as they agree with it,
+so that filtered or otherwise coloured outputs are not taken for quieter ones. The mean
+of squares leaves out the largest tenth, so that a few disturbed spots do not count.
+Source: IEEE Std 952, annex C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.samples import Array
+
+KEEP = 0.9
+KEPT = 0.62302
+"""Second moment of a unit normal inside its central nine tenths."""
+
+AGREE = 3.0
+ANCHOR_S = 1.0
+
+
+def white(pieces: Sequence[Array], rate_hz: float) -> Array:
+    """Standard deviation of one sample of each channel, (c,).
+
+    Parameters
+    ----------
+    pieces : (n_i, c) samples of each window, nan where not to be used
+    rate_hz : samples a second
+
+    """
+    channels = pieces[0].shape[1] if pieces else 0
+    anchor = max(1, round(ANCHOR_S * rate_hz))
+    longest = max((len(p) for p in pieces), default=0)
+    anchor = max(1, min(anchor, longest // 8))
+    lengths = [anchor]
+    while lengths[-1] > 1:
+        lengths.append(max(1, lengths[-1] // 4))
+    levels, spreads = zip(*(_level(pieces, m) for m in lengths), strict=True)
+    out = np.full(channels, np.nan)
+    for c in range(channels):
+        out[c] = _pooled([v[c] for v in levels], [s[c] for s in spreads])
+    return out
+
+
+def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
+    """s^2(m) of each channel and its relative standard error."""
+    steps = [np.diff(_means(p, m), axis=0) for p in pieces if len(p) >= 2 * m]
+    if not steps:
+        nothing = np.full(pieces[0].shape[1], np.nan)
+        return nothing, nothing
+    squares = m * np.concatenate(steps) ** 2 / 2
+    count = np.isfinite(squares).sum(axis=0)
+    level = np.full(squares.shape[1], np.nan)
+    for c in np.flatnonzero(count >= 4):
+        column = squares[np.isfinite(squares[:, c]), c]
+        kept = int(np.ceil(KEEP * len(column)))
+        level[c] = np.partition(column, kept - 1)[:kept].mean() / KEPT
+    return level, np.sqrt(4.5 / np.maximum(count, 1))
+
+
+def _means(piece: Array, m: int) -> Array:
+    if m == 1:
+        return piece
+    whole = len(piece) // m * m
+    out: Array = piece[:whole].reshape(-1, m, piece.shape[1]).mean(axis=1)
+    return out
+
+
+def _pooled(levels: Sequence[float], spreads: Sequence[float]) -> float:
+    """Level at the shortest m that all longer ones agree with."""
+    best, spread = levels[0], spreads[0]
+    for level, finer in zip(levels[1:], spreads[1:], strict=True):
+        if not np.isfinite(best):
+            best, spread = level, finer
+        elif not abs(level - best) <= AGREE * np.hypot(spread, finer) * best:
+            break
+        else:
+            best, spread = level, finer
+    return float(np.sqrt(best))

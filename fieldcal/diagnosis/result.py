@@ -1,0 +1,213 @@
+"""What a diagnosis says: the content of diagnosis.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+Verdict = Literal["consistent", "left_out", "ambiguous", "unexplained"]
+
+Kind = Literal[
+    "position", "time", "temperature", "spectrum", "transient", "samples", "turn"
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A value with its standard uncertainty and unit; text where it is no number."""
+
+    value: float | str
+    sigma: float | None
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        if isinstance(self.value, str):
+            return {"value": self.value}
+        return {
+            "value": number(self.value),
+            "sigma": number(self.sigma),
+            "unit": self.unit,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """Where simulation and recording part.
+
+    Attributes
+    ----------
+    channel : name in `samples.CHANNELS`, or "t"
+    kind : what it depends on
+    positions : of session.toml, counted from 0
+    from_s, to_s : stretch of device time
+    covariate : what it follows
+    rms : size of the residual there, in the channel's unit
+    sigma : its significance, standard deviations
+    correlation : with the covariate, nan where there is none
+    share : part of its variance that a smooth function of the covariate takes
+
+    """
+
+    channel: str
+    kind: Kind
+    positions: tuple[int, ...]
+    from_s: float
+    to_s: float
+    covariate: str
+    rms: float
+    sigma: float
+    correlation: float = np.nan
+    share: float = np.nan
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        out: dict[str, Any] = {
+            "channel": self.channel,
+            "kind": self.kind,
+            "positions": list(self.positions),
+            "from_s": number(self.from_s),
+            "to_s": number(self.to_s),
+            "covariate": self.covariate,
+            "rms": number(self.rms),
+            "sigma": number(self.sigma),
+        }
+        if np.isfinite(self.share):
+            out["correlation"] = number(self.correlation)
+            out["share"] = number(self.share)
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """An effect that is there.
+
+    Attributes
+    ----------
+    id : its name in the catalogue
+    parameters : by name
+    aliases : ids that would explain the same in this recording
+    evidence : delta_chi2, delta_bic, held_out_gain
+
+    """
+
+    id: str
+    parameters: Mapping[str, Quantity]
+    aliases: tuple[str, ...] = ()
+    evidence: Mapping[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        return {
+            "id": self.id,
+            "parameters": {n: q.to_json() for n, q in self.parameters.items()},
+            "aliases": list(self.aliases),
+            "evidence": {n: number(v) for n, v in self.evidence.items()},
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How well a model does.
+
+    Attributes
+    ----------
+    rms : of the residual, in `Diagnosis.unit`
+    chi2_per_dof : of the whitened residual
+    held_out_rms : of what was predicted from a fit that had not seen it
+    by_channel : held-out rms of each channel, m/s^2 and rad/s
+
+    """
+
+    rms: float
+    chi2_per_dof: float
+    held_out_rms: float
+    by_channel: Mapping[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        return {
+            "rms": number(self.rms),
+            "chi2_per_dof": number(self.chi2_per_dof),
+            "held_out_rms": number(self.held_out_rms),
+            "held_out_by_channel": {n: number(v) for n, v in self.by_channel.items()},
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A group of the calibration in device axes, with its change from nominal.
+
+    `value`, `sigma` and `change` are (3,), nan where not determined.
+    """
+
+    value: tuple[float, ...]
+    sigma: tuple[float, ...]
+    change: tuple[float, ...]
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        return {
+            "value": [number(v) for v in self.value],
+            "sigma": [number(s) for s in self.sigma],
+            "change_sigmas": [
+                number(c / s) if s > 0 else None
+                for c, s in zip(self.change, self.sigma, strict=True)
+            ],
+            "unit": self.unit,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What the simulation leaves out of a recording, and how well that explains it.
+
+    Attributes
+    ----------
+    verdict : consistent, left_out, ambiguous or unexplained
+    mismatch : where the two part
+    effects : what is left out
+    unit : of the rms values: of the triad that parts most
+    before, after : the simulation without and with the effects
+    calibration : with the effects; groups that the recording determines
+    warnings : what limits the diagnosis
+    says : a paragraph for a person
+
+    """
+
+    verdict: Verdict
+    mismatch: tuple[Mismatch, ...]
+    effects: tuple[Found, ...]
+    unit: str
+    before: Quality
+    after: Quality
+    calibration: Mapping[str, Group]
+    warnings: tuple[str, ...]
+    says: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of diagnosis.json."""
+        return {
+            "verdict": self.verdict,
+            "mismatch": [m.to_json() for m in self.mismatch],
+            "effects": [e.to_json() for e in self.effects],
+            "fit": {
+                "before": self.before.to_json(),
+                "after": self.after.to_json(),
+                "unit": self.unit,
+            },
+            "calibration": {n: g.to_json() for n, g in self.calibration.items()},
+            "warnings": list(self.warnings),
+            "says": self.says,
+        }
+
+
+def number(value: float | None) -> float | None:
+    """A JSON number, or null where there is none."""
+    if value is None or not np.isfinite(value):
+        return None
+    return float(value)

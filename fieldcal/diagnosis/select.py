@@ -1,0 +1,229 @@
+"""Which effects are there: a search that pays for what it tries.
+
+A model is a set of hypotheses and a description of the random part. Its objective is
+
+    ln Z - m (ln N + EXTRA)
+
+with m hypotheses in it and N tried. By Markov's inequality a term that is not there
+raises Z by a factor exp(x) with a probability below exp(-x): with N tried and EXTRA on
+top, nothing enters a recording that has nothing more often than exp(-EXTRA). Models
+grow by one or two at a time, lose what has become idle, and swap. What is random (a
+walk, a scatter from window to window, angles set by hand), and a smooth function that
+no effect makes, compete on the same footing: a term has to beat them, not only white
+noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.diagnosis.candidates import Hypothesis, instants
+from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.model import Term
+from fieldcal.diagnosis.scatter import Wander, dropped, wanders
+from fieldcal.diagnosis.steps import step_gains
+
+EXTRA = 6.9
+"""Of ln 1000."""
+
+MARGIN = 3.0
+"""How much better an effect has to be than something random, ln."""
+
+OTHERS = 60
+"""Random and smooth parts that are tried besides."""
+
+BEAM = 3
+RIVAL = 0.3
+"""Beginnings followed up have at least this part of the best one's gain."""
+
+MOST = 5
+"""Hypotheses in one model."""
+
+STEPS = 3
+LEAVES = 4.0
+"""Standard deviations of chi^2 from which a fit leaves something to explain."""
+
+Choice = tuple[Hypothesis, Term]
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """Hypotheses with their fit.
+
+    Attributes
+    ----------
+    chosen : hypotheses, each with the variant that fits best
+    bench : rows with the errors of this model
+    fit : at the optimum
+    objective : ln Z less what the hypotheses cost
+    random : names of the random parts that were let in
+    shaped : what the choice of variants cost, ln
+
+    """
+
+    chosen: tuple[Choice, ...]
+    bench: Bench
+    fit: Fit
+    objective: float
+    random: tuple[str, ...] = ()
+    shaped: tuple[float, ...] = ()
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the hypotheses in it."""
+        return frozenset(h.name for h, _ in self.chosen)
+
+    @property
+    def leaves_nothing(self) -> bool:
+        """Whether its rows are no further off than white noise."""
+        spread = np.sqrt(2 * max(self.fit.dof, 1))
+        return self.fit.chi2 < self.fit.dof + LEAVES * float(spread)
+
+
+class Search:
+    """The search for one recording.
+
+    Parameters
+    ----------
+    bench : rows with white noise only
+    pool : the hypotheses
+    always : terms that are in every model, and are not counted
+
+    """
+
+    def __init__(
+        self, bench: Bench, pool: Sequence[Hypothesis], always: Sequence[Term] = ()
+    ) -> None:
+        self.bench, self.pool, self.always = bench, list(pool), tuple(always)
+        self.price = float(np.log(len(self.pool) + OTHERS)) + EXTRA
+        self._grown: dict[tuple[frozenset[str], tuple[str, ...]], list[Model]] = {}
+
+    def run(self) -> Model:
+        """The best model found."""
+        best = self.model((), self.bench)
+        while (grown := self._grow(best)) is not None:
+            best = self._tidied(grown)
+        return best
+
+    def model(
+        self,
+        chosen: tuple[Choice, ...],
+        bench: Bench,
+        near: Fit | None = None,
+        random: tuple[str, ...] = (),
+        shaped: tuple[float, ...] = (),
+    ) -> Model:
+        """Fit some hypotheses."""
+        fit = bench.fit([*self.always, *(t for _, t in chosen)], near)
+        cost = self.price * (len(chosen) + len(random)) + sum(shaped)
+        return Model(chosen, bench, fit, fit.score - cost, random, shaped)
+
+    def _grow(self, model: Model) -> Model | None:
+        """The model with something more in it, if that is better."""
+        if len(model.chosen) + len(model.random) >= MOST:
+            return None
+        chance = max(wanders(model.bench, model.fit), key=lambda w: w.gain)
+        first = self.larger(model)
+        best = max(first, key=lambda m: m.objective, default=model)
+        gain = best.objective - model.objective
+        if max(gain, chance.gain - self.price) <= 0:
+            return None
+        if chance.gain - self.price > gain - MARGIN or not best.leaves_nothing:
+            best = self._followed(model, first)
+            gain = best.objective - model.objective
+        if chance.gain - self.price > gain - MARGIN * len(best.chosen):
+            return self._with_random(model, chance)
+        return best if gain > 0 else None
+
+    def _followed(self, model: Model, first: Sequence[Model]) -> Model:
+        """The best of one or two more hypotheses."""
+        ranked = sorted(first, key=lambda m: -m.objective)
+        if not ranked:
+            return model
+        best = ranked[0]
+        enough = RIVAL * (best.objective - model.objective)
+        for start in ranked[:BEAM]:
+            if start.objective - model.objective >= enough:
+                more = self.larger(start)
+                best = max([best, *more], key=lambda m: m.objective)
+        return best
+
+    def larger(self, model: Model) -> list[Model]:
+        """The model with each hypothesis that it has not."""
+        key = (model.names, model.random)
+        if key not in self._grown:
+            self._grown[key] = [
+                self.with_one(model, h) for h in self.pool if h.name not in model.names
+            ]
+        return self._grown[key]
+
+    def with_one(self, model: Model, hypothesis: Hypothesis) -> Model:
+        """The model and the variant of a hypothesis that fits best with it.
+
+        Several variants are one hypothesis: their mean likelihood counts.
+        """
+        variants, cost = hypothesis.variants, hypothesis.cost
+        if "at_s" in variants[0].shape:
+            variants, more = self._jumps(model, hypothesis)
+            cost += more
+        tried = [
+            self.model(
+                (*model.chosen, (hypothesis, term)),
+                model.bench,
+                model.fit,
+                model.random,
+                (*model.shaped, cost),
+            )
+            for term in variants
+        ]
+        best = max(tried, key=lambda m: m.objective)
+        if "at_s" in variants[0].shape or len(tried) == 1:
+            return best
+        relative = np.array([m.objective for m in tried]) - best.objective
+        more = -float(np.log(np.mean(np.exp(relative))))
+        shaped = (*model.shaped, cost + more)
+        return replace(best, objective=best.objective - more, shaped=shaped)
+
+    def _jumps(
+        self, model: Model, hypothesis: Hypothesis
+    ) -> tuple[tuple[Term, ...], float]:
+        """The likeliest instants of a jump, and what choosing among all costs."""
+        term = hypothesis.variants[0]
+        channels = term.columns
+        gains = step_gains(model.bench, model.fit, channels, term.prior)
+        best = np.argsort(gains)[::-1][:STEPS]
+        cost = -float(np.log(np.mean(np.exp(gains - gains.max()))))
+        at = instants(model.bench)
+        return tuple(replace(term, shape={"at_s": float(at[i])}) for i in best), cost
+
+    def _with_random(self, model: Model, chance: Wander) -> Model:
+        bench = model.bench.but(errors=chance.errors)
+        random = (*model.random, chance.name)
+        return self.model(model.chosen, bench, model.fit, random, model.shaped)
+
+    def _tidied(self, model: Model) -> Model:
+        """Without what has become idle, and with what does better swapped in."""
+        for less in self._smaller(model):
+            if less.objective > model.objective:
+                return self._tidied(less)
+            if len(model.chosen) > 1 and not model.random:
+                swapped = max(self.larger(less), key=lambda m: m.objective)
+                if swapped.objective > model.objective + 1e-6:
+                    return self._tidied(swapped)
+        return model
+
+    def _smaller(self, model: Model) -> list[Model]:
+        """The model without each of its parts; random parts are estimated anew."""
+        out = []
+        for i in range(len(model.chosen)):
+            rest = model.chosen[:i] + model.chosen[i + 1 :]
+            shaped = model.shaped[:i] + model.shaped[i + 1 :]
+            out.append(self.model(rest, model.bench, model.fit, model.random, shaped))
+        for name in model.random:
+            kept = tuple(r for r in model.random if r != name)
+            bench = model.bench.but(errors=dropped(model.bench.errors, name))
+            out.append(self.model(model.chosen, bench, model.fit, kept, model.shaped))
+        return out

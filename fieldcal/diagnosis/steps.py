@@ -1,0 +1,42 @@
+"""All instants at which biases may have jumped, tried at once.
+
+For a column u of the design, added to a fit with Jacobian J and normal matrix A, all
+whitened, its own information is G = u^T u - u^T J A^-1 J^T u and its pull b = u^T r;
+with a prior of size s it raises ln Z by
+
+    (b^2 / (G + s^-2) - ln(1 + s^2 G)) / 2
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.samples import Array
+
+
+def step_gains(
+    bench: Bench, fit: Fit, channels: tuple[int, ...], sizes: Array
+) -> Array:
+    """Rise of ln Z for a jump after each row but the last, (n - 1,).
+
+    Parameters
+    ----------
+    channels : outputs that jump together
+    sizes : prior of each channel's jump
+
+    """
+    n = len(bench.rows.x)
+    after = np.tri(n, n - 1, -1)
+    total = np.zeros(n - 1)
+    for c, size in zip(channels, sizes, strict=True):
+        deep = np.zeros((n, 6, n - 1))
+        deep[:, c] = after
+        column = bench.whiten(deep)[:, c]
+        shared = fit.jacobian[:, c].T @ column
+        own = (column**2).sum(axis=0)
+        own -= np.einsum("ki,kl,li->i", shared, fit.covariance, shared)
+        pull = column.T @ fit.white[:, c]
+        own = np.maximum(own, 0.0)
+        total += 0.5 * (pull**2 / (own + size**-2) - np.log1p(size**2 * own))
+    return total

@@ -1,0 +1,95 @@
+"""The temperature that the device reports, smoothed, and its rate.
+
+Over a span of some seconds about each instant a straight line is fitted to the means
+over a second; its value and its slope are taken. So the noise and the steps of a
+thermometer do not enter the hypotheses as if they were temperature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.samples import Array, Block
+
+VALUE_S, SLOPE_S = 12.0, 40.0
+"""Half spans of the lines for the value and for the rate."""
+
+STEPS = 3600
+
+
+@dataclass(frozen=True, slots=True)
+class Thermometer:
+    """Temperature on a grid of instants.
+
+    Attributes
+    ----------
+    t : (m,) s, device time
+    warming : (m,) K, temperature less that at the start
+    heating : (m,) K/s
+    start_c : temperature at the start, deg C; nan where there is no thermometer
+    noise : standard deviation of the means that were smoothed, K
+
+    """
+
+    t: Array
+    warming: Array
+    heating: Array
+    start_c: float
+    noise: float
+
+    @classmethod
+    def of(cls, block: Block) -> Thermometer:
+        """Smooth the temperature of a recording."""
+        known = np.isfinite(block.temperature)
+        if known.sum() < 8:
+            t = np.array([0.0])
+            return cls(t, np.array([np.nan]), np.array([np.nan]), np.nan, np.nan)
+        t, mean, count = _means(block.t[known], block.temperature[known])
+        step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+        line = _line(t, mean, count, max(VALUE_S, 4 * step))
+        slope = _line(t, mean, count, max(SLOPE_S, 4 * step))
+        start = line[0][0] - line[1][0] * (t[0] - block.t[0])
+        noise = float(np.std(mean - line[0]))
+        return cls(t, line[0] - start, slope[1], float(start), noise)
+
+    @property
+    def changes(self) -> bool:
+        """Whether the temperature changed by more than the thermometer's own noise."""
+        if not np.isfinite(self.start_c):
+            return False
+        return bool(np.ptp(self.warming) > max(0.1, 6 * self.noise))
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Warming and heating at some instants, (n,) each."""
+        return np.interp(t, self.t, self.warming), np.interp(t, self.t, self.heating)
+
+
+def _means(t: Array, values: Array) -> tuple[Array, Array, Array]:
+    width = max(1.0, (t[-1] - t[0]) / STEPS)
+    bins = ((t - t[0]) / width).astype(np.intp)
+    first = np.concatenate([[0], np.flatnonzero(np.diff(bins)) + 1])
+    count = np.diff(np.append(first, len(t))).astype(float)
+    shifted = values - values[0]
+    return (
+        np.add.reduceat(t, first) / count,
+        np.add.reduceat(shifted, first) / count + values[0],
+        count,
+    )
+
+
+def _line(t: Array, y: Array, weight: Array, half: float) -> tuple[Array, Array]:
+    """Value and slope of local lines, by running sums."""
+    middle = t[len(t) // 2]
+    s, v = t - middle, y - y[0]
+    sums = [
+        np.concatenate([[0.0], np.cumsum(weight * term)])
+        for term in (np.ones_like(s), s, s * s, v, s * v)
+    ]
+    low = np.searchsorted(t, t - half, side="left")
+    high = np.searchsorted(t, t + half, side="right")
+    n, a, b, c, d = (total[high] - total[low] for total in sums)
+    spread = b - a * a / n
+    slope = np.where(spread > 0, (d - a * c / n) / np.where(spread > 0, spread, 1), 0.0)
+    return c / n + slope * (s - a / n) + y[0], slope

@@ -1,0 +1,231 @@
+"""Effects that only turns show, fitted to all turns at once.
+
+The windows' fit stands in as the prior of biases and scale factors, so that windows and
+turns together are one fit. White noise of the gyroscopes of density N makes phi_T a sum
+with covariance N^2 T, and phi_k - u phi_T on the way a bridge with
+
+    N^2 (min(t, t') - u' t - u t' + u u' T)
+
+for which the accelerometers' rows are whitened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
+from fieldcal.diagnosis.model import Term
+from fieldcal.diagnosis.turns import Turn, Undo
+from fieldcal.effects import Motion, Sensor, catalogue, columns
+from fieldcal.samples import Array
+
+CANDIDATES = ("gyro_cross_coupling", "gyro_scale", "lever_arm", "time_delay")
+
+ON_THE_WAY = ("lever_arm", "time_delay")
+"""Seen by the accelerometers on the way, if nothing else shakes them there."""
+
+STEADY = 3.0
+"""Squares a row that the accelerometers may leave on the way and still be used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turning:
+    """A fit to the turns.
+
+    Attributes
+    ----------
+    terms : effects in it
+    names : of the columns; the windows' biases and scale factors first
+    values, covariance : of the columns; the windows' ones as changes
+    determined : columns that the turns say something about
+    white : (r,) residual, whitened, of the rows used
+    rows : rows used, of all
+    chi2, dof : of the turns' rows
+    score : ln Z but for a constant
+
+    """
+
+    terms: tuple[Term, ...]
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    determined: NDArray[np.bool_]
+    white: Array
+    rows: NDArray[np.bool_]
+    chi2: float
+    dof: int
+    score: float
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Effects in it."""
+        return tuple(t.effect.id for t in self.terms)
+
+
+class Turntable:
+    """All turns of a recording, whitened, ready to be fitted.
+
+    Parameters
+    ----------
+    bench, fit : the windows' rows and their fit
+    made : the turns
+    interval : s between samples
+
+    Attributes
+    ----------
+    turn : (r,) number of the turn of each row
+    closing : (r,) rows that are closures
+
+    """
+
+    def __init__(
+        self, bench: Bench, fit: Fit, made: Sequence[Turn], interval: float
+    ) -> None:
+        self._bench, self._fit = bench, fit
+        self._density = bench.rows.noise[3:] * np.sqrt(interval)
+        self.pool = tuple(self._pool())
+        kept = ("acc_bias", "acc_scale", "gyr_bias")
+        self._kept = [j for j, n in enumerate(fit.names) if n.startswith(kept)]
+        blocks = [self._block(t) for t in made]
+        self._z = np.concatenate([z for z, _, _ in blocks])
+        self._a = np.vstack([a for _, a, _ in blocks])
+        self.closing = np.concatenate([c for _, _, c in blocks])
+        self.turn = np.repeat(np.arange(len(made)), [len(z) for z, _, _ in blocks])
+        self._rank = sum(int(round(np.trace(t.across))) for t in made)
+
+    def _pool(self) -> Iterator[Term]:
+        for name in CANDIDATES:
+            if name != "gyro_scale" or not self._bench.rated:
+                effect = catalogue()[name]
+                yield Term(effect, tuple(range(len(effect.params))))
+
+    def best(self, price: float) -> Turning:
+        """The set of effects with the highest evidence, each paying the price.
+
+        What the accelerometers see on the way counts only if it is explained: a hand
+        that carries the device shakes it as well.
+        """
+        best = self._best(self.pool, price, np.ones(len(self._z), dtype=bool))
+        if best.chi2 <= STEADY * best.dof:
+            return best
+        pool = tuple(t for t in self.pool if t.effect.id not in ON_THE_WAY)
+        return self._best(pool, price, self.closing)
+
+    def _best(
+        self, pool: Sequence[Term], price: float, rows: NDArray[np.bool_]
+    ) -> Turning:
+        sets = [c for n in range(len(pool) + 1) for c in combinations(pool, n)]
+        tried = [self.fit(terms, rows) for terms in sets]
+        return max(tried, key=lambda f: f.score - price * len(f.terms))
+
+    def fit(
+        self, terms: Sequence[Term], rows: NDArray[np.bool_], relax: float = 1.0
+    ) -> Turning:
+        """Fit some of the pool's effects to some of the rows."""
+        width = len(self._kept)
+        columns, names = list(range(width)), [self._fit.names[j] for j in self._kept]
+        sizes: list[float] = []
+        at = width
+        for term in self.pool:
+            if term in terms:
+                columns += range(at, at + len(term.columns))
+                names += [f"{term.effect.id}.{n}" for n in term.names]
+                sizes += list(relax * term.prior)
+            at += len(term.columns)
+        a = self._a[rows][:, columns]
+        precision = np.zeros((len(columns), len(columns)))
+        known = self._fit.covariance[np.ix_(self._kept, self._kept)]
+        precision[:width, :width] = np.linalg.inv(known)
+        precision[range(width, len(columns)), range(width, len(columns))] = (
+            1 / np.array(sizes) ** 2
+        )
+        normal = a.T @ a + precision
+        values = np.linalg.solve(normal, a.T @ self._z[rows])
+        white = self._z[rows] - a @ values
+        covariance = np.linalg.inv(normal)
+        prior = np.concatenate([np.full(width, np.inf), sizes])
+        determined = np.diag(covariance) < DETERMINED * prior**2
+        chi2 = float(white @ white)
+        missing = int(self.closing[rows].sum()) - self._rank
+        dof = int(rows.sum()) - missing - int(determined[width:].sum())
+        score = -0.5 * (chi2 + float(values @ precision @ values))
+        score -= 0.5 * float(
+            np.linalg.slogdet(normal)[1] - np.linalg.slogdet(precision)[1]
+        )
+        return Turning(
+            tuple(terms), tuple(names), values, covariance, determined, white, rows,
+            chi2, dof, score,
+        )  # fmt: skip
+
+    def undo(self, found: Turning) -> Undo:
+        """What the gyroscopes have to be rid of, as far as it was found."""
+        matrix, delay = np.zeros((3, 3)), 0.0
+        for name, value in zip(found.names, found.values, strict=True):
+            group, _, part = name.partition(".")
+            if group == "gyro_scale":
+                matrix[int(part[1]) - 1, int(part[1]) - 1] = value
+            elif group == "gyro_cross_coupling":
+                matrix[int(part[1]) - 1, int(part[2]) - 1] = value
+            elif group == "time_delay":
+                delay = float(value)
+        return Undo(matrix, delay)
+
+    def _block(self, turn: Turn) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Whitened observations, design and which rows are closures, of one turn."""
+        state = self._fit.state
+        output = state.output(turn.x)
+        off = (output[:, 3:] - state.bias[3:]) / state.scale[3:] - turn.x.w
+        phi, end = turn.carried(off[:, :, None])
+        seen = turn.means(output[:, :3])
+        seen = seen + turn.means(turn.swung(phi)[:, :, 0]) * state.scale[:3]
+        design = self._design(turn)
+        path, close = turn.carried(design[:, 3:] / state.scale[3:, None])
+        swung = turn.swung(path) * state.scale[:3, None]
+        on_way = turn.means(design[:, :3] + swung)
+        setting = 2 * self._bench.errors.setting**2
+        spread = np.sqrt(self._density**2 * (turn.t[-1] - turn.t[0]) + setting)
+        across = turn.across / spread[:, None]
+        whiten = self._whitener(turn)
+        z = np.concatenate(
+            [across @ (turn.closure - end[:, 0]), whiten @ (turn.acc - seen).ravel()]
+        )
+        width = design.shape[2]
+        a = np.vstack([across @ close, whiten @ on_way.reshape(-1, width)])
+        return z, a, np.arange(len(z)) < 3
+
+    def _design(self, turn: Turn) -> Array:
+        """Outputs at the edges by kept columns, then by the pool's, (m + 1, 6, k)."""
+        x = turn.x
+        out: list[Array] = []
+        for name in (self._fit.names[j] for j in self._kept):
+            group, _, axis = name.partition(".")
+            i = "xyz".index(axis) + 3 * group.startswith("gyr")
+            column = np.zeros((len(x), 6, 1))
+            column[:, i, 0] = x.f[:, i] if group == "acc_scale" else 1.0
+            out.append(column)
+        for term in self.pool:
+            effect = term.effect
+            if isinstance(effect, Motion | Sensor):
+                out.append(columns(effect, x, scale=self._bench.scale))
+        return np.concatenate(out, axis=2)
+
+    def _whitener(self, turn: Turn) -> Array:
+        """L^-1 of the accelerometers' rows on the way, (3 k, 3 k)."""
+        middle = (turn.t[turn.cut[1:]] + turn.t[turn.cut[:-1]]) / 2 - turn.t[0]
+        done = np.interp(middle, turn.t - turn.t[0], turn.done)
+        length = turn.t[-1] - turn.t[0]
+        bridge = np.minimum.outer(middle, middle) + np.outer(done, done) * length
+        bridge -= np.outer(middle, done) + np.outer(done, middle)
+        cov = np.diag((turn.sd**2).ravel())
+        for axis in range(3):
+            along = np.broadcast_to(np.eye(3)[axis][:, None], (len(turn.t), 3, 1))
+            arm = turn.means(turn.swung(along)[:, :, 0]) * self._fit.state.scale[:3]
+            arm = arm * self._density[axis]
+            blocks = bridge[:, None, :, None] * np.multiply.outer(arm, arm)
+            cov += blocks.reshape(cov.shape)
+        return np.linalg.inv(np.linalg.cholesky(cov))

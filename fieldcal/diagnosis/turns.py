@@ -1,0 +1,300 @@
+"""What the gyroscopes say about each turn between two positions.
+
+With bias and scale of the model, w^ = (W - d)/s - w_earth, the attitude is carried from
+position p to position q: R_k = exp(-[w^ dt]x) R_{k-1}. If the gyroscopes' outputs are
+off by dW, the true attitude is R (I + [phi]x) with
+
+    phi_k = sum_{j<=k} R_j^T dW_j dt / s
+
+At the end R must take the attitude (or, without known angles, the force) of p to that
+of q: that is phi_T, the closure. On the way the accelerometers see
+
+    f_k = (1 - u) R_k f_p + u R_k R_T^T f_q + R_k ((phi_k - u phi_T) x f_p)
+
+u being the part of the turn that is done. Source: rotation kinematics to first order in
+phi.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
+from fieldcal.effects import Experience
+from fieldcal.frames import turn
+from fieldcal.samples import Array, Block
+
+FINE_S = 0.02
+"""Step of the integration at high sampling rates."""
+
+PIECE_S = 0.15
+"""Means of the accelerometers on the way."""
+
+PIECES = 60
+"""Of one turn at most."""
+
+MARGIN_S = 0.3
+LONGEST_S = 60.0
+LEAST = np.deg2rad(1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """Gyroscope errors to be taken out before anything is integrated.
+
+    Attributes
+    ----------
+    matrix : (3, 3) dW = matrix w
+    delay : s by which the gyroscopes are late
+
+    """
+
+    matrix: Array
+    delay: float
+
+    def of(self, name: str) -> float:
+        """Value by a parameter's full name, zero for what is not undone."""
+        group, _, part = name.partition(".")
+        if group == "gyro_scale":
+            return float(self.matrix[int(part[1]) - 1, int(part[1]) - 1])
+        if group == "gyro_cross_coupling":
+            return float(self.matrix[int(part[1]) - 1, int(part[2]) - 1])
+        return self.delay if group == "time_delay" else 0.0
+
+
+NOTHING = Undo(np.zeros((3, 3)), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One turn, in m fine steps between m + 1 edges and k pieces.
+
+    Attributes
+    ----------
+    positions : from, to
+    x : what is experienced at the edges, as far as the gyroscopes tell
+    attitude : (m + 1, 3, 3) R
+    done : (m + 1,) u
+    cut : (k + 1,) edges between the pieces
+    acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
+    closure : (3,) rad, phi_T as seen
+    across : (3, 3) projection on what of the closure is known
+    start_force : (3,) f_p, m/s^2
+
+    """
+
+    positions: tuple[int, int]
+    x: Experience
+    attitude: Array
+    done: Array
+    cut: NDArray[np.intp]
+    acc: Array
+    sd: Array
+    closure: Array
+    across: Array
+    start_force: Array
+
+    @property
+    def t(self) -> Array:
+        """Instants of the edges, s."""
+        return self.x.t
+
+    def means(self, values: Array) -> Array:
+        """Means over the pieces of something known at the edges, (k, ...)."""
+        return trapezoid_means(self.t, values, self.cut)
+
+    def carried(self, off: Array) -> tuple[Array, Array]:
+        """Phi less its share of the closure at the edges, and the closure.
+
+        `off` is dW/s, (m + 1, 3, k) rad/s; back come (m + 1, 3, k) and (3, k).
+        """
+        turned = np.einsum("mji,mjk->mik", self.attitude, off)
+        gaps = np.diff(self.t)[:, None, None]
+        phi = np.zeros_like(turned)
+        phi[1:] = np.cumsum((turned[1:] + turned[:-1]) / 2 * gaps, axis=0)
+        way: Array = phi - self.done[:, None, None] * phi[-1]
+        return way, phi[-1]
+
+    def swung(self, phi: Array) -> Array:
+        """R (phi x f_p) at the edges, (m + 1, 3, k)."""
+        force = np.broadcast_to(self.start_force, (len(phi), phi.shape[2], 3))
+        crossed = np.cross(np.moveaxis(phi, 1, 2), force)
+        out: Array = np.einsum("mij,mkj->mik", self.attitude, crossed)
+        return out
+
+
+def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
+    """Means between cuts (indices) of a course given at instants."""
+    gaps = np.diff(t).reshape(-1, *[1] * (values.ndim - 1))
+    total = np.zeros_like(values, dtype=float)
+    total[1:] = np.cumsum((values[1:] + values[:-1]) / 2 * gaps, axis=0)
+    length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
+    mean: Array = np.diff(total[cut], axis=0) / length
+    return mean
+
+
+def turns(source: Source, rows: Rows, fit: Fit, undo: Undo = NOTHING) -> list[Turn]:
+    """Every turn between two windows that the gyroscopes have followed."""
+    if not rows.used.any(axis=0).all():
+        return []
+    windows = spans(source.block, source.about)
+    x = fit.state.experienced(rows.x)
+    held = np.unique(x.position)
+    found = []
+    for p, q in zip(held[:-1].tolist(), held[1:].tolist(), strict=True):
+        if x.rate[np.isin(x.position, (p, q))].any():
+            continue
+        stretch = _moving(source, rows, q, int(windows[p, 1]), int(windows[q, 0]))
+        made = _turn(source, rows, fit, x, undo, (p, q), *stretch) if stretch else None
+        if made is not None:
+            found.append(made)
+    return found
+
+
+def _moving(
+    source: Source, rows: Rows, q: int, first: int, last: int
+) -> tuple[int, int] | None:
+    """Samples from just before the motion to just after it, if none is missing."""
+    block, rate = source.block, rate_of(source.block)
+    gap, m = slice(first, last), max(2, round(0.1 * rate))
+    if last - first < 4 * m or not source.usable[gap].all():
+        return None
+    if np.diff(block.t[gap]).max() > 3.5 / rate:
+        return None
+    rest = np.nanmean(rows.y[rows.x.position == q, 3:], axis=0)
+    off = block.gyr[gap] - rest
+    total = np.vstack([np.zeros(3), np.cumsum(off, axis=0)])
+    level = np.abs(total[m:] - total[:-m]) / m
+    limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
+    at = np.flatnonzero((level > limit).any(axis=1))
+    if not len(at):
+        return None
+    margin = round(MARGIN_S * rate)
+    start = max(first, first + int(at[0]) - margin)
+    end = min(last, first + int(at[-1]) + m + margin)
+    return (start, end) if block.t[end - 1] - block.t[start] < LONGEST_S else None
+
+
+def _turn(
+    source: Source,
+    rows: Rows,
+    fit: Fit,
+    x: Experience,
+    undo: Undo,
+    pair: tuple[int, int],
+    first: int,
+    last: int,
+) -> Turn | None:
+    block, rate = source.block, rate_of(source.block)
+    each = max(1, round(FINE_S * rate))
+    count = (last - first - 1) // each
+    if count < 8:
+        return None
+    rows_p, rows_q = (x.position == p for p in pair)
+    t = block.t[first : first + count * each + 1]
+    edge = np.arange(count + 1) * each
+    part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
+    earth = (1 - part) * x.w[rows_p].mean(axis=0) + part * x.w[rows_q].mean(axis=0)
+    inertial = _undone(block, fit, undo, t)
+    angle = trapezoid_means(t, inertial - earth, edge) * np.diff(t[edge])[:, None]
+    size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
+    if size[-1] < LEAST:
+        return None
+    attitude, done = carry(angle), size / size[-1]
+    f_p, f_q = x.f[rows_p].mean(axis=0), x.f[rows_q].mean(axis=0)
+    back = attitude @ attitude[-1].T
+    f = (1 - done)[:, None] * (attitude @ f_p) + done[:, None] * (back @ f_q)
+    each_piece = max(1, round(PIECE_S * rate / each), -(-count // PIECES))
+    cut = np.append(np.arange(0, count - each_piece // 2, each_piece), count).astype(
+        np.intp
+    )
+    acc = trapezoid_means(t, block.acc[first : first + len(t)], edge[cut])
+    closure, across = _closure(x, pair, attitude[-1], f_p)
+    return Turn(
+        pair,
+        _edges(source, x, t[edge], f, inertial[edge]),
+        attitude,
+        done,
+        cut,
+        acc,
+        rows.noise[:3] / np.sqrt(np.diff(edge[cut]))[:, None],
+        closure,
+        across,
+        f_p,
+    )
+
+
+def _undone(block: Block, fit: Fit, undo: Undo, t: Array) -> Array:
+    """Angular rate at some samples, (n, 3) rad/s."""
+    first, n = int(np.searchsorted(block.t, t[0])), len(t)
+    span = slice(max(first - n, 0), first + 2 * n)
+    late = t + undo.delay
+    seen = [np.interp(late, block.t[span], g) for g in block.gyr[span].T]
+    response = np.diag(fit.state.scale[3:]) + undo.matrix
+    rate: Array = np.linalg.solve(response, np.array(seen) - fit.state.bias[3:, None]).T
+    return rate
+
+
+def _edges(source: Source, x: Experience, t: Array, f: Array, w: Array) -> Experience:
+    unknown = np.full(len(t), np.nan)
+    warming, heating = source.warmth.at(t)
+    out = Experience.at_rest(
+        unknown,
+        unknown,
+        x.gravity,
+        t=t,
+        since_start=t - source.block.t[0],
+        since_turn=np.full(len(t), np.inf),
+        warming=warming,
+        heating=heating,
+        variance=np.full((len(t), 3), x.variance.min(axis=0)),
+        position=np.full(len(t), -1),
+        mounting=x.mounting,
+        latitude=x.latitude,
+        f=f,
+    )
+    return replace(out, w=w, w_dot=np.gradient(w, t, axis=0))
+
+
+def carry(angle: Array) -> Array:
+    """Attitudes from small turns, (m + 1, 3, 3), the first of them identity.
+
+    `angle` is (m, 3) rad; the turn of a body by it turns vectors seen in it back.
+
+    >>> quarter = carry(np.full((90, 3), [0.0, 0.0, np.pi / 180]))
+    >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0
+    array([ 0., -1.,  0.])
+    """
+    size = np.linalg.norm(angle, axis=1)[:, None, None]
+    axis = angle[:, :, None] / np.where(size > 0, size, 1.0)
+    x, y, z = axis[:, 0, 0], axis[:, 1, 0], axis[:, 2, 0]
+    zero = np.zeros_like(x)
+    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    steps = np.eye(3) - np.sin(size) * cross + (1 - np.cos(size)) * (cross @ cross)
+    out = np.empty((len(angle) + 1, 3, 3))
+    out[0] = np.eye(3)
+    for k, step in enumerate(steps):
+        out[k + 1] = step @ out[k]
+    return out
+
+
+def _closure(
+    x: Experience, pair: tuple[int, int], attitude: Array, f_p: Array
+) -> tuple[Array, Array]:
+    """Phi_T in the axes of p, and the projection on what of it is known."""
+    p, q = (int(np.argmax(x.position == i)) for i in pair)
+    if x.oriented[[p, q]].all():
+        known = x.mounting.T @ turn(x.alpha[[p, q]], x.beta[[p, q]])
+        off = attitude.T @ known[1] @ known[0].T  # I + [phi]x
+        vee = np.array(
+            [off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]]
+        )
+        return vee / 2, np.eye(3)
+    up = f_p / np.linalg.norm(f_p)
+    seen = attitude.T @ x.f[q]
+    seen /= np.linalg.norm(seen)
+    return np.cross(up, seen), np.eye(3) - np.outer(up, up)

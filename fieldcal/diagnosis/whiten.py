@@ -1,0 +1,176 @@
+"""The covariance of the rows: white noise, and random parts beyond it.
+
+    cov(U_i) = diag(sd_i^2) + sum_parts v^2 F F^T
+
+Each part belongs to one channel. F of
+
+- "walk": a random walk through the rows, per sqrt(s), its increments on KNOTS spans;
+- "offset": one value for each window;
+- "time", "alpha", "beta", "joints", "force", "temperature", "since turn": a smooth
+  function of that, nothing more being known of it (a short series with smaller and
+  smaller terms).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.diagnosis.reduce import Rows
+from fieldcal.effects import Experience
+from fieldcal.samples import Array
+
+KNOTS = 40
+HARMONICS = 4
+WAVES = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A random part of one channel: its kind, and v."""
+
+    kind: str
+    channel: int
+    size: float
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """What the rows' errors are made of beyond white noise.
+
+    Attributes
+    ----------
+    parts : random parts of the channels
+    setting : scatter of the angles from position to position, rad
+
+    """
+
+    parts: tuple[Part, ...] = ()
+    setting: float = 0.0
+
+    def sized(self, kind: str, channel: int) -> float:
+        """V of a part, zero where there is none."""
+        return sum(
+            p.size for p in self.parts if p.kind == kind and p.channel == channel
+        )
+
+    def but(self, parts: tuple[Part, ...]) -> Errors:
+        """The same with some parts put in place of those of their kind and channel."""
+        new = {(p.kind, p.channel) for p in parts}
+        kept = tuple(p for p in self.parts if (p.kind, p.channel) not in new)
+        return Errors(kept + tuple(p for p in parts if p.size > 0), self.setting)
+
+
+class Whitener:
+    """L^-1 of the covariance L L^T, channel by channel."""
+
+    def __init__(self, rows: Rows, errors: Errors) -> None:
+        self._used = rows.used
+        self._weight = np.zeros(rows.y.shape)
+        self._weight[self._used] = 1 / rows.sd[self._used]
+        self._inverse: dict[int, Array] = {}
+        self.log_det = -2.0 * float(np.log(self._weight[self._used]).sum())
+        for c in sorted({p.channel for p in errors.parts}):
+            use = self._used[:, c]
+            if use.any():
+                cov = covariance(rows, errors, c)[np.ix_(use, use)]
+                cov += np.diag(rows.sd[use, c] ** 2)
+                lower = np.linalg.cholesky(cov)
+                self._inverse[c] = np.linalg.inv(lower)
+                wider = np.diag(lower) * self._weight[use, c]
+                self.log_det += 2 * float(np.log(wider).sum())
+
+    def __call__(self, values: Array) -> Array:
+        """Whiten (n, 6) or (n, 6, k); rows that are not used become zero."""
+        deep = (slice(None), slice(None)) + (None,) * (values.ndim - 2)
+        clean = np.where(self._used[deep], values, 0.0)
+        out = clean * self._weight[deep]
+        for c, inverse in self._inverse.items():
+            use = self._used[:, c]
+            out[use, c] = np.tensordot(inverse, clean[use, c], 1)
+        return out
+
+
+def covariance(rows: Rows, errors: Errors, channel: int) -> Array:
+    """Covariance of a channel's random parts, (n, n)."""
+    out = np.zeros((len(rows.x), len(rows.x)))
+    for part in errors.parts:
+        if part.channel == channel:
+            f = factor(part.kind, rows.x, channel)
+            out += part.size**2 * f @ f.T
+    return out
+
+
+def factor(kind: str, x: Experience, channel: int) -> Array:
+    """F of a part, (n, m)."""
+    return _FACTORS[kind](x, channel)
+
+
+def _walk(x: Experience, channel: int) -> Array:
+    t = x.t
+    knots = np.linspace(0, len(t) - 1, KNOTS + 1)
+    at = np.interp(knots, np.arange(len(t)), t)
+    gaps = np.diff(at)
+    part = np.clip((t[:, None] - at[:-1]) / np.where(gaps > 0, gaps, 1.0), 0.0, 1.0)
+    out: Array = part * np.sqrt(gaps)
+    return out
+
+
+def _offset(x: Experience, channel: int) -> Array:
+    same: Array = np.equal.outer(x.position, np.unique(x.position)).astype(float)
+    return same
+
+
+def _time(x: Experience, channel: int) -> Array:
+    part = (x.t - x.t[0]) / max(np.ptp(x.t), 1e-9)
+    k = np.arange(1, WAVES + 1)
+    return np.cos(np.pi * np.outer(part, k)) / k
+
+
+def _angle(angle: Array) -> Array:
+    k = np.arange(1, HARMONICS + 1)
+    turns = np.outer(angle, k)
+    return np.hstack([np.sin(turns) / k, np.cos(turns) / k])
+
+
+def _joints(x: Experience, channel: int) -> Array:
+    one, two = (_angle(a)[:, [0, 1, 4, 5]] for a in (x.alpha, x.beta))
+    return (one[:, :, None] * two[:, None, :]).reshape(len(x), -1)
+
+
+def _force(x: Experience, channel: int) -> Array:
+    f = x.f / x.gravity
+    i = channel % 3
+    j, k = (i + 1) % 3, (i + 2) % 3
+    powers = [f[:, i] ** n / n for n in (2, 3, 4, 5)]
+    others = [f[:, j] ** 2 / 2, f[:, k] ** 2 / 2, np.abs(f[:, i]) / 2]
+    return np.column_stack(powers + others)
+
+
+def _temperature(x: Experience, channel: int) -> Array:
+    part = x.warming / max(np.ptp(x.warming), 1e-9)
+    return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
+
+
+def _since_turn(x: Experience, channel: int) -> Array:
+    part = np.log1p(np.maximum(x.since_turn, 0.0))
+    part = part / max(float(np.max(part)), 1e-9)
+    return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
+
+
+_FACTORS: dict[str, Callable[[Experience, int], Array]] = {
+    "walk": _walk,
+    "offset": _offset,
+    "time": _time,
+    "alpha": lambda x, c: _angle(x.alpha),
+    "beta": lambda x, c: _angle(x.beta),
+    "joints": _joints,
+    "force": _force,
+    "temperature": _temperature,
+    "since turn": _since_turn,
+}
+
+SMOOTH = tuple(_FACTORS)[2:]
+"""Kinds that are a smooth function of something."""

@@ -1,0 +1,135 @@
+"""Somebody, or the wind, touched the device while it was held.
+
+A stretch of a window, at_s and for_s long, far beyond the noise: in single samples, in
+the energy or the mean of a tenth or half a second. It is left out. Source: model of
+this project.
+
+>>> import numpy as np
+>>> quiet = np.random.default_rng(1).standard_normal((1000, 1))
+>>> quiet[400:420] += 7.0
+>>> [(int(a), int(b)) for a, b in disturbed(quiet, 10)]
+[(400, 420)]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.effects import Chain, Fault, Recording, Shape
+from fieldcal.effects.recording import runs
+from fieldcal.samples import CHANNELS, Array
+
+LARGEST = 6.5
+"""A single sample, in standard deviations."""
+
+LARGE = 4.0
+"""A sample that belongs to a stretch found by its mean."""
+
+MEAN = 6.0
+"""The mean of a short stretch, in standard deviations."""
+
+LONGEST_S = 5.0
+"""A disturbance that lasts longer is a change of the device, not a bump."""
+
+SHORTEST = 3
+"""Samples; a single wild one is left out and not called a bump."""
+
+
+def disturbed(z: Array, m: int) -> NDArray[np.intp]:
+    """Stretches far beyond unit noise, (k, 2) first and one past the last sample.
+
+    `z` is (n, c) in standard deviations, without its slow part; `m` the samples of the
+    shortest stretch looked at as a whole.
+    """
+    loud: NDArray[np.bool_] = np.any(np.abs(z) > LARGEST, axis=1)
+    total = np.vstack([np.zeros(z.shape[1]), np.cumsum(z, axis=0)])
+    for width in (m, 4 * m):
+        if width < 2 or width >= len(z):
+            continue
+        mean = (total[width:] - total[:-width]) / np.sqrt(width)
+        peak = np.abs(mean)
+        for first, last in runs((peak > MEAN).any(axis=1)):
+            at = first + int(np.argmax(peak[first:last].max(axis=1)))
+            loud[at : at + width] = True
+    return np.array([_trimmed(z, a, b) for a, b in _joined(runs(loud), 2 * m)])
+
+
+def _joined(stretches: NDArray[np.intp], gap: int) -> NDArray[np.intp]:
+    """Stretches with the short breaks between them closed."""
+    out: list[list[int]] = []
+    for first, last in stretches:
+        if out and first - out[-1][1] <= gap:
+            out[-1][1] = int(last)
+        else:
+            out.append([int(first), int(last)])
+    return np.array(out, dtype=np.intp).reshape(-1, 2)
+
+
+def _trimmed(z: Array, first: int, last: int) -> tuple[int, int]:
+    """A stretch from its first large sample to its last."""
+    large = np.flatnonzero((np.abs(z[first:last]) > LARGE).any(axis=1))
+    if len(large) < 2:
+        return first, last
+    return first + int(large[0]), first + int(large[-1]) + 1
+
+
+class Bump(Chain):
+    """A short disturbance inside a window."""
+
+    shapes = (Shape("at_s", "s"), Shape("for_s", "s"))
+    covariate = "a stretch far beyond the noise"
+    decided_by = "the window taken again"
+    source = "model of this project"
+
+    def find(self, recording: Recording) -> list[Fault]:
+        """Disturbed stretches of every window."""
+        t, out = recording.block.t, []
+        rate = 1 / float(np.median(np.diff(t)))
+        for first, last in recording.windows:
+            if last - first < 20:
+                continue
+            piece = recording.block.six[first:last]
+            z = _quick(piece, rate) / recording.noise
+            z = np.nan_to_num(z)
+            for a, b in disturbed(z, max(2, round(0.1 * rate))):
+                if b - a <= LONGEST_S * rate:
+                    out.append(
+                        _fault(recording, t, int(first), int(a), int(b), z, rate)
+                    )
+        return out
+
+
+def _quick(piece: Array, rate: float) -> Array:
+    """What is left of a window when its course over seconds is taken out."""
+    width = int(np.clip(round(2 * rate), 8, max(len(piece) // 4, 8)))
+    count = max(len(piece) // width, 1)
+    parts = np.array_split(np.arange(len(piece)), count)
+    centre = np.array([p.mean() for p in parts])
+    rows = np.arange(len(piece))
+    out = np.zeros_like(piece)
+    for c in range(piece.shape[1]):
+        known = [i for i, p in enumerate(parts) if np.isfinite(piece[p, c]).any()]
+        if known:
+            level = [float(np.nanmedian(piece[parts[i], c])) for i in known]
+            out[:, c] = piece[:, c] - np.interp(rows, centre[known], level)
+    return out
+
+
+def _fault(
+    recording: Recording, t: Array, start: int, a: int, b: int, z: Array, rate: float
+) -> Fault:
+    worst = int(np.argmax(np.abs(z[a:b]).max(axis=0)))
+    at, length = float(t[start + a]), float(t[start + b - 1] - t[start + a]) + 1 / rate
+    margin = round(0.2 * rate)
+    known = b - a >= SHORTEST
+    return Fault(
+        channel=CHANNELS[worst],
+        values={"at_s": at, "for_s": length} if known else {},
+        sigmas={"at_s": 0.05 + 1 / rate, "for_s": 0.1 + 1 / rate},
+        from_s=at,
+        to_s=at + length,
+        rows=np.arange(max(start, start + a - margin), start + b + margin),
+        size=float(np.abs(z[a:b, worst]).max() * recording.noise[worst]),
+        sigma=float(np.abs(z[a:b, worst]).max()),
+    )

@@ -1,0 +1,109 @@
+"""Values off by whole bytes.
+
+Of a 16-bit count, high and low byte hi, lo:
+
+    sign-extended low byte   256 hi + lo - 256 [lo >= 128]
+    swapped bytes            256 lo + hi
+    wrapped                  count - 65536 [count > 32767], and the other way about
+
+Each can be undone count by count; what was broken gets smoother by it, what was whole
+rougher. Source: model of this project; the usual slips in reading a register pair.
+
+>>> import numpy as np
+>>> course = np.arange(1000, 3000, 7)
+>>> broken = course - 256 * (course % 256 >= 128)
+>>> kind, mended = undone(broken)
+>>> kind, bool((mended == course).all())
+('low byte sign-extended', True)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.effects import Chain, Fault, Param, Recording
+from fieldcal.effects.recording import lsb_of
+from fieldcal.samples import CHANNELS
+
+Counts = NDArray[np.int64]
+
+SMOOTHER = 0.9
+"""Part of the total variation that may be left after undoing."""
+
+WIDEST = 70_000
+"""Counts beyond which values are no 16-bit ones, but decimals written out."""
+
+FEWEST = 3
+"""Jumps that have to go."""
+
+
+def undone(counts: Counts) -> tuple[str, Counts]:
+    """What happened to counts and what they were; "" where nothing did."""
+    before = np.abs(np.diff(counts))
+    best, kind, mended = SMOOTHER * float(before.sum()), "", counts
+    for name, undo in _UNDO.items():
+        tried = undo(counts)
+        after = np.abs(np.diff(tried))
+        gone = int(((before > 128) & (after < before / 2)).sum())
+        if gone >= FEWEST and float(after.sum()) < best:
+            best, kind, mended = float(after.sum()), name, tried
+    return kind, mended
+
+
+def _extended(counts: Counts) -> Counts:
+    return counts + 256 * (counts % 256 >= 128)
+
+
+def _swapped(counts: Counts) -> Counts:
+    return counts.astype(np.int16).byteswap().astype(np.int64)
+
+
+def _wrapped(counts: Counts) -> Counts:
+    jumps = np.diff(counts, prepend=counts[:1])
+    turns = -np.round(jumps / 65536).astype(np.int64)
+    return counts + 65536 * np.cumsum(turns)
+
+
+_UNDO = {
+    "low byte sign-extended": _extended,
+    "bytes swapped": _swapped,
+    "wrapped at 16 bits": _wrapped,
+}
+
+
+class DecodeFault(Chain):
+    """A slip in decoding 16-bit values."""
+
+    params = (Param("step", "LSB", 65536.0),)
+    covariate = "clusters 256 LSB apart, jumps at ±2^15"
+    decided_by = "the byte order and width in the device's manual"
+    source = "model of this project"
+
+    def find(self, recording: Recording) -> list[Fault]:
+        """Channels that become smooth when a slip is undone."""
+        out, t = [], recording.block.t
+        for c, name in enumerate(CHANNELS):
+            values = recording.block.six[:, c]
+            if not np.isfinite(values).all() or not (lsb := lsb_of(values)):
+                continue
+            if np.abs(values).max() > WIDEST * lsb:
+                continue
+            counts = np.round(values / lsb).astype(np.int64)
+            kind, mended = undone(counts)
+            if kind:
+                wrong = np.flatnonzero(mended != counts)
+                six = recording.block.six
+                six[:, c] = mended * lsb
+                out.append(
+                    Fault(
+                        channel=name,
+                        values={"channel": name, "kind": kind},
+                        sigmas={},
+                        from_s=float(t[wrong[0]]),
+                        to_s=float(t[wrong[-1]]),
+                        size=float(np.abs(mended - counts).max() * lsb),
+                        mended=six,
+                    )
+                )
+        return out

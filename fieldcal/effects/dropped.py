@@ -1,0 +1,78 @@
+"""Samples that are missing from the stream.
+
+Found as gaps in the times against their usual step, or in the device's counter.
+`fraction` is of all samples sent. Source: model of this project.
+
+>>> import numpy as np
+>>> t = np.delete(np.arange(100) * 0.01, [20, 21, 50])
+>>> missing(t).sum()
+np.int64(3)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.effects import Chain, Fault, Param, Recording
+from fieldcal.samples import Array
+
+PAUSE_S = 5.0
+"""A gap outside windows that is longer is a pause of the recording, not a loss."""
+
+REGULAR = 0.2
+"""Spread of the steps, in steps, up to which times can show a loss."""
+
+FEWEST = 2
+
+
+def missing(t: Array) -> NDArray[np.int_]:
+    """Samples missing after each sample but the last, (n - 1,)."""
+    step = np.diff(t)
+    usual = np.median(step)
+    spread = np.median(np.abs(step - usual))
+    lost: NDArray[np.int_]
+    if spread > REGULAR * usual:
+        lost = np.zeros(len(step), dtype=int)
+        return lost
+    lost = np.maximum(np.round(step / usual).astype(int) - 1, 0)
+    return lost
+
+
+class Dropped(Chain):
+    """Lost samples."""
+
+    params = (Param("fraction", "1", 0.1),)
+    covariate = "gaps in the times or the counter"
+    decided_by = "the link's own count of lost frames"
+    source = "model of this project"
+
+    def find(self, recording: Recording) -> list[Fault]:
+        """Samples lost, as a fraction."""
+        block = recording.block
+        if len(block) < 10:
+            return []
+        lost = missing(block.t)
+        if np.isfinite(block.seq).all():
+            jumps = np.diff(block.seq)
+            usual = np.median(jumps)
+            if usual > 0:  # a counter that wraps goes back, and tells nothing there
+                counted = np.where(jumps > 0, np.round(jumps / usual) - 1, 0)
+                lost = np.maximum(lost, counted.astype(int))
+        outside = ~recording.still[:-1] & (np.diff(block.t) > PAUSE_S)
+        lost = np.where(outside, 0, lost)
+        total = int(lost.sum())
+        if total < FEWEST:
+            return []
+        sent = len(block) + total
+        at = np.flatnonzero(lost)
+        return [
+            Fault(
+                channel="t",
+                values={"fraction": total / sent},
+                sigmas={"fraction": float(np.sqrt(total)) / sent},
+                from_s=float(block.t[at[0]]),
+                to_s=float(block.t[at[-1] + 1]),
+                size=float(lost.max()),
+            )
+        ]

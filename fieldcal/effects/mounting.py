@@ -1,0 +1,140 @@
+"""Axes exchanged or reversed, or a unit that is not the declared one.
+
+    U = b + diag(k) S u f,    S one of the 48 signed permutations, u a ratio of units
+
+At rest f is known in every position, so the S and u under which bias and scale factor
+stay near the nominal ones are found by trying them all. Source: model of this project.
+
+>>> import numpy as np
+>>> f = np.array([[0, -9.8, 0], [-6.9, -6.9, 0], [0, -6.9, 6.9]])
+>>> axes, _ = turned_axes(f[:, [1, 0, 2]] * [1, 1, -1], f)
+>>> axes
+('+y', '+x', '-z')
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations, product
+
+import numpy as np
+
+from fieldcal.effects import Chain, Fault, Recording
+from fieldcal.gravity import G0
+from fieldcal.samples import Array
+
+BIAS, SCALE, FLOOR = 1.0, 0.1, 0.1
+"""Spread allowed: of bias in m/s^2, of scale, and of what other effects do, m/s^2."""
+
+BETTER = 30.0
+"""Odds (ln) against the declared axes."""
+
+FITS = 10.0
+"""Squares a row that axes to be believed in leave, in the spreads above."""
+
+UNITS = {"g": G0, "mg": 1e-3 * G0, "m/s^2 read as g": 1 / G0, "deg/s": np.pi / 180}
+NEAR = 0.05
+
+
+def signed_axes() -> Iterator[tuple[str, ...]]:
+    """All 48 ways to name three signed axes; the declared one first."""
+    for order in permutations("xyz"):
+        for signs in product("+-", repeat=3):
+            yield tuple(s + a for s, a in zip(signs, order, strict=True))
+
+
+def matrix_of(axes: tuple[str, ...]) -> Array:
+    """Signed permutation, outputs = S true, either-handed."""
+    out = np.zeros((3, 3))
+    for row, name in enumerate(axes):
+        out[row, "xyz".index(name[1])] = -1.0 if name[0] == "-" else 1.0
+    return out
+
+
+def turned_axes(measured: Array, f: Array) -> tuple[tuple[str, ...], float]:
+    """Axes under which forces (n, 3) read as measured, and the odds against identity.
+
+    Both in m/s^2, measured with the nominal calibration taken out.
+    """
+    declared = ("+x", "+y", "+z")
+    odds = {axes: _odds(measured, f @ matrix_of(axes).T) for axes in signed_axes()}
+    best = max(odds, key=lambda axes: odds[axes][0])
+    if odds[best][1] > FITS * measured.size:
+        return declared, 0.0
+    return best, odds[best][0] - odds[declared][0]
+
+
+def _odds(measured: Array, f: Array) -> tuple[float, float]:
+    """Likelihood (ln) and squares, each axis as bias + scale x force near 0 and 1."""
+    total, squares = 0.0, 0.0
+    for m, force in zip(measured.T, f.T, strict=True):
+        design = np.column_stack([np.ones(len(force)) * BIAS, force * SCALE])
+        cov = design @ design.T + FLOOR**2 * np.eye(len(force))
+        rest = m - force
+        squares += float(rest @ np.linalg.solve(cov, rest))
+        total -= 0.5 * float(np.linalg.slogdet(cov)[1])
+    return total - 0.5 * squares, squares
+
+
+class Mounting(Chain):
+    """Wrong axes or a wrong unit."""
+
+    covariate = "force at rest is not where it should be"
+    decided_by = "the drawing on the device, and its data sheet"
+    source = "model of this project"
+
+    def find(self, recording: Recording) -> list[Fault]:
+        """Axes or unit that are not the declared ones."""
+        block, rows = recording.block, recording.windows
+        held = [i for i, (a, b) in enumerate(rows) if b > a]
+        six = block.six
+        mean = np.array([six[a:b].mean(axis=0) for a, b in rows[held]])
+        if not np.isfinite(mean[:, :3]).all() or not len(mean):
+            return []
+        acc = (mean[:, :3] - recording.bias[:3]) / recording.scale[:3]
+        unit = self._unit(acc, recording.x.gravity)
+        if unit:
+            return [self._fault(recording, {"unit": unit}, UNITS[unit], np.eye(3))]
+        oriented = recording.x.oriented[held]
+        if oriented.sum() < 2:
+            return []
+        axes, odds = turned_axes(acc[oriented], recording.x.f[held][oriented])
+        if odds < BETTER:
+            return []
+        undo = matrix_of(axes).T
+        named: dict[str, float | str] = {"axes": " ".join(self._named(recording, undo))}
+        return [self._fault(recording, named, 1.0, undo)]
+
+    @staticmethod
+    def _unit(acc: Array, gravity: float) -> str:
+        length = float(np.median(np.linalg.norm(acc, axis=1)))
+        for name, size in UNITS.items():
+            if name != "deg/s" and abs(length * size / gravity - 1) < NEAR:
+                return name
+        return ""
+
+    @staticmethod
+    def _named(recording: Recording, undo: Array) -> list[str]:
+        """The mounting that session.toml should have had."""
+        right = recording.x.mounting @ undo
+        rows = [int(np.argmax(np.abs(r))) for r in right]
+        return [
+            ("-" if r[i] < 0 else "+") + "xyz"[i]
+            for r, i in zip(right, rows, strict=True)
+        ]
+
+    @staticmethod
+    def _fault(
+        recording: Recording, values: dict[str, float | str], unit: float, undo: Array
+    ) -> Fault:
+        six = recording.block.six
+        acc = six[:, :3] @ undo.T * unit
+        return Fault(
+            channel="ax",
+            values=values,
+            sigmas={},
+            from_s=float(recording.block.t[0]),
+            to_s=float(recording.block.t[-1]),
+            size=recording.x.gravity,
+            mended=np.hstack([acc, six[:, 3:] @ undo.T]),
+        )

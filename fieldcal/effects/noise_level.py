@@ -1,0 +1,64 @@
+"""A channel noisier than its like.
+
+    sigma_i = ratio x sigma of the other two axes of the triad
+
+Seen at high frequency, where nothing else is. It widens intervals and shifts nothing.
+Source: model of this project; a triad's axes agree within tens of percent.
+
+>>> import numpy as np
+>>> louder(np.array([1.0, 1.1, 3.0]))
+(2, 2.857142857142857)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.effects import Chain, Fault, Param, Recording
+from fieldcal.samples import CHANNELS, Array
+
+RATIO = 1.8
+"""Ratio from which an axis counts as noisier: out-of-plane axes reach 1.5."""
+
+
+def louder(noise: Array) -> tuple[int, float]:
+    """The noisiest of three axes and its ratio to the mean of the others."""
+    worst = int(np.argmax(noise))
+    others = np.delete(noise, worst).mean()
+    return worst, float(noise[worst] / others) if others > 0 else 1.0
+
+
+class NoiseLevel(Chain):
+    """Noise of one axis beyond that of the others."""
+
+    params = (Param("ratio", "1", 10.0),)
+    covariate = "spectrum at high frequency"
+    decided_by = "the axes exchanged: what stays with the axis is the sensor's"
+    source = "model of this project"
+
+    def find(self, recording: Recording) -> list[Fault]:
+        """The noisier axis of each triad."""
+        out = []
+        t = recording.block.t
+        samples = max(int(recording.still.sum()), 2)
+        for first in (0, 3):
+            noise = recording.noise[first : first + 3]
+            if not np.isfinite(noise).all() or not noise.all():
+                continue
+            worst, ratio = louder(noise)
+            if ratio < RATIO:
+                continue
+            name = CHANNELS[first + worst]
+            sigma = ratio * float(np.sqrt(2.0 / samples))
+            out.append(
+                Fault(
+                    channel=name,
+                    values={"channel": name, "ratio": ratio},
+                    sigmas={"ratio": sigma},
+                    from_s=float(t[0]),
+                    to_s=float(t[-1]),
+                    size=float(noise[worst]),
+                    sigma=(ratio - 1) / sigma,
+                )
+            )
+        return out

@@ -1,0 +1,72 @@
+"""Rounding to a step that matters against the noise.
+
+    U = lsb round(U / lsb)
+
+With noise above half a step, rounding only adds lsb^2/12 to the variance of a sample.
+Below that the mean of a window itself is off, by up to
+
+    (lsb / pi) exp(-2 pi^2 (noise / lsb)^2)
+
+which longer averaging does not mend. Source: B. Widrow, I. Kollar, Quantization Noise,
+chapter 4.
+
+>>> round(bias_of(1.0, 0.3), 4)
+0.0539
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.effects import Chain, Fault, Param, Recording
+from fieldcal.effects.recording import lsb_of
+from fieldcal.samples import CHANNELS
+
+MATTERS = 0.5
+"""Noise in steps from which rounding is no matter: LSB > 2 sigma is far beyond it."""
+
+
+def bias_of(lsb: float, noise: float) -> float:
+    """How far rounding can move the mean of many samples."""
+    return lsb / np.pi * float(np.exp(-2 * np.pi**2 * (noise / lsb) ** 2))
+
+
+class Quantisation(Chain):
+    """Rounding of the outputs."""
+
+    params = (Param("acc", "m/s^2", 1.0), Param("gyr", "rad/s", 0.1))
+    covariate = "few distinct values"
+    decided_by = "a smaller range, or a finer output format"
+    source = "Widrow and Kollar, Quantization Noise"
+
+    def find(self, recording: Recording) -> list[Fault]:
+        """The step of each triad, where it is coarse against the noise."""
+        out = []
+        for part, channels in (("acc", (0, 1, 2)), ("gyr", (3, 4, 5))):
+            steps = [self._step(recording, c) for c in channels]
+            if any(steps):
+                worst = channels[int(np.argmax(steps))]
+                t, lsb = recording.block.t, max(steps)
+                out.append(
+                    Fault(
+                        channel=CHANNELS[worst],
+                        values={part: lsb},
+                        sigmas={part: 1e-3 * lsb},
+                        from_s=float(t[0]),
+                        to_s=float(t[-1]),
+                        size=lsb,
+                        sigma=lsb / max(float(recording.noise[worst]), 1e-12),
+                    )
+                )
+        return out
+
+    def _step(self, recording: Recording, c: int) -> float:
+        values = recording.block.six[:, c]
+        lsb = lsb_of(values)
+        return lsb if lsb > 2 * MATTERS * self._noise(recording, c) else 0.0
+
+    @staticmethod
+    def _noise(recording: Recording, c: int) -> float:
+        """Noise before rounding, as far as it can be told."""
+        measured, lsb = recording.noise[c], lsb_of(recording.block.six[:, c])
+        return float(np.sqrt(max(measured**2 - lsb**2 / 12, 0.0)))

@@ -1,0 +1,84 @@
+"""Outputs that stop at full scale.
+
+    U = min(max(U, -limit), limit)
+
+Found where a channel's largest or smallest value is taken again and again: at the
+declared range, or in several places and far more often than the value next to it.
+Source: model of this project.
+
+>>> import numpy as np
+>>> signal = np.clip(np.sin(np.arange(200) / 7.0), -0.9, 0.9)
+>>> [(float(signal[rows[0]]), len(rows)) for rows in rails(signal, np.nan)]
+[(-0.9, 28), (0.9, 35)]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.effects import Chain, Fault, Param, Recording
+from fieldcal.effects.recording import Rows
+from fieldcal.samples import CHANNELS, Array
+
+FEWEST = 5
+"""Samples at the rail from which it counts."""
+
+BESIDE = 4.0
+"""How much more often the rail is taken than the value next to it."""
+
+
+def rails(values: Array, limit: float) -> list[Rows]:
+    """Samples at each rail of a channel; none where there is no rail.
+
+    `limit` is the declared full scale, nan where unknown.
+    """
+    out = []
+    for edge in (np.nanmin(values), np.nanmax(values)):
+        at = np.flatnonzero(values == edge)
+        declared = abs(abs(edge) - limit) < 1e-3 * limit
+        if len(at) >= FEWEST and (declared or _repeated(values, float(edge), at)):
+            out.append(at)
+    return out
+
+
+def _repeated(values: Array, edge: float, at: Rows) -> bool:
+    places = 1 + int((np.diff(at) > 1).sum())
+    inner = values[np.isfinite(values) & (values != edge)]
+    if not len(inner):
+        return False
+    beside = inner[np.argmin(np.abs(inner - edge))]
+    often = len(at) > BESIDE * int((inner == beside).sum()) + FEWEST
+    return places >= 2 and often
+
+
+class Saturation(Chain):
+    """Clipping at full scale."""
+
+    params = (Param("limit", "m/s^2 or rad/s", 1e3),)
+    covariate = "samples at the rail"
+    decided_by = "a larger range, or positions that load the axis less"
+    source = "model of this project"
+
+    def find(self, recording: Recording) -> list[Fault]:
+        """Channels with samples at a rail."""
+        out = []
+        for c, name in enumerate(CHANNELS):
+            values = recording.block.six[:, c]
+            if not np.isfinite(values).any():
+                continue
+            at = rails(values, float(recording.limits[c // 3]))
+            if at:
+                rows = np.sort(np.concatenate(at))
+                limit = float(np.abs(values[rows]).max())
+                out.append(
+                    Fault(
+                        channel=name,
+                        values={"channel": name, "limit": limit},
+                        sigmas={"limit": float(recording.noise[c])},
+                        from_s=float(recording.block.t[rows[0]]),
+                        to_s=float(recording.block.t[rows[-1]]),
+                        rows=rows,
+                        size=limit,
+                    )
+                )
+        return out

@@ -1,0 +1,80 @@
+"""A channel repeats one value while the others go on.
+
+    U(t) = U(from_s),    from_s <= t < to_s
+
+Found as a run of equal values that chance does not make: with p the share of equal
+neighbours elsewhere, a run of k has odds of n p^k. Source: model of this project.
+
+>>> import numpy as np
+>>> values = np.sin(np.arange(500.0))
+>>> values[100:140] = values[100]
+>>> repeats(values).tolist()
+[[100, 140]]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.effects import Chain, Fault, Recording, Shape
+from fieldcal.effects.recording import runs
+from fieldcal.samples import CHANNELS, Array
+
+ODDS = 1e-6
+MANY = 20
+"""Runs from which their usual length can be told."""
+
+FEWEST = 8
+"""Equal samples from which a run counts."""
+
+
+def repeats(values: Array) -> NDArray[np.intp]:
+    """First and one past the last sample of each run of one value, (m, 2)."""
+    equal = np.diff(values) == 0
+    found = runs(equal)
+    if not len(found):
+        return found
+    length = found[:, 1] - found[:, 0]
+    many = 10 * np.median(length) if len(length) >= MANY else 0.0
+    usual = length[length <= max(FEWEST, many)]
+    often = usual.sum() / max(len(equal) - length.sum() + usual.sum(), 1)
+    # a grid coarser than the noise repeats itself: what follows a repeat decides
+    again = 1 - len(usual) / usual.sum() if len(usual) else 0.0
+    chance = min(max(often, again, 1e-3), 0.999)
+    longest = np.log(ODDS / len(values)) / np.log(chance)
+    long = found[length + 1 >= max(FEWEST, longest)]
+    return np.column_stack([long[:, 0], long[:, 1] + 1])
+
+
+class Stuck(Chain):
+    """A channel that stands still."""
+
+    shapes = (Shape("from_s", "s"), Shape("to_s", "s"))
+    covariate = "runs of equal values"
+    decided_by = "the stretch recorded again"
+    source = "model of this project"
+
+    def find(self, recording: Recording) -> list[Fault]:
+        """Runs of equal values in each channel."""
+        t, out = recording.block.t, []
+        step = float(np.median(np.diff(t)))
+        for c, name in enumerate(CHANNELS):
+            for first, last in repeats(recording.block.six[:, c]):
+                values: dict[str, float | str] = {
+                    "channel": name,
+                    "from_s": float(t[first]),
+                    "to_s": float(t[last - 1] + step),
+                }
+                out.append(
+                    Fault(
+                        channel=name,
+                        values=values,
+                        sigmas={"from_s": step, "to_s": step},
+                        from_s=float(t[first]),
+                        to_s=float(t[last - 1] + step),
+                        rows=np.arange(first, last),
+                        size=float(recording.noise[c]),
+                    )
+                )
+        return out

@@ -52,8 +52,8 @@ def sims() -> Iterator[list[Sim]]:
     yield started
     for sim in started:
         if sim.process.poll() is None:
-            sim.process.kill()
-        sim.process.communicate()
+            sim.process.terminate()
+        sim.ended()
 
 
 def start(sims: list[Sim], *options: str) -> Sim:

@@ -17,6 +17,8 @@ COMMANDS = {
     "run": ("recalibrate a device, at the console or headless", "run"),
     "plan": ("choose positions and say what they will tell", "plan"),
     "solve": ("calibrate from a recorded session", "solve"),
+    "apply": ("take a calibration out of a recording", "apply"),
+    "compare": ("say whether two calibrations differ", "compare"),
     "import": ("make a session of a recording from elsewhere", "import_recording"),
     "sim": ("be a virtual device on a link", "sim"),
     "ports": ("list the devices that are plugged in", "ports"),

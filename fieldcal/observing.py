@@ -8,7 +8,7 @@ out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from fieldcal import __version__
 from fieldcal.calibration import Calibration, Nominal
@@ -62,6 +62,36 @@ def observe(session: Session) -> tuple[Observations, tuple[str, ...]]:
         If it has no position, or no window of any position can be used.
 
     """
+    found = rests(session)
+    return observations(session.about, found.averages, found.rows), found.warnings
+
+
+@dataclass(frozen=True, slots=True)
+class Rests:
+    """The windows of a session that can be used.
+
+    Attributes
+    ----------
+    rows : number of each one's position
+    averages : of each
+    warnings : what was left out, and why
+
+    """
+
+    rows: tuple[int, ...]
+    averages: tuple[Average, ...]
+    warnings: tuple[str, ...]
+
+
+def rests(session: Session) -> Rests:
+    """Average the windows of a recorded session.
+
+    Raises
+    ------
+    SessionError
+        If it has no position, or no window of any position can be used.
+
+    """
     if not session.positions:
         raise SessionError(
             f"{session.folder}: session.toml has no [[position]]: write down when each"
@@ -81,7 +111,7 @@ def observe(session: Session) -> tuple[Observations, tuple[str, ...]]:
             warnings.append(f"position {i}: {said}")
     if not rows:
         raise SessionError(f"{session.folder}: no window can be used; {warnings[-1]}")
-    return observations(session.about, averages, rows), tuple(warnings)
+    return Rests(tuple(rows), tuple(averages), tuple(warnings))
 
 
 def _take(block: Block, window: tuple[float, float] | None) -> tuple[Average, str]:

@@ -1,17 +1,21 @@
 """Gyroscopes from turns: rotations built another way, many seeds, real devices."""
 
 import doctest
+import json
+import shutil
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from observed import G, motionless, observe, outputs
+from observed import SHARED, G, motionless, observe, outputs
 from recordings import mpu9150, mpu9150_published
 from scipy.spatial.transform import Rotation
 
 from fieldcal.calibration import Calibration
+from fieldcal.cli import main
 from fieldcal.errors import InputError, NotObservable
 from fieldcal.positions import FIVE, TWO, Position
 from fieldcal.samples import Array, Block, concat
@@ -317,3 +321,73 @@ def test_where_the_published_table_differs_ours_predicts_the_turns_better() -> N
             miss.append(attitude.inv().apply(up[k]) - up[k + 1])
         misses.append(np.sqrt(np.mean(np.square(miss))))
     assert misses[0] < 0.5 * misses[1]
+
+
+# --- the command line ---
+
+
+def solved(tmp_path: Path, name: str, *options: str) -> tuple[int, Calibration, Path]:
+    source = SHARED / "practice" / name
+    if not source.is_dir():
+        pytest.skip(f"practice sessions are not here: {source}")
+    folder = tmp_path / name
+    shutil.copytree(source, folder)
+    code = main(["solve", str(folder), *options])
+    document = json.loads((folder / "result.json").read_text())
+    return code, Calibration.from_json(document), folder
+
+
+def test_solve_takes_the_turns_of_a_session_along(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, result, _ = solved(tmp_path, "p01")
+    assert code == 0
+    # the practice device's gyroscopes have scale factor 1 and no cross-coupling
+    matrix, sigma = result.gyroscopes()[1], result.vector("gyr_scale")[1]
+    assert abs(matrix[2, 2] - 1) < 3 * sigma[2] and sigma[2] < 2e-3
+    for part in result.components("gyro_cross_coupling"):
+        name = f"gyro_cross_coupling.{part}"
+        assert abs(result.value(name)) < 3.5 * result.uncertainty(name)
+    assert "gyro scale factor z" in capsys.readouterr().out
+
+
+def test_solve_leaves_the_turns_out_when_told_to(tmp_path: Path) -> None:
+    _, result, _ = solved(tmp_path, "p10", "--turns", "no")
+    assert "gyr_scale" not in result.groups
+
+
+def test_compare_and_apply(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, _, first = solved(tmp_path, "p09")
+    _, result, second = solved(tmp_path, "p10")
+    capsys.readouterr()
+    assert main(["compare", str(first), str(second / "result.json"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    # the same device on two days: nothing has changed
+    assert found["chance"] > 1e-3 and "angle_offset.beta0_deg" in found["only_first"]
+    assert main(["compare", str(first), str(second)]) == 0
+    assert "all together" in capsys.readouterr().out
+    out = tmp_path / "calibrated.csv"
+    assert main(["apply", str(second), str(out)]) == 0
+    assert "gyr_scale" not in capsys.readouterr().err
+    rows = np.genfromtxt(out, delimiter=",", names=True)
+    still = (rows["t"] > 3) & (rows["t"] < 63)
+    down = np.mean(rows["ay"][still])
+    assert down == pytest.approx(-result.info["conditions"]["gravity"], abs=1e-3)
+
+
+def test_compare_and_apply_say_what_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", str(tmp_path), str(tmp_path)]) == 2
+    assert "run fieldcal solve first" in capsys.readouterr().err
+    broken = tmp_path / "result.json"
+    broken.write_text("{")
+    assert main(["compare", str(broken), str(broken)]) == 2
+    assert "cannot be read" in capsys.readouterr().err
+    broken.write_text("{}")
+    assert main(["compare", str(broken), str(broken)]) == 2
+    assert "format is missing" in capsys.readouterr().err
+    _, _, folder = solved(tmp_path, "p10")
+    capsys.readouterr()
+    assert main(["apply", str(folder), str(tmp_path / "x.xls")]) == 2
+    assert ".parquet" in capsys.readouterr().err

@@ -6,6 +6,13 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fieldcal.calibration import Calibration
+    from fieldcal.observing import Rests
+    from fieldcal.session import Session
+    from fieldcal.solve import Observations
 
 EXAMPLE = """\
   fieldcal solve bench-7/2026-03-01
@@ -32,6 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--cross", action="store_true", help="cross-coupling (non-orthogonality) too")
     add(
+        "--turns",
+        default="auto",
+        choices=("auto", "yes", "no"),
+        help="gyroscopes' scale factor and cross-coupling from the turns between the "
+        "windows; auto (default) where they give it",
+    )
+    add(
         "--as-printed",
         action="store_true",
         help="follow the paper's print with its misprints, for comparison",
@@ -43,12 +57,13 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from fieldcal.commands.table import show
-    from fieldcal.observing import observe, with_provenance
+    from fieldcal.observing import observations, rests, with_provenance
     from fieldcal.session import RESULT, Session
     from fieldcal.solve import solve
 
     session = Session.open(args.session)
-    seen, warnings = observe(session)
+    still = rests(session)
+    seen = observations(session.about, still.averages, still.rows)
     found = solve(
         seen,
         method=args.method,
@@ -56,7 +71,9 @@ def run(args: argparse.Namespace) -> int:
         cross=args.cross,
         as_printed=args.as_printed,
     )
-    found = replace(found, warnings=(*warnings, *found.warnings))
+    if args.turns != "no" and not args.as_printed and seen.has_gyr:
+        found = _with_turns(found, session, still, seen, args.turns == "yes")
+    found = replace(found, warnings=(*still.warnings, *found.warnings))
     found = with_provenance(found, session.about)
     path = session.write_json(RESULT, found.to_json())
     if args.json:
@@ -67,3 +84,21 @@ def run(args: argparse.Namespace) -> int:
         show(found)
         sys.stdout.write(f"written: {path}\n")
     return 0 if found.good else 1
+
+
+def _with_turns(
+    found: Calibration,
+    session: Session,
+    still: Rests,
+    seen: Observations,
+    wanted: bool,
+) -> Calibration:
+    """Add what the turns between the windows say about the gyroscopes."""
+    from fieldcal.solve.turns import offered, turns, with_turns
+
+    if wanted:
+        by_turns = turns(session.block, still.averages, found, seen.nominal)
+        return with_turns(found, by_turns)
+    if "gyr_scale" in found.groups:
+        return found
+    return offered(found, session.block, still.averages, seen.nominal)

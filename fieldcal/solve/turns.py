@@ -94,15 +94,26 @@ def _widened(problem: Problem) -> tuple[Estimate, list[str]]:
 
 
 def _open(useful: Mask) -> str:
-    missing = [n for n, ok in zip(NAMES, useful, strict=True) if not ok]
+    missing = [n for n, ok in zip(NAMES[:6], useful[:6], strict=True) if not ok]
+    if couplings := int((~useful[6:]).sum()):
+        missing.append(f"{couplings} of 6 gyro_cross_coupling")
     about = sorted({"xyz"[ENTRIES[i - 3][1]] for i in np.flatnonzero(~useful)})
     level = f"turns about device axis {join(about)} while that axis is level"
     return not_determined(missing, [level], "these turns")
 
 
 def with_turns(calibration: Calibration, found: Estimate) -> Calibration:
-    """Replace the gyroscopes' parameters of a calibration by those of the turns."""
-    kept = [i for i, n in enumerate(calibration.names) if not n.startswith("gyr")]
+    """Add scale factor and cross-coupling of the gyroscopes to a calibration.
+
+    They replace what it has of them. The bias is taken only where it has none: that of
+    windows in known positions is the better one.
+    """
+    if "gyr_bias" in calibration.groups:
+        found = found.only(np.array([not n.startswith("gyr_b") for n in found.names]))
+    groups = {n.partition(".")[0] for n in found.names}
+    kept = [
+        i for i, n in enumerate(calibration.names) if n.partition(".")[0] not in groups
+    ]
     size = len(kept) + len(found.names)
     covariance = np.zeros((size, size))
     covariance[: len(kept), : len(kept)] = calibration.covariance[np.ix_(kept, kept)]
@@ -121,6 +132,25 @@ def with_turns(calibration: Calibration, found: Estimate) -> Calibration:
     )
 
 
+def offered(
+    calibration: Calibration,
+    block: Block,
+    averages: Sequence[Average],
+    nominal: Nominal | None = None,
+) -> Calibration:
+    """Calibration with what the turns give, or unchanged if they give no scale factor.
+
+    Parameters as in `turns`.
+    """
+    try:
+        found = turns(block, averages, calibration, nominal)
+    except InputError:
+        return calibration
+    if not any(n.startswith("gyr_scale") for n in found.names):
+        return calibration
+    return with_turns(calibration, found)
+
+
 def directions(averages: Sequence[Average], accelerometers: Calibration) -> Rests:
     """Directions of the specific force at rest, with what makes them uncertain."""
     bias, matrix = accelerometers.accelerometers()
@@ -135,6 +165,8 @@ def directions(averages: Sequence[Average], accelerometers: Calibration) -> Rest
     up = f / size[:, None]
     level = (np.eye(3) - up[:, :, None] * up[:, None, :]) / size[:, None, None]
     by_mean = level @ inverse
+    # what the positions scatter beyond their noise is in the directions as well
+    loose = float(accelerometers.info.get("extra_scatter", 0.0))
     rows, columns = [], []
     for i, name in enumerate(accelerometers.names):
         place = _reach(name, f)
@@ -145,7 +177,7 @@ def directions(averages: Sequence[Average], accelerometers: Calibration) -> Rest
         up,
         by_mean,
         np.stack(columns, axis=-1),
-        np.array([a.covariance[:3, :3] for a in averages]),
+        np.array([a.covariance[:3, :3] for a in averages]) + loose**2 * np.eye(3),
         accelerometers.covariance[np.ix_(rows, rows)],
     )
 

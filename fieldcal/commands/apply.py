@@ -1,0 +1,81 @@
+"""`fieldcal apply`: a session's samples with the calibration taken out of them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fieldcal.samples import Block
+
+EXAMPLE = """\
+  fieldcal apply bench-7/2026-03-01 calibrated.csv
+  fieldcal apply bench-7/today calibrated.parquet --calibration bench-7/2026-03-01
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add("session", type=Path, metavar="SESSION", help="session folder with the samples")
+    add("out", type=Path, metavar="OUT", help="file to write: .csv, .csv.gz, .parquet")
+    add(
+        "--calibration",
+        type=Path,
+        help="another solved session, or its result.json; by default the session's own",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    from fieldcal.calibration import Nominal
+    from fieldcal.commands.compare import read
+    from fieldcal.session import Session
+
+    session = Session.open(args.session)
+    calibration = read(args.calibration or args.session)
+    nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
+    kept = [g for g in ("acc_scale", "gyr_scale") if g not in calibration.groups]
+    for group in kept:
+        sys.stderr.write(
+            f"fieldcal apply: {group} is not in the calibration, the nominal one is "
+            "used\n"
+        )
+    block = calibration.apply(session.block, nominal)
+    _write(args.out, block)
+    sys.stdout.write(f"written: {args.out}, {len(block)} samples, m/s^2 and rad/s\n")
+    return 0
+
+
+def _write(path: Path, block: Block) -> None:
+    """Write samples in the columns of a session.
+
+    Raises
+    ------
+    InputError
+        If the ending is none that is known, or the file cannot be written.
+
+    """
+    import pyarrow as pa
+    from pyarrow import csv, parquet
+
+    from fieldcal.errors import InputError
+    from fieldcal.sample_files import to_batch
+
+    table = pa.Table.from_batches([to_batch(block)])
+    try:
+        if path.name.endswith(".csv"):
+            csv.write_csv(table, path)
+        elif path.name.endswith(".csv.gz"):
+            with pa.CompressedOutputStream(path, "gzip") as stream:
+                csv.write_csv(table, stream)
+        elif path.name.endswith(".parquet"):
+            parquet.write_table(table, path)
+        else:
+            raise InputError(
+                f"{path.name}: samples are written as .csv, .csv.gz or .parquet"
+            )
+    except OSError as fault:
+        raise InputError(f"{path} cannot be written: {fault}") from fault

@@ -1,0 +1,99 @@
+"""`fieldcal compare`: whether two calibrations of a device differ significantly."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fieldcal.calibration import Calibration, Comparison
+
+EXAMPLE = """\
+  fieldcal compare bench-7/2026-03-01 bench-7/2026-06-01
+  fieldcal compare before.json after.json --json
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    what = "solved session folder, or its result.json"
+    add("first", type=Path, metavar="FIRST", help=what)
+    add("second", type=Path, metavar="SECOND", help=what)
+    add("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    from fieldcal.calibration import compare
+
+    found = compare(read(args.first), read(args.second))
+    if args.json:
+        sys.stdout.write(json.dumps(_document(found)) + "\n")
+    else:
+        sys.stdout.write(_table(found))
+    return 0
+
+
+def read(path: Path) -> Calibration:
+    """Read the calibration of a solved session folder or of a result.json.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it cannot be used.
+
+    """
+    from fieldcal.calibration import Calibration
+    from fieldcal.errors import InputError
+    from fieldcal.session import RESULT
+
+    file = path / RESULT if path.is_dir() else path
+    try:
+        document = json.loads(file.read_text("utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{file} is not there: run fieldcal solve first") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as fault:
+        raise InputError(f"{file} cannot be read: {fault}") from None
+    try:
+        return Calibration.from_json(document)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+
+
+def _table(found: Comparison) -> str:
+    from fieldcal.commands.table import number
+
+    width = max(len(n) for n in found.names)
+    lines = [f"{'parameter':{width}}  second - first      ± 1σ       difference/σ"]
+    for name, d, s, z in zip(
+        found.names, found.difference, found.sigma, found.z, strict=True
+    ):
+        value, sigma = number(-float(d), float(s))
+        mark = "  changed" if name in found.changed else ""
+        lines.append(f"{name:{width}}  {value:>14}  {sigma:>10}  {-z:12.1f}{mark}")
+    for which, names in (("first", found.only_first), ("second", found.only_second)):
+        if names:
+            lines.append(f"only in the {which}: {', '.join(names)}")
+    lines.append(
+        f"all together: χ² = {found.chi2:.1f} with {found.dof} degrees of freedom, "
+        f"probability {found.chance:.2g} if nothing has changed"
+    )
+    return "\n".join(lines) + "\n"
+
+
+def _document(found: Comparison) -> dict[str, object]:
+    return {
+        "names": list(found.names),
+        "difference": [-float(d) for d in found.difference],
+        "sigma": found.sigma.tolist(),
+        "changed": list(found.changed),
+        "chi2": found.chi2,
+        "dof": found.dof,
+        "chance": found.chance,
+        "only_first": list(found.only_first),
+        "only_second": list(found.only_second),
+    }

@@ -62,7 +62,7 @@ class Arrivals:
         """Return times (n,) on the host's clock, nan while the rate is learnt."""
         parts = []
         for batch, z in _batches(steps, t_host):
-            if np.isnan(self._t):
+            if np.isnan(self._t) or np.isnan(z):
                 self._learn(int(batch.sum()), z)
                 parts.append(np.full(len(batch), np.nan))
             else:
@@ -77,6 +77,8 @@ class Arrivals:
         if self._broken:
             self._lessons, self._broken = [], False
         self._k += m
+        if np.isnan(z):
+            return
         self._lessons.append((self._k, z))
         k, arrival = np.array(self._lessons).T
         if len(k) < LEAST or arrival[-1] - arrival[0] < LEARN:

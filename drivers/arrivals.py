@@ -19,6 +19,7 @@ All in s. It holds for a device that runs in real time.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import exp, sqrt
 
 import numpy as np
 
@@ -30,6 +31,9 @@ LEARN = 1.0
 
 LEAST = 8
 """Batches that the first regression takes."""
+
+LEAST_NOISE = 1e-8
+"""Least variance of the delays, s^2."""
 
 LATE = 0.5
 """Time after which late arrivals mean lost samples, s."""
@@ -51,8 +55,8 @@ class Arrivals:
         self._health = health
         self._k = 0
         self._lessons: list[tuple[int, float]] = []
-        self._x = np.full(2, np.nan)
-        self._cov = np.zeros((2, 2))
+        self._x = self._period = float("nan")
+        self._cov = (0.0, 0.0, 0.0)
         self._noise = 0.0
         self._t = float("nan")
         self._late: list[tuple[float, float]] = []
@@ -62,7 +66,7 @@ class Arrivals:
         """Return times (n,) on the host's clock, nan while the rate is learnt."""
         parts = []
         for batch, z in _batches(steps, t_host):
-            if np.isnan(self._t):
+            if np.isnan(self._t) or np.isnan(z):
                 self._learn(int(batch.sum()), z)
                 parts.append(np.full(len(batch), np.nan))
             else:
@@ -77,53 +81,65 @@ class Arrivals:
         if self._broken:
             self._lessons, self._broken = [], False
         self._k += m
+        if np.isnan(z):
+            return
         self._lessons.append((self._k, z))
         k, arrival = np.array(self._lessons).T
         if len(k) < LEAST or arrival[-1] - arrival[0] < LEARN:
             return
         design = np.column_stack([np.ones(len(k)), k - k[-1]])
-        self._x, square, *_ = np.linalg.lstsq(design, arrival)
-        self._noise = max(float(square.sum()) / (len(k) - 2), 1e-8)
-        self._cov = self._noise * np.linalg.inv(design.T @ design)
-        self._t = float(self._x[0])
+        (x, period), square, *_ = np.linalg.lstsq(design, arrival)
+        self._noise = max(float(square.sum()) / (len(k) - 2), LEAST_NOISE)
+        cov = self._noise * np.linalg.inv(design.T @ design)
+        self._x, self._period = float(x), float(period)
+        self._cov = (float(cov[0, 0]), float(cov[0, 1]), float(cov[1, 1]))
+        self._t = self._x
 
     def _batch(self, steps: Array, z: float) -> Array:
-        m = int(steps.sum())
-        move = np.array([[1.0, m], [0.0, 1.0]])
-        self._x = move @ self._x  # (1)
-        forget = np.exp(m * self._x[1] / MEMORY)
-        self._cov = move @ self._cov @ move.T * forget
+        m = float(steps.sum())
+        self._predict(m)
         lost = self._weigh(z)
         if lost:
-            self._x[0] += lost * self._x[1]
+            self._x += lost * self._period
             self._health.gaps += 1
             self._health.missing += lost
             behind = np.cumsum(steps[::-1])[::-1] - steps
-            t: Array = self._x[0] - behind * self._x[1]
+            t: Array = self._x - behind * self._period
         else:
             # between the two estimates, so that a correction never turns time back
-            ahead = max(float(self._x[0]) - self._t, 0.1 * m * float(self._x[1]))
+            ahead = max(self._x - self._t, 0.1 * m * self._period)
             t = self._t + ahead * np.cumsum(steps) / m
         self._t = float(t[-1])
         return t
 
+    def _predict(self, m: float) -> None:
+        """Go on by m samples, (1), and forget, (2)."""
+        a, b, c = self._cov
+        forget = exp(m * self._period / MEMORY)
+        self._x += m * self._period
+        self._cov = (
+            (a + 2 * m * b + m * m * c) * forget,
+            (b + m * c) * forget,
+            c * forget,
+        )
+
     def _weigh(self, z: float) -> int:
         """Correct the estimate by an arrival, (2); return how many were lost."""
-        error, period = z - float(self._x[0]), float(self._x[1])
-        spread = float(self._cov[0, 0]) + self._noise
-        if error > max(6 * np.sqrt(spread), 1.5 * period):
+        error, (a, b, c) = z - self._x, self._cov
+        spread = a + self._noise
+        if error > max(6 * sqrt(spread), 1.5 * self._period):
             self._late.append((z, error))
             if not self._broken and z - self._late[0][0] < LATE:
                 return 0
-            lost = round(min(e for _, e in self._late) / period)
+            lost = round(min(e for _, e in self._late) / self._period)
             self._late, self._broken = [], False
             return lost
         self._late, self._broken = [], False
-        gain = self._cov[:, 0] / spread
-        self._x = self._x + gain * error  # (2)
-        self._cov = self._cov - np.outer(gain, self._cov[0])
+        self._x += a / spread * error  # (2)
+        self._period += b / spread * error
+        self._cov = (a - a * a / spread, b - a * b / spread, c - b * b / spread)
         self._noise += 0.02 * (min(error**2, 9 * spread) - self._noise)
-        self._noise = max(self._noise, 1e-8)
+        self._noise = max(self._noise, LEAST_NOISE)
         return 0
 
 

@@ -84,6 +84,11 @@ class Codec(ABC):
         self._begin += len(self._rest)
         self._rest = b""
 
+    @property
+    def waiting(self) -> int:
+        """Bytes kept until more come."""
+        return len(self._rest)
+
     @classmethod
     def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
         """Judge whether bytes that came in so many seconds are of this format."""

@@ -17,6 +17,7 @@ from fieldcal.driver import Driver
 from fieldcal.drivers.codec import open_codec, recognise
 from fieldcal.drivers.options import split
 from fieldcal.drivers.reader import Chunk, Reader
+from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Block
 
@@ -71,7 +72,13 @@ class SerialPort:
 
 
 class Imu(Driver):
-    """A serial port and the codec of what comes from it."""
+    """A serial port and the codec of what comes from it.
+
+    Attributes
+    ----------
+    skew : the device's clock against the host's
+
+    """
 
     faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)
 
@@ -83,6 +90,7 @@ class Imu(Driver):
         self._format = options.text("format", "witmotion")
         self._codec = open_codec(self._format, options)
         self._heard: list[Chunk] = []
+        self.skew = Skew()
         self.health = self._codec.health
         baud = int(options.number("baud", self._codec.bauds[0], 50, 1e8))
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
@@ -102,6 +110,7 @@ class Imu(Driver):
             block = self._codec.feed_all(chunks)
             if block is not None:
                 self._heard = []
+                self.skew.add(block.t, block.t_host)
                 return block
             self._heard = [*self._heard, *chunks][-HEARD:]
             if monotonic() >= deadline:

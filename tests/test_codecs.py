@@ -116,7 +116,7 @@ def test_damage_makes_no_fault_and_no_memory(
     codec = decoder(name, stream)
     for piece in cut(bytes(spoilt), step):
         codec.feed(piece)
-        assert len(codec._rest) < 1200 + step
+        assert codec.waiting < 1200 + step
         assert len(codec._arrivals) <= 1200 + step
 
 

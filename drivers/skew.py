@@ -1,0 +1,102 @@
+"""How the device's clock runs against the host's.
+
+A sample stamped t on the device arrives at h = a + r t + delay, the delay never below
+that of an idle line. So the least h - t of each stretch of time is free of queueing,
+and a straight line through these tells offset a and rate r:
+
+    h_i = a + r t_i + e_i,   least squares,   s^2 = sum(e^2) / (n - 2)      (1)
+
+The device's clock is fast by 1/r - 1. Source: Moon, Skelly, Towsley, Estimation and
+removal of clock skew from network delay measurements, INFOCOM 1999, with the line
+through minima in place of their linear programme. All in s.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.samples import Array
+
+STRETCH = 1.0
+"""First length of a stretch, s of device time."""
+
+MOST = 512
+"""Stretches kept; beyond that two and two are joined."""
+
+LEAST = 10
+"""Stretches that a line takes."""
+
+
+class Line(NamedTuple):
+    """The device's clock against the host's.
+
+    Attributes
+    ----------
+    fast_ppm, sigma_ppm : how fast the device's clock is, and its standard error
+    offset, sigma : host time when the device's is 0, least delay included, s
+
+    """
+
+    fast_ppm: float
+    sigma_ppm: float
+    offset: float
+    sigma: float
+
+
+class Skew:
+    """Collects device times and arrivals in bounded memory."""
+
+    def __init__(self) -> None:
+        self._length = STRETCH
+        self._least: dict[int, tuple[float, float, int]] = {}
+
+    def add(self, t: Array, t_host: Array) -> None:
+        """Take device times and arrivals, (n,) each; arrivals may be unknown."""
+        known = ~(np.isnan(t) | np.isnan(t_host))
+        t, late = t[known], (t_host - t)[known]
+        if not len(t):
+            return
+        stretch = np.floor(t / self._length).astype(np.int64)
+        begins = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
+        ends = [*begins[1:].tolist(), len(t)]
+        for begin, end in zip(begins.tolist(), ends, strict=True):
+            i = begin + int(np.argmin(late[begin:end]))
+            n = end - begin
+            self._keep(int(stretch[begin]), float(t[i]), float(late[i]), n)
+        while len(self._least) > MOST:
+            self._coarsen()
+
+    def _keep(self, stretch: int, t: float, late: float, n: int) -> None:
+        before_t, before, count = self._least.get(stretch, (t, late, 0))
+        least = (t, late) if late < before else (before_t, before)
+        self._least[stretch] = (*least, count + n)
+
+    def _coarsen(self) -> None:
+        self._length *= 2
+        points, self._least = list(self._least.values()), {}
+        for t, late, n in points:
+            self._keep(int(np.floor(t / self._length)), t, late, n)
+
+    def line(self) -> Line | None:
+        """Fit the line, (1); None before there is enough."""
+        if len(self._least) < LEAST:
+            return None
+        t, late, count = np.array(list(self._least.values())).T
+        # a stretch that has hardly begun has no least delay yet
+        full = count >= np.median(count) / 2
+        t, late = t[full], late[full]
+        middle = t.mean()
+        design = np.column_stack([np.ones(len(t)), t - middle])
+        (level, slope), square, *_ = np.linalg.lstsq(design, late)
+        variance = float(square[0]) / (len(t) - 2)
+        spread = float(np.sum((t - middle) ** 2))
+        rate = 1.0 + float(slope)  # (1)
+        sigma_rate = np.sqrt(variance / spread)
+        return Line(
+            fast_ppm=(1 / rate - 1) * 1e6,
+            sigma_ppm=float(sigma_rate / rate**2) * 1e6,
+            offset=float(level - slope * middle),
+            sigma=float(np.sqrt(variance / len(t) + (sigma_rate * middle) ** 2)),
+        )

@@ -1,0 +1,82 @@
+"""A recording as a device."""
+
+import gzip
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from wires import STREAMS
+
+from fieldcal.driver import open_driver
+from fieldcal.errors import DeviceError, InputError, SessionError
+from fieldcal.samples import Block, concat
+
+
+def everything(url: str) -> Block:
+    blocks = []
+    with open_driver(url) as imu:
+        with pytest.raises(DeviceError, match="has ended after"):
+            for block in imu.blocks():
+                blocks.append(block)
+        assert imu.health.samples == sum(map(len, blocks))
+    return concat(blocks)
+
+
+def csv(path: Path, n: int, rate: float) -> Path:
+    rows = [f"{i / rate},{i},0,9.8,0,0,0" for i in range(n)]
+    path.write_text("t,ax,ay,az,gx,gy,gz\n" + "\n".join(rows) + "\n")
+    return path
+
+
+def test_a_session_in_its_units(tmp_path: Path) -> None:
+    csv(tmp_path / "samples.csv", 500, 100)
+    (tmp_path / "session.toml").write_text(
+        'format = 1\n[units]\nacceleration = "g"\nangular_rate = "deg/s"\n'
+        "[site]\nlatitude_deg = 50.0\nheight_m = 0.0\n"
+    )
+    block = everything(f"replay:{tmp_path}?speed=max")
+    np.testing.assert_allclose(block.acc[:, 0], np.arange(500) * 9.80665)
+    np.testing.assert_array_equal(block.t, np.arange(500) / 100)
+
+
+def test_a_samples_file_at_the_speed_asked_for(tmp_path: Path) -> None:
+    path = csv(tmp_path / "samples.csv", 1001, 100)
+    began = time.monotonic()
+    assert len(everything(f"replay:{path}?speed=50")) == 1001
+    assert 0.2 <= time.monotonic() - began < 5
+    with open_driver(f"replay:{path}?speed=0.01") as imu:
+        first = imu.receive(0.0)
+        assert first is not None and len(first) == 1
+        assert imu.receive(0.01) is None
+
+
+@pytest.mark.parametrize("name", sorted(STREAMS))
+@pytest.mark.parametrize("packed", [False, True])
+def test_bytes_of_a_port(tmp_path: Path, name: str, packed: bool) -> None:
+    stream = STREAMS[name](300, np.random.default_rng(0))
+    data = b"".join(stream.pieces)
+    path = tmp_path / ("port.bin.gz" if packed else "port.bin")
+    path.write_bytes(gzip.compress(data) if packed else data)
+    query = f"&{stream.query}" if stream.query else ""
+    block = everything(f"replay:{path}?format={name}&speed=max{query}")
+    np.testing.assert_allclose(block.six, stream.samples.six, rtol=1e-6, atol=1e-9)
+
+
+def test_the_autopilots_stream(shared: Path) -> None:
+    path = shared / "real" / "autopilot_streams" / "vectornav.bin.gz"
+    assert len(everything(f"replay:{path}?format=vectornav&speed=max")) == 343
+
+
+def test_what_cannot_be_replayed(tmp_path: Path) -> None:
+    (tmp_path / "noise.bin").write_bytes(bytes(1000))
+    with pytest.raises(InputError, match="no such session or log"):
+        open_driver(f"replay:{tmp_path}/nothing")
+    with pytest.raises(InputError, match="say what bytes these are"):
+        open_driver(f"replay:{tmp_path}/noise.bin")
+    with pytest.raises(InputError, match="holds no sample"):
+        open_driver(f"replay:{tmp_path}/noise.bin?format=mip")
+    with pytest.raises(SessionError):
+        open_driver(f"replay:{tmp_path}")
+    with pytest.raises(InputError, match="speed"):
+        open_driver(f"replay:{tmp_path}/noise.bin?format=mip&speed=0")

@@ -17,6 +17,7 @@ COMMANDS = {
     "run": ("recalibrate a device, at the console or headless", "run"),
     "plan": ("choose positions and say what they will tell", "plan"),
     "solve": ("calibrate from a recorded session", "solve"),
+    "diagnose": ("say what physics the simulation leaves out", "diagnose"),
     "import": ("make a session of a recording from elsewhere", "import_recording"),
     "sim": ("be a virtual device on a link", "sim"),
     "ports": ("list the devices that are plugged in", "ports"),

@@ -150,7 +150,7 @@ def _force(x: Experience, channel: int) -> Array:
 
 
 def _temperature(x: Experience, channel: int) -> Array:
-    part = x.warming / max(np.ptp(x.warming), 1e-9)
+    part = x.warming / max(float(np.ptp(x.warming)), 1e-9)
     return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
 
 

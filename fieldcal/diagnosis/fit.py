@@ -58,6 +58,7 @@ class Fit:
     residual : (n, 6) outputs less prediction
     white : (n, 6) the same, whitened
     jacobian : (n, 6, k), whitened
+    design : (n, 6, k), the same before
     chi2, dof : of the whitened residual
     score : ln Z but for a constant that all models of the same rows share
 
@@ -71,6 +72,7 @@ class Fit:
     residual: Array
     white: Array
     jacobian: Array
+    design: Array
     chi2: float
     dof: int
     score: float
@@ -192,6 +194,7 @@ class Bench:
             residual,
             white,
             jacobian,
+            columns,
             chi2,
             dof,
             score,

@@ -75,6 +75,28 @@ def dropped(errors: Errors, name: str) -> Errors:
     return errors.but(tuple(Part(kind, c, 0.0) for c in channels))
 
 
+def size_sigma(bench: Bench, fit: Fit, kind: str, channel: int, size: float) -> float:
+    """Standard uncertainty of a part's v, from the information on ln v.
+
+    `bench` has white noise only; `fit` says what the model leaves free. The information
+    is 2 sum_i (v^2 s_i^2 / (1 + v^2 s_i^2))^2.
+    """
+    names = [not n.startswith("aside") for n in fit.names]
+    if kind == "setting":
+        free = bench.whiten(fit.design)[:, :, names].reshape(-1, int(sum(names)))
+        white = bench.whiten(bench.aside(fit.state)).reshape(len(free), -1)
+    else:
+        use = bench.rows.used[:, channel]
+        free = bench.whiten(fit.design)[use, channel][:, names]
+        white = factor(kind, bench.rows.x, channel)[use]
+        white = white / bench.rows.sd[use, channel][:, None]
+    basis = span(free)
+    s = np.linalg.svd(white - basis @ (basis.T @ white), compute_uv=False)
+    load = size**2 * s**2
+    information = 2 * float(((load / (1 + load)) ** 2).sum())
+    return size / float(np.sqrt(max(information, 1e-12)))
+
+
 def _known(bench: Bench, kind: str) -> bool:
     x = bench.rows.x
     if kind in ("alpha", "beta", "joints"):

@@ -105,7 +105,7 @@ class Search:
         """The best model found."""
         best = self.model((), self.bench)
         while (grown := self._grow(best)) is not None:
-            best = self._tidied(grown)
+            best = self._tidied(self._anew(grown))
         return best
 
     def model(
@@ -215,8 +215,18 @@ class Search:
                     return self._tidied(swapped)
         return model
 
+    def _anew(self, model: Model) -> Model:
+        """With the random parts' sizes estimated beside what is in it now."""
+        for name in model.random if model.chosen else ():
+            bench = model.bench.but(errors=dropped(model.bench.errors, name))
+            kept = tuple(r for r in model.random if r != name)
+            less = self.model(model.chosen, bench, model.fit, kept, model.shaped)
+            chance = {w.name: w for w in wanders(bench, less.fit)}.get(name)
+            model = self._with_random(less, chance) if chance else less
+        return model
+
     def _smaller(self, model: Model) -> list[Model]:
-        """The model without each of its parts; random parts are estimated anew."""
+        """The model without each of its parts."""
         out = []
         for i in range(len(model.chosen)):
             rest = model.chosen[:i] + model.chosen[i + 1 :]

@@ -22,12 +22,18 @@ from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.turns import Turn, Undo
 from fieldcal.effects import Motion, Sensor, catalogue, columns
-from fieldcal.samples import Array
+from fieldcal.samples import CHANNELS, Array
 
 CANDIDATES = ("gyro_cross_coupling", "gyro_scale", "lever_arm", "time_delay")
 
 ON_THE_WAY = ("lever_arm", "time_delay")
 """Seen by the accelerometers on the way, if nothing else shakes them there."""
+
+WIDE = 20.0
+"""Priors of what is reported, in typical sizes."""
+
+PART = 0.1
+"""Of what the most affected channel shows, from which another one shows it too."""
 
 STEADY = 3.0
 """Squares a row that the accelerometers may leave on the way and still be used."""
@@ -86,7 +92,7 @@ class Turntable:
     def __init__(
         self, bench: Bench, fit: Fit, made: Sequence[Turn], interval: float
     ) -> None:
-        self._bench, self._fit = bench, fit
+        self._bench, self._fit, self._made = bench, fit, list(made)
         self._density = bench.rows.noise[3:] * np.sqrt(interval)
         self.pool = tuple(self._pool())
         kept = ("acc_bias", "acc_scale", "gyr_bias")
@@ -127,16 +133,12 @@ class Turntable:
         self, terms: Sequence[Term], rows: NDArray[np.bool_], relax: float = 1.0
     ) -> Turning:
         """Fit some of the pool's effects to some of the rows."""
-        width = len(self._kept)
-        columns, names = list(range(width)), [self._fit.names[j] for j in self._kept]
+        width, columns = len(self._kept), self._columns(terms)
+        names = [self._fit.names[j] for j in self._kept]
         sizes: list[float] = []
-        at = width
-        for term in self.pool:
-            if term in terms:
-                columns += range(at, at + len(term.columns))
-                names += [f"{term.effect.id}.{n}" for n in term.names]
-                sizes += list(relax * term.prior)
-            at += len(term.columns)
+        for term in (t for t in self.pool if t in terms):
+            names += [f"{term.effect.id}.{n}" for n in term.names]
+            sizes += list(relax * term.prior)
         a = self._a[rows][:, columns]
         precision = np.zeros((len(columns), len(columns)))
         known = self._fit.covariance[np.ix_(self._kept, self._kept)]
@@ -161,6 +163,52 @@ class Turntable:
             tuple(terms), tuple(names), values, covariance, determined, white, rows,
             chi2, dof, score,
         )  # fmt: skip
+
+    def left_out(self, terms: Sequence[Term], rows: NDArray[np.bool_]) -> float:
+        """Rms of each turn predicted from the others, in standard deviations."""
+        squares, count = 0.0, 0
+        columns = self._columns(terms)
+        for i in np.unique(self.turn):
+            rest, here = rows & (self.turn != i), rows & (self.turn == i)
+            seen = self.fit(terms, rest, WIDE)
+            if rest.any():
+                off = self._z[here] - self._a[here][:, columns] @ seen.values
+                squares, count = squares + float(off @ off), count + len(off)
+        return float(np.sqrt(squares / max(count, 1)))
+
+    def _columns(self, terms: Sequence[Term]) -> list[int]:
+        """Columns of the windows' parameters and of some of the pool's effects."""
+        at = len(self._kept)
+        out = list(range(at))
+        for term in self.pool:
+            if term in terms:
+                out += range(at, at + len(term.columns))
+            at += len(term.columns)
+        return out
+
+    def shown(
+        self, term: Term, found: Turning, some: NDArray[np.intp]
+    ) -> dict[str, float]:
+        """What an effect does in some turns, by channel: rms m/s^2, or rad turned.
+
+        An effect on the gyroscopes shows in the angle turned, or, if it leaves that
+        alone, in the forces on the way; it is given for the gyroscopes then, rad/s.
+        """
+        out: dict[str, float] = {}
+        gyro = term.effect.id != "lever_arm"
+        for i in some:
+            turn = self._made[i]
+            if not isinstance(term.effect, Motion | Sensor):
+                continue
+            design = columns(term.effect, turn.x, scale=self._bench.scale)
+            values = [found.values[found.names.index(f"{term.effect.id}.{n}")]
+                      for n in term.names]  # fmt: skip
+            course = design @ np.array(values)
+            for c in range(3, 6) if gyro else range(3):
+                size = float(np.sqrt(np.mean(course[:, c] ** 2)))
+                out[CHANNELS[c]] = max(out.get(CHANNELS[c], 0.0), size)
+        largest = max(out.values(), default=0.0)
+        return {name: size for name, size in out.items() if size > PART * largest}
 
     def undo(self, found: Turning) -> Undo:
         """What the gyroscopes have to be rid of, as far as it was found."""

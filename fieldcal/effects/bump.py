@@ -132,4 +132,5 @@ def _fault(
         rows=np.arange(max(start, start + a - margin), start + b + margin),
         size=float(np.abs(z[a:b, worst]).max() * recording.noise[worst]),
         sigma=float(np.abs(z[a:b, worst]).max()),
+        channels=tuple(np.array(CHANNELS)[np.abs(z[a:b]).max(axis=0) > LARGEST]),
     )

@@ -14,7 +14,7 @@ rougher. Source: model of this project; the usual slips in reading a register pa
 >>> broken = course - 256 * (course % 256 >= 128)
 >>> kind, mended = undone(broken)
 >>> kind, bool((mended == course).all())
-('low byte sign-extended', True)
+('low_byte_signed', True)
 """
 
 from __future__ import annotations
@@ -28,25 +28,29 @@ from fieldcal.samples import CHANNELS
 
 Counts = NDArray[np.int64]
 
-SMOOTHER = 0.9
-"""Part of the total variation that may be left after undoing."""
+JUMP = 128
+"""LSB from which a step between samples is a jump."""
+
+CLEARLY = 5
+"""How many more jumps have to go than come."""
 
 WIDEST = 70_000
 """Counts beyond which values are no 16-bit ones, but decimals written out."""
 
-FEWEST = 3
+FEWEST = 4
 """Jumps that have to go."""
 
 
 def undone(counts: Counts) -> tuple[str, Counts]:
     """What happened to counts and what they were; "" where nothing did."""
     before = np.abs(np.diff(counts))
-    best, kind, mended = SMOOTHER * float(before.sum()), "", counts
+    best, kind, mended = float(before.sum()), "", counts
     for name, undo in _UNDO.items():
         tried = undo(counts)
         after = np.abs(np.diff(tried))
-        gone = int(((before > 128) & (after < before / 2)).sum())
-        if gone >= FEWEST and float(after.sum()) < best:
+        gone = int(((before > JUMP) & (after < before / 2)).sum())
+        made = int(((after > JUMP) & (before < after / 2)).sum())
+        if gone >= FEWEST and gone > CLEARLY * made and float(after.sum()) < best:
             best, kind, mended = float(after.sum()), name, tried
     return kind, mended
 
@@ -66,9 +70,9 @@ def _wrapped(counts: Counts) -> Counts:
 
 
 _UNDO = {
-    "low byte sign-extended": _extended,
-    "bytes swapped": _swapped,
-    "wrapped at 16 bits": _wrapped,
+    "low_byte_signed": _extended,
+    "bytes_swapped": _swapped,
+    "wrapped": _wrapped,
 }
 
 

@@ -102,7 +102,7 @@ class Mounting(Chain):
         if odds < BETTER:
             return []
         undo = matrix_of(axes).T
-        named: dict[str, float | str] = {"axes": " ".join(self._named(recording, undo))}
+        named: dict[str, float | str] = {"axes": "".join(self._named(recording, undo))}
         return [self._fault(recording, named, 1.0, undo)]
 
     @staticmethod

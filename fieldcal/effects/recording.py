@@ -67,6 +67,7 @@ class Fault:
     size : departure, in the channel's unit
     sigma : significance, in standard deviations
     mended : (n, 6) outputs put right, where they can be
+    channels : every channel concerned, if there are several
 
     """
 
@@ -79,6 +80,7 @@ class Fault:
     size: float = 0.0
     sigma: float = np.inf
     mended: Array | None = None
+    channels: tuple[str, ...] = ()
 
 
 def runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -1,0 +1,125 @@
+"""Which other effects would explain the same in this recording, and what would tell.
+
+Every model that the search looked at, and every swap of one effect for another, is
+compared with the best: what comes within `CLOSE` is an alias. What decides between two
+is the position, in reach of a fixture, at which they predict the most different
+outputs, or failing that what the effect's own entry in the catalogue says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.select import Model, Search
+from fieldcal.effects import Experience, catalogue
+from fieldcal.frames import turn
+
+CLOSE = 4.6
+"""Of ln 100: an explanation a hundred times less likely is no alias."""
+
+REACH = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
+TELLING = 5.0
+"""Difference in white noise of a window's mean that decides."""
+
+
+def aliases(explanation: Explanation) -> dict[str, tuple[str, ...]]:
+    """Ids that stand for an effect as well as the one chosen, by id."""
+    search, best = explanation.search, explanation.model
+    found: dict[str, list[str]] = {}
+    mine = {h.effect.id for h, _ in best.chosen}
+    for other in _rivals(search, best):
+        if other.objective < best.objective - CLOSE:
+            continue
+        theirs = {h.effect.id for h, _ in other.chosen}
+        for name in sorted(mine - theirs):
+            new = [i for i in sorted(theirs - mine) if i not in found.get(name, [])]
+            found.setdefault(name, []).extend(new)
+    return {name: tuple(ids) for name, ids in found.items() if ids}
+
+
+def _rivals(search: Search, best: Model) -> Iterator[Model]:
+    """Models as large as the best with one effect exchanged."""
+    for i in range(len(best.chosen)):
+        chosen = best.chosen[:i] + best.chosen[i + 1 :]
+        shaped = best.shaped[:i] + best.shaped[i + 1 :]
+        less = search.model(chosen, best.bench, best.fit, best.random, shaped)
+        yield from search.larger(less)
+
+
+def telling_position(
+    explanation: Explanation, one: str, other: str
+) -> tuple[float, float, float] | None:
+    """Position at which two explanations differ most, and by how many sigmas.
+
+    Returns
+    -------
+    alpha, beta in degrees and the difference, or None if no position in reach tells
+
+    """
+    models = {name: _with(explanation, one, name) for name in (one, other)}
+    if any(m is None for m in models.values()):
+        return None
+    rows = explanation.prepared.bench.rows
+    x, best = rows.x, None
+    sd = np.nanmedian(rows.sd, axis=0) / np.sqrt(
+        max(len(x) / max(x.position[-1], 1), 1)
+    )
+    for alpha in REACH:
+        for beta in REACH[:5]:
+            place = _place(x, alpha, beta)
+            seen = [m.fit.state.predict(place) for m in models.values() if m]
+            apart = float(np.nanmax(np.abs(seen[0] - seen[1]) / sd))
+            if best is None or apart > best[2] * 1.2:
+                best = (alpha, beta, apart)
+    return best if best is not None and best[2] > TELLING else None
+
+
+def _with(explanation: Explanation, one: str, name: str) -> Model | None:
+    """The best model with an effect in the place of the chosen one."""
+    search, best = explanation.search, explanation.model
+    if name == one:
+        return best
+    kept = [i for i, (h, _) in enumerate(best.chosen) if h.effect.id != one]
+    less = search.model(
+        tuple(best.chosen[i] for i in kept),
+        best.bench,
+        best.fit,
+        best.random,
+        tuple(best.shaped[i] for i in kept),
+    )
+    for hypothesis in search.pool:
+        if hypothesis.effect.id == name:
+            less = search.with_one(less, hypothesis)
+    return less
+
+
+def _place(x: Experience, alpha: float, beta: float) -> Experience:
+    """One row in a position, late in the session and in its window."""
+    a, b = np.deg2rad([[alpha], [beta]])
+    last = slice(len(x) - 1, len(x))
+    force = x.mounting.T @ turn(a, b) @ x.base_force
+    return Experience.at_rest(
+        a,
+        b,
+        x.gravity,
+        f=force,
+        t=x.t[last],
+        since_start=x.since_start[last],
+        since_turn=x.since_turn[last],
+        warming=x.warming[last],
+        heating=x.heating[last],
+        variance=x.variance[last],
+        position=np.array([-1]),
+        base_force=x.base_force,
+        base_rate=x.base_rate,
+        mounting=x.mounting,
+        latitude=x.latitude,
+    )
+
+
+def decided_by(name: str) -> str:
+    """What the catalogue says tells an effect from others."""
+    return catalogue()[name].decided_by

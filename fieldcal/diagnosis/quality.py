@@ -1,0 +1,104 @@
+"""How well recording and simulation agree, before and after.
+
+Residuals are averaged over parts of the windows before their rms is taken, so that it
+is the mismatch that counts and not the white noise of single samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.heldout import held_out, rms
+from fieldcal.diagnosis.prepare import Prepared, bench_of
+from fieldcal.diagnosis.reduce import Source
+from fieldcal.diagnosis.result import Quality
+from fieldcal.samples import CHANNELS, Array, Block
+
+UNITS = ("m/s^2", "rad/s")
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Residuals of one model.
+
+    Attributes
+    ----------
+    bench, fit : the model
+    ahead : (n, 6) residuals of what was predicted
+    rms, held_out : (6,) over parts of windows
+
+    """
+
+    bench: Bench
+    fit: Fit
+    ahead: Array
+    rms: Array
+    held_out: Array
+
+    def quality(self, triad: int) -> Quality:
+        """In the unit of one triad: 0 accelerometers, 1 gyroscopes."""
+        part = slice(3 * triad, 3 * triad + 3)
+        seen = {
+            n: float(v)
+            for n, v in zip(CHANNELS, self.held_out, strict=True)
+            if np.isfinite(v)
+        }
+        return Quality(
+            rms=_mean(self.rms[part]),
+            chi2_per_dof=self.fit.chi2 / max(self.fit.dof, 1),
+            held_out_rms=_mean(self.held_out[part]),
+            by_channel=seen,
+        )
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+def agreement(bench: Bench, fit: Fit) -> Agreement:
+    """Residuals of a fit, seen and predicted."""
+    ahead = held_out(bench, fit.terms, fit)
+    seen = fit.residual
+    return Agreement(bench, fit, ahead, rms(bench.rows, seen), rms(bench.rows, ahead))
+
+
+def before(block: Block, explanation: Explanation) -> Agreement:
+    """The simulation alone, on the samples as they came."""
+    prepared = explanation.prepared
+    bench = raw_bench(block, prepared)
+    fit = explanation.base if bench is prepared.bench else bench.fit(explanation.always)
+    return agreement(bench, fit)
+
+
+def after(explanation: Explanation) -> Agreement:
+    """The simulation with the effects found in the windows."""
+    return agreement(explanation.model.bench.but(relax=20.0), explanation.fit)
+
+
+def raw_bench(block: Block, prepared: Prepared) -> Bench:
+    """Rows of the samples as they came, if anything was done to them."""
+    if block is prepared.source.block and not prepared.checked.ids:
+        return prepared.bench
+    source: Source = replace(
+        prepared.source, block=block, usable=np.isfinite(block.six)
+    )
+    return bench_of(source)
+
+
+def parted(one: Agreement, other: Agreement) -> int:
+    """The triad in which two models differ most: 0 or 1."""
+    sizes = []
+    for triad in (0, 1):
+        part = slice(3 * triad, 3 * triad + 3)
+        floor = np.nanmax(np.nan_to_num(other.rms[part]), initial=0.0)
+        gain = np.nan_to_num(one.rms[part]) ** 2 - np.nan_to_num(other.rms[part]) ** 2
+        sizes.append(float(gain.max()) / max(float(floor) ** 2, 1e-300))
+    known = [bool(np.isfinite(one.rms[3 * i : 3 * i + 3]).any()) for i in (0, 1)]
+    if known[0] != known[1]:
+        return int(known[1])
+    return int(sizes[1] > sizes[0])

@@ -1,0 +1,218 @@
+"""From what was found to a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.description import Description
+from fieldcal.diagnosis import locate, naming
+from fieldcal.diagnosis.aliases import aliases
+from fieldcal.diagnosis.chain import recording
+from fieldcal.diagnosis.common import common_scale
+from fieldcal.diagnosis.explain import Explanation, explain
+from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.naming import Removed
+from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.quality import UNITS, Agreement, after, before, parted
+from fieldcal.diagnosis.result import (
+    Diagnosis,
+    Found,
+    Group,
+    Mismatch,
+    Quality,
+    Quantity,
+    Verdict,
+)
+from fieldcal.diagnosis.unknown import Unknown, matters, unknowns
+from fieldcal.diagnosis.words import notes, paragraph
+from fieldcal.samples import Block
+
+GROUPS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+GROUP_UNITS = ("m/s^2", "1", "rad/s", "1")
+
+ABSURD = (1.0, 0.1, 0.1, 0.1)
+"""Sigma from which a parameter of a group counts as not determined."""
+
+
+def diagnose(block: Block, about: Description) -> Diagnosis:
+    """Say what physics the simulation leaves out of a recording.
+
+    Parameters
+    ----------
+    block : all samples, SI
+    about : what session.toml says
+
+    Raises
+    ------
+    InputError
+        If nothing in the recording can be used.
+
+    """
+    explanation = explain(prepare(block, about))
+    lost = {t.effect.id: naming.removed(explanation, t) for t in explanation.terms}
+    first, then = before(block, explanation), after(explanation)
+    unknown = _unknown(explanation, first, then)
+    effects = _effects(explanation, lost, then)
+    verdict = _verdict(effects, unknown)
+    mismatch = tuple(_mismatch(block, explanation, lost, unknown))
+    quality = _quality(explanation, first, then)
+    words = paragraph(
+        verdict,
+        effects,
+        mismatch,
+        unknown,
+        quality,
+        explanation,
+        notes(explanation, explanation.left),
+    )
+    return Diagnosis(
+        verdict=verdict,
+        mismatch=mismatch,
+        effects=tuple(effects),
+        unit=quality[2],
+        before=quality[0],
+        after=quality[1],
+        calibration=_calibration(explanation),
+        warnings=_warnings(explanation),
+        says=words,
+    )
+
+
+def _unknown(
+    explanation: Explanation, first: Agreement, then: Agreement
+) -> list[Unknown]:
+    found = unknowns(explanation)
+    explained = first.fit.chi2 - explanation.fit.chi2
+    return found if matters(found, explained) or not explanation.terms else []
+
+
+def _effects(
+    explanation: Explanation, lost: dict[str, Removed], then: Agreement
+) -> list[Found]:
+    prepared = explanation.prepared
+    found = list(naming.of_samples(prepared.checked.faults))
+    for tone in prepared.tones:
+        values = {
+            n: Quantity(v, tone.sigmas[n], tone.effect.unit(n))
+            for n, v in tone.values.items()
+        }
+        found.append(Found(tone.effect.id, values, evidence={"delta_chi2": tone.chi2}))
+    found += naming.of_windows(explanation, lost, then, aliases(explanation))
+    found += naming.of_chance(explanation)
+    found += naming.of_turns(explanation)
+    if explanation.sees_earth:
+        evidence = {"delta_chi2": 2 * explanation.earth}
+        found.append(Found("earth_rate", {}, evidence=evidence))
+    if (gravity := common_scale(explanation)) is not None:
+        found.append(gravity)
+    return found
+
+
+def _verdict(effects: Sequence[Found], unknown: Sequence[Unknown]) -> Verdict:
+    if unknown:
+        return "unexplained"
+    if any(f.aliases for f in effects):
+        return "ambiguous"
+    return "left_out" if effects else "consistent"
+
+
+def _mismatch(
+    block: Block,
+    explanation: Explanation,
+    lost: dict[str, Removed],
+    unknown: Sequence[Unknown],
+) -> list[Mismatch]:
+    prepared = explanation.prepared
+    about = prepared.source.about
+    whole = recording(block, np.isfinite(block.six), about)
+    out = list(locate.of_faults(whole, prepared.checked.faults))
+    out += locate.of_tones(explanation)
+    out += locate.of_effects(explanation, lost)
+    out += locate.of_chance(explanation)
+    out += locate.of_turns(explanation)
+    out += locate.of_unknown(explanation, unknown)
+    return sorted(out, key=lambda m: -m.sigma)
+
+
+def _quality(
+    explanation: Explanation, first: Agreement, then: Agreement
+) -> tuple[Quality, Quality, str]:
+    """Before, after and the unit: of the windows, or of the turns if only they part."""
+    turning, table = explanation.turning, explanation.table
+    prepared = explanation.prepared
+    seen = bool(explanation.terms or prepared.tones or prepared.checked.ids)
+    seen = seen or bool(explanation.model.random)
+    if turning is not None and table is not None and turning.terms and not seen:
+        plain = table.fit((), turning.rows)
+        one = Quality(
+            float(np.sqrt(plain.chi2 / max(turning.rows.sum(), 1))),
+            plain.chi2 / max(plain.dof, 1),
+            table.left_out((), turning.rows),
+        )
+        other = Quality(
+            float(np.sqrt(turning.chi2 / max(turning.rows.sum(), 1))),
+            turning.chi2 / max(turning.dof, 1),
+            table.left_out(turning.terms, turning.rows),
+        )
+        return one, other, "standard deviations, in turns"
+    triad = parted(first, then)
+    return first.quality(triad), then.quality(triad), UNITS[triad]
+
+
+def _calibration(explanation: Explanation) -> dict[str, Group]:
+    fit: Fit = explanation.fit
+    nominal = explanation.prepared.source.about.nominal
+    out = {}
+    for group, unit, absurd in zip(GROUPS, GROUP_UNITS, ABSURD, strict=True):
+        value, sigma = np.full(3, np.nan), np.full(3, np.nan)
+        for i, axis in enumerate("xyz"):
+            if (name := f"{group}.{axis}") in fit.names:
+                at = fit.names.index(name)
+                if fit.determined[at] and fit.sigma[at] < absurd * _size(fit, group, i):
+                    value[i], sigma[i] = fit.values[at], fit.sigma[at]
+        if np.isfinite(value).any():
+            change = value - nominal[group]
+            out[group] = Group(tuple(value), tuple(sigma), tuple(change), unit)
+    return out
+
+
+def _size(fit: Fit, group: str, axis: int) -> float:
+    scale = fit.state.scale[axis + 3 * group.startswith("gyr")]
+    return float(abs(scale)) or 1.0
+
+
+def _warnings(explanation: Explanation) -> tuple[str, ...]:
+    bench, fit = explanation.prepared.bench, explanation.fit
+    out = []
+    parameters = sum(n.startswith(("acc", "gyr")) for n in fit.names)
+    triads = [("accelerometers", 0), ("gyroscopes", 3)]
+    for name, first in triads:
+        if bench.rows.used[:, first : first + 3].any():
+            spare = _spare(explanation, first)
+            if spare <= 1:
+                out.append(
+                    f"{spare} degrees of freedom in the means of the {name}: their"
+                    " residual says nothing about the fit; take more positions"
+                )
+    open_ = [
+        n
+        for n, d in zip(fit.names, fit.determined, strict=True)
+        if not d and not n.startswith("aside")
+    ]
+    if open_ and parameters:
+        out.append(f"not determined by these positions: {', '.join(open_)}")
+    return tuple(out)
+
+
+def _spare(explanation: Explanation, first: int) -> int:
+    """Means of windows less parameters, for one triad."""
+    bench, fit = explanation.prepared.bench, explanation.fit
+    part = slice(first, first + 3)
+    held = [
+        bench.rows.used[bench.rows.x.position == p][:, part].any(axis=0).sum()
+        for p in np.unique(bench.rows.x.position)
+    ]
+    columns = np.abs(fit.design[:, part]).max(axis=(0, 1)) > 0
+    return int(sum(held) - (columns & fit.determined).sum())

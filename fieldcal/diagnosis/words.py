@@ -1,0 +1,157 @@
+"""The paragraph that says it all to a person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fieldcal.diagnosis.aliases import decided_by, telling_position
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.result import Found, Mismatch, Quality, Quantity, Verdict
+from fieldcal.diagnosis.unknown import Unknown
+from fieldcal.effects import Scatter, catalogue
+from fieldcal.samples import CHANNELS
+
+SHOWN = 3.0
+"""Standard deviations from which a parameter is worth its words."""
+
+
+def said(quantity: Quantity) -> str:
+    """A value with its uncertainty and unit.
+
+    >>> said(Quantity(0.00312, 0.00011, "1"))
+    '0.00312 ± 0.00011'
+    """
+    if isinstance(quantity.value, str):
+        return quantity.value
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+    sigma = quantity.sigma
+    if sigma is None or not math.isfinite(sigma) or sigma <= 0:
+        return f"{quantity.value:.4g}{unit}"
+    digits = 1 - math.floor(math.log10(sigma))
+    if digits > 6:
+        return f"{quantity.value:.3g} ± {sigma:.2g}{unit}"
+    return f"{quantity.value:.{max(digits, 0)}f} ± {sigma:.{max(digits, 0)}f}{unit}"
+
+
+def named(found: Found) -> str:
+    """An effect with the parameters that stand out."""
+    parts = []
+    for name, q in found.parameters.items():
+        if isinstance(q.value, str) or not q.sigma or abs(q.value) > SHOWN * q.sigma:
+            parts.append(f"{name} = {said(q)}")
+    return f"{found.id} ({', '.join(parts)})" if parts else found.id
+
+
+def paragraph(
+    verdict: Verdict,
+    effects: Sequence[Found],
+    mismatch: Sequence[Mismatch],
+    unknown: Sequence[Unknown],
+    quality: tuple[Quality, Quality, str],
+    explanation: Explanation,
+    notes: Sequence[str],
+) -> str:
+    """Say verdict, effects, improvement, doubts and what to do next."""
+    out = [_opening(verdict, effects, mismatch)]
+    out += [_how_random(f) for f in effects if _is_random(f)]
+    if verdict in ("left_out", "ambiguous") and effects:
+        out += _improvement(*quality)
+    for one in effects:
+        for other in one.aliases:
+            out.append(_deciding(explanation, one.id, other))
+    out += [_unexplained(u) for u in unknown]
+    return " ".join([*filter(None, out), *notes])
+
+
+def _opening(
+    verdict: Verdict, effects: Sequence[Found], mismatch: Sequence[Mismatch]
+) -> str:
+    listed = " and ".join(named(f) for f in effects)
+    if verdict == "consistent":
+        return (
+            "Recording and simulation agree: bias and scale factor, refitted, leave"
+            " nothing that this recording can show."
+        )
+    if verdict == "left_out":
+        return f"The simulation leaves out {listed}."
+    if verdict == "ambiguous":
+        return f"Something is left out, and it may be {listed}."
+    where = "; ".join(sorted({f"{m.channel}, {_where(m)}" for m in mismatch}))
+    some = f" Besides, it leaves out {listed}." if listed else ""
+    return (
+        "Recording and simulation part, and no effect in the catalogue explains it"
+        f" ({where}).{some}"
+    )
+
+
+def _where(m: Mismatch) -> str:
+    places = ", ".join(map(str, m.positions[:6])) + (
+        "…" if len(m.positions) > 6 else ""
+    )
+    return f"positions {places}, {m.from_s:.0f} to {m.to_s:.0f} s"
+
+
+def _is_random(found: Found) -> bool:
+    return isinstance(catalogue()[found.id], Scatter)
+
+
+def _how_random(found: Found) -> str:
+    return (
+        f"{found.id} is random: it widens the intervals, and no equation is fitted to"
+        " it."
+    )
+
+
+def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
+    if not after.held_out_rms < before.held_out_rms:
+        return []
+    return [
+        f"With it the rms falls from {before.rms:.2g} to {after.rms:.2g} {unit}, that"
+        f" of what is predicted unseen from {before.held_out_rms:.2g} to"
+        f" {after.held_out_rms:.2g} {unit}."
+    ]
+
+
+def _deciding(explanation: Explanation, one: str, other: str) -> str:
+    head = f"{other} would explain it as well as {one}"
+    position = telling_position(explanation, one, other)
+    if position is None:
+        return f"{head}; what tells them apart: {decided_by(one)}."
+    alpha, beta, apart = position
+    return (
+        f"{head}; the position α = {alpha:g}°, β = {beta:g}° would decide: there they"
+        f" differ by {apart:.0f} σ."
+    )
+
+
+def _unexplained(unknown: Unknown) -> str:
+    channel = CHANNELS[unknown.channel]
+    if not np.isfinite(unknown.correlation):
+        places = ", ".join(map(str, unknown.positions))
+        return (
+            f"{channel} is off in positions {places} by itself; take them again, and"
+            " look for what was different there."
+        )
+    return (
+        f"{channel} follows {unknown.covariate} (correlation"
+        f" {unknown.correlation:+.2f}); a smooth function of {unknown.kind} takes"
+        f" {100 * unknown.share:.0f} % of its variance."
+    )
+
+
+def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
+    """What else a person should know."""
+    out = []
+    if explanation.earth > explanation.search.price and not explanation.sees_earth:
+        out.append("The gyroscopes show the Earth's rate, which is taken into account.")
+    if left:
+        out.append(f"The positions leave open: {', '.join(left)}.")
+    return out
+
+
+def count_said(effects: Mapping[str, int]) -> str:
+    """Ids with how often each was found."""
+    return ", ".join(f"{n} {i}" if n > 1 else i for i, n in effects.items())

@@ -51,14 +51,14 @@ def low_passed(corner_hz: float) -> Source:
         b, a = butter(2, 2 * corner_hz / rate)
         lead = int(10 * rate / corner_hz)
         x: Array = lfilter(b, a, rng.standard_normal((n + lead, 6)), axis=0)[lead:]
-        unit: Array = x / x.std()
-        return unit
+        scaled: Array = x / x.std()
+        return scaled
 
     return source
 
 
 def coloured(knee_hz: float, slope: int) -> Source:
-    """White and f^-slope noise that are equal at the knee; nothing below 1/4 n."""
+    """White noise and f^-slope noise that are equal at the knee; none below 1/4n."""
 
     def source(rng: np.random.Generator, n: int, rate: float) -> Array:
         f = np.fft.rfftfreq(4 * n, 1 / rate)[1:]

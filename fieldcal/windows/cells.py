@@ -14,7 +14,10 @@ sum. Device axes, SI.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.samples import Array, Block
 from fieldcal.windows.trend import line
@@ -22,101 +25,50 @@ from fieldcal.windows.trend import line
 CELL = 0.1
 """Length of a cell, s."""
 
-_CHUNK = 8192
+_CHUNK = 2048
 """Samples summed at a time, so that what is in hand stays in the processor's cache."""
+
+_COARSE = 0.6
+"""Noise, in steps of the resolution, below which the rounding shows."""
 
 _GRACE = 1e-5
 """Part of a cell by which a time may miss its edge through rounding."""
 
 
-class Cells:
-    """Cells of one stretch of samples, in time order; empty cells are left out.
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Cells in time order; empty ones are left out.
 
     Attributes
     ----------
-    n : samples taken in
-    start, end : first and last instant, s of device time; nan before the first sample
+    times : (m,) start of each cell, s of device time
+    sums : (m, 32) n, S, D, m of the six channels, sum and number of the temperatures,
+        and the smallest change from one value to the next but none
     origin : (6,) what the sums are taken about: the first value of each channel
-    finest : (6,) smallest change from one value to the next but none, SI
 
     """
 
-    def __init__(self) -> None:
-        self.n = 0
-        self.start = self.end = np.nan
-        self.origin = np.full(6, np.nan)
-        self.finest = np.full(6, np.inf)
-        self._last = np.full((1, 6), np.nan)
-        self._size = 0
-        self._index = np.zeros(64, dtype=np.int64)
-        self._sums = np.zeros((64, 26))
+    times: Array
+    sums: Array
+    origin: Array
 
     def __len__(self) -> int:
-        return self._size
-
-    def add(self, block: Block) -> None:
-        """Take in the samples of a block that follows the last one."""
-        for first in range(0, len(block), _CHUNK):
-            self._add(block[first : first + _CHUNK])
-
-    def _add(self, block: Block) -> None:
-        x = self._centred(block)
-        if not self.n:
-            self.start = float(block.t[0])
-        self.n += len(block)
-        self.end = float(block.t[-1])
-        step = np.diff(np.vstack([self._last, x]), axis=0)
-        self._last = x[-1:]
-        size = np.abs(step)
-        self.finest = np.fmin(self.finest, np.where(size > 0, size, np.inf).min(axis=0))
-        index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
-        self._accumulate(index, _rows(x, step, block.temperature))
-
-    def _centred(self, block: Block) -> Array:
-        six = np.where(np.isfinite(block.six), block.six, np.nan)
-        for channel in np.flatnonzero(np.isnan(self.origin)):
-            known = np.flatnonzero(~np.isnan(six[:, channel]))
-            if known.size:
-                self.origin[channel] = six[known[0], channel]
-        centred: Array = six - self.origin
-        return centred
-
-    def _accumulate(self, index: np.ndarray, rows: Array) -> None:
-        first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
-        sums = np.add.reduceat(rows, first, axis=0)
-        index = index[first]
-        if self._size and self._index[self._size - 1] == index[0]:
-            self._sums[self._size - 1] += sums[0]
-            index, sums = index[1:], sums[1:]
-        end = self._size + len(index)
-        while end > len(self._index):
-            self._index = np.concatenate([self._index, np.zeros_like(self._index)])
-            self._sums = np.concatenate([self._sums, np.zeros_like(self._sums)])
-        self._index[self._size : end] = index
-        self._sums[self._size : end] = sums
-        self._size = end
-
-    @property
-    def times(self) -> Array:
-        """Start of each cell, (m,) s of device time."""
-        times: Array = self.start + CELL * self._index[: self._size]
-        return times
+        return len(self.times)
 
     @property
     def counts(self) -> Array:
         """Values in each cell, (m, 6)."""
-        return self._sums[: self._size, 0:6]
+        return self.sums[:, 0:6]
 
     @property
     def means(self) -> Array:
         """Mean of each cell less the origin, (m, 6); nan where it has no value."""
-        return _ratio(self._sums[: self._size, 6:12], self.counts)
+        return _ratio(self.sums[:, 6:12], self.counts)
 
     @property
     def short(self) -> Array:
         """Variance of the short-lag noise in each cell, (m, 6); nan where unknown."""
-        sums = self._sums[: self._size]
-        return _ratio(sums[:, 12:18], 2 * sums[:, 18:24])
+        return _ratio(self.sums[:, 12:18], 2 * self.sums[:, 18:24])
 
     @property
     def steady(self) -> Array:
@@ -137,46 +89,154 @@ class Cells:
     @property
     def whole(self) -> int:
         """Cells that are complete: all, or all but the last while it fills."""
-        if self._size < 2:
-            return self._size
+        if len(self) < 2:
+            return len(self)
         filled = self.counts[-1].max() >= 0.9 * np.median(self.counts.max(axis=1))
-        return self._size if filled else self._size - 1
+        return len(self) if filled else len(self) - 1
 
     @property
     def steps(self) -> Array:
         """Successive differences in each cell, (m, 6)."""
-        return self._sums[: self._size, 18:24]
+        return self.sums[:, 18:24]
 
     @property
     def spacing(self) -> float:
         """Device time from one cell to the next on average, s."""
-        span = self._index[self._size - 1] - self._index[0] + 1
-        return float(CELL * span / self._size)
+        return float((self.times[-1] - self.times[0] + CELL) / len(self))
 
     @property
     def noise(self) -> Array:
         """Standard deviation of the short-lag noise, (6,); nan where unknown."""
-        total = self._sums[: self._size].sum(axis=0)
+        total = self.sums.sum(axis=0)
         return np.sqrt(_ratio(total[12:18], 2 * total[18:24]))
 
     @property
     def resolution(self) -> Array:
         """Finest change seen on any axis of the same sensor, (6,); 0 where none."""
-        finest = np.repeat(self.finest.reshape(2, 3).min(axis=1), 3)
-        return np.where(np.isfinite(finest), finest, 0.0)
+        return _resolution(self.finest.min(axis=0, initial=np.inf))
 
     @property
     def mean(self) -> Array:
         """Mean of all values, (6,); nan where not measured."""
-        total = self._sums[: self._size].sum(axis=0)
+        total = self.sums.sum(axis=0)
         mean: Array = self.origin + _ratio(total[6:12], total[0:6])
         return mean
 
     @property
     def temperature(self) -> float:
         """Mean temperature, deg C; nan where unknown."""
-        total = self._sums[: self._size].sum(axis=0)
+        total = self.sums.sum(axis=0)
         return float(_ratio(total[24:25], total[25:26])[0])
+
+    @property
+    def finest(self) -> Array:
+        """Smallest change from one value to the next but none in each cell, (m, 6)."""
+        return self.sums[:, 26:32]
+
+    @property
+    def rounding(self) -> Array:
+        """Resolution where the noise does not hide it, (6,); 0 elsewhere."""
+        return rounding(self.noise, self.finest.min(axis=0, initial=np.inf))
+
+
+class Cells:
+    """Sums up a stream of samples.
+
+    Attributes
+    ----------
+    n : samples taken in
+    start, end : first and last instant, s of device time; nan before the first sample
+
+    """
+
+    def __init__(self) -> None:
+        self.n = 0
+        self.start = self.end = np.nan
+        self._origin = np.full(6, np.nan)
+        self._last = np.full((1, 6), np.nan)
+        self._size = 0
+        self._index = np.zeros(64, dtype=np.int64)
+        self._sums = np.zeros((64, 32))
+
+    @property
+    def table(self) -> Table:
+        """The cells so far, the last one while it fills."""
+        return self._table(self._size)
+
+    def take_complete(self) -> Table:
+        """Hand over the cells that no sample can come to any more, and forget them."""
+        done = max(0, self._size - 1)
+        taken = self._table(done)
+        self._index = self._index[done:].copy()
+        self._sums = self._sums[done:].copy()
+        self._size -= done
+        return taken
+
+    def add(self, block: Block) -> None:
+        """Take in the samples of a block that follows the last one."""
+        for first in range(0, len(block), _CHUNK):
+            self._add(block[first : first + _CHUNK])
+
+    def _add(self, block: Block) -> None:
+        x = self._centred(block)
+        if not self.n:
+            self.start = float(block.t[0])
+        self.n += len(block)
+        self.end = float(block.t[-1])
+        step = np.diff(np.vstack([self._last, x]), axis=0)
+        self._last = x[-1:]
+        index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
+        first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
+        size = np.abs(step)
+        finest = np.where(size > 0, size, np.inf)
+        sums = [
+            np.add.reduceat(_rows(x, step, block.temperature), first, axis=0),
+            np.minimum.reduceat(finest, first, axis=0),
+        ]
+        self._append(index[first], np.hstack(sums))
+
+    def _centred(self, block: Block) -> Array:
+        six = np.where(np.isfinite(block.six), block.six, np.nan)
+        for channel in np.flatnonzero(np.isnan(self._origin)):
+            known = np.flatnonzero(~np.isnan(six[:, channel]))
+            if known.size:
+                self._origin[channel] = six[known[0], channel]
+        centred: Array = six - self._origin
+        return centred
+
+    def _append(self, index: NDArray[np.int64], sums: Array) -> None:
+        if self._size and self._index[self._size - 1] == index[0]:
+            last = self._sums[self._size - 1]
+            last[:26] += sums[0, :26]
+            last[26:] = np.minimum(last[26:], sums[0, 26:])
+            index, sums = index[1:], sums[1:]
+        end = self._size + len(index)
+        if end > len(self._index):
+            more = max(end, 2 * len(self._index)) - len(self._index)
+            self._index = np.pad(self._index, (0, more))
+            self._sums = np.pad(self._sums, ((0, more), (0, 0)))
+        self._index[self._size : end] = index
+        self._sums[self._size : end] = sums
+        self._size = end
+
+    def _table(self, size: int) -> Table:
+        times = self.start + CELL * self._index[:size]
+        return Table(times, self._sums[:size], self._origin)
+
+
+def rounding(noise: Array, finest: Array) -> Array:
+    """Resolution where the noise does not hide it, (6,); 0 elsewhere.
+
+    From the short-lag noise and the smallest change of each channel, (6,) each.
+    """
+    resolution = _resolution(finest)
+    return np.where(np.nan_to_num(noise) < _COARSE * resolution, resolution, 0.0)
+
+
+def _resolution(finest: Array) -> Array:
+    """Smallest change on any axis of the same sensor; 0 where there was none."""
+    sensor = np.repeat(finest.reshape(2, 3).min(axis=1), 3)
+    return np.where(np.isfinite(sensor), sensor, 0.0)
 
 
 def _rows(x: Array, step: Array, temperature: Array) -> Array:

@@ -1,30 +1,61 @@
 """Whether the device has come to rest, before a window begins.
 
-The means of the last second are compared with one another: at rest they differ by no
-more than the device's own noise, which is the smallest seen so far.
+Every 0.1 s the means y of the last 0.8 s of cells are looked at:
+
+    a = sqrt(mean of (y_i - y_i-1)^2 / 2)          noise of a cell                 (1)
+    d = sd of y about their straight line          what goes to and fro            (2)
+    e = their slope times 0.8 s                    what goes on                    (3)
+    w = mean rate less that of the last rest       what turns evenly               (4)
+
+Rest is d, e and w of every channel within what its noise explains. The noise is the
+smallest tenth of a of the last 20 s, so it is known from the first second on, a turn
+does not spoil it, and a device that became noisier is at rest again after a while.
 """
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 
 from fieldcal.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells
+from fieldcal.windows.cells import CELL, Cells, rounding
 from fieldcal.windows.limits import Limits
 
-SETTLE = 8
-"""Cells that must agree before the device is called still."""
+SPAN = 8
+"""Cells that are looked at together: 0.8 s."""
 
-TIMES = 6.0
-"""Spread, in multiples of the quietest seen, that still is rest."""
+MEMORY = 200
+"""Cells the noise is remembered for: 20 s."""
+
+SPREAD, SLOPE = 3.5, 6.0
+"""Multiples of the noise within which (2) and (3) are rest."""
+
+RATE = 0.006
+"""Change of a gyroscope's bias from one rest to the next, rad/s: more is a turn."""
+
+EVEN = 30
+"""Cells after which a rate that does not change is no turn by hand but a bias: 3 s."""
+
+_SMALLEST = 1.6
+"""Noise over the smallest tenth of its estimates (1) in 20 s."""
+
+_UNKNOWN = 0.2
+"""Part of the limits that a device never seen at rest must stay within."""
+
+_TIME = np.arange(SPAN) - (SPAN - 1) / 2
+_SLOPE = SPAN * _TIME / (_TIME @ _TIME)
+"""Slope times duration of SPAN values, as their weighted sum."""
 
 
 class Stillness:
     """Watch a stream and say whether the device is at rest.
 
+    What it says does not depend on how the samples were cut into blocks.
+
     Attributes
     ----------
-    meter : present motion as part of what is allowed; below 1 is still
+    meter : present motion as part of what is allowed; below 1 is rest
     since : device time from which on it has been at rest, s; None while it moves
 
     """
@@ -32,8 +63,11 @@ class Stillness:
     def __init__(self, limits: Limits | None = None) -> None:
         self._limits = limits or Limits()
         self._cells = Cells()
-        self._seen = 0
-        self._quiet: Array = np.full(6, np.inf)
+        self._recent: deque[tuple[Array, Array]] = deque(maxlen=SPAN)
+        self._finest = np.full(6, np.inf)
+        self._noises: deque[Array] = deque(maxlen=MEMORY)
+        self._rest: Array | None = None
+        self._even = 0
         self.meter = np.inf
         self.since: float | None = None
 
@@ -43,26 +77,61 @@ class Stillness:
         return self.since is not None
 
     def add(self, block: Block) -> None:
-        """Take in the block that follows."""
+        """Take in the block that follows; costs as much as the block is long."""
         self._cells.add(block)
-        complete = len(self._cells) - 1
-        while self._seen < complete:
-            self._seen += 1
-            self._judge(self._seen)
+        complete = self._cells.take_complete()
+        for time, mean, short, finest in zip(
+            complete.times,
+            complete.means,
+            complete.short,
+            complete.finest,
+            strict=True,
+        ):
+            self._recent.append((np.nan_to_num(mean), np.nan_to_num(short)))
+            self._finest = np.minimum(self._finest, finest)
+            if len(self._recent) == SPAN:
+                self._judge(float(time))
 
-    def _judge(self, end: int) -> None:
-        if end < SETTLE:
-            return
-        means = self._cells.means[end - SETTLE : end]
-        short = self._cells.short[end - SETTLE : end]
-        if np.isnan(means).all():
-            return
-        noise = np.sqrt(np.nan_to_num(short).mean(axis=0))
-        self._quiet = np.minimum(self._quiet, np.where(noise > 0, noise, np.inf))
-        spread = np.nan_to_num(np.ptp(np.nan_to_num(means), axis=0))
-        allowed = np.minimum(TIMES * np.nan_to_num(self._quiet), self._limits.noise)
-        self.meter = float(np.max(spread / np.where(allowed > 0, allowed, np.inf)))
+    def _judge(self, time: float) -> None:
+        y, short = (np.array(rows) for rows in zip(*self._recent, strict=True))
+        self._noises.append(np.sqrt((np.diff(y, axis=0) ** 2).mean(axis=0) / 2))  # (1)
+        noise = self._noise(np.sqrt(short.mean(axis=0)))
+        self.meter = max(self._unrest(y, noise), self._turning(y[:, 3:], noise[3:]))
         if self.meter > 1:
             self.since = None
         elif self.since is None:
-            self.since = float(self._cells.times[end - SETTLE] + CELL)
+            self.since = time - (SPAN - 1) * CELL
+        if self.since is not None and time - self.since > 2 * SPAN * CELL:
+            self._rest = y[:, 3:].mean(axis=0)
+
+    def _noise(self, sampled: Array) -> Array:
+        smallest = _SMALLEST * np.quantile(self._noises, 0.1, axis=0)
+        noise: Array = np.maximum(smallest, rounding(sampled, self._finest))
+        return noise
+
+    def _unrest(self, y: Array, noise: Array) -> float:
+        """(2) and (3) over what the noise allows, within the limits of sanity."""
+        slope = _SLOPE @ y
+        about = y - y.mean(axis=0) - np.outer(_TIME, slope) / SPAN
+        spread = np.sqrt((about**2).sum(axis=0) / (SPAN - 2))
+        known = 1.0 if self._rest is not None else _UNKNOWN
+        bound = known * self._limits.noise
+        ratio = np.maximum(
+            spread / _or_inf(np.minimum(SPREAD * noise, bound)),
+            np.abs(slope) / _or_inf(np.minimum(SLOPE * noise, bound)),
+        )
+        return float(ratio.max())
+
+    def _turning(self, rates: Array, noise: Array) -> float:
+        """(4) over what a bias may change by; an even rate that lasts is a bias."""
+        if self._rest is None:
+            return 0.0
+        off = np.abs(rates.mean(axis=0) - self._rest) / (RATE + SPREAD * noise)
+        even = np.abs(np.diff(rates, axis=0)).max(axis=0) <= 3 * SLOPE * noise
+        self._even = self._even + 1 if off.max() > 1 and even.all() else 0
+        return float(off.max()) if self._even < EVEN else 0.0
+
+
+def _or_inf(allowed: Array) -> Array:
+    """What is allowed; a channel without noise is not judged."""
+    return np.where(allowed > 0, allowed, np.inf)

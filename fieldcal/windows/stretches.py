@@ -1,34 +1,115 @@
-"""Still stretches of a recording that nobody marked."""
+"""Still stretches of a recording that nobody marked.
+
+    r_i = max over channels of sd(y over 1 s about i) / quietest tenth of them     (1)
+
+y are cell means. Rest and turns make two heaps of log r; the valley between them (Otsu
+1979) tells one from the other, be the rest on a table or in a hand. Each stretch is
+then held to its own noise, to the level of the gyroscopes at rest, and to the test that
+a window must pass, so that no sample of a turn gets in.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from fieldcal.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells
+from fieldcal.windows.cells import CELL, Cells, Table
+from fieldcal.windows.limits import Limits
+from fieldcal.windows.verdict import judge
 
-_SPAN = 5
-"""Cells to either side whose spread tells rest from motion."""
+_SPAN = 10
+"""Cells whose spread tells rest from motion: 1 s."""
+
+_LEAST, _MOST = 4.0, 64.0
+"""Bounds on the valley, in multiples of the quietest: a recording may have no turn."""
+
+_OWN = 4.0
+"""Spread, in multiples of what is usual in a stretch, that still belongs to it."""
+
+_RATE = 0.02
+"""Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
+
+Runs = list[tuple[int, int]]
 
 
 def still_stretches(
-    block: Block, min_seconds: float = 2.0
+    block: Block, min_seconds: float = 2.0, limits: Limits | None = None
 ) -> list[tuple[float, float]]:
-    """Find the stretches, (start, end) in s of device time, in which it was still."""
+    """Find where the device was still, (start, end) in s of device time, in order.
+
+    Every stretch lasts `min_seconds`, at least 1 s, and passes `average`.
+    """
+    cells = _cells(block)
+    if len(cells) < 2 * _SPAN:
+        return []
+    means = cells.steady
+    view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
+    spread = view.std(axis=-1)
+    shortest = max(1.0, min_seconds)
+    found: list[tuple[float, float]] = []
+    for first, last in _at_rest(spread, view.mean(axis=-1)):
+        start = float(cells.times[first + _SPAN // 2])
+        end = float(cells.times[last - 1 + _SPAN // 2])
+        found += _passing(block.between(start, end), shortest, limits or Limits())
+    return found
+
+
+def _at_rest(spread: Array, level: Array) -> Runs:
+    """Runs of spans, [first, last), at rest by (1), by their own noise and rate."""
+    quiet = np.quantile(spread, 0.1, axis=0)
+    scale = np.where(quiet > 0, quiet, np.inf)
+    ratio = (spread / scale).max(axis=1)
+    valley = np.clip(_valley(ratio), _LEAST, _MOST)
+    kept: Runs = []
+    for first, last in _runs(ratio < valley):
+        own = np.maximum(np.quantile(spread[first:last], 0.3, axis=0), quiet)
+        own = np.where(own > 0, own, np.inf)
+        calm = (spread[first:last] < _OWN * own).all(axis=1)
+        kept += [(first + a, first + b) for a, b in _runs(calm)]
+    if not kept:
+        return []
+    rates = np.array([np.median(level[a:b, 3:], axis=0) for a, b in kept])
+    weights = np.array([b - a for a, b in kept])
+    rest = np.median(np.repeat(rates, weights, axis=0), axis=0)
+    turning = np.nan_to_num(np.abs(rates - rest)).max(axis=1) > _RATE
+    return [run for run, turns in zip(kept, turning, strict=True) if not turns]
+
+
+def _valley(ratio: Array) -> float:
+    """Threshold that splits the logarithms of `ratio` into two heaps best."""
+    logs = np.sort(np.log(np.maximum(ratio, 1e-3)))
+    n = np.arange(1, len(logs))
+    below = np.cumsum(logs)[:-1] / n
+    above = (logs.sum() - n * below) / (len(logs) - n)
+    between = n * (len(logs) - n) * (above - below) ** 2
+    k = int(np.argmax(between))
+    return float(np.exp((below[k] + above[k]) / 2))
+
+
+def _passing(
+    block: Block, shortest: float, limits: Limits
+) -> list[tuple[float, float]]:
+    """Parts of a stretch that pass as windows: it is cut where it was disturbed."""
+    if not len(block) or block.t[-1] - block.t[0] < shortest:
+        return []
+    worst = judge(_cells(block), limits).worst
+    if worst.ratio <= 1:
+        return [(float(block.t[0]), float(np.nextafter(block.t[-1], np.inf)))]
+    after = max(worst.at + worst.seconds, float(block.t[0]) + CELL)
+    return [
+        *_passing(block.between(-np.inf, worst.at), shortest, limits),
+        *_passing(block.between(after, np.inf), shortest, limits),
+    ]
+
+
+def _cells(block: Block) -> Table:
     cells = Cells()
     cells.add(block)
-    means = np.nan_to_num(cells.means)
-    if len(means) <= 2 * _SPAN:
-        return []
-    view = np.lib.stride_tricks.sliding_window_view(means, 2 * _SPAN + 1, axis=0)
-    spread = view.std(axis=-1)
-    quiet = np.quantile(spread, 0.1, axis=0)
-    ratio = (spread / np.where(quiet > 0, quiet, np.inf)).max(axis=1)
-    return _runs(ratio < 6.0, cells.times[_SPAN:-_SPAN], min_seconds)
+    return cells.table
 
 
-def _runs(still: Array, times: Array, shortest: float) -> list[tuple[float, float]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
-    pairs = zip(edges[::2], edges[1::2], strict=True)
-    found = [(float(times[a]), float(times[b - 1] + CELL)) for a, b in pairs]
-    return [(a, b) for a, b in found if b - a >= shortest]
+def _runs(flags: Any) -> Runs:
+    edges = np.flatnonzero(np.diff(flags.astype(int), prepend=0, append=0))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.errors import Moved
 from fieldcal.samples import CHANNELS, Array
-from fieldcal.windows.cells import CELL, Cells
+from fieldcal.windows.cells import CELL, Table
 from fieldcal.windows.disturbance import Kind, Statistic, pushes, repeats, shakes, steps
 from fieldcal.windows.limits import Limits
 from fieldcal.windows.quiet import Quiet, quiet
@@ -23,9 +23,6 @@ EARLY = 8.0
 
 FEWEST = 30
 """Cells whose own noise is known well enough to judge them."""
-
-_COARSE = 0.6
-"""Noise, in steps of the resolution, below which the rounding shows."""
 
 _PRESENT = 10
 """Cells that are the present."""
@@ -93,7 +90,7 @@ class Verdict:
     quiet: Quiet | None
 
 
-def judge(cells: Cells, limits: Limits, before: Quiet | None = None) -> Verdict:
+def judge(cells: Table, limits: Limits, before: Quiet | None = None) -> Verdict:
     """Judge the samples so far by their own noise and that of the windows before."""
     m = cells.whole
     if m < FEWEST:
@@ -114,10 +111,9 @@ def judge(cells: Cells, limits: Limits, before: Quiet | None = None) -> Verdict:
     )
 
 
-def _tests(cells: Cells, means: Array, noise: Quiet, allowed: float) -> list[Statistic]:
+def _tests(cells: Table, means: Array, noise: Quiet, allowed: float) -> list[Statistic]:
     m = len(means)
-    coarse = np.nan_to_num(cells.noise) < _COARSE * cells.resolution
-    least = np.where(coarse, cells.resolution, 0.0) / allowed
+    least = cells.rounding / allowed
     return [
         *pushes(means, noise, least),
         *steps(means, noise, least),
@@ -125,7 +121,7 @@ def _tests(cells: Cells, means: Array, noise: Quiet, allowed: float) -> list[Sta
     ]
 
 
-def _stuck(cells: Cells) -> list[Departure]:
+def _stuck(cells: Table) -> list[Departure]:
     """Runs of one value, where the axes of a sensor are noisier than its resolution."""
     sampled = np.nan_to_num(cells.noise)
     sensor = np.repeat(np.median(sampled.reshape(2, 3), axis=1), 3)
@@ -145,7 +141,7 @@ def _stuck(cells: Cells) -> list[Departure]:
     ]
 
 
-def _worst(cells: Cells, test: Statistic, allowed: float) -> Departure:
+def _worst(cells: Table, test: Statistic, allowed: float) -> Departure:
     first, channel = divmod(int(np.argmax(test.z)), test.z.shape[1])
     cell = first + test.cells if test.kind == "step" else first
     return Departure(
@@ -160,7 +156,7 @@ def _worst(cells: Cells, test: Statistic, allowed: float) -> Departure:
 
 
 def _beyond_drift(
-    cells: Cells, means: Array, noise: Quiet, limits: Limits
+    cells: Table, means: Array, noise: Quiet, limits: Limits
 ) -> Departure:
     """Change over the window, allowed for what noise can pretend."""
     laid = line(means)
@@ -172,13 +168,13 @@ def _beyond_drift(
         "drift",
         channel,
         float(cells.times[0]),
-        cells.end - cells.start,
+        CELL * len(cells),
         float(change[channel]),
         float(noise.allan[-1][channel]),
     )
 
 
-def _beyond_noise(cells: Cells, scatter: Array, limits: Limits) -> Departure:
+def _beyond_noise(cells: Table, scatter: Array, limits: Limits) -> Departure:
     ratio = scatter / limits.noise
     channel = int(np.argmax(ratio))
     means = np.abs(np.nan_to_num(cells.means[:, channel]))

@@ -63,24 +63,26 @@ class Window:
     ) -> None:
         self._limits = limits or Limits()
         self._before = noise
-        self._cells = Cells()
+        self._sum = Cells()
+        self._cells = self._sum.table
         self._error: MeanError | None = None
         self._verdict: Verdict | None = None
 
     def add(self, block: Block) -> None:
         """Take in the block that follows; costs as much as the block is long."""
-        self._cells.add(block)
+        self._sum.add(block)
+        self._cells = self._sum.table
         self._error = self._verdict = None
 
     @property
     def n(self) -> int:
         """Samples so far."""
-        return self._cells.n
+        return self._sum.n
 
     @property
     def elapsed(self) -> float:
         """Device time so far, s."""
-        return self._cells.end - self._cells.start if self.n else 0.0
+        return self._sum.end - self._sum.start if self.n else 0.0
 
     @property
     def mean(self) -> Array:
@@ -122,7 +124,7 @@ class Window:
     def moved(self) -> Moved | None:
         """The disturbance, if there was one; None while the window is good."""
         worst = self._judged().worst
-        return worst.error(self._cells.start) if worst.ratio > 1 else None
+        return worst.error(self._sum.start) if worst.ratio > 1 else None
 
     @property
     def noise(self) -> Noise | None:
@@ -171,7 +173,7 @@ class Window:
             )
         if moved := self.moved:
             raise moved
-        start, end = self._cells.start, self._cells.end
+        start, end = self._sum.start, self._sum.end
         return Average(self.mean, self.covariance, self.temperature, self.n, start, end)
 
     def _judged(self) -> Verdict:

@@ -80,6 +80,9 @@ def solve(
             f"method {method!r} with tilt {tilt!r} is unknown: methods are "
             f"{join(METHODS)}, tilts are {join(TILTS)}"
         )
+    for degrees in (level_sigma_deg, heading_sigma_deg, angle_sigma_deg):
+        if degrees is not None and not 0 <= degrees < 90:
+            raise InputError(f"an uncertainty of {degrees:g}° is none: give 0 to 90°")
     if angle_sigma_deg:
         observations = loosely_set(observations, angle_sigma_deg)
     rows = np.flatnonzero(~observations.rotating)

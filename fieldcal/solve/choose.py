@@ -230,10 +230,10 @@ def _gyroscopes(
         None if heading_sigma_deg is None else float(np.deg2rad(heading_sigma_deg))
     )
     found = gyroscopes.bias(observations, heading, as_printed)
-    if observations.grade == "tactical":
-        return found
-    note = (
-        "the Earth's rate gives a scale factor only with two known positions and the "
-        "latitude: the gyroscopes have a bias only"
-    )
+    note = gyroscopes.NO_SCALE
+    if observations.grade == "navigation":
+        note = (
+            "gyr_scale is not determined: the Earth's rate gives it only with two "
+            "known positions and the latitude"
+        )
     return replace(found, warnings=(*found.warnings, note))

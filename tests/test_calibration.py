@@ -1,10 +1,7 @@
 """Calibrations applied, compared, written and read back."""
 
 import copy
-import doctest
 import json
-import shutil
-from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -12,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from observed import BIAS, COUPLING, SCALE, SHARED, G, observe, outputs
+from observed import BIAS, COUPLING, SCALE, G, observe, outputs
 
 from fieldcal.calibration import Calibration, Nominal, compare
 from fieldcal.calibration.document import schema
@@ -216,14 +213,3 @@ def test_gravity_of_another_place_shows_as_scale() -> None:
     u = outputs(WIDE, g=G * 1.001)
     result = solve(observe(WIDE, u), tilt="none")
     np.testing.assert_allclose(result.vector("acc_scale")[0], SCALE * 1.001, rtol=1e-9)
-
-
-def test_five_lines_of_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    session = SHARED / "practice" / "p09"
-    if not session.is_dir():
-        pytest.skip(f"practice sessions are not here: {session}")
-    shutil.copytree(session, tmp_path / "bench-7")
-    monkeypatch.chdir(tmp_path)
-    page = Path(__file__).parents[1] / "docs" / "estimators.md"
-    failed, tried = doctest.testfile(str(page), module_relative=False)
-    assert tried and not failed

@@ -58,7 +58,8 @@ def solve(
     level_sigma_deg : how level the base was made, about each level axis; the tilt is
         then that of the base, within this
     heading_sigma_deg : how well z points north; not known for tactical grade if None
-    angle_sigma_deg : how well the angles of each position are set, position by position
+    angle_sigma_deg : how well the angles of each position are set, about each level
+        axis and independently from position to position
 
     Raises
     ------

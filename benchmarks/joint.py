@@ -6,7 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
-from fieldcal.positions import FIVE, SETS, WIDE, Position
+from fieldcal.planner import Ladder, best_positions
+from fieldcal.positions import FIVE, TWO, WIDE, Position
 from fieldcal.samples import Array
 from fieldcal.solve.design import Model, design, predict
 from fieldcal.solve.five_position import axis_estimates
@@ -61,10 +62,11 @@ def against_the_bound() -> None:
     """Print rmse over the bound, pulls, coverage and chi2 for three position sets."""
     print(f"{SEEDS} seeds, {SIGMA:g} m/s^2 on each mean")
     print(f"{'positions, tilt':26} rmse/bound  pull std    95 % holds   chi2/dof")
-    cases = [("two", Model()), ("five", OFFSET), ("wide", OFFSET),
-             ("wide", Model("base_tilt"))]  # fmt: skip
-    for name, model in cases:
-        places = SETS[name]
+    planned = best_positions(5, Ladder(), G)
+    cases = [("two", TWO, Model()), ("five", FIVE, OFFSET), ("wide", WIDE, OFFSET),
+             ("planned", planned, OFFSET),
+             ("planned", planned, Model("base_tilt"))]  # fmt: skip
+    for name, places, model in cases:
         found, error, sigma = solve(model, places, noisy(model, places, SEEDS))
         rmse = np.sqrt((error**2).mean(axis=0)) / bound(model, places)
         pulls = (error / sigma).std(axis=0)

@@ -1,6 +1,10 @@
 """The joint estimate against its bound, its statements against many seeds."""
 
+import doctest
+import subprocess
+import sys
 from collections.abc import Callable
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -9,12 +13,14 @@ from hypothesis import strategies as st
 from observed import BIAS, COUPLING, SCALE, G, observe, outputs, practice
 from test_closed_form import MOUNTINGS, SPREAD_OUT, TILTED
 
+import fieldcal
 from fieldcal.errors import InputError, NotObservable
 from fieldcal.positions import FIVE, SIX_FACES, TWO, WIDE, Position
 from fieldcal.samples import Array
-from fieldcal.solve import solve
+from fieldcal.solve import Observations, choose, scatter, solve
 from fieldcal.solve.design import Model, Tilt, design, predict
 from fieldcal.solve.joint import Solution, estimate, joint
+from fieldcal.windows import Average
 
 SIGMA = 1e-3
 SIX = tuple(
@@ -194,11 +200,9 @@ def test_angles_that_are_loosely_set_are_in_the_uncertainty() -> None:
     rng = np.random.default_rng(12)
     pulls, chi2 = [], []
     for _ in range(150):
-        set_to = [
-            Position.deg(*(np.array(p.degrees) + 0.1 * rng.standard_normal(2)))
-            for p in NINE
-        ]
-        u = outputs(set_to) + SIGMA * rng.standard_normal((9, 3))
+        f = (outputs(NINE) - BIAS) / SCALE
+        f += np.cross(np.deg2rad(0.1) * rng.standard_normal((9, 3)), f)
+        u = BIAS + SCALE * f + SIGMA * rng.standard_normal((9, 3))
         result = solve(observe(NINE, u), tilt="none", angle_sigma_deg=0.1)
         pulls.append((result.values[:6] - [*BIAS, *SCALE]) / result.sigma[:6])
         chi2.append(result.chi2 / result.dof)
@@ -229,6 +233,8 @@ def test_what_is_no_method_is_refused() -> None:
     seen = observe(TWO, outputs(TWO))
     with pytest.raises(InputError, match="methods are"):
         solve(seen, method="guess")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="0 to 90°"):
+        solve(seen, level_sigma_deg=-1.0)
     with pytest.raises(InputError, match="prints no joint"):
         solve(seen, method="joint", as_printed=True)
     with pytest.raises(NotObservable, match="five positions"):
@@ -258,3 +264,25 @@ def test_the_practice_session_with_a_stuck_axis_loses_that_position_only() -> No
     assert any("position 5" in w and "no weight" in w for w in result.warnings)
     value, sigma = result.vector("acc_bias")
     assert (np.abs(value - answers["truth"]["acc_bias"]) < 3 * sigma).all()
+
+
+def test_a_window_too_short_to_know_its_correlations_is_still_used() -> None:
+    rng = np.random.default_rng(2)
+    u = outputs(WIDE)
+    averages = []
+    for row in u:
+        few = np.hstack([row, np.zeros(3)]) + SIGMA * rng.standard_normal((3, 6))
+        averages.append(Average(few.mean(axis=0), np.cov(few.T) / 3, 20.0, 3, 0.0, 1.0))
+    result = solve(Observations.of(WIDE, averages, G), tilt="none")
+    assert np.isfinite(result.sigma).all()
+
+
+def test_importing_the_estimators_loads_no_scipy() -> None:
+    code = "import sys, fieldcal.solve; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("module", [choose, scatter, fieldcal])
+def test_examples_in_the_text(module: ModuleType) -> None:
+    failed, tried = doctest.testmod(module, extraglobs={"np": np})
+    assert not failed and (tried or module is fieldcal)

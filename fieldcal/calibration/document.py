@@ -113,8 +113,8 @@ def _parameters(
     for group, entry in groups.items():
         where = f"parameters.{group}"
         entry = _mapping(entry, where)
-        parts = entry.get("names", COMPONENTS.get(group, ((),))[0])
-        parts = _texts(list(parts), f"{where}.names")
+        usual = list(COMPONENTS[group][0]) if group in COMPONENTS else None
+        parts = _texts(entry.get("names", usual), f"{where}.names")
         numbers = entry.get("value")
         if not isinstance(numbers, list) or len(numbers) != len(parts):
             raise InputError(
@@ -122,7 +122,7 @@ def _parameters(
             )
         unit = _at(entry, "unit", str, f"{where}.unit")
         known = [p for p, v in zip(parts, numbers, strict=True) if v is not None]
-        units = entry.get("units", [unit] * len(known))
+        units = _texts(entry.get("units", [unit] * len(known)), f"{where}.units")
         if len(units) != len(known):
             raise InputError(f"result.json: {where}.units does not fit its values")
         for part, u in zip(known, units, strict=True):

@@ -45,6 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="gyroscopes' scale factor and cross-coupling from the turns between the "
         "windows; auto (default) where they give it",
     )
+    for option, what in (
+        ("--level", "how level the base was made, 1σ about each axis"),
+        ("--angles", "how well each position's angles were set, 1σ"),
+        ("--heading", "how well z points north, 1σ; for the gyroscopes"),
+    ):
+        add(option, type=float, metavar="DEG", help=what)
     add(
         "--as-printed",
         action="store_true",
@@ -70,6 +76,9 @@ def run(args: argparse.Namespace) -> int:
         tilt=args.tilt,
         cross=args.cross,
         as_printed=args.as_printed,
+        level_sigma_deg=args.level,
+        heading_sigma_deg=args.heading,
+        angle_sigma_deg=args.angles or 0.0,
     )
     if args.turns != "no" and not args.as_printed and seen.has_gyr:
         found = _with_turns(found, session, still, seen, args.turns == "yes")

@@ -58,7 +58,8 @@ def solve(
     level_sigma_deg : how level the base was made, about each level axis; the tilt is
         then that of the base, within this
     heading_sigma_deg : how well z points north; not known for tactical grade if None
-    angle_sigma_deg : how well the angles of each position are set, position by position
+    angle_sigma_deg : how well the angles of each position are set, about each level
+        axis and independently from position to position
 
     Raises
     ------
@@ -80,6 +81,9 @@ def solve(
             f"method {method!r} with tilt {tilt!r} is unknown: methods are "
             f"{join(METHODS)}, tilts are {join(TILTS)}"
         )
+    for degrees in (level_sigma_deg, heading_sigma_deg, angle_sigma_deg):
+        if degrees is not None and not 0 <= degrees < 90:
+            raise InputError(f"an uncertainty of {degrees:g}° is none: give 0 to 90°")
     if angle_sigma_deg:
         observations = loosely_set(observations, angle_sigma_deg)
     rows = np.flatnonzero(~observations.rotating)
@@ -227,10 +231,10 @@ def _gyroscopes(
         None if heading_sigma_deg is None else float(np.deg2rad(heading_sigma_deg))
     )
     found = gyroscopes.bias(observations, heading, as_printed)
-    if observations.grade == "tactical":
-        return found
-    note = (
-        "the Earth's rate gives a scale factor only with two known positions and the "
-        "latitude: the gyroscopes have a bias only"
-    )
+    note = gyroscopes.NO_SCALE
+    if observations.grade == "navigation":
+        note = (
+            "gyr_scale is not determined: the Earth's rate gives it only with two "
+            "known positions and the latitude"
+        )
     return replace(found, warnings=(*found.warnings, note))

@@ -185,19 +185,18 @@ def design(
 
 
 def loosely_set(observations: Observations, sigma_deg: float) -> Observations:
-    """Observations whose angles are uncertain, independently in each position.
+    """Observations of a device that stands a little off its angles in each position.
 
-    The error of an angle acts along the derivative of the force by it; that is added to
-    the accelerometers' covariance. Positions without known angles stay as they are.
+    The error is independent from position to position and alike about every level
+    axis; it is added to the accelerometers' covariance. Positions without known angles
+    stay as they are.
     """
     known = np.flatnonzero(observations.oriented)
-    places = [observations.positions[i] for i in known]
-    _, by_angle = tilted_forces(
-        "angle_offset", places, observations.gravity, observations.mounting, np.zeros(2)
-    )
-    moved = sigma_deg * np.array(observations.nominal.acc_scale)[:, None] * by_angle
+    up = observations.forces[known]
+    level = observations.gravity**2 * np.eye(3) - up[:, :, None] * up[:, None, :]
+    scale = np.array(observations.nominal.acc_scale)
     covariance = observations.covariance.copy()
-    covariance[known, :3, :3] += moved @ np.swapaxes(moved, -1, -2)
+    covariance[known, :3, :3] += (sigma_deg * RAD) ** 2 * np.outer(scale, scale) * level
     return replace(observations, covariance=covariance)
 
 

@@ -96,58 +96,60 @@ def solve(
     batch = y.shape[:-2]
     x = np.broadcast_to(start, (*batch, start.shape[-1])).copy()
     held = np.full(x.shape[-1], np.inf) if prior is None else prior
-    rows, r = _weighted(model, y, white, x, held)
+    rows, r, residual = _weighted(model, y, white, x, held)
     cost = (r**2).sum(axis=-1)
     for _ in range(steps):
         basis, back = _decompose(rows)
         z = np.swapaxes(basis, -1, -2) @ r[..., None]
         step = (back @ z)[..., 0]
-        x, rows, r, cost = _descend(model, y, white, held, (x, rows, r, cost), step)
+        x, rows, r, residual, cost = _descend(model, y, white, held, x, cost, step)
         if float(np.abs(z).max(initial=0.0)) < SMALL:
             break
     basis, back = _decompose(rows)
     first = rows.reshape(-1, *rows.shape[-2:])[0]
     _, determined, kept, _ = linear.decompose(first)
-    residual = y - model(x)[0]
     condition = float(kept[0] / kept[-1]) if len(kept) else np.inf
     return Fit(x, residual, r, basis, back, determined, condition)
 
 
-State = tuple[Array, Array, Array, Array]
-
-
 def _descend(
-    model: Predict, y: Array, white: Array, held: Array, now: State, step: Array
-) -> State:
+    model: Predict,
+    y: Array,
+    white: Array,
+    held: Array,
+    x: Array,
+    cost: Array,
+    step: Array,
+) -> tuple[Array, Array, Array, Array, Array]:
     """Take the step, halved for those fits whose sum of squares it would raise."""
-    x, _, _, cost = now
     length = np.ones(x.shape[:-1])
     for _ in range(8):
         moved = x + length[..., None] * step
-        rows, r = _weighted(model, y, white, moved, held)
+        rows, r, residual = _weighted(model, y, white, moved, held)
         new = (r**2).sum(axis=-1)
         worse = new > cost * (1 + 1e-9) + 1e-12
         if not worse.any():
             break
         length = np.where(worse, length / 2, length)
-    return moved, rows, r, new
+    return moved, rows, r, residual, new
 
 
 def _weighted(
     model: Predict, y: Array, white: Array, x: Array, held: Array
-) -> tuple[Array, Array]:
-    """Weighted design (..., m, p) and residual (..., m), priors as further rows."""
+) -> tuple[Array, Array, Array]:
+    """Weighted design (..., m, p), its residual (..., m), and y - u, (..., n, 3)."""
     u, design = model(x)
     p = x.shape[-1]
     rows = (white @ design).reshape(*x.shape[:-1], -1, p)
-    r = (white @ (y - u)[..., None]).reshape(*x.shape[:-1], -1)
+    residual = y - u
+    r = (white @ residual[..., None]).reshape(*x.shape[:-1], -1)
     known = np.flatnonzero(np.isfinite(held))
     if len(known):
         extra = np.broadcast_to(np.eye(p)[known] / held[known, None],
                                 (*x.shape[:-1], len(known), p))  # fmt: skip
         rows = np.concatenate([rows, extra], axis=-2)
         r = np.concatenate([r, -x[..., known] / held[known]], axis=-1)
-    return rows, r
+    return rows, r, residual
 
 
 def _decompose(rows: Array) -> tuple[Array, Array]:

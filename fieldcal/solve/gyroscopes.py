@@ -30,6 +30,11 @@ from fieldcal.solve import linear, scatter
 from fieldcal.solve.estimate import Estimate, axes, not_determined
 from fieldcal.solve.observations import ACC, GYR, Observations
 
+NO_SCALE = (
+    "gyr_scale is not determined: the Earth's rate is too weak for it in windows like "
+    "these; the turns between the positions give it"
+)
+
 USEFUL = 0.1
 """A scale factor less well known than this is not offered."""
 

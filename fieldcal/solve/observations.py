@@ -24,6 +24,9 @@ from fieldcal.windows import Average
 
 Grade = Literal["tactical", "navigation"]
 Index = NDArray[np.integer[Any]]
+SINGULAR = 1e-6
+"""Least eigenvalue of a correlation matrix that is taken as known."""
+
 ACC, GYR = slice(0, 3), slice(3, 6)
 
 
@@ -94,7 +97,7 @@ class Observations:
         return cls(
             tuple(positions),
             np.array([a.mean for a in averages]),
-            np.array([a.covariance for a in averages]),
+            np.array([_regular(a.covariance) for a in averages]),
             gravity,
             np.array([a.temperature for a in averages]),
             np.array([(a.start + a.end) / 2 for a in averages]),
@@ -212,3 +215,20 @@ class Observations:
                 f"the {sensor}' means have no uncertainty above 0 {UNITS[three][0]}: "
                 "a window of repeated equal values tells nothing about its noise"
             )
+
+
+def _regular(covariance: Array) -> Array:
+    """Drop correlations that a window is too short to know; they make it singular."""
+    out = covariance.copy()
+    for three in (ACC, GYR):
+        block = out[three, three]
+        if not np.isfinite(block).all():
+            continue
+        size = np.sqrt(np.diag(block))
+        if not (size > 0).all():
+            continue
+        least = np.linalg.eigvalsh(block / np.outer(size, size)).min()
+        if least < SINGULAR:
+            out[three, three] = np.diag(size**2)
+            out[:3, 3:] = out[3:, :3] = 0.0
+    return out

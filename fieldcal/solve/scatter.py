@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.gravity import G0
 from fieldcal.samples import UNITS, Array
 from fieldcal.solve.estimate import Estimate
 from fieldcal.solve.observations import Observations
@@ -95,7 +96,17 @@ def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
     return (
         f"the {what} disagree with the model beyond their windows' noise "
         f"(chi2 {chi2:.0f} with dof {dof}): an extra scatter of {spread:.2g} {unit} is "
-        f"in the uncertainties{few}, and diagnosis can say where it comes from"
+        f"in the uncertainties{few}, and {_cause(what, spread)}"
+    )
+
+
+def _cause(what: str, spread: float) -> str:
+    if what != "positions":
+        return "diagnosis can say where it comes from"
+    angle = np.rad2deg(spread / G0)
+    return (
+        f"either the angles are set no better than {angle:.1g}°, or diagnosis can say "
+        "what the model leaves out"
     )
 
 

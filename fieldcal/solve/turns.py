@@ -111,6 +111,9 @@ def with_turns(calibration: Calibration, found: Estimate) -> Calibration:
     if "gyr_bias" in calibration.groups:
         found = found.only(np.array([not n.startswith("gyr_b") for n in found.names]))
     groups = {n.partition(".")[0] for n in found.names}
+    said = calibration.warnings
+    if "gyr_scale" in groups:
+        said = tuple(w for w in said if w != gyroscopes.NO_SCALE)
     kept = [
         i for i, n in enumerate(calibration.names) if n.partition(".")[0] not in groups
     ]
@@ -127,7 +130,7 @@ def with_turns(calibration: Calibration, found: Estimate) -> Calibration:
             *(calibration.units[i] for i in kept),
             *(UNITS[n.partition(".")[0]] for n in found.names),
         ),
-        warnings=(*calibration.warnings, *found.warnings),
+        warnings=(*said, *found.warnings),
         info={**calibration.info, "turns": {"chi2": found.chi2, "dof": found.dof}},
     )
 

@@ -22,6 +22,10 @@ IMPORT = ["--columns", "ax,ay,az,gx,gy,gz", "--rate", "100", "--gravity", "9.81"
 """9.81 m/s^2 is the gravity that the peer's own cost function takes."""
 
 
+HAND = ["--still", "2.5"]
+"""Held by hand: shorter stops are shaky."""
+
+
 def solve(folder: Path, *options: str) -> dict[str, Any]:
     assert main(["solve", str(folder), "--json", *options]) in (0, 1)
     result: dict[str, Any] = json.loads((folder / "result.json").read_text())
@@ -41,7 +45,7 @@ def solved(
     for i in UNITS:
         folder = tmp_path_factory.mktemp("mikoff") / "session"
         log = shared / "real" / "mikoff_mpu9150_x5" / f"imu{i}.log.gz"
-        assert main(["import", str(log), *IMPORT, "-o", str(folder)]) == 0
+        assert main(["import", str(log), *IMPORT, *HAND, "-o", str(folder)]) == 0
         results.append(solve(folder, "--cross"))
     return results
 

@@ -229,6 +229,16 @@ def test_an_effect_left_out_makes_the_verdict_bad() -> None:
     assert solve(observe(NINE, u), cross=True).good
 
 
+def test_positions_without_angles_among_others_are_not_used_and_named() -> None:
+    u = outputs(NINE)
+    places = (*NINE, Position("somewhere"))
+    seen = observe(places, np.vstack([u, u[0] + 1.0]))
+    result = solve(seen, tilt="none")
+    assert result.method == "joint"
+    np.testing.assert_allclose(result.vector("acc_bias")[0], BIAS, atol=1e-9)
+    assert any("1 of 10 positions have no angles" in w for w in result.warnings)
+
+
 def test_what_is_no_method_is_refused() -> None:
     seen = observe(TWO, outputs(TWO))
     with pytest.raises(InputError, match="methods are"):

@@ -156,6 +156,18 @@ def test_rates_about_one_axis_only() -> None:
     }  # fmt: skip
 
 
+def test_a_rate_table_whose_rest_says_nothing_of_the_accelerometers() -> None:
+    turns = [[0.0, 0, 0], [20.0, 0, 0], [0.0, 20, 0], [0.0, 0, 20], [9.0, 9, 9]]
+    table = np.deg2rad(np.array(turns))
+    places = (Position("at rest"), *rates(table[1:]))
+    acc = np.tile([0.0, -9.81, 0.0], (5, 1))
+    seen = observe(places, acc, gyr=0.01 + table @ M1.T, sigma_gyr=1e-7)
+    result = solve(seen)
+    assert result.method == "least_squares" and "acc_bias" not in result.groups
+    np.testing.assert_allclose(result.gyroscopes()[1], M1, atol=1e-6)
+    assert any("accelerometers are not calibrated" in w for w in result.warnings)
+
+
 def test_two_turned_positions_leave_everything_open() -> None:
     places = (Position.deg(20, 3), Position.deg(20, 3))
     with pytest.raises(NotObservable, match="acc_bias.x"):

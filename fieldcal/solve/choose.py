@@ -23,7 +23,7 @@ from fieldcal.solve import closed_form, five_position, gyroscopes, least_squares
 from fieldcal.solve.design import Model, Tilt, ladder_remedy, loosely_set
 from fieldcal.solve.estimate import Estimate, combine, join
 from fieldcal.solve.joint import WRONG, joint
-from fieldcal.solve.observations import Observations
+from fieldcal.solve.observations import Index, Observations
 
 METHODS = ("auto", "two_position", "five_position", "least_squares", "joint", "scalar")
 TILTS = ("auto", "none", "angle_offset", "base_tilt")
@@ -86,17 +86,39 @@ def solve(
             raise InputError(f"an uncertainty of {degrees:g}° is none: give 0 to 90°")
     if angle_sigma_deg:
         observations = loosely_set(observations, angle_sigma_deg)
-    rows = np.flatnonzero(~observations.rotating)
-    still = observations[rows] if len(rows) else None
+    rows, notes = _usable(observations, method)
     acc = None
     chosen: Method = "least_squares"
-    if still is not None and still.has_acc:
-        chosen = _method(still) if method == "auto" else method
-        acc = _accelerometers(still, chosen, tilt, cross, as_printed, level_sigma_deg)
-        acc = acc.spread(rows, len(observations))
+    if len(rows) and observations.has_acc:
+        still = observations[rows]
+        wanted = _method(still) if method == "auto" else method
+        try:
+            acc = _accelerometers(
+                still, wanted, tilt, cross, as_printed, level_sigma_deg
+            ).spread(rows, len(observations))
+            chosen = wanted
+        except NotObservable as error:
+            # a rate table has its gyroscopes' result all the same
+            if not observations.rotating.any():
+                raise
+            notes.append(f"the accelerometers are not calibrated: {error}")
     gyr = _gyroscopes(observations, heading_sigma_deg, as_printed)
     good = acc is None or acc.dof <= 0 or acc.chi2 / acc.dof < WRONG
-    return combine(chosen, observations, acc, gyr, good=good)
+    return combine(chosen, observations, acc, gyr, notes, good)
+
+
+def _usable(
+    observations: Observations, method: Method | Literal["auto"]
+) -> tuple[Index, list[str]]:
+    """Positions for the accelerometers: those at rest, and of one kind."""
+    rows = np.flatnonzero(~observations.rotating)
+    known = rows[observations.oriented[rows]]
+    if method != "auto" or not 2 < len(known) < len(rows):
+        return rows, []
+    return known, [
+        f"{len(rows) - len(known)} of {len(rows)} positions have no angles and are not "
+        "used; method scalar uses all, and no angles"
+    ]
 
 
 def _method(still: Observations) -> Method:

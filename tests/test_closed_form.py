@@ -94,14 +94,14 @@ def test_covariance_is_that_of_the_windows_carried_through() -> None:
     half = rng.standard_normal((2, 3, 3))
     cov = 1e-6 * (half @ half.transpose(0, 2, 1) + np.eye(3))
     drawn = []
-    for _ in range(3000):
+    for _ in range(1500):
         noise = (np.linalg.cholesky(cov) @ rng.standard_normal((2, 3, 1)))[..., 0]
         seen = observe(TWO, truth + noise)
         seen.covariance[:, :3, :3] = cov
         found = two_position(seen)
         drawn.append(found.values)
     ratio = np.std(drawn, axis=0) / np.sqrt(np.diag(found.covariance))
-    np.testing.assert_allclose(ratio, 1, atol=0.05)
+    np.testing.assert_allclose(ratio, 1, atol=0.07)
 
 
 def test_table_2_is_one_degree_of_tilt() -> None:

@@ -129,7 +129,7 @@ def bumped(size: float) -> Callable[[np.random.Generator, Array], Array]:
 def test_one_bad_position_is_doubted_and_never_spoils_the_interval(
     places: tuple[Position, ...], size: float
 ) -> None:
-    seeds = 2500 if size < 100 else 300
+    seeds = 1500 if size < 100 else 300
     solution, error = run(Model("angle_offset"), places, 2, bumped(size), seeds)
     sigma = np.sqrt(np.diagonal(solution.covariance, axis1=-2, axis2=-1))
     pulls = error / sigma

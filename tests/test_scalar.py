@@ -10,7 +10,7 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.errors import NotObservable
 from fieldcal.positions import SIX_FACES, Position
 from fieldcal.samples import Array
-from fieldcal.solve import Observations, solve
+from fieldcal.solve import Observations, scatter, solve
 from fieldcal.solve.scalar import fit_norms, scalar
 
 UPPER = np.array([[0.0, 0.004, -0.011], [0.0, 0.0, 0.007], [0.0, 0.0, 0.0]])
@@ -237,3 +237,16 @@ def test_six_faces_by_their_norms_say_that_nothing_checks_them() -> None:
     text = " ".join(result.warnings)
     assert result.dof == 0 and "no degree of freedom" in text
     assert "not determined" in text
+
+
+def test_extra_scatter_is_found_where_the_windows_differ_in_noise() -> None:
+    """One quiet window among loud ones carries the misfit."""
+    noise = np.array([4e-4, 5e-4, 1e-3, 5e-5, 5e-5])
+    residual = np.array([1e-4, -2e-4, 3e-4, 2e-4, -2e-4])
+
+    def chi2(t: float) -> float:
+        return float((residual**2 / (noise**2 + t**2)).sum())
+
+    found = scatter.extra(chi2, 4, float(np.sqrt((noise**2).mean())))
+    assert found > 5e-5 and chi2(found) == pytest.approx(4, rel=0.02)
+    assert scatter.extra(chi2, 400, 1e-4) == 0.0

@@ -123,11 +123,12 @@ def extra(chi2: Callable[[float], float], dof: int, typical: float) -> float:
     if dof <= 0:
         return 0.0
     # where all means are alike, chi2 goes as 1 / (typical^2 + t^2): one step is exact
-    floor = typical**2
-    variance = floor
+    low, t = 0.0, typical * np.sqrt(max(0.0, chi2(0.0) / dof - 1))
+    high = np.inf
     for _ in range(STEPS):
-        ratio = chi2(float(np.sqrt(variance - floor))) / dof
-        variance = max(floor, variance * ratio)
-        if abs(ratio - 1) < CLOSE or variance == floor:
+        ratio = chi2(float(t)) / dof
+        if t == 0 or abs(ratio - 1) < CLOSE:
             break
-    return float(np.sqrt(variance - floor))
+        low, high = (t, high) if ratio > 1 else (low, t)
+        t = 2 * t if np.isinf(high) else (low + high) / 2
+    return float(t)

@@ -46,11 +46,14 @@ class Codec(ABC):
     Attributes
     ----------
     bauds : rates such devices use, bit/s, the factory's first
+    longest : longest frame that is taken for one, bytes; no more is ever kept
     health : what was decoded and refused so far
 
     """
 
     bauds: ClassVar[tuple[int, ...]] = (115200, 921600, 9600, 57600, 230400, 460800)
+
+    longest: ClassVar[int]
 
     def __init__(self, options: Options) -> None:
         self.health = Health()

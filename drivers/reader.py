@@ -110,7 +110,7 @@ class Reader:
 
     @property
     def _plenty(self) -> bool:
-        return self._held >= self._limit // 4
+        return self._held >= self._limit // 2
 
     @property
     def _ended(self) -> bool:

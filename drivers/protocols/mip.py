@@ -38,6 +38,7 @@ class Codec(Base):
     """Decoder of set 0x80; the option is the rate of a device that sends no time."""
 
     bauds = (115200, 921600, 230400, 460800)
+    longest = LONGEST
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)

@@ -67,6 +67,8 @@ for _digit in hexdigits:
 class Codec(Base):
     """Decoder of lines; the options are those of the module's text."""
 
+    longest = LONGEST
+
     def __init__(self, options: Options) -> None:
         super().__init__(options)
         self._names = options.text("columns", DEFAULT).split(",")

@@ -45,6 +45,7 @@ class Codec(Base):
     """Decoder of ESF-RAW, or of ESF-MEAS with option message=meas."""
 
     bauds = (38400, 115200, 9600, 921600, 230400, 460800)
+    longest = LONGEST
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)

@@ -72,6 +72,7 @@ class Codec(Base):
     """Decoder of the messages that carry accelerations and angular rates."""
 
     bauds = (115200, 921600, 230400, 460800, 57600, 128000)
+    longest = LONGEST
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)

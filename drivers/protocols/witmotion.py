@@ -63,6 +63,7 @@ class Codec(Base):
     """Decoder of 0x50 to 0x52; options acc_range (g), gyr_range (deg/s), rate (Hz)."""
 
     bauds = (115200, 9600, 921600, 230400, 460800, 57600, 38400, 19200)
+    longest = SIZE
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)

@@ -48,6 +48,7 @@ class Codec(Base):
     """Decoder of MTData2; the option is the rate of a device that sends no time."""
 
     bauds = (115200, 921600, 460800, 230400, 57600, 2000000)
+    longest = LONGEST
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)

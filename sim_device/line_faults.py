@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fieldcal.errors import InputError
+from fieldcal.sim_device.can_packing import Frame
 from fieldcal.sim_device.noise import stream
 
 KINDS = ("garbage_bytes", "flip_bits", "lose_bytes", "double_bytes")
 MOST = 100_000
 """Bytes or bits that one order can spoil."""
+
+
+OTHERS = (0x300, 0x700)
+"""Identifiers of somebody else's frames on a bus."""
 
 
 class LineFaults:
@@ -47,6 +52,28 @@ class LineFaults:
             out = self._spoil(out, kind, count)
         self._orders.clear()
         return out.tobytes()
+
+    def spoil_frames(self, frames: Sequence[Frame]) -> list[Frame]:
+        """Carry out what was ordered on frames of a bus, each in place of a byte.
+
+        A bus checks its frames: one with a flipped bit is lost. Garbage is frames that
+        belong to somebody else.
+        """
+        out = list(frames)
+        if not out or not self._orders:
+            return out
+        for kind, count in self._orders:
+            at_each = self._rng.integers(0, max(1, len(out)), count)
+            chosen = set(at_each.tolist())
+            if kind == "garbage_bytes":
+                others = self._rng.integers(*OTHERS, count).tolist()
+                out[:0] = [Frame(other, self._rng.bytes(8)) for other in others]
+            elif kind == "double_bytes":
+                out = [f for i, f in enumerate(out) for _ in range(1 + (i in chosen))]
+            else:
+                out = [f for i, f in enumerate(out) if i not in chosen]
+        self._orders.clear()
+        return out
 
     def _spoil(
         self, out: np.ndarray[tuple[int], np.dtype[np.uint8]], kind: str, count: int

@@ -178,7 +178,7 @@ class Stream:
             reading += more_reading
             writing += more_writing
         free = self.link.attached()
-        if free:
+        if free and self.link.fileno() >= 0:
             reading.append(self.link.fileno())
             if self.link.pending:
                 writing.append(self.link.fileno())

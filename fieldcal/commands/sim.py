@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 from fieldcal.errors import InputError
 
 if TYPE_CHECKING:
+    from fieldcal.sim_device.line_faults import LineFaults
+    from fieldcal.sim_device.link import Link
     from fieldcal.sim_device.profile import Profile
     from fieldcal.sim_device.stream import Stream, Watched
 
@@ -23,6 +25,7 @@ HELP = "be a virtual device on a link"
 EXAMPLE = """\
   fieldcal sim --serial witmotion
   fieldcal sim --serial "text?separator=semicolon&checksum=xor" --speed 20
+  fieldcal sim --can slcan --rate 1000
   fieldcal sim --base-tilt=-1,0.5 --with cross_coupling:k12=0.003,k21=-0.002
 """
 
@@ -38,6 +41,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="witmotion",
         help="wire format of the pty: witmotion or text, with options as in"
         ' "text?separator=tab&columns=t,ax,ay,az" (default: witmotion)',
+    )
+    add(
+        "--can",
+        metavar="INTERFACE",
+        help="on a CAN bus instead: slcan (an adapter on a pty), or any bus of"
+        " python-can with its channel, as in udp_multicast:239.74.163.2",
     )
     add("--port-link", type=Path, metavar="PATH", help="symbolic link to the pty")
     add(
@@ -102,12 +111,9 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.sim_device.control import Control
     from fieldcal.sim_device.device import VirtualDevice
     from fieldcal.sim_device.line_faults import LineFaults
-    from fieldcal.sim_device.link_serial import SerialLink
     from fieldcal.sim_device.orders import carry_out
     from fieldcal.sim_device.stream import Stream
-    from fieldcal.sim_device.wire import open_wire
 
-    wire = open_wire(args.serial)
     device = VirtualDevice(_profile(args), args.seed)
     speed, duration = _speed(args.speed), _duration(args.duration)
     steps = _numbers("--steps", args.steps, 2)
@@ -117,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
         with contextlib.ExitStack() as stack:
             stack.enter_context(_interruptible())
             faults = LineFaults(args.seed)
-            link = SerialLink(wire, faults, args.port_link)
+            link = _link(args, faults)
             stack.callback(link.close)
             stream = Stream(device, link, faults, speed, duration, args.once, _say)
             control = Control(lambda order: carry_out(stream, order), args.control)
@@ -129,6 +135,18 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     return 0
+
+
+def _link(args: argparse.Namespace, faults: LineFaults) -> Link:
+    """Make what the device talks through."""
+    if args.can:
+        from fieldcal.sim_device.link_can import open_link
+
+        return open_link(args.can, faults, args.port_link)
+    from fieldcal.sim_device.link_serial import SerialLink
+    from fieldcal.sim_device.wire import open_wire
+
+    return SerialLink(open_wire(args.serial), faults, args.port_link)
 
 
 def _profile(args: argparse.Namespace) -> Profile:

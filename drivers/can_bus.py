@@ -1,0 +1,166 @@
+"""A CAN bus as a reader wants it: rows of frames, through python-can.
+
+An adapter that speaks the Lawicel protocol (slcan) is set up by python-can, but read
+here: python-can reads its port byte by byte, 7000 frames/s, and takes lines that lost
+or gained a byte for frames.
+"""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Mapping
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from fieldcal.drivers.can_frames import pack_message
+from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.lawicel import Lawicel
+from fieldcal.drivers.options import Options
+from fieldcal.drivers.serial_imu import POLL, reason
+from fieldcal.errors import DeviceError, InputError
+
+if TYPE_CHECKING:
+    from can import BusABC
+
+MOST = 2000
+"""Frames taken at once."""
+
+LONGEST = 0.02
+"""Longest time that frames are collected before they are handed on, s."""
+
+Settings = Mapping[str, Any]
+
+
+def settings(options: Options) -> dict[str, Any]:
+    """Take what python-can is to be told from the options of an address."""
+    told: dict[str, Any] = {"interface": options.text("interface", "socketcan")}
+    for name, low, high in (
+        ("bitrate", 1e3, 1e6),
+        ("data_bitrate", 1e3, 1e7),
+        ("tty_baudrate", 50, 1e8),
+        ("port", 1, 65535),
+    ):
+        if number := options.number(name, 0.0, low, high):
+            told[name] = int(number)
+    if options.choice("fd", ("0", "1"), "0") == "1":
+        told["fd"] = True
+    settle = options.number("settle", 0.0, 0.0, 10.0)
+    if told["interface"] == "slcan":
+        told |= {"sleep_after_open": settle, "timeout": POLL}
+    return told
+
+
+def connect(channel: str, told: Settings) -> BusABC:
+    """Open a bus.
+
+    Raises
+    ------
+    InputError
+        If python-can knows no such interface, or refuses a setting.
+    DeviceError
+        If the bus cannot be opened.
+
+    """
+    import can
+
+    interface, at = told["interface"], f"{told['interface']} channel {channel}"
+    if interface not in can.VALID_INTERFACES:
+        known = ", ".join(sorted(can.VALID_INTERFACES))
+        raise InputError(f"can: there is no interface {interface!r}; there are {known}")
+    try:
+        return can.Bus(channel, **told)
+    except can.CanInterfaceNotImplementedError as fault:
+        raise InputError(f"can: {interface} cannot be used here: {fault}") from fault
+    except (ValueError, TypeError) as fault:
+        raise InputError(f"can: cannot open {at}: {fault}") from fault
+    except (OSError, can.CanError) as fault:
+        raise DeviceError(f"cannot open {at}: {_reason(interface, fault)}") from fault
+
+
+class BusSource:
+    """Frames of any bus that python-can knows."""
+
+    def __init__(self, bus: BusABC) -> None:
+        self._bus = bus
+
+    def read(self) -> bytes:
+        """Return rows of the frames that came, waiting `POLL` seconds for the first.
+
+        Raises
+        ------
+        OSError
+            If the bus is gone.
+
+        """
+        import can
+
+        try:
+            rows, until = [], monotonic() + LONGEST
+            message = self._bus.recv(POLL)
+            while message is not None:
+                rows.append(pack_message(message))
+                if len(rows) >= MOST or monotonic() > until:
+                    break
+                message = self._bus.recv(0)
+        except can.CanError as fault:
+            raise OSError(str(fault)) from fault
+        return b"".join(rows)
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._bus.shutdown()
+
+
+class SlcanSource:
+    """Frames of an adapter on a serial port.
+
+    Parameters
+    ----------
+    bus : python-can's, which has opened the port and the channel
+    health : where lines that are no frames are counted
+
+    """
+
+    def __init__(self, bus: Any, health: CanHealth) -> None:
+        self._bus, self._port = bus, bus.serialPortOrig
+        self._lines = Lawicel(health)
+
+    def read(self) -> bytes:
+        """Return rows of the frames that came, waiting `POLL` seconds for the first."""
+        return self._lines.feed(self._port.read(max(1, self._port.in_waiting)))
+
+    def close(self) -> None:
+        """Close the channel and the port, if it is still there."""
+        import can
+
+        try:
+            self._bus.shutdown()
+        except (can.CanError, OSError):
+            self._port.close()
+
+
+def open_source(
+    channel: str, told: Settings, health: CanHealth
+) -> BusSource | SlcanSource:
+    """Open a bus for a reader; errors as in `connect`."""
+    bus = connect(channel, told)
+    if told["interface"] == "slcan":
+        return SlcanSource(bus, health)
+    return BusSource(bus)
+
+
+def _reason(interface: str, fault: BaseException) -> str:
+    """Say why a bus did not open, and what to do."""
+    if interface == "slcan":
+        return reason(fault)
+    number = fault.errno if isinstance(fault, OSError) else None
+    if number in (errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT):
+        return (
+            "the kernel has no CAN; load it with `modprobe can_raw`, or use another"
+            " interface, such as interface=slcan"
+        )
+    if number in (errno.ENODEV, errno.ENXIO):
+        return "there is no such CAN channel; see `ip link`"
+    if number == errno.ENETDOWN:
+        return "it is down; `ip link set` it up with its bitrate"
+    return str(fault)

@@ -1,0 +1,132 @@
+"""Numbers out of the bits of many CAN frames at once, as a DBC file lays them out.
+
+A field of L bits is cut out of a word w of eight bytes, the first or the last of which
+is the field's, in the byte order of the field, s bits above the lowest:
+
+    r = floor(w / 2^s) mod 2^L                                              (1)
+    r <- r - 2^L where r >= 2^(L-1), if the field is signed                 (2)
+    v = a r + b, with the scale a and the offset b of the DBC               (3)
+
+The start bit is the lowest bit of a little-endian field, counted from the first byte's
+lowest; of a big-endian one it is the highest, and 8 (i // 8) + 7 - i % 8 counts from
+the first byte's highest. A field across nine bytes takes its last bits from the ninth.
+
+Source: Vector, DBC file format documentation 1.0.5, section 8 (signal definitions).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.drivers.can_frames import LONGEST
+from fieldcal.samples import Array
+
+if TYPE_CHECKING:
+    from cantools.database.can import Signal
+
+Words = NDArray[np.unsignedinteger[Any]]
+Bytes = NDArray[np.uint8]
+
+WORD = 8
+_FLOATS = {16: np.float16, 32: np.float32, 64: np.float64}
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """Where a number is in a frame, and what it means.
+
+    Attributes
+    ----------
+    first : byte at which the word begins
+    ninth : byte that goes on above the word, -1 if there is none
+    shift : s, bits of the word below the field
+    length : L, bits
+    big_endian, signed, floating : how the bits are read
+    scale, offset : a and b
+    special : raw numbers with a name of their own: no measurements
+    size : bytes that a frame needs to hold it
+
+    """
+
+    first: int
+    ninth: int
+    shift: int
+    length: int
+    big_endian: bool
+    signed: bool
+    floating: bool
+    scale: float
+    offset: float
+    special: tuple[int, ...]
+    size: int
+
+    @classmethod
+    def of(cls, signal: Signal) -> Field:
+        """Lay out a signal of a database."""
+        big, length = signal.byte_order == "big_endian", signal.length
+        if big:
+            begin = 8 * (signal.start // 8) + 7 - signal.start % 8
+        else:
+            begin = signal.start
+        head, end = begin // 8, (begin + length + 7) // 8
+        shift = 8 * end - begin - length if big else begin % 8
+        first, ninth = head, -1
+        if end - head > WORD:
+            first, ninth = (head + 1, head) if big else (head, head + WORD)
+        elif big:
+            first = max(0, end - WORD)
+            shift += 8 * (first + WORD - end)
+        else:
+            first = min(head, LONGEST - WORD)
+            shift += 8 * (head - first)
+        return cls(
+            first,
+            ninth,
+            shift,
+            length,
+            big,
+            signal.is_signed,
+            signal.is_float,
+            float(signal.scale),
+            float(signal.offset),
+            tuple(int(value) for value in signal.choices or ()),
+            end,
+        )
+
+    def bits(self, data: Bytes) -> Words:
+        """Cut the field out of frames (m, 64); (m,), unsigned, (1)."""
+        window = np.ascontiguousarray(data[:, self.first : self.first + WORD])
+        order = ">u8" if self.big_endian else "<u8"
+        word: Words = window.view(order)[:, 0] >> np.uint64(self.shift)
+        if self.ninth >= 0:
+            above = data[:, self.ninth].astype(np.uint64)
+            word = word | above << np.uint64(8 * WORD - self.shift)
+        return word & np.uint64(2**self.length - 1)
+
+    def raw(self, data: Bytes) -> NDArray[Any]:
+        """Numbers of frames (m, 64) before they are scaled, (m,)."""
+        bits = self.bits(data)
+        if self.floating:
+            narrow = bits.astype(f"u{self.length // 8}")
+            return narrow.view(_FLOATS[self.length])
+        if not self.signed:
+            return bits
+        sign = np.uint64(1 << (self.length - 1))
+        return ((bits ^ sign) - sign).view(np.int64)  # (2)
+
+    def values(self, data: Bytes) -> Array:
+        """Physical numbers of frames (m, 64), nan for a special one; (m,), (3)."""
+        raw = self.raw(data)
+        values: Array = raw * self.scale + self.offset  # (3)
+        if self.special:
+            values[np.isin(raw, self.special)] = np.nan
+        return values
+
+    @property
+    def span(self) -> float:
+        """What a counter in it counts to before it wraps, raw."""
+        return float("inf") if self.floating else float(2**self.length)

@@ -1,0 +1,225 @@
+"""Frames that belong to one sample, found among many at once.
+
+By key: frames belong together that carry the same number, unwrapped in the order of
+arrival. A sample is whole with its last frame, and given up once a later one is whole
+or so many newer ones have begun. By turns: a sample begins with one kind of frame, and
+has each of the others once before the next one begins.
+
+What comes out does not depend on how the frames were cut into batches, and what waits
+is bounded.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.driver import Health
+from fieldcal.samples import Array
+
+Index = NDArray[np.int64]
+
+
+@dataclass(slots=True)
+class CanHealth(Health):
+    """How a CAN link does.
+
+    Attributes
+    ----------
+    errors : error frames of the bus
+    incomplete : samples of which a frame was missing
+    strange : frames that the map does not know
+
+    """
+
+    errors: int = 0
+    incomplete: int = 0
+    strange: int = 0
+
+
+class Rows(NamedTuple):
+    """Frames that belong to samples, in the order of their arrival.
+
+    Attributes
+    ----------
+    part : (m,) number of the kind of frame
+    key : (m,) what frames of one sample share
+    t, arrived : (m,) s, stamp of the bus and arrival
+    values : (m, k) SI, nan where the frame has none
+
+    """
+
+    part: Index
+    key: Index
+    t: Array
+    arrived: Array
+    values: Array
+
+    def take(self, which: Any) -> Rows:
+        """Return some of the rows."""
+        return Rows(*(column[which] for column in self))
+
+    def then(self, more: Rows) -> Rows:
+        """Return these rows and those after them."""
+        if not len(self.key):
+            return more
+        pairs = zip(self, more, strict=True)
+        return Rows(*(np.concatenate(pair) for pair in pairs))
+
+
+class Whole(NamedTuple):
+    """Samples in the order in which they got whole.
+
+    Attributes
+    ----------
+    key : (n,)
+    rows : (n, parts) the row of each part
+    last : (n,) the row that came last
+
+    """
+
+    key: Index
+    rows: Index
+    last: Index
+
+    def take(self, which: Any) -> Whole:
+        """Return some of the samples."""
+        return Whole(self.key[which], self.rows[which], self.last[which])
+
+
+class Groups(ABC):
+    """Puts frames together, and keeps those of samples that are not whole.
+
+    Parameters
+    ----------
+    parts : kinds of frames that a sample has
+    health : where incomplete samples are counted
+
+    """
+
+    def __init__(self, parts: int, health: CanHealth) -> None:
+        self._parts, self._health = parts, health
+        self._rest: Rows | None = None
+
+    @abstractmethod
+    def feed(self, new: Rows) -> tuple[Rows, Whole]:
+        """Return rows, some kept from before, and the samples that got whole."""
+
+    def reset(self) -> None:
+        """Forget what is not whole."""
+        self._rest = None
+
+    def _after_rest(self, new: Rows) -> Rows:
+        return self._rest.then(new) if self._rest else new
+
+    def _whole(self, rows: Rows) -> tuple[Whole, Index]:
+        """Find keys that every part has, and the first row of each part and key."""
+        keys, places = [], []
+        for number in range(self._parts):
+            of = np.flatnonzero(rows.part == number)
+            some, first = np.unique(rows.key[of], return_index=True)
+            keys.append(some)
+            places.append(of[first])
+        common = reduce(np.intersect1d, keys)
+        pairs = zip(keys, places, strict=True)
+        table = np.column_stack([p[np.searchsorted(k, common)] for k, p in pairs])
+        last = table.max(axis=1)
+        order = np.argsort(last)
+        whole = Whole(common, table, last).take(order)
+        return whole, np.sort(np.concatenate(places))
+
+
+class ByKey(Groups):
+    """Groups of the same key.
+
+    Parameters
+    ----------
+    parts, health : as in `Groups`
+    span : what the key counts to before it wraps
+    deep : how far a key may lie behind the newest
+
+    """
+
+    def __init__(self, parts: int, health: CanHealth, span: int, deep: int) -> None:
+        super().__init__(parts, health)
+        self._span, self._deep = span, deep
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what is not whole, and begin to unwrap anew."""
+        super().reset()
+        self._raw, self._key = -1, 0
+        self._newest = self._done = -1
+
+    def feed(self, new: Rows) -> tuple[Rows, Whole]:
+        """Put frames of the same key together."""
+        rows = self._after_rest(new._replace(key=self._unwrapped(new.key)))
+        whole, firsts = self._whole(rows)
+        if not len(rows.key):
+            return rows, whole
+        newest = np.maximum(np.maximum.accumulate(rows.key), self._newest)
+        later = np.maximum.accumulate(np.concatenate([[self._done], whole.key]))[:-1]
+        behind = newest[whole.last] - whole.key
+        whole = whole.take((whole.key > later) & (behind <= self._deep))
+        before, self._newest = self._done, int(newest[-1])
+        if len(whole.key):
+            self._done = int(whole.key[-1])
+        key = rows.key[firsts]
+        waits = (key > self._done) & (self._newest - key <= self._deep)
+        begun = np.unique(key[~waits & (key > before)])
+        self._health.incomplete += len(begun) - len(whole.key)
+        self._rest = rows.take(firsts[waits])
+        return rows, whole
+
+    def _unwrapped(self, raw: Index) -> Index:
+        if not len(raw):
+            return raw
+        before = raw[0] if self._raw < 0 else self._raw
+        steps = (np.diff(raw, prepend=before) + self._deep) % self._span - self._deep
+        key: Index = self._key + np.cumsum(steps)
+        self._raw, self._key = int(raw[-1]), int(key[-1])
+        return key
+
+
+class ByTurns(Groups):
+    """Groups that follow one another.
+
+    Parameters
+    ----------
+    parts, health : as in `Groups`
+    first : number of the part that begins a sample
+    within : longest time that a sample may take on the bus, s
+
+    """
+
+    def __init__(
+        self, parts: int, health: CanHealth, first: int, within: float
+    ) -> None:
+        super().__init__(parts, health)
+        self._first, self._within = first, within
+
+    def feed(self, new: Rows) -> tuple[Rows, Whole]:
+        """Put frames together that follow one another; a doubled one spoils them."""
+        rows = self._after_rest(new)
+        rows = rows._replace(key=np.cumsum(rows.part == self._first))
+        rows = rows.take(rows.key > 0)
+        whole, firsts = self._whole(rows)
+        turns = int(rows.key[-1]) if len(rows.key) else 0
+        again = np.ones(len(rows.key), dtype=bool)
+        again[firsts] = False
+        first_again = np.full(turns + 1, len(rows.key))
+        np.minimum.at(first_again, rows.key[again], np.flatnonzero(again))
+        good = first_again[whole.key] > whole.last
+        took = rows.t[whole.last] - rows.t[whole.rows[:, self._first]]
+        good &= took <= self._within
+        waits = (
+            turns > 0 and turns not in whole.key and not again[rows.key == turns].any()
+        )
+        self._rest = rows.take(rows.key == turns) if waits else None
+        self._health.incomplete += turns - int(waits) - int(good.sum())
+        return rows, whole.take(good)

@@ -1,0 +1,159 @@
+"""An IMU on a CAN bus: ``can:can0?dbc=imu.dbc&map=ax=Frame.Signal,ay=Frame.Other``.
+
+Options: ``interface`` (any of python-can's; socketcan), ``bitrate``, ``data_bitrate``,
+``fd=1``, ``port`` (udp_multicast), ``tty_baudrate`` and ``settle`` (slcan: what the
+adapter needs after its port is opened, s), ``reconnect`` as for a serial port; ``dbc``,
+``map`` and the units as in `can_map`; ``first``, ``within`` and ``rate`` as in
+`can_samples`. A log (.log, .asc, .blf) in place of the channel is played, with
+``speed`` as device time against the clock, or ``max``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+from itertools import pairwise
+from math import inf
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+
+from fieldcal.driver import Driver, Health
+from fieldcal.drivers.can_frames import EXTENDED, FRAME, Frames
+from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.can_log import Log, is_log
+from fieldcal.drivers.options import Options, split
+from fieldcal.drivers.reader import Reader
+from fieldcal.errors import InputError
+from fieldcal.samples import Array, Block, concat
+
+ENOUGH = 10_000
+"""Strange frames after which no more identifiers are kept."""
+
+LIMIT = 1 << 24
+"""Most bytes of rows that wait: a minute of a device at 1 kHz."""
+
+
+class Imu(Driver):
+    """A CAN bus, or a log of one, and the samples that are in its frames."""
+
+    def __init__(self, address: str) -> None:
+        _check_installed()
+        from fieldcal.drivers.can_bus import open_source, settings
+        from fieldcal.drivers.can_map import read_map
+        from fieldcal.drivers.can_samples import Samples
+
+        channel, options = split(address, "can")
+        if not channel:
+            raise InputError("can: name a channel, such as can:can0, or a log")
+        self.name = channel
+        self._counts = CanHealth()
+        self.health: Health = self._counts
+        self._parts = read_map(options)
+        self._samples = Samples(self._parts, self._counts, options)
+        self._heard: set[int] = set()
+        self._log: Log | None = None
+        self._reader: Reader | None = None
+        if is_log(channel):
+            speed = _speed(options)
+            options.finish()
+            self._log = Log(Path(channel), speed)
+            return
+        told = settings(options)
+        patience = options.number("reconnect", 10.0, 0.0, 86400.0)
+        options.finish()
+        self._reader = Reader(
+            channel, lambda: open_source(channel, told, self._counts), patience, LIMIT
+        )
+
+    @property
+    def reconnecting(self) -> bool:
+        """True while the bus is gone and is being tried again."""
+        return self._reader is not None and self._reader.reconnecting
+
+    def host_time(self) -> float:
+        """Now, in s of the clock that stamps `Block.t_host`: for a log, its own."""
+        return self._log.now if self._log else super().host_time()
+
+    def receive(self, timeout: float) -> Block | None:
+        """Return what has come, or None if nothing whole came in `timeout` seconds."""
+        deadline = monotonic() + timeout
+        while True:
+            blocks = []
+            for frames, arrived, broken in self._take(max(0.0, deadline - monotonic())):
+                if broken:
+                    self._samples.reset()
+                if self._counts.strange < ENOUGH:
+                    self._heard.update(frames["id"].tolist())
+                blocks.append(self._samples.feed(frames, arrived))
+            block = concat(block for block in blocks if block is not None)
+            if len(block):
+                return block
+            if monotonic() >= deadline:
+                return None
+
+    def close(self) -> None:
+        """Leave the bus, or the log; safe to call twice."""
+        if self._reader:
+            self._reader.close()
+        if self._log:
+            self._log.close()
+
+    def _take(self, timeout: float) -> Iterator[tuple[Frames, Array, bool]]:
+        """Frames, their arrivals, and whether the link was away before them."""
+        if self._log:
+            frames = self._log.take(timeout)
+            self.health.received += frames.nbytes
+            yield frames, frames["t"], False
+        if self._reader:
+            chunks = self._reader.take(timeout)
+            cuts = [i for i, chunk in enumerate(chunks) if chunk.broken]
+            for start, end in pairwise([0, *cuts, len(chunks)]):
+                some = chunks[start:end]
+                frames = np.frombuffer(b"".join(chunk.data for chunk in some), FRAME)
+                many = [len(chunk.data) // FRAME.itemsize for chunk in some]
+                arrived = np.repeat([chunk.t_host for chunk in some], many)
+                self.health.received += frames.nbytes
+                yield frames, arrived, bool(some) and some[0].broken
+
+    def _silence(self, timeout: float, before: Health) -> str:
+        health = self._counts
+        if health.errors and not health.samples and not health.strange:
+            cause = "only error frames come; check bit rate, wiring and termination"
+        elif health.received == before.received and health.bad > before.bad:
+            cause = "lines come that are no frames; check tty_baudrate and the adapter"
+        elif health.received == before.received:
+            cause = "not a frame came; check wiring, power and bit rate"
+        else:
+            cause = self._missing()
+        sent = "went silent" if health.samples else "has sent no sample"
+        return f"{self.name} {sent} for {timeout:g} s: {cause}"
+
+    def _missing(self) -> str:
+        """Name the frames that a sample needs and that have never come."""
+        missing = [p for p in self._parts if p.identifier not in self._heard]
+        if not missing:
+            return "frames come, but no whole sample; check map, first and within"
+        names = ", ".join(f"{p.name} ({_hex(p.identifier)})" for p in missing)
+        others = self._heard - {p.identifier for p in self._parts}
+        heard = ", ".join(_hex(i) for i in sorted(others)[:8]) or "nothing else"
+        return f"frames come, but no {names}; heard: {heard}; check dbc and map"
+
+
+def _hex(identifier: int) -> str:
+    wide = identifier & EXTENDED
+    return f"0x{identifier & ~EXTENDED:0{8 if wide else 3}X}"
+
+
+def _speed(options: Options) -> float:
+    if options.text("speed") == "max":
+        return inf
+    return options.number("speed", 1.0, 1e-3, 1e6)
+
+
+def _check_installed() -> None:
+    if not all(find_spec(module) for module in ("can", "cantools")):
+        raise InputError(
+            "CAN needs python-can and cantools: pip install 'fieldcal[can]'"
+        )

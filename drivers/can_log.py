@@ -1,0 +1,129 @@
+"""Frames of a log, delivered when they are due: candump (.log), .asc, .blf, .trc.
+
+Read through python-can, piece by piece, so a log may be as long as it likes; also as
+.gz. Times are those of the log.
+"""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Generator
+from itertools import islice
+from math import inf
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+
+from fieldcal.drivers.can_frames import FRAME, Frames, pack_message
+from fieldcal.errors import DeviceError, InputError
+
+READERS = {
+    ".log": "CanutilsLogReader",
+    ".asc": "ASCReader",
+    ".blf": "BLFReader",
+    ".trc": "TRCReader",
+}
+"""What python-can calls the readers of each kind of log."""
+
+PIECE = 4096
+"""Frames read at once."""
+
+
+def is_log(place: str) -> bool:
+    """Tell whether an address names a log and no channel.
+
+    >>> is_log("drive.log.gz"), is_log("can0")
+    (True, False)
+    """
+    return place.lower().removesuffix(".gz").endswith(tuple(READERS))
+
+
+class Log:
+    """A log that is played.
+
+    Parameters
+    ----------
+    path : the file
+    speed : time of the log against the clock; inf for as fast as it is read
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is no log.
+
+    """
+
+    def __init__(self, path: Path, speed: float) -> None:
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such log")
+        self._path, self._speed = path, speed
+        self._pieces = self._read()
+        self._began, self._first, self.now = -1.0, 0.0, 0.0
+        self._piece: Frames = next(self._pieces, np.empty(0, FRAME))
+        if not len(self._piece):
+            raise InputError(f"{path}: holds no frame; check that it is a CAN log")
+        self._first = self.now = float(self._piece["t"][0])
+
+    def take(self, timeout: float) -> Frames:
+        """Return the frames that are due, or none after `timeout` seconds.
+
+        Raises
+        ------
+        DeviceError
+            At the end of the log.
+
+        """
+        if not len(self._piece):
+            self._piece = next(self._pieces, self._piece)
+        if not len(self._piece):
+            raise DeviceError(
+                f"{self._path} has ended after {self.now - self._first:.3f} s"
+            )
+        piece = self._piece
+        if self._speed < inf:
+            piece = piece[: self._due(float(piece["t"][0]), timeout)]
+        self._piece = self._piece[len(piece) :]
+        if len(piece):
+            self.now = float(piece["t"].max())
+        return piece
+
+    def _due(self, t: float, timeout: float) -> int:
+        """Wait for the next frame; how many are due then."""
+        if self._began < 0:
+            self._began = monotonic()
+        wait = self._began + (t - self._first) / self._speed - monotonic()
+        sleep(max(0.0, min(wait, timeout)))
+        until = self._first + (monotonic() - self._began) * self._speed
+        late = np.flatnonzero(self._piece["t"] > until)
+        return int(late[0]) if len(late) else len(self._piece)
+
+    def _read(self) -> Generator[Frames]:
+        try:
+            with _reader(self._path) as reader:
+                messages = iter(reader)
+                while rows := [pack_message(m) for m in islice(messages, PIECE)]:
+                    yield np.frombuffer(b"".join(rows), FRAME)
+        except (OSError, EOFError) as fault:
+            raise InputError(f"{self._path}: cannot be read: {fault}") from fault
+        except Exception as fault:
+            # the readers of the several formats raise what they like
+            raise InputError(
+                f"{self._path}: is no CAN log of this kind: {fault}"
+            ) from fault
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._pieces.close()
+
+
+def _reader(path: Path) -> Any:
+    import can
+
+    packed = path.suffix.lower() == ".gz"
+    ending = Path(path.stem if packed else path.name).suffix.lower()
+    reader = getattr(can, READERS[ending])
+    if not packed:
+        return reader(path)
+    return reader(gzip.open(path, "rb" if ending == ".blf" else "rt"))

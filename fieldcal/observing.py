@@ -114,6 +114,32 @@ def rests(session: Session) -> Rests:
     return Rests(tuple(rows), tuple(averages), tuple(warnings))
 
 
+def with_turns_between(
+    calibration: Calibration, session: Session, still: Rests, wanted: bool = False
+) -> Calibration:
+    """Add what the turns between the windows say about the gyroscopes.
+
+    Parameters
+    ----------
+    calibration : from the windows
+    session : the recording
+    still : its windows
+    wanted : add it however uncertain; otherwise only where it is worth having
+
+    """
+    from fieldcal.solve import turns
+
+    seen = observations(session.about, still.averages, still.rows)
+    if not seen.has_gyr:
+        return calibration
+    if wanted:
+        found = turns.turns(session.block, still.averages, calibration, seen.nominal)
+        return turns.with_turns(calibration, found)
+    if "gyr_scale" in calibration.groups:
+        return calibration
+    return turns.offered(calibration, session.block, still.averages, seen.nominal)
+
+
 def _take(block: Block, window: tuple[float, float] | None) -> tuple[Average, str]:
     if window is None:
         raise SessionError("its window was not taken before the recording ended")

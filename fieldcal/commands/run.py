@@ -83,6 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.table import show
+    from fieldcal.observing import rests, with_turns_between
     from fieldcal.session import RESULT, Session
 
     task = make_task(args)
@@ -90,7 +91,9 @@ def run(args: argparse.Namespace) -> int:
     with _link(args, task) as (driver, mover):
         found = _record(args, task, driver, mover)
         truth = getattr(mover, "truth", None)
-    written = Session.open(task.folder).write_json(RESULT, found.to_json())
+    session = Session.open(task.folder)
+    found = with_turns_between(found, session, rests(session))
+    written = session.write_json(RESULT, found.to_json())
     if args.json:
         concealed = {"virtual": truth} if truth else {}
         sys.stdout.write(json.dumps({**found.to_json(), **concealed}) + "\n")

@@ -9,10 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fieldcal.calibration import Calibration
-    from fieldcal.observing import Rests
-    from fieldcal.session import Session
-    from fieldcal.solve import Observations
+    pass
 
 EXAMPLE = """\
   fieldcal solve bench-7/2026-03-01
@@ -63,7 +60,12 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from fieldcal.commands.table import show
-    from fieldcal.observing import observations, rests, with_provenance
+    from fieldcal.observing import (
+        observations,
+        rests,
+        with_provenance,
+        with_turns_between,
+    )
     from fieldcal.session import RESULT, Session
     from fieldcal.solve import solve
 
@@ -80,8 +82,8 @@ def run(args: argparse.Namespace) -> int:
         heading_sigma_deg=args.heading,
         angle_sigma_deg=args.angles or 0.0,
     )
-    if args.turns != "no" and not args.as_printed and seen.has_gyr:
-        found = _with_turns(found, session, still, seen, args.turns == "yes")
+    if args.turns != "no" and not args.as_printed:
+        found = with_turns_between(found, session, still, args.turns == "yes")
     found = replace(found, warnings=(*still.warnings, *found.warnings))
     found = with_provenance(found, session.about)
     path = session.write_json(RESULT, found.to_json())
@@ -93,21 +95,3 @@ def run(args: argparse.Namespace) -> int:
         show(found)
         sys.stdout.write(f"written: {path}\n")
     return 0 if found.good else 1
-
-
-def _with_turns(
-    found: Calibration,
-    session: Session,
-    still: Rests,
-    seen: Observations,
-    wanted: bool,
-) -> Calibration:
-    """Add what the turns between the windows say about the gyroscopes."""
-    from fieldcal.solve.turns import offered, turns, with_turns
-
-    if wanted:
-        by_turns = turns(session.block, still.averages, found, seen.nominal)
-        return with_turns(found, by_turns)
-    if "gyr_scale" in found.groups:
-        return found
-    return offered(found, session.block, still.averages, seen.nominal)

@@ -55,7 +55,7 @@ class Window:
     >>> for k in range(0, 3000, 50):
     ...     window.add(Block.of(t[k : k + 50], acc[k : k + 50]))
     >>> window.moved is None, window.n, f"{window.sigma[1]:.5f} m/s^2"
-    (True, 3000, '0.00039 m/s^2')
+    (True, 3000, '0.00036 m/s^2')
     """
 
     def __init__(

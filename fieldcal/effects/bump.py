@@ -1,8 +1,10 @@
 """Somebody, or the wind, touched the device while it was held.
 
-A stretch of a window, at_s and for_s long, far beyond the noise: in single samples, in
-the energy or the mean of a tenth or half a second. It is left out. Source: model of
-this project.
+A stretch of a window, at_s and for_s long, far beyond what is usual in that window: in
+single samples, or in the mean of a tenth or half a second. Usual is the noise, or what
+the window shows at that length throughout, so that a base that rocks, a machine that
+shakes or a hand that trembles makes no bumps. It is left out. Source: model of this
+project.
 
 >>> import numpy as np
 >>> quiet = np.random.default_rng(1).standard_normal((1000, 1))
@@ -42,17 +44,28 @@ def disturbed(z: Array, m: int) -> NDArray[np.intp]:
     `z` is (n, c) in standard deviations, without its slow part; `m` the samples of the
     shortest stretch looked at as a whole.
     """
+    z = z / usual(z)
     loud: NDArray[np.bool_] = np.any(np.abs(z) > LARGEST, axis=1)
     total = np.vstack([np.zeros(z.shape[1]), np.cumsum(z, axis=0)])
     for width in (m, 4 * m):
         if width < 2 or width >= len(z):
             continue
         mean = (total[width:] - total[:-width]) / np.sqrt(width)
-        peak = np.abs(mean)
+        peak = np.abs(mean) / usual(mean)
         for first, last in runs((peak > MEAN).any(axis=1)):
             at = first + int(np.argmax(peak[first:last].max(axis=1)))
             loud[at : at + width] = True
     return np.array([_trimmed(z, a, b) for a, b in _joined(runs(loud), 2 * m)])
+
+
+def usual(z: Array) -> Array:
+    """Spread of each column by its middle half, at least that of the noise, (c,).
+
+    >>> usual(np.array([[0.0], [3.0], [-3.0], [3.0], [-3.0], [90.0]])).round(2)
+    array([4.45])
+    """
+    spread: Array = 1.4826 * np.median(np.abs(z), axis=0)
+    return np.maximum(spread, 1.0)
 
 
 def _joined(stretches: NDArray[np.intp], gap: int) -> NDArray[np.intp]:

@@ -3,7 +3,9 @@
     U(t) = U(from_s),    from_s <= t < to_s
 
 Found as a run of equal values that chance does not make: with p the share of equal
-neighbours elsewhere, a run of k has odds of n p^k. Source: model of this project.
+neighbours elsewhere, a run of k has odds of n p^k. A channel whose steps are coarser
+than its noise repeats itself for as long as the device is held; there a run counts only
+if it goes on while the device is turned. Source: model of this project.
 
 >>> import numpy as np
 >>> values = np.sin(np.arange(500.0))
@@ -18,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.effects import Chain, Fault, Recording, Shape
-from fieldcal.effects.recording import runs
+from fieldcal.effects.recording import lsb_of, runs
 from fieldcal.samples import CHANNELS, Array
 
 ODDS = 1e-6
@@ -59,8 +61,13 @@ class Stuck(Chain):
         """Runs of equal values in each channel."""
         t, out = recording.block.t, []
         step = float(np.median(np.diff(t)))
+        still = recording.still
         for c, name in enumerate(CHANNELS):
-            for first, last in repeats(recording.block.six[:, c]):
+            values_of = recording.block.six[:, c]
+            coarse = lsb_of(values_of) > 2 * recording.noise[c]
+            for first, last in repeats(values_of):
+                if coarse and still[first:last].all():
+                    continue
                 values: dict[str, float | str] = {
                     "channel": name,
                     "from_s": float(t[first]),

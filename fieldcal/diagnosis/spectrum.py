@@ -35,6 +35,12 @@ BESIDE = 40
 ODDS = 1e-6
 """Of a line where there is none, over all frequencies and channels."""
 
+NEAR = 2.0
+"""Distance between two lines, in cycles of the shortest window."""
+
+STEADY = 0.5
+"""Part of the energy that one amplitude and phase must take to be a line."""
+
 MOST = 4
 CLEAR = 5.0
 """Standard deviations from which a channel is said to have the line."""
@@ -82,7 +88,7 @@ def tones(source: Source, rows: Rows) -> list[Tone]:
     pieces = _pieces(source, rows)
     found: list[Tone] = []
     while pieces.samples and len(found) < MOST:
-        near = _highest(pieces)
+        near = _highest(pieces, [tone.hz for tone in found])
         tone = _explained(pieces, near) if near is not None else None
         if tone is None:
             break
@@ -133,11 +139,17 @@ def _flat(t: Array, six: Array) -> Array:
     return flat
 
 
-def _highest(pieces: _Pieces) -> float | None:
-    """Frequency of the line that stands out most, None if none does."""
+def _highest(pieces: _Pieces, taken: Sequence[float]) -> float | None:
+    """Frequency of the line that stands out most, None if none does.
+
+    Near one that is taken already, what is left belongs to it.
+    """
     power, count, hz = _power(pieces)
-    low = max(0.05, CYCLES * pieces.rate / min(LONGEST, min(map(len, pieces.samples))))
+    shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
+    low = max(0.05, CYCLES / shortest)
     band = hz >= low
+    for other in taken:
+        band &= np.abs(hz - other) > NEAR / shortest
     if band.sum() < 4 * BESIDE:
         return None
     best, near = np.log(ODDS), None
@@ -205,7 +217,23 @@ def _explained(pieces: _Pieces, near: float) -> Tone | None:
         return None
     cost = np.log(sum(map(len, pieces.samples)))
     best = max(tried, key=lambda tone: tone.chi2 / 2 - len(tone.causes) * cost)
-    return best if best.chi2 / 2 > len(best.causes) * cost and best.channels else None
+    if best.chi2 / 2 <= len(best.causes) * cost or not best.channels:
+        return None
+    return best if _share(pieces, best, seen, counts) > STEADY else None
+
+
+def _share(pieces: _Pieces, tone: Tone, seen: Complex, counts: Array) -> float:
+    """Part of the energy at a line's frequency that one steady line takes.
+
+    A line keeps amplitude and phase through all windows. A hand that trembles or a base
+    that is pushed has as much energy there, but another phase each time.
+    """
+    clear = [CHANNELS.index(name) for name in tone.channels]
+    energy = (counts[:, None] / 2 * np.abs(seen[:, clear]) ** 2).sum(axis=0)
+    modelled = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[:, clear]
+    left = (counts[:, None] / 2 * np.abs(seen[:, clear] - modelled) ** 2).sum(axis=0)
+    weight = 1 / pieces.noise[clear] ** 2
+    return float(1 - (weight @ left) / (weight @ energy))
 
 
 def _tuned(pieces: _Pieces, near: float) -> tuple[float, Complex, Array]:

@@ -49,21 +49,25 @@ def still_stretches(
     spread = view.std(axis=-1)
     shortest = max(1.0, min_seconds)
     found: list[tuple[float, float]] = []
-    for first, last in _at_rest(spread, view.mean(axis=-1)):
+    limits = limits or Limits()
+    for first, last in _at_rest(spread, view.mean(axis=-1), limits.noise):
         start = float(cells.times[first + _SPAN // 2])
         end = float(cells.times[last - 1 + _SPAN // 2])
-        found += _passing(block.between(start, end), shortest, limits or Limits())
+        found += _passing(block.between(start, end), shortest, limits)
     return found
 
 
-def _at_rest(spread: Array, level: Array) -> Runs:
-    """Runs of spans, [first, last), at rest by (1), by their own noise and rate."""
+def _at_rest(spread: Array, level: Array, bound: Array) -> Runs:
+    """Runs of spans, [first, last), at rest by (1), by their own noise and rate.
+
+    `bound` (6,) is what no spread at rest exceeds.
+    """
     quiet = np.quantile(spread, 0.1, axis=0)
     scale = np.where(quiet > 0, quiet, np.inf)
     ratio = (spread / scale).max(axis=1)
     valley = np.clip(_valley(ratio), _LEAST, _MOST)
     kept: Runs = []
-    for first, last in _runs(ratio < valley):
+    for first, last in _runs((ratio < valley) & (spread < bound).all(axis=1)):
         own = np.maximum(np.quantile(spread[first:last], 0.3, axis=0), quiet)
         own = np.where(own > 0, own, np.inf)
         calm = (spread[first:last] < _OWN * own).all(axis=1)

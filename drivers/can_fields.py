@@ -112,7 +112,7 @@ class Field:
         bits = self.bits(data)
         if self.floating:
             narrow = bits.astype(f"u{self.length // 8}")
-            return narrow.view(_FLOATS[self.length])
+            return narrow.view(_FLOATS[self.length]).astype(float)
         if not self.signed:
             return bits
         sign = np.uint64(1 << (self.length - 1))
@@ -120,8 +120,10 @@ class Field:
 
     def values(self, data: Bytes) -> Array:
         """Physical numbers of frames (m, 64), nan for a special one; (m,), (3)."""
-        raw = self.raw(data)
-        values: Array = raw * self.scale + self.offset  # (3)
+        # of a damaged frame a float may be anything: that is no reason to complain
+        with np.errstate(over="ignore", invalid="ignore"):
+            raw = self.raw(data)
+            values: Array = raw * self.scale + self.offset  # (3)
         if self.special:
             values[np.isin(raw, self.special)] = np.nan
         return values

@@ -207,7 +207,9 @@ class ByTurns(Groups):
         """Put frames together that follow one another; a doubled one spoils them."""
         rows = self._after_rest(new)
         rows = rows._replace(key=np.cumsum(rows.part == self._first))
-        rows = rows.take(rows.key > 0)
+        begun = rows.key > 0
+        self._orphans(rows.part[~begun])
+        rows = rows.take(begun)
         whole, firsts = self._whole(rows)
         turns = int(rows.key[-1]) if len(rows.key) else 0
         again = np.ones(len(rows.key), dtype=bool)
@@ -222,4 +224,12 @@ class ByTurns(Groups):
         )
         self._rest = rows.take(rows.key == turns) if waits else None
         self._health.incomplete += turns - int(waits) - int(good.sum())
-        return rows, whole.take(good)
+        whole = whole.take(good)
+        ends = np.full(turns + 1, len(rows.key))
+        ends[whole.key] = whole.last
+        self._orphans(rows.part[np.arange(len(rows.key)) > ends[rows.key]])
+        return rows, whole
+
+    def _orphans(self, part: Index) -> None:
+        """Count samples of which the first frame was missing."""
+        self._health.incomplete += int(np.bincount(part, minlength=1).max())

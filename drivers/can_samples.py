@@ -191,5 +191,5 @@ class Samples:
             degrees = rows.values[at, TEMPERATURE]
             degrees[at < 0] = self._temperature
             rows.values[:, TEMPERATURE] = degrees
-            self._temperature = float(degrees[-1]) if len(degrees) else np.nan
+            self._temperature = float(np.append(self._temperature, degrees)[-1])
         return rows if needed.all() else rows.take(needed)

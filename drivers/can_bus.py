@@ -74,7 +74,9 @@ def connect(channel: str, told: Settings) -> BusABC:
     except (ValueError, TypeError) as fault:
         raise InputError(f"can: cannot open {at}: {fault}") from fault
     except (OSError, can.CanError) as fault:
-        raise DeviceError(f"cannot open {at}: {_reason(interface, fault)}") from fault
+        if isinstance(fault.__cause__, ValueError):
+            raise InputError(f"can: cannot open {at}: {fault}") from fault
+        raise DeviceError(f"cannot open {at}: {why(interface, fault)}") from fault
 
 
 class BusSource:
@@ -149,7 +151,7 @@ def open_source(
     return BusSource(bus)
 
 
-def _reason(interface: str, fault: BaseException) -> str:
+def why(interface: str, fault: BaseException) -> str:
     """Say why a bus did not open, and what to do."""
     if interface == "slcan":
         return reason(fault)

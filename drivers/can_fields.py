@@ -1,7 +1,7 @@
 """Numbers out of the bits of many CAN frames at once, as a DBC file lays them out.
 
-A field of L bits is cut out of a word w of eight bytes, the first or the last of which
-is the field's, in the byte order of the field, s bits above the lowest:
+A field of L bits is cut out of a word w of eight bytes that hold it, taken in the byte
+order of the field, s bits above the lowest:
 
     r = floor(w / 2^s) mod 2^L                                              (1)
     r <- r - 2^L where r >= 2^(L-1), if the field is signed                 (2)
@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.drivers.can_frames import LONGEST
 from fieldcal.samples import Array
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ class Field:
             first = max(0, end - WORD)
             shift += 8 * (first + WORD - end)
         else:
-            first = min(head, LONGEST - WORD)
+            first = max(0, end - WORD)
             shift += 8 * (head - first)
         return cls(
             first,
@@ -98,7 +97,7 @@ class Field:
         )
 
     def bits(self, data: Bytes) -> Words:
-        """Cut the field out of frames (m, 64); (m,), unsigned, (1)."""
+        """Cut the field out of frames (m, bytes); (m,), unsigned, (1)."""
         window = np.ascontiguousarray(data[:, self.first : self.first + WORD])
         order = ">u8" if self.big_endian else "<u8"
         word: Words = window.view(order)[:, 0] >> np.uint64(self.shift)
@@ -108,20 +107,22 @@ class Field:
         return word & np.uint64(2**self.length - 1)
 
     def raw(self, data: Bytes) -> NDArray[Any]:
-        """Numbers of frames (m, 64) before they are scaled, (m,)."""
+        """Numbers of frames (m, bytes) before they are scaled, (m,)."""
         bits = self.bits(data)
         if self.floating:
             narrow = bits.astype(f"u{self.length // 8}")
-            return narrow.view(_FLOATS[self.length])
+            return narrow.view(_FLOATS[self.length]).astype(float)
         if not self.signed:
             return bits
         sign = np.uint64(1 << (self.length - 1))
         return ((bits ^ sign) - sign).view(np.int64)  # (2)
 
     def values(self, data: Bytes) -> Array:
-        """Physical numbers of frames (m, 64), nan for a special one; (m,), (3)."""
-        raw = self.raw(data)
-        values: Array = raw * self.scale + self.offset  # (3)
+        """Physical numbers of frames (m, bytes), nan for a special one; (m,), (3)."""
+        # of a damaged frame a float may be anything: that is no reason to complain
+        with np.errstate(over="ignore", invalid="ignore"):
+            raw = self.raw(data)
+            values: Array = raw * self.scale + self.offset  # (3)
         if self.special:
             values[np.isin(raw, self.special)] = np.nan
         return values

@@ -55,9 +55,7 @@ def pack_message(message: Any) -> bytes:
         return pack(message.timestamp, ERROR, False, b"")
     if message.is_remote_frame:
         return b""
-    return pack(
-        message.timestamp,
-        message.arbitration_id,
-        message.is_extended_id,
-        bytes(message.data),
-    )
+    identifier = message.arbitration_id
+    if message.is_extended_id:
+        identifier |= EXTENDED
+    return _ROW.pack(message.timestamp, identifier, len(message.data), message.data)

@@ -119,6 +119,32 @@ class Groups(ABC):
 
     def _whole(self, rows: Rows) -> tuple[Whole, Index]:
         """Find keys that every part has, and the first row of each part and key."""
+        return self._regular(rows) or self._any_order(rows)
+
+    def _regular(self, rows: Rows) -> tuple[Whole, Index] | None:
+        """Find them where the parts come in turn, as they nearly always do."""
+        n, left = divmod(len(rows.key), self._parts)
+        if not n:
+            return None
+        turn = rows.part[: self._parts]
+        place = np.argsort(turn)
+        key = rows.key[: n * self._parts].reshape(n, self._parts)
+        later = rows.key[n * self._parts :]
+        if not (
+            np.array_equal(turn[place], np.arange(self._parts))
+            and np.array_equal(rows.part[self._parts :], rows.part[: -self._parts])
+            and (key == key[:, :1]).all()
+            and (np.diff(key[:, 0]) > 0).all()
+            and (later == later[:1]).all()
+            and (later > key[-1, 0]).all()
+        ):
+            return None
+        begin = self._parts * np.arange(n)
+        last = begin + self._parts - 1
+        whole = Whole(key[:, 0], begin[:, None] + place, last)
+        return whole, np.arange(len(rows.key))
+
+    def _any_order(self, rows: Rows) -> tuple[Whole, Index]:
         keys, places = [], []
         for number in range(self._parts):
             of = np.flatnonzero(rows.part == number)
@@ -171,8 +197,9 @@ class ByKey(Groups):
             self._done = int(whole.key[-1])
         key = rows.key[firsts]
         waits = (key > self._done) & (self._newest - key <= self._deep)
-        begun = np.unique(key[~waits & (key > before)])
-        self._health.incomplete += len(begun) - len(whole.key)
+        if len(firsts) > self._parts * len(whole.key) + np.count_nonzero(waits):
+            begun = np.unique(key[~waits & (key > before)])
+            self._health.incomplete += len(begun) - len(whole.key)
         self._rest = rows.take(firsts[waits])
         return rows, whole
 
@@ -207,7 +234,9 @@ class ByTurns(Groups):
         """Put frames together that follow one another; a doubled one spoils them."""
         rows = self._after_rest(new)
         rows = rows._replace(key=np.cumsum(rows.part == self._first))
-        rows = rows.take(rows.key > 0)
+        begun = rows.key > 0
+        self._orphans(rows.part[~begun])
+        rows = rows.take(begun)
         whole, firsts = self._whole(rows)
         turns = int(rows.key[-1]) if len(rows.key) else 0
         again = np.ones(len(rows.key), dtype=bool)
@@ -222,4 +251,12 @@ class ByTurns(Groups):
         )
         self._rest = rows.take(rows.key == turns) if waits else None
         self._health.incomplete += turns - int(waits) - int(good.sum())
-        return rows, whole.take(good)
+        whole = whole.take(good)
+        ends = np.full(turns + 1, len(rows.key))
+        ends[whole.key] = whole.last
+        self._orphans(rows.part[np.arange(len(rows.key)) > ends[rows.key]])
+        return rows, whole
+
+    def _orphans(self, part: Index) -> None:
+        """Count samples of which the first frame was missing."""
+        self._health.incomplete += int(np.bincount(part, minlength=1).max())

@@ -7,7 +7,7 @@ Read through python-can, piece by piece, so a log may be as long as it likes; al
 from __future__ import annotations
 
 import gzip
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from itertools import islice
 from math import inf
 from pathlib import Path
@@ -101,10 +101,9 @@ class Log:
 
     def _read(self) -> Generator[Frames]:
         try:
-            with _reader(self._path) as reader:
-                messages = iter(reader)
-                while rows := [pack_message(m) for m in islice(messages, PIECE)]:
-                    yield np.frombuffer(b"".join(rows), FRAME)
+            messages = _messages(self._path)
+            while rows := [pack_message(m) for m in islice(messages, PIECE)]:
+                yield np.frombuffer(b"".join(rows), FRAME)
         except (OSError, EOFError) as fault:
             raise InputError(f"{self._path}: cannot be read: {fault}") from fault
         except Exception as fault:
@@ -118,12 +117,13 @@ class Log:
         self._pieces.close()
 
 
-def _reader(path: Path) -> Any:
+def _messages(path: Path) -> Iterator[Any]:
     import can
 
     packed = path.suffix.lower() == ".gz"
     ending = Path(path.stem if packed else path.name).suffix.lower()
-    reader = getattr(can, READERS[ending])
-    if not packed:
-        return reader(path)
-    return reader(gzip.open(path, "rb" if ending == ".blf" else "rt"))
+    mode = "rb" if ending == ".blf" else "rt"
+    file = gzip.open(path, mode) if packed else path.open(mode)
+    # the reader closes it, but not if it refuses to read it
+    with file, getattr(can, READERS[ending])(file) as reader:
+        yield from reader

@@ -3,9 +3,9 @@
 Options: ``dbc`` (a file, or ``virtual`` for that of the virtual device), ``map`` as in
 ``ax=Frame.Signal,ay=…``; without it, signals are taken that are called like the
 channels. A signal that only one frame has needs no frame before it; ``seq`` and ``t``
-without one are taken from every frame that has them. ``acc_unit``, ``gyr_unit``,
-``t_unit`` and ``temperature_unit`` overrule the units of the file, also with a factor,
-as in ``gyr_unit=0.244*deg/s``.
+without one are taken from every frame of a sample that has them. ``acc_unit``,
+``gyr_unit``, ``t_unit`` and ``temperature_unit`` overrule the units of the file, also
+with a factor, as in ``gyr_unit=0.244*deg/s``.
 """
 
 from __future__ import annotations
@@ -175,19 +175,20 @@ def _chosen(
     if wanted:
         named = _pairs(wanted)
     else:
-        there = {s.name.lower(): s.name for _, s in everything}
-        named = {column: there[column] for column in COLUMNS if column in there}
+        called = {s.name.lower(): s.name for _, s in everything}
+        named = {column: called[column] for column in COLUMNS if column in called}
     if not set(named) & set(CHANNELS):
         raise InputError(
             f"{path}: say which signals are the channels with map=ax=Frame.Signal,…;"
             f" there are {_listed(everything)}"
         )
     chosen = {c: _find(path, everything, c, text) for c, text in named.items()}
-    used = {m.name for c in named if c in CHANNELS for m, _ in chosen[c]}
-    for column in set(named) & {"t", "seq"}:
-        if "." not in named[column] and len(chosen[column]) > 1:
-            in_used = [(m, s) for m, s in chosen[column] if m.name in used]
-            chosen[column] = in_used or chosen[column]
+    used = {m.name for c in chosen if c in CHANNELS for m, _ in chosen[c]}
+    for column in ("t", "seq"):
+        if column in chosen and "." not in named[column]:
+            there = [pair for pair in chosen[column] if pair[0].name in used]
+            chosen[column] = there or chosen[column]
+        used |= {m.name for m, _ in chosen.get(column, [])}
     return chosen
 
 

@@ -16,7 +16,7 @@ from collections.abc import Sequence as Sequenced
 
 import numpy as np
 
-from fieldcal.drivers.can_fields import Bytes
+from fieldcal.drivers.can_fields import WORD, Bytes
 from fieldcal.drivers.can_frames import ERROR, Frames
 from fieldcal.drivers.can_groups import (
     ByKey,
@@ -125,7 +125,7 @@ class Samples:
         values = rows.values[whole.last]
         for number, part in enumerate(self._needed):
             columns = [COLUMNS.index(column) for column in part.channels]
-            values[:, columns] = rows.values[whole.rows[:, number]][:, columns]
+            values[:, columns] = rows.values[whole.rows[:, number, None], columns]
         return self._timed(values, rows.arrived[whole.last])
 
     def _timed(self, values: Array, arrived: Array) -> Block | None:
@@ -154,10 +154,11 @@ class Samples:
         for identifier, parts in self._by_identifier.items():
             of = np.flatnonzero(identifiers == identifier)
             known += len(of)
-            whole = frames["size"][of] >= max(self._parts[p].size for p in parts)
+            size = max(self._parts[p].size for p in parts)
+            whole = frames["size"][of] >= size
             self.health.bad += int(np.count_nonzero(~whole))
             of = of[whole]
-            data = frames["data"][of]
+            data = frames["data"][:, : max(size, WORD)][of]
             for number in parts:
                 if self._parts[number].selectors:
                     chosen = self._parts[number].selected(data)
@@ -191,5 +192,5 @@ class Samples:
             degrees = rows.values[at, TEMPERATURE]
             degrees[at < 0] = self._temperature
             rows.values[:, TEMPERATURE] = degrees
-            self._temperature = float(degrees[-1]) if len(degrees) else np.nan
+            self._temperature = float(np.append(self._temperature, degrees)[-1])
         return rows if needed.all() else rows.take(needed)

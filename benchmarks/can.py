@@ -1,0 +1,114 @@
+"""CAN frames into samples against python-can with cantools, as ratios in one run."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time, sleep
+
+import can
+import numpy as np
+
+from fieldcal.driver import open_driver
+from fieldcal.drivers.can_frames import FRAME, Frames, pack_message
+from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.can_map import SHIPPED, load, read_map
+from fieldcal.drivers.can_samples import Samples
+from fieldcal.drivers.options import Options
+from fieldcal.errors import DeviceError
+from fieldcal.sim_device import Profile, VirtualDevice
+from fieldcal.sim_device.can_packing import frames
+
+SAMPLES = 30_000
+"""Half a minute at 1 kHz: three times as many frames."""
+
+BATCH = 3000
+"""Frames decoded at once: a second."""
+
+RUNS = 5
+GOAL = 10.0
+WATCHED = 5.0
+"""Time over which the share of the processor is taken, s."""
+
+DATABASE = load(SHIPPED)
+
+
+def messages() -> list[can.Message]:
+    """Frames of the virtual device, as python-can hands them over."""
+    packed = frames(VirtualDevice(Profile(), seed=1).take(SAMPLES))
+    return [
+        can.Message(
+            timestamp=i / 3000,
+            arbitration_id=frame.identifier,
+            data=bytearray(frame.data),
+            is_extended_id=False,
+        )
+        for i, frame in enumerate(packed)
+    ]
+
+
+def by_cantools(received: list[tuple[int, bytes]]) -> int:
+    """Decode frame by frame; the number of frames."""
+    decode = DATABASE.decode_message
+    return len([decode(identifier, data) for identifier, data in received])
+
+
+def numbers(rows: Frames) -> int:
+    """Decode every signal of frames that came as rows; the number of frames."""
+    got = 0
+    for part in read_map(Options("can", "dbc=virtual")):
+        data = rows["data"][rows["id"] == part.identifier]
+        for channel in part.channels.values():
+            channel.field.values(data)
+        got += len(data)
+    return got
+
+
+def samples(rows: Frames) -> int:
+    """Decode, put together and time samples; the number of their frames."""
+    options = Options("can", "dbc=virtual")
+    decoder = Samples(read_map(options), CanHealth(), options)
+    got = 0
+    for i in range(0, len(rows), BATCH):
+        some = rows[i : i + BATCH]
+        block = decoder.feed(some, some["t"].astype(float))
+        got += 0 if block is None else len(block)
+    return 3 * got
+
+
+def as_rows(received: list[can.Message]) -> Frames:
+    """Pack what python-can hands over."""
+    return np.frombuffer(b"".join([pack_message(m) for m in received]), FRAME)
+
+
+def log_by_cantools(path: Path) -> int:
+    """Read and decode a log frame by frame."""
+    with can.LogReader(path) as log:
+        return by_cantools([(m.arbitration_id, bytes(m.data)) for m in log])
+
+
+def log_by_driver(path: Path) -> int:
+    """Read and decode a log with the driver."""
+    with open_driver(f"can:{path}?dbc=virtual&speed=max") as imu:
+        with suppress(DeviceError):  # the end of the log
+            for _ in imu.blocks():
+                pass
+        return 3 * imu.health.samples
+
+
+def compare(
+    what: str, theirs: Callable[[], int], ours: Callable[[], int], goal: float = 0.0
+) -> None:
+    """Print frames/s of both, the best of several runs in turn, and the ratio."""
+    best = [float("inf"), float("inf")]
+    for _ in range(RUNS):
+        for k, run in enumerate((theirs, ours)):
+            began = perf_counter()
+            if run() != 3 * SAMPLES:
+                print(f"! {what}: not every frame was decoded")
+            best[k] = min(best[k], perf_counter() - began)
+    slow, fast = (3 * SAMPLES / seconds / 1e3 for seconds in best)
+    aim = f"{goal:4.0f}" if goal else ""
+    print(f"{what:34} {slow:6.0f} k/s {fast:6.0f} k/s  {fast / slow:5.1f}  {aim}")

@@ -1,0 +1,102 @@
+"""Frames as a bus carries them, for tests of what decodes them."""
+
+from __future__ import annotations
+
+import struct
+from functools import cache
+
+import numpy as np
+
+from fieldcal.drivers.can_frames import FRAME, Frames, pack
+from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.can_map import Part, read_map
+from fieldcal.drivers.can_samples import Samples
+from fieldcal.drivers.options import Options
+from fieldcal.samples import Array, Block, concat
+
+DBC = """\
+VERSION ""
+NS_ :
+BS_:
+BU_: A
+
+BO_ 32 Force: 8 A
+ SG_ ax : 0|16@1- (0.001,0) [0|0] "g" A
+ SG_ ay : 16|16@1- (0.001,0) [0|0] "g" A
+ SG_ az : 32|16@1- (0.001,0) [0|0] "g" A
+ SG_ seq : 48|8@1+ (1,0) [0|0] "" A
+
+BO_ 33 Rate: 8 A
+ SG_ gx : 0|16@1- (0.01,0) [0|0] "deg/s" A
+ SG_ gy : 16|16@1- (0.01,0) [0|0] "deg/s" A
+ SG_ gz : 32|16@1- (0.01,0) [0|0] "deg/s" A
+ SG_ seq : 48|8@1+ (1,0) [0|0] "" A
+
+BO_ 34 Climate: 8 A
+ SG_ warmth : 0|16@1- (0.01,0) [0|0] "K" A
+ SG_ level : 16|8@1+ (1,0) [0|0] "furlong" A
+ SG_ bare : 24|8@1+ (1,0) [0|0] "" A
+
+VAL_ 32 ax -32768 "not available" ;
+"""
+
+KEYED = "ax=ax,ay=ay,az=az,gx=gx,gy=gy,gz=gz,seq=seq"
+TURNS = "ax=ax,ay=ay,az=az,gx=gx,gy=gy,gz=gz,temperature=warmth"
+
+
+def sample(i: int, seq: bool = True) -> list[bytes]:
+    """The two frames of a sample numbered in all its channels."""
+    rows = []
+    for identifier in (32, 33):
+        data = struct.pack("<3hBx", i, 2 * i, 3 * i, i % 256 if seq else 0)
+        rows.append(pack(i / 100 + identifier * 1e-5, identifier, False, data))
+    return rows
+
+
+def climate(degrees: float, t: float = 0.0) -> bytes:
+    """A frame of the temperature."""
+    return pack(
+        t, 34, False, struct.pack("<hHI", round((degrees + 273.15) * 100), 0, 0)
+    )
+
+
+def stream(n: int, seq: bool = True) -> list[bytes]:
+    """Frames of n samples, one after the other."""
+    return [row for i in range(n) for row in sample(i, seq)]
+
+
+def frames(rows: list[bytes]) -> Frames:
+    """All of them at once."""
+    return np.frombuffer(b"".join(rows), FRAME)
+
+
+@cache
+def parts(query: str) -> list[Part]:
+    """Read a map once."""
+    return read_map(Options("can", query))
+
+
+def decode(
+    dbc: object, query: str, rows: list[bytes], cuts: list[int] | None = None
+) -> tuple[Block, CanHealth]:
+    """Samples of the frames, given in pieces cut before these numbers."""
+    mapped = f"dbc={dbc}&rate=100{query and '&'}{query}"
+    health = CanHealth()
+    decoder = Samples(parts(mapped), health, Options("can", mapped))
+    edges = [0, *(cuts or []), len(rows)]
+    blocks = []
+    for start, end in zip(edges[:-1], edges[1:], strict=True):
+        some = frames(rows[start:end])
+        blocks.append(decoder.feed(some, some["t"].astype(float)))
+    return concat(block for block in blocks if block is not None), health
+
+
+def numbers(block: Block) -> list[int]:
+    """The number of each sample, which all six channels agree on."""
+    counts: Array = np.hstack(
+        [block.acc / (9.80665e-3), np.rad2deg(block.gyr) / 0.01]
+    ) / np.array([1, 2, 3, 1, 2, 3])
+    whole = np.rint(counts)
+    np.testing.assert_allclose(counts, whole, atol=1e-6)
+    assert (whole == whole[:, :1]).all(), "frames of two samples in one"
+    return [int(number) for number in whole[:, 0]]

@@ -1,0 +1,486 @@
+"""The CAN driver on real links and logs, most with the virtual device behind them."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import tty
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+from can_wires import DBC, KEYED, numbers, stream
+
+from fieldcal.cli import main
+from fieldcal.driver import Driver, open_driver
+from fieldcal.drivers.can_bus import why
+from fieldcal.drivers.can_frames import FRAME
+from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.lawicel import Lawicel
+from fieldcal.errors import DeviceError, DeviceSilent, InputError
+from fieldcal.samples import Array, Block, concat
+from fieldcal.sim_device import Profile, VirtualDevice
+from fieldcal.sim_device.line_faults import LineFaults
+from fieldcal.sim_device.link_can import BusLink
+from fieldcal.sim_device.profile import Sampling
+from fieldcal.sim_device.remote import Remote
+from fieldcal.sim_device.vocabulary import effect
+
+SIM = [sys.executable, "-m", "fieldcal", "sim"]
+SLCAN = "interface=slcan&bitrate=500000&dbc=virtual"
+
+
+@pytest.fixture
+def sims() -> Iterator[list[subprocess.Popen[str]]]:
+    started: list[subprocess.Popen[str]] = []
+    yield started
+    for sim in started:
+        sim.terminate()
+        sim.communicate(timeout=10)
+
+
+def start(
+    sims: list[subprocess.Popen[str]], *options: str, before: tuple[str, ...] = ()
+) -> tuple[str, str]:
+    """A virtual device in another process: its port or channel, and its control."""
+    sims.append(
+        subprocess.Popen(
+            [*before, *SIM, *options],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    )
+    out = sims[-1].stdout
+    assert out is not None
+    return out.readline().strip(), out.readline().strip()
+
+
+def until_the_end(imu: Driver) -> Block:
+    """All samples until the device goes."""
+    got = []
+    with pytest.raises(DeviceError, match="hung up|ended"):
+        for block in imu.blocks():
+            got.append(block)
+    return concat(got)
+
+
+def some(imu: Driver, n: int) -> Block:
+    """At least n samples."""
+    got: list[Block] = []
+    for block in imu.blocks(5.0):
+        got.append(block)
+        if sum(map(len, got)) >= n:
+            break
+    return concat(got)
+
+
+LSB = np.array([1e-4] * 3 + [np.deg2rad(0.004)] * 3)
+
+
+def test_slcan_between_two_processes_loses_nothing_of_a_minute_at_1_khz(
+    sims: list[subprocess.Popen[str]],
+) -> None:
+    port, _ = start(
+        sims,
+        *("--can", "slcan", "--rate", "1000", "--speed", "max", "--once"),
+        *("--duration", "60", "--seed", "4"),
+    )
+    with open_driver(f"can:{port}?{SLCAN}&reconnect=0") as imu:
+        block = until_the_end(imu)
+        health = imu.health
+    assert isinstance(health, CanHealth)
+    assert len(block) == health.samples == 60_000
+    assert health.bad == health.gaps == health.incomplete == health.repeated == 0
+    np.testing.assert_allclose(block.t, np.arange(60_000) / 1000, atol=1e-6)
+    np.testing.assert_array_equal(block.seq, np.arange(60_000) % 16)
+    earth = effect("earth_rate", {})
+    profile = Profile(sampling=Sampling(1000.0), effects=(earth,))
+    truth = VirtualDevice(profile, seed=4).take(60_000)
+    off = np.abs(block.six - truth.six) / LSB
+    assert off.max() < 0.5 + 1e-6
+    assert np.abs(block.temperature - truth.temperature).max() < 0.005 + 1e-9
+
+
+def test_the_windows_of_a_calibration_are_those_of_a_serial_device(
+    sims: list[subprocess.Popen[str]],
+) -> None:
+    means = []
+    for option, url in (
+        (("--can", "slcan"), f"can:{{}}?{SLCAN}&reconnect=0"),
+        (("--serial", "xsens"), "serial:{}?format=xsens&reconnect=0"),
+    ):
+        port, control = start(
+            sims, *option, "--speed", "max", "--once", "--duration", "65"
+        )
+        with Remote(control) as remote:
+            remote.ask(turn={"alpha_deg": 45, "beta_deg": 5, "at_s": 30.0})
+            with open_driver(url.format(port)) as imu:
+                block = until_the_end(imu)
+        windows = [block.between(0.0, 29.9), block.between(35.0, 64.9)]
+        assert [len(window) for window in windows] == [2990, 2990]
+        means.append([window.six.mean(axis=0) for window in windows])
+    assert np.abs(np.subtract(means[0], means[1])).max() < 5e-6
+
+
+def test_faults_of_the_line_cost_samples_and_make_none_up(
+    sims: list[subprocess.Popen[str]],
+) -> None:
+    port, control = start(sims, "--can", "slcan", "--speed", "max")
+    twin = VirtualDevice(Profile(), seed=1).take(20_000)
+    with Remote(control) as remote, open_driver(f"can:{port}?{SLCAN}") as imu:
+        got = [some(imu, 500)]
+        for fault in ({"lose_bytes": 5}, {"double_bytes": 5}, {"garbage_bytes": 99}):
+            remote.ask(fault=fault)
+            got.append(some(imu, 500))
+        health = imu.health
+    assert isinstance(health, CanHealth)
+    block = concat(got)
+    at = np.rint(block.t * 100).astype(int)
+    assert np.abs(block.acc - twin.acc[at]).max() < 1e-4
+    assert 0 < health.bad < 30 and 0 < health.incomplete < 30
+    assert health.missing >= health.incomplete - 2
+
+
+def test_hang_up_and_return_is_a_gap(
+    sims: list[subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    link = tmp_path / "adapter"
+    _, control = start(
+        sims, "--can", "slcan", "--port-link", str(link), "--speed", "20"
+    )
+    with Remote(control) as remote, open_driver(f"can:{link}?{SLCAN}") as imu:
+        before = some(imu, 50)
+        remote.ask(fault={"hangup_s": 4})
+        after = some(imu, 500)
+        assert imu.health.gaps == 1 and imu.health.missing > 300
+        t = np.concatenate([before.t, after.t])
+        assert (np.diff(t) > 0).all() and np.diff(t).max() > 3.9
+
+
+@pytest.fixture
+def namespace() -> Iterator[tuple[str, ...]]:
+    """A network of its own with multicast on its loopback."""
+    name = f"fieldcal{os.getpid()}"
+    if shutil.which("ip") is None:
+        pytest.skip("no `ip` to make a network namespace with")
+    made = subprocess.run(
+        ["ip", "netns", "add", name], capture_output=True, check=False
+    )
+    if made.returncode:
+        pytest.skip(f"no network namespace: {made.stderr.decode().strip()}")
+    inside = ("ip", "netns", "exec", name)
+    try:
+        for command in ("ip link set lo up", "ip route add 224.0.0.0/4 dev lo"):
+            subprocess.run([*inside, *command.split()], check=True)
+        yield inside
+    finally:
+        subprocess.run(["ip", "netns", "del", name], check=True)
+
+
+HOST = """
+import sys
+from fieldcal.driver import open_driver
+with open_driver("can:239.74.163.2?interface=udp_multicast&dbc=virtual") as imu:
+    print("listening", flush=True)
+    got = 0
+    for block in imu.blocks(10.0):
+        got += len(block)
+        if got >= 300:
+            break
+    h = imu.health
+    print(got, h.gaps, h.incomplete, h.bad, *block.acc[-1])
+"""
+
+
+def test_udp_multicast_between_two_processes(
+    sims: list[subprocess.Popen[str]], namespace: tuple[str, ...]
+) -> None:
+    host = subprocess.Popen(
+        [*namespace, sys.executable, "-c", HOST], stdout=subprocess.PIPE, text=True
+    )
+    assert host.stdout is not None and host.stdout.readline() == "listening\n"
+    spec = "udp_multicast:239.74.163.2"
+    address, _ = start(sims, "--can", spec, "--speed", "10", before=namespace)
+    assert address == "239.74.163.2"
+    got, gaps, incomplete, bad, *acc = host.communicate(timeout=30)[0].split()
+    assert int(got) >= 300 and [gaps, incomplete, bad] == ["0", "0", "0"]
+    assert abs(np.linalg.norm([float(a) for a in acc]) - 9.81) < 0.8
+
+
+@pytest.fixture
+def bus() -> Iterator[tuple[BusLink, Driver]]:
+    """The virtual device and the driver on a bus within this process."""
+    channel = f"test {os.getpid()}"
+    with (
+        closing(BusLink("virtual", channel, LineFaults(1))) as link,
+        open_driver(f"can:{channel}?interface=virtual&dbc=virtual") as imu,
+    ):
+        yield link, imu
+
+
+def pumped(link: BusLink, block: Block) -> None:
+    link.send(block)
+    while link.pending:
+        link.pump()
+
+
+def test_a_bus_within_the_process(bus: tuple[BusLink, Driver]) -> None:
+    link, imu = bus
+    device = VirtualDevice(Profile(), seed=2)
+    truth = device.take(500)
+    pumped(link, truth)
+    block = some(imu, 500)
+    assert np.abs(block.six - truth.six).max() < 1e-4
+    link.hang_up()
+    assert not link.attached()
+    device.take(100)
+    link.come_back()
+    pumped(link, device.take(10))
+    assert some(imu, 10).t[0] == pytest.approx(6.0)
+    assert (imu.health.gaps, imu.health.missing) == (1, 100)
+
+
+def test_faults_of_a_bus_are_lost_doubled_and_foreign_frames(
+    bus: tuple[BusLink, Driver],
+) -> None:
+    link, imu = bus
+    device = VirtualDevice(Profile(), seed=2)
+    health = imu.health
+    assert isinstance(health, CanHealth)
+    link._faults.order({"flip_bits": 3})
+    pumped(link, device.take(400))
+    block = some(imu, 397)
+    assert len(block) == 397 and health.incomplete == 3
+    link._faults.order({"double_bytes": 9, "garbage_bytes": 20})
+    pumped(link, device.take(400))
+    assert len(some(imu, 400)) == 400
+    assert (health.strange, health.incomplete) == (20, 3)
+
+
+def test_the_right_frames_are_missing(bus: tuple[BusLink, Driver]) -> None:
+    link, imu = bus
+    with pytest.raises(DeviceSilent, match="not a frame came; check wiring, power"):
+        next(imu.blocks(0.05))
+    with can.Bus(link.address, interface="virtual") as other:
+        other.send(
+            can.Message(arbitration_id=0x100, data=bytes(8), is_extended_id=False)
+        )
+        other.send(
+            can.Message(arbitration_id=0x777, data=bytes(8), is_extended_id=False)
+        )
+        other.send(can.Message(arbitration_id=0x5, is_remote_frame=True))
+        says = r"no AngularRate \(0x101\), Status \(0x102\); heard: 0x777; check dbc"
+        with pytest.raises(DeviceSilent, match=says):
+            next(imu.blocks(0.2))
+
+
+def test_only_error_frames(bus: tuple[BusLink, Driver]) -> None:
+    link, imu = bus
+    with can.Bus(link.address, interface="virtual") as other:
+        other.send(can.Message(arbitration_id=4, is_error_frame=True))
+        with pytest.raises(
+            DeviceSilent, match="only error frames come; check bit rate"
+        ):
+            next(imu.blocks(0.2))
+
+
+def test_an_adapter_at_the_wrong_baud_rate() -> None:
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    with open_driver(f"can:{os.ttyname(theirs)}?{SLCAN}") as imu:
+        os.write(ours, b"\x80\xff\x13\r" * 50)
+        with pytest.raises(DeviceSilent, match="no frames; check tty_baudrate"):
+            next(imu.blocks(0.2))
+    os.close(ours)
+    os.close(theirs)
+
+
+def lines(rows: list[bytes]) -> bytes:
+    """The same frames as an adapter writes them."""
+    text = ""
+    for row in np.frombuffer(b"".join(rows), FRAME):
+        data = row["data"][: row["size"]].tobytes().hex().upper()
+        text += f"t{row['id']:03X}{row['size']}{data}\r"
+    return text.encode()
+
+
+def test_lines_of_an_adapter_in_any_pieces() -> None:
+    data = lines(stream(20))
+    for text, bad in ((data, 0), (data.replace(b"t021", b"t0218", 1), 1)):
+        health = CanHealth()
+        whole = Lawicel(health).feed(b"\a\rz\rV1013\r" + text)
+        assert health.bad == bad
+        decoder = Lawicel(CanHealth())
+        got = b"".join(decoder.feed(text[i : i + 1]) for i in range(len(text)))
+        a, b = np.frombuffer(whole, FRAME), np.frombuffer(got, FRAME)
+        for name in ("id", "size", "data"):
+            np.testing.assert_array_equal(a[name], b[name])
+        assert len(a) == 40 - bad
+
+
+def test_every_kind_of_line() -> None:
+    health = CanHealth()
+    kinds = b"t1232AABB\rT12345678100\rt1230ABCD\rd1239" + b"11" * 12 + b"\rr1238\r"
+    wrong = b"t1239" + b"0" * 18 + b"\rt12\rQ\rt123201\rt1231 A\r\xff\r"
+    rows = np.frombuffer(Lawicel(health).feed(kinds + wrong), FRAME)
+    assert rows["id"].tolist() == [0x123, 0x12345678 | 1 << 31, 0x123, 0x123]
+    assert rows["size"].tolist() == [2, 1, 0, 12]
+    assert health.bad == 6
+    decoder = Lawicel(health)
+    for _ in range(10):
+        decoder.feed(b"x" * 10_000)
+    assert len(decoder._rest) < 200
+
+
+def test_a_log_is_played_as_the_bus_was(tmp_path: Path) -> None:
+    dbc = tmp_path / "imu.dbc"
+    dbc.write_text(DBC)
+    query = f"dbc={dbc}&map={KEYED}&rate=100&speed=max"
+    for ending in (".log", ".asc", ".blf", ".trc"):
+        path = tmp_path / f"drive.day.1{ending}"
+        with can.Logger(path) as log:
+            for row in np.frombuffer(b"".join(stream(200)), FRAME):
+                log(
+                    can.Message(
+                        timestamp=1e9 + float(row["t"]),
+                        arbitration_id=int(row["id"]),
+                        is_extended_id=False,
+                        data=row["data"][: row["size"]].tobytes(),
+                        channel=0,
+                    )
+                )
+        packed = tmp_path / f"{path.name}.gz"
+        packed.write_bytes(gzip.compress(path.read_bytes()))
+        for name in (path, packed):
+            with open_driver(f"can:{name}?{query}") as imu:
+                assert numbers(until_the_end(imu)) == list(range(200)), name
+
+
+def test_a_log_takes_its_time(tmp_path: Path) -> None:
+    dbc, path = tmp_path / "imu.dbc", tmp_path / "x.log"
+    dbc.write_text(DBC)
+    rows = [f"({i}.000000) can0 020#{i:02X}00000000000{i:X}00" for i in range(9)]
+    rows = [row[:-16] + f"{i:02X}00" + "00" * 6 for i, row in enumerate(rows)]
+    path.write_text("\n".join(rows) + "\n")
+    with open_driver(f"can:{path}?dbc={dbc}&map=ax=ax&rate=1&speed=20") as imu:
+        assert imu.receive(0.0) is not None
+        assert imu.receive(0.01) is None
+        assert imu.host_time() == 0.0
+        block = until_the_end(imu)
+        np.testing.assert_allclose(block.t_host, np.arange(1, 9))
+        assert imu.host_time() == 8.0
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("none.log", None, "there is no such log"),
+        ("empty.log", b"", "holds no frame"),
+        ("text.log", b"hello\nworld\n", "is no CAN log of this kind"),
+        ("bad.blf", b"LOGGG", "is no CAN log of this kind"),
+        ("bad.log.gz", b"no gzip", "cannot be read"),
+    ],
+)
+def test_logs_that_are_none(
+    tmp_path: Path, name: str, content: bytes | None, says: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=says) as raised:
+        open_driver(f"can:{tmp_path / name}?dbc=virtual")
+    assert "\n" not in str(raised.value)
+
+
+def test_a_real_car_turns_as_the_phone_in_it_says(shared: Path) -> None:
+    folder = shared / "real" / "comma_rav4_can"
+    if not folder.is_dir():
+        pytest.skip("no recording of a car's CAN beside the project")
+    log = next(folder.glob("*.candump.log.gz"))
+    dbc = next(folder.glob("*.dbc"))
+    url = f"can:{log}?dbc={dbc}&map=gz=KINEMATICS.YAW_RATE&speed=max"
+    with pytest.raises(InputError, match="YAW_RATE has no unit"):
+        open_driver(url)
+    with open_driver(f"{url}&gyr_unit=0.244*deg/s") as imu:
+        block = until_the_end(imu)
+        assert len(block) > 4800 and imu.health.gaps == 0
+    t = block.t - 1533200000
+    phone = np.load(folder / "phone_imu.npz")
+    inside = (phone["gyro_t"] > t[0]) & (phone["gyro_t"] < t[-1])
+    car = np.interp(phone["gyro_t"][inside], t, block.gyr[:, 2])
+    down = -phone["gyro_value"][inside, 2]  # the phone's z points down
+    a, b = smooth(car), smooth(down)
+    assert np.corrcoef(a, b)[0, 1] > 0.95
+    assert 0.85 < np.polyfit(a, b, 1)[0] < 1.1
+    assert np.corrcoef(a[300:], b[:-300])[0, 1] < 0.8  # and at the same time
+
+
+def smooth(x: Array) -> Array:
+    """Means over half a second of the phone."""
+    return np.convolve(x, np.full(52, 1 / 52), "valid")
+
+
+def test_a_kernel_without_can_and_channels_that_are_not_there(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    command = ["run", "two_position", "--headless", "-o", str(tmp_path / "s")]
+    for url, says in (
+        ("can:nosuch0?dbc=virtual", "no CAN; load it|no such CAN channel"),
+        (f"can:{tmp_path}/tty?interface=slcan&dbc=virtual", "no such port"),
+    ):
+        assert main([*command, "--device", url]) == 3
+        said = capsys.readouterr().err
+        assert re.search(says, said) and said.count("\n") == 1
+    for number, says in (
+        (97, "the kernel has no CAN"),
+        (19, "no such CAN channel"),
+        (100, "is down"),
+    ):
+        assert says in why("socketcan", OSError(number, "what the kernel says"))
+
+
+def test_without_the_extra_one_sentence_tells_what_to_install(tmp_path: Path) -> None:
+    script = (
+        "import sys\nsys.modules['can'] = None\n"
+        "from fieldcal.cli import main\nsys.exit(main(sys.argv[1:]))\n"
+    )
+    for arguments in (
+        ["run", "two_position", "--device", "can:can0?dbc=virtual", "-o", "s"],
+        ["sim", "--can", "virtual:x"],
+    ):
+        done = subprocess.run(
+            [
+                sys.executable,
+                "-c",
+                script,
+                *arguments,
+                *(["-o", str(tmp_path)] * (arguments[0] == "run")),
+            ],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+        )
+        assert done.returncode == 2, done.stderr
+        assert "pip install 'fieldcal[can]'" in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
+def test_nothing_is_left_behind(bus: tuple[BusLink, Driver]) -> None:
+    _, imu = bus
+    name = f"read {imu.name}"
+    assert name in [thread.name for thread in threading.enumerate()]
+    imu.close()
+    imu.close()
+    assert name not in [thread.name for thread in threading.enumerate()]
+    with pytest.raises(DeviceError, match="was closed"):
+        imu.receive(0.1)

@@ -1,12 +1,9 @@
 """CAN frames into samples against python-can with cantools, as ratios in one run."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from time import perf_counter, process_time, sleep
+from time import perf_counter
 
 import can
 import numpy as np

@@ -39,6 +39,7 @@ class Device:
     start_c: float = 24.0
     ramp_k: float = 0.0
     ramp_s: float = 150.0
+    cycle_s: float = 0.0
     columns: tuple[str, ...] = ("gyr", "temperature")
     angles_known: bool = True
 
@@ -108,6 +109,8 @@ def _carried(
             table = np.deg2rad(rate) @ _mounting(device)
             w[(t >= start) & (t < end)] += table
     warm = device.ramp_k * (1 - np.exp(-t / device.ramp_s))
+    if device.cycle_s:
+        warm = device.ramp_k * np.sin(2 * np.pi * t / device.cycle_s)
     return World(device, trip, rng, t, path, f, w, w_dot, warm)
 
 

@@ -1,7 +1,7 @@
 """Which other effects would explain the same in this recording, and what would tell.
 
-Every model that the search looked at, and every swap of one effect for another, is
-compared with the best: what comes within `CLOSE` is an alias. What decides between two
+A model with one effect exchanged for another that comes close to the best, windows and
+turns together, makes the two aliases. What decides between two
 is the position, in reach of a fixture, at which they predict the most different
 outputs, or failing that what the effect's own entry in the catalogue says.
 """
@@ -12,13 +12,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.select import Model, Search
+from fieldcal.diagnosis.explain import CLOSE, Explanation, preferred
+from fieldcal.diagnosis.scatter import wanders
+from fieldcal.diagnosis.select import Model
 from fieldcal.effects import Experience, catalogue
 from fieldcal.frames import turn
 
-CLOSE = 4.6
-"""Of ln 100: an explanation a hundred times less likely is no alias."""
+RANDOM = {"walk": "random_walk", "setting": "angle_setting"}
 
 REACH = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
 TELLING = 5.0
@@ -27,26 +27,47 @@ TELLING = 5.0
 
 def aliases(explanation: Explanation) -> dict[str, tuple[str, ...]]:
     """Ids that stand for an effect as well as the one chosen, by id."""
-    search, best = explanation.search, explanation.model
     found: dict[str, list[str]] = {}
-    mine = {h.effect.id for h, _ in best.chosen}
-    for other in _rivals(search, best):
-        if other.objective < best.objective - CLOSE:
-            continue
-        theirs = {h.effect.id for h, _ in other.chosen}
+    mine = {h.effect.id for h, _ in explanation.model.chosen}
+    for rival in explanation.rivals:
+        theirs = {h.effect.id for h, _ in rival.chosen}
         for name in sorted(mine - theirs):
-            new = [i for i in sorted(theirs - mine) if i not in found.get(name, [])]
-            found.setdefault(name, []).extend(new)
+            _add(found, name, sorted(theirs - mine))
+    for name, chance in _chances(explanation):
+        _add(found, name, [chance])
     return {name: tuple(ids) for name, ids in found.items() if ids}
 
 
-def _rivals(search: Search, best: Model) -> Iterator[Model]:
-    """Models as large as the best with one effect exchanged."""
-    for i in range(len(best.chosen)):
-        chosen = best.chosen[:i] + best.chosen[i + 1 :]
-        shaped = best.shaped[:i] + best.shaped[i + 1 :]
-        less = search.model(chosen, best.bench, best.fit, best.random, shaped)
-        yield from search.larger(less)
+def undecided(explanation: Explanation) -> bool:
+    """Whether a rival is no second choice by its nature, so that nothing decides."""
+    cost = preferred(explanation.model)
+    second = [m for m in explanation.rivals if preferred(m) > cost]
+    return len(second) < len(explanation.rivals) or any(_chances(explanation))
+
+
+def _add(found: dict[str, list[str]], name: str, ids: list[str]) -> None:
+    there = found.setdefault(name, [])
+    there += [i for i in ids if i not in there]
+
+
+def _chances(explanation: Explanation) -> Iterator[tuple[str, str]]:
+    """Effects that chance would do for as well, and the other way about."""
+    search, best = explanation.search, explanation.model
+    for less in search.smaller(best):
+        gone = {h.effect.id for h, _ in best.chosen} - {
+            h.effect.id for h, _ in less.chosen
+        }
+        level = best.objective - CLOSE
+        for name in gone:
+            for wander in wanders(less.bench, less.fit):
+                id_ = RANDOM.get(wander.name.partition(":")[0])
+                if id_ and less.objective + wander.gain - search.price > level:
+                    yield name, id_
+        for name in set(best.random) - set(less.random):
+            if (id_ := RANDOM.get(name.partition(":")[0])) is not None:
+                for other in search.larger(less):
+                    if other.objective > level:
+                        yield id_, other.chosen[-1][0].effect.id
 
 
 def telling_position(

@@ -48,7 +48,7 @@ def estimate(
 
 def _free(term: Term) -> Term:
     smooth = term.shape and "at_s" not in term.shape and term.columns
-    return replace(term, free_shape=bool(smooth))
+    return replace(term, free_shape=bool(smooth), tight=1.0)
 
 
 def _open(fit: Fit, terms: Sequence[Term]) -> tuple[int, int] | None:

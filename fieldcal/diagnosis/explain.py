@@ -21,6 +21,12 @@ from fieldcal.frames import EARTH_RATE
 
 PASSES = 2
 
+CLOSE = 4.6
+"""Of ln 100: an explanation a hundred times less likely is no rival."""
+
+NEARBY, RIVALS = 15.0, 4
+"""How close, by the windows alone, a model must come for its turns to be looked at."""
+
 SEES_EARTH = 20.0
 """Earth rate over the noise of one window from which tactical gyroscopes see it."""
 
@@ -35,6 +41,7 @@ class Explanation:
     always : terms that are in every model: what the simulation has, the Earth
     search : the search, with what else was tried
     model : what the windows say
+    rivals : models that explain windows and turns about as well
     base : the simulation alone, refitted
     fit : with the effects of the windows, wide priors
     left : parameters that the rows leave open
@@ -48,6 +55,7 @@ class Explanation:
     always: tuple[Term, ...]
     search: Search
     model: Model
+    rivals: tuple[Model, ...]
     base: Fit
     fit: Fit
     left: tuple[str, ...]
@@ -75,20 +83,66 @@ def explain(prepared: Prepared) -> Explanation:
     """Find what explains a recording."""
     always, earth = _always(prepared)
     search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
-    model = search.run()
+    model, rivals = _with_turns(prepared, search, search.run())
     if any(h.effect.id == "settling" for h, _ in model.chosen):
         prepared = refined(prepared, model.fit)
         errors = model.bench.errors
         bench = prepared.bench.but(errors=errors)
         search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
         model = search.model(model.chosen, bench, None, model.random, model.shaped)
-    terms = [*always, *merged([t for _, t in model.chosen])]
-    fit, left = estimate(model.bench, terms, model.fit)
+    fit, left = _estimated(search, model)
     made, table, turning = _turned(prepared, model, fit, search.price)
     base = prepared.bench.fit(always)
     return Explanation(
-        prepared, always, search, model, base, fit, left, made, table, turning, earth
+        prepared,
+        always,
+        search,
+        model,
+        rivals,
+        base,
+        fit,
+        left,
+        made,
+        table,
+        turning,
+        earth,
     )
+
+
+def _estimated(search: Search, model: Model) -> tuple[Fit, tuple[str, ...]]:
+    whole = [replace(t, columns=h.variants[0].columns) for h, t in model.chosen]
+    terms = [*search.always, *merged(whole)]
+    return estimate(model.bench, terms, model.fit)
+
+
+def _with_turns(
+    prepared: Prepared, search: Search, best: Model
+) -> tuple[Model, tuple[Model, ...]]:
+    """The best model of windows and turns, and the rivals that come close to it."""
+    close = [m for m in search.rivals(best) if m.objective > best.objective - NEARBY]
+    close = [best, *sorted(close, key=lambda m: -m.objective)[:RIVALS]]
+    if len(close) == 1:
+        return best, ()
+    gains = []
+    for model in close:
+        fit, _ = _estimated(search, model)
+        made = turns(prepared.source, model.bench.rows, fit)
+        if made:
+            interval = 1 / rate_of(prepared.source.block)
+            found = Turntable(model.bench, fit, made, interval).best(search.price)
+            gains.append(found.score - search.price * len(found.terms))
+        else:
+            gains.append(0.0)
+    totals = [m.objective + g for m, g in zip(close, gains, strict=True)]
+    first = int(np.argmax(totals))
+    level = totals[first] + preferred(close[first]) - CLOSE
+    rivals = [m for m, t in zip(close, totals, strict=True) if t + preferred(m) > level]
+    return close[first], tuple(m for m in rivals if m is not close[first])
+
+
+def preferred(model: Model) -> float:
+    """What a model paid for effects that are second choice by their nature, ln."""
+    return sum(h.cost for h, _ in model.chosen)
 
 
 def _pool(prepared: Prepared, bench: Bench) -> list[Hypothesis]:

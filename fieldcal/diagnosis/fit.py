@@ -200,6 +200,16 @@ class Bench:
             score,
         )
 
+    def shifted(self, fit: Fit, column: int, step: float) -> State:
+        """Where a fit would stand with one column changed."""
+        p = fit.values.copy()
+        p[column] += step
+        return self._unpack(fit.state, p)
+
+    def prior_of(self, term: Term) -> Array:
+        """Prior of a term's values, in outputs' units."""
+        return self.relax * term.prior * self._unit(term)
+
     @property
     def _turns_aside(self) -> bool:
         return self.free or self.errors.setting > 0
@@ -233,7 +243,7 @@ class Bench:
         gravity, acc = self.rows.x.gravity, np.abs(self.scale[:3])
         bias = np.concatenate([BIAS_G * gravity * acc, BIAS_G * np.abs(self.scale[3:])])
         base = np.concatenate([bias, SCALE * np.abs(self.scale)])[self._base]
-        sizes = [self.relax * t.prior * self._unit(t) for t in state.terms]
+        sizes: list[Array] = [self.prior_of(t) for t in state.terms]
         aside = np.full(self.places * 2, self.errors.setting or TURN)
         if self.free:
             aside[:] = TURN

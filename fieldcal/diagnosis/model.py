@@ -24,7 +24,8 @@ class Term:
 
     `columns` are indices into the effect's `params`; `start` are the values that the
     simulation has already, to which the estimates are added; `free_shape` says whether
-    the shape parameters are estimated as well.
+    the shape parameters are estimated as well; `tight` is the size of the prior in
+    typical sizes.
     """
 
     effect: Effect
@@ -32,6 +33,7 @@ class Term:
     shape: Mapping[str, float] = field(default_factory=dict)
     free_shape: bool = False
     start: tuple[float, ...] = ()
+    tight: float = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -50,7 +52,7 @@ class Term:
     @property
     def prior(self) -> Array:
         """Size that each value can have."""
-        sizes = [self.effect.params[j].typical for j in self.columns]
+        sizes = [self.tight * self.effect.params[j].typical for j in self.columns]
         if self.free_shape:
             sizes += list(self.shape.values())
         return np.array(sizes)

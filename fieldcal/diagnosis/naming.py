@@ -86,7 +86,9 @@ def gain(without: Removed, now: Array) -> float:
     return float(1 - now[c] / without.held_out[c])
 
 
-def of_chance(explanation: Explanation) -> Iterator[Found]:
+def of_chance(
+    explanation: Explanation, aliases: Mapping[str, Sequence[str]]
+) -> Iterator[Found]:
     """Random effects: what wanders, and angles set by hand."""
     bench, model = explanation.model.bench, explanation.model
     plain = explanation.prepared.bench
@@ -101,7 +103,8 @@ def of_chance(explanation: Explanation) -> Iterator[Found]:
                     "deg",
                 )
             },
-            evidence=_rise(explanation, "setting"),
+            tuple(aliases.get("angle_setting", ())),
+            _rise(explanation, "setting"),
         )
     walks = [
         p for p in bench.errors.parts if p.kind == "walk" and _matters(explanation)
@@ -114,7 +117,8 @@ def of_chance(explanation: Explanation) -> Iterator[Found]:
             sigma = size_sigma(plain, explanation.fit, "walk", part.channel, part.size)
             found[name] = Quantity(part.size, sigma, unit(name))
         names = [n for n in model.random if n.startswith("walk")]
-        yield Found("random_walk", found, evidence=_rise(explanation, *names))
+        others = tuple(aliases.get("random_walk", ()))
+        yield Found("random_walk", found, others, _rise(explanation, *names))
 
 
 def _matters(explanation: Explanation) -> bool:

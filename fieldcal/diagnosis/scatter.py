@@ -25,6 +25,9 @@ from fieldcal.samples import CHANNELS, Array
 VARIANCE = 2.0
 """What a variance to be estimated costs, ln."""
 
+UNKNOWN = 6.0
+"""What a function costs that no effect makes, ln: known causes come first."""
+
 FEWEST = 4
 """Windows from which their scatter can be told."""
 
@@ -51,17 +54,16 @@ class Wander:
 def wanders(bench: Bench, fit: Fit) -> Iterator[Wander]:
     """Every part that is not there yet, with its gain."""
     there = {(p.kind, p.channel) for p in bench.errors.parts}
-    spans = [span(fit.jacobian[bench.rows.used[:, c], c]) for c in range(6)]
     for triad, channels in TRIADS:
         for kind in ("walk", "offset"):
             if kind == "offset" and bench.windows < FEWEST:
                 continue
             if not any((kind, c) in there for c in channels):
-                yield _of(bench, fit, spans, kind, triad, channels)
+                yield _of(bench, fit, kind, triad, channels)
     for c, name in enumerate(CHANNELS):
         for kind in SMOOTH:
             if (kind, c) not in there and _known(bench, kind):
-                yield _of(bench, fit, spans, kind, name, (c,))
+                yield _of(bench, fit, kind, name, (c,))
     if bench.rows.x.oriented.all() and bench.errors.setting == 0:
         yield _of_angles(bench, fit)
 
@@ -78,21 +80,18 @@ def dropped(errors: Errors, name: str) -> Errors:
 def size_sigma(bench: Bench, fit: Fit, kind: str, channel: int, size: float) -> float:
     """Standard uncertainty of a part's v, from the information on ln v.
 
-    `bench` has white noise only; `fit` says what the model leaves free. The information
-    is 2 sum_i (v^2 s_i^2 / (1 + v^2 s_i^2))^2.
+    `bench` has white noise only; `fit` says which effects are in the model. The
+    information is 2 sum_i (v^2 s_i^2 / (1 + v^2 s_i^2))^2.
     """
-    names = [not n.startswith("aside") for n in fit.names]
     if kind == "setting":
-        free = bench.whiten(fit.design)[:, :, names].reshape(-1, int(sum(names)))
-        white = bench.whiten(bench.aside(fit.state)).reshape(len(free), -1)
+        columns = bench.aside(fit.state)
     else:
-        use = bench.rows.used[:, channel]
-        free = bench.whiten(fit.design)[use, channel][:, names]
-        white = factor(kind, bench.rows.x, channel)[use]
-        white = white / bench.rows.sd[use, channel][:, None]
-    basis = span(free)
-    s = np.linalg.svd(white - basis @ (basis.T @ white), compute_uv=False)
-    load = size**2 * s**2
+        wide = factor(kind, bench.rows.x, channel)
+        columns = np.zeros((*bench.rows.y.shape, wide.shape[1]))
+        columns[:, channel] = wide
+    there = bench.fit(fit.terms, fit)
+    strength = np.linalg.eigvalsh(projected(there, bench.whiten(columns))[0])
+    load = size**2 * np.maximum(strength, 0.0)
     information = 2 * float(((load / (1 + load)) ** 2).sum())
     return size / float(np.sqrt(max(information, 1e-12)))
 
@@ -109,7 +108,6 @@ def _known(bench: Bench, kind: str) -> bool:
 def _of(
     bench: Bench,
     fit: Fit,
-    spans: list[Array],
     kind: str,
     label: str,
     channels: tuple[int, ...],
@@ -119,53 +117,61 @@ def _of(
         use = bench.rows.used[:, c]
         if use.sum() < 8:
             continue
-        f = factor(kind, bench.rows.x, c)
-        deep = np.zeros((len(use), 6, f.shape[1]))
-        deep[:, c] = f
-        white = bench.whiten(deep)[use, c]
-        size, more = raised(white, spans[c], fit.white[use, c])
+        white = bench.whiten.channel(factor(kind, bench.rows.x, c), c)
+        size, more = raised(*projected_channel(fit, white, c))
         if more > VARIANCE:
             found.append(Part(kind, c, size))
             gain += more - VARIANCE
+    gain -= UNKNOWN if kind in SMOOTH or kind == "offset" and len(found) < 2 else 0.0
     return Wander(f"{kind}:{label}", gain, bench.errors.but(tuple(found)))
 
 
 def _of_angles(bench: Bench, fit: Fit) -> Wander:
     turned = bench.whiten(bench.aside(fit.state))
-    flat = fit.jacobian.reshape(-1, len(fit.names))
-    size, more = raised(turned.reshape(len(flat), -1), span(flat), fit.white.ravel())
+    size, more = raised(*projected(fit, turned))
     return Wander("setting", more - VARIANCE, replace(bench.errors, setting=size))
 
 
-def span(jacobian: Array) -> Array:
-    """Orthonormal basis of what a model leaves free, (r, k)."""
-    norm = np.linalg.norm(jacobian, axis=0)
-    keep = norm > 0
-    basis, size, _ = np.linalg.svd(jacobian[:, keep] / norm[keep], full_matrices=False)
-    out: Array = basis[:, size > 1e-9 * size.max(initial=0.0)]
-    return out
-
-
-def raised(factor: Array, basis: Array, white: Array) -> tuple[float, float]:
+def raised(information: Array, pull: Array) -> tuple[float, float]:
     """Size v at the highest likelihood, and by how much that is higher.
 
     Parameters
     ----------
-    factor : (r, m) F, whitened
-    basis : (r, k) orthonormal, of what the model leaves free
-    white : (r,) residual, whitened
+    information : (m, m) F^T P F
+    pull : (m,) F^T P r
 
     """
-    left = factor - basis @ (basis.T @ factor)
-    r = white - basis @ (basis.T @ white)
-    a, s, _ = np.linalg.svd(left, full_matrices=False)
-    seen = s > 1e-6 * np.linalg.norm(factor, axis=0).max(initial=1e-300)
-    power, strength = (a.T @ r)[seen] ** 2, s[seen] ** 2
+    strength, a = np.linalg.eigh(information)
+    seen = strength > 1e-10 * max(float(strength.max()), 1e-300)
+    strength, power = strength[seen], (a.T @ pull)[seen] ** 2
     if not seen.any():
         return 0.0, 0.0
+    power = power / strength
     top = 10.0 * np.sqrt(power.max() + 1.0) / np.sqrt(strength.max())
     sizes = top * np.geomspace(1.0, 1e-4, 120)
     load = sizes[:, None] ** 2 * strength
     gain = 0.5 * np.sum(power * load / (1 + load) - np.log1p(load), axis=1)
     best = int(np.argmax(gain))
     return (float(sizes[best]), float(gain[best])) if gain[best] > 0 else (0.0, 0.0)
+
+
+def projected(fit: Fit, columns: Array) -> tuple[Array, Array]:
+    """F^T P F and F^T P r for whitened columns F, (n, 6, m), of a fit's rows."""
+    flat = columns.reshape(-1, columns.shape[2])
+    free = fit.jacobian.reshape(len(flat), -1)
+    shared = free.T @ flat
+    information = flat.T @ flat - shared.T @ fit.covariance @ shared
+    white = fit.white.ravel()
+    pull = flat.T @ white - shared.T @ (fit.covariance @ (free.T @ white))
+    return (information + information.T) / 2, pull
+
+
+def projected_channel(fit: Fit, columns: Array, channel: int) -> tuple[Array, Array]:
+    """The same for columns (n, m) of one channel."""
+    free = fit.jacobian[:, channel]
+    shared = free.T @ columns
+    information = columns.T @ columns - shared.T @ fit.covariance @ shared
+    flat = fit.jacobian.reshape(-1, free.shape[1])
+    kept = fit.covariance @ (flat.T @ fit.white.ravel())
+    pull = columns.T @ fit.white[:, channel] - shared.T @ kept
+    return (information + information.T) / 2, pull

@@ -23,14 +23,15 @@ import numpy as np
 from fieldcal.diagnosis.candidates import Hypothesis, instants
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
+from fieldcal.diagnosis.narrow import narrower
 from fieldcal.diagnosis.scatter import Wander, dropped, wanders
 from fieldcal.diagnosis.steps import step_gains
 
 EXTRA = 6.9
 """Of ln 1000."""
 
-MARGIN = 3.0
-"""How much better an effect has to be than something random, ln."""
+MARGIN, WEAK = 3.0, 8.0
+"""How much better an effect has to be than something random, ln, if it is weak."""
 
 OTHERS = 60
 """Random and smooth parts that are tried besides."""
@@ -105,6 +106,9 @@ class Search:
         """The best model found."""
         best = self.model((), self.bench)
         while (grown := self._grow(best)) is not None:
+            grown = self.model(
+                grown.chosen, grown.bench, grown.fit, grown.random, grown.shaped
+            )
             best = self._tidied(self._anew(grown))
         return best
 
@@ -131,10 +135,11 @@ class Search:
         gain = best.objective - model.objective
         if max(gain, chance.gain - self.price) <= 0:
             return None
-        if chance.gain - self.price > gain - MARGIN or not best.leaves_nothing:
+        by_chance = chance.gain - self.price
+        if by_chance > gain - MARGIN or not best.leaves_nothing:
             best = self._followed(model, first)
             gain = best.objective - model.objective
-        if chance.gain - self.price > gain - MARGIN * len(best.chosen):
+        if by_chance > gain or (gain < WEAK and by_chance > gain - MARGIN):
             return self._with_random(model, chance)
         return best if gain > 0 else None
 
@@ -170,12 +175,14 @@ class Search:
             variants, more = self._jumps(model, hypothesis)
             cost += more
         tried = [
-            self.model(
-                (*model.chosen, (hypothesis, term)),
-                model.bench,
-                model.fit,
-                model.random,
-                (*model.shaped, cost),
+            narrowed(
+                self.model(
+                    (*model.chosen, (hypothesis, term)),
+                    model.bench,
+                    model.fit,
+                    model.random,
+                    (*model.shaped, cost),
+                )
             )
             for term in variants
         ]
@@ -184,7 +191,7 @@ class Search:
             return best
         relative = np.array([m.objective for m in tried]) - best.objective
         more = -float(np.log(np.mean(np.exp(relative))))
-        shaped = (*model.shaped, cost + more)
+        shaped = (*model.shaped, best.shaped[-1] + more)
         return replace(best, objective=best.objective - more, shaped=shaped)
 
     def _jumps(
@@ -206,7 +213,7 @@ class Search:
 
     def _tidied(self, model: Model) -> Model:
         """Without what has become idle, and with what does better swapped in."""
-        for less in self._smaller(model):
+        for less in self.smaller(model):
             if less.objective > model.objective:
                 return self._tidied(less)
             if len(model.chosen) > 1 and not model.random:
@@ -214,6 +221,16 @@ class Search:
                 if swapped.objective > model.objective + 1e-6:
                     return self._tidied(swapped)
         return model
+
+    def rivals(self, model: Model) -> list[Model]:
+        """Models with one hypothesis exchanged for another."""
+        out = []
+        for i in range(len(model.chosen)):
+            chosen = model.chosen[:i] + model.chosen[i + 1 :]
+            shaped = model.shaped[:i] + model.shaped[i + 1 :]
+            less = self.model(chosen, model.bench, model.fit, model.random, shaped)
+            out += [m for m in self.larger(less) if m.names != model.names]
+        return out
 
     def _anew(self, model: Model) -> Model:
         """With the random parts' sizes estimated beside what is in it now."""
@@ -225,7 +242,7 @@ class Search:
             model = self._with_random(less, chance) if chance else less
         return model
 
-    def _smaller(self, model: Model) -> list[Model]:
+    def smaller(self, model: Model) -> list[Model]:
         """The model without each of its parts."""
         out = []
         for i in range(len(model.chosen)):
@@ -237,3 +254,16 @@ class Search:
             bench = model.bench.but(errors=dropped(model.bench.errors, name))
             out.append(self.model(model.chosen, bench, model.fit, kept, model.shaped))
         return out
+
+
+def narrowed(model: Model) -> Model:
+    """With the newest term on the axes, and of the size, that serve it best."""
+    hypothesis, term = model.chosen[-1]
+    columns, tight, more, cost = narrower(model.bench, model.fit, term)
+    new = replace(term, columns=columns, tight=tight)
+    return replace(
+        model,
+        chosen=(*model.chosen[:-1], (hypothesis, new)),
+        objective=model.objective + more - cost,
+        shaped=(*model.shaped[:-1], model.shaped[-1] + cost),
+    )

@@ -5,6 +5,8 @@ whitened, its own information is G = u^T u - u^T J A^-1 J^T u and its pull b = u
 with a prior of size s it raises ln Z by
 
     (b^2 / (G + s^-2) - ln(1 + s^2 G)) / 2
+
+Each channel may jump or not, one as likely as the other.
 """
 
 from __future__ import annotations
@@ -30,13 +32,12 @@ def step_gains(
     after = np.tri(n, n - 1, -1)
     total = np.zeros(n - 1)
     for c, size in zip(channels, sizes, strict=True):
-        deep = np.zeros((n, 6, n - 1))
-        deep[:, c] = after
-        column = bench.whiten(deep)[:, c]
+        column = bench.whiten.channel(after, c)
         shared = fit.jacobian[:, c].T @ column
         own = (column**2).sum(axis=0)
-        own -= np.einsum("ki,kl,li->i", shared, fit.covariance, shared)
+        own -= (shared * (fit.covariance @ shared)).sum(axis=0)
         pull = column.T @ fit.white[:, c]
         own = np.maximum(own, 0.0)
-        total += 0.5 * (pull**2 / (own + size**-2) - np.log1p(size**2 * own))
+        gain = 0.5 * (pull**2 / (own + size**-2) - np.log1p(size**2 * own))
+        total += np.logaddexp(0.0, gain) - np.log(2.0)
     return total

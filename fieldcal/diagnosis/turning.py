@@ -12,15 +12,15 @@ for which the accelerometers' rows are whitened.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
-from fieldcal.diagnosis.model import Term
-from fieldcal.diagnosis.turns import Turn, Undo
+from fieldcal.diagnosis.model import State, Term
+from fieldcal.diagnosis.turns import Turn, Undo, geometry
 from fieldcal.effects import Motion, Sensor, catalogue, columns
 from fieldcal.samples import CHANNELS, Array
 
@@ -31,6 +31,9 @@ ON_THE_WAY = ("lever_arm", "time_delay")
 
 WIDE = 20.0
 """Priors of what is reported, in typical sizes."""
+
+STEP = 1.0
+"""Of the differences that the design is made of, in standard deviations."""
 
 PART = 0.1
 """Of what the most affected channel shows, from which another one shows it too."""
@@ -95,8 +98,7 @@ class Turntable:
         self._bench, self._fit, self._made = bench, fit, list(made)
         self._density = bench.rows.noise[3:] * np.sqrt(interval)
         self.pool = tuple(self._pool())
-        kept = ("acc_bias", "acc_scale", "gyr_bias")
-        self._kept = [j for j, n in enumerate(fit.names) if n.startswith(kept)]
+        self._kept = list(range(len(fit.names)))
         blocks = [self._block(t) for t in made]
         self._z = np.concatenate([z for z, _, _ in blocks])
         self._a = np.vstack([a for _, a, _ in blocks])
@@ -231,36 +233,53 @@ class Turntable:
         phi, end = turn.carried(off[:, :, None])
         seen = turn.means(output[:, :3])
         seen = seen + turn.means(turn.swung(phi)[:, :, 0]) * state.scale[:3]
-        design = self._design(turn)
+        design, moved = self._design(turn)
         path, close = turn.carried(design[:, 3:] / state.scale[3:, None])
         swung = turn.swung(path) * state.scale[:3, None]
         on_way = turn.means(design[:, :3] + swung)
-        setting = 2 * self._bench.errors.setting**2
-        spread = np.sqrt(self._density**2 * (turn.t[-1] - turn.t[0]) + setting)
+        spread = self._density * np.sqrt(turn.t[-1] - turn.t[0])
         across = turn.across / spread[:, None]
         whiten = self._whitener(turn)
         z = np.concatenate(
             [across @ (turn.closure - end[:, 0]), whiten @ (turn.acc - seen).ravel()]
         )
         width = design.shape[2]
-        a = np.vstack([across @ close, whiten @ on_way.reshape(-1, width)])
+        a = np.vstack([across @ (close - moved), whiten @ on_way.reshape(-1, width)])
         return z, a, np.arange(len(z)) < 3
 
-    def _design(self, turn: Turn) -> Array:
-        """Outputs at the edges by kept columns, then by the pool's, (m + 1, 6, k)."""
-        x = turn.x
-        out: list[Array] = []
-        for name in (self._fit.names[j] for j in self._kept):
-            group, _, axis = name.partition(".")
-            i = "xyz".index(axis) + 3 * group.startswith("gyr")
-            column = np.zeros((len(x), 6, 1))
-            column[:, i, 0] = x.f[:, i] if group == "acc_scale" else 1.0
-            out.append(column)
-        for term in self.pool:
-            effect = term.effect
-            if isinstance(effect, Motion | Sensor):
-                out.append(columns(effect, x, scale=self._bench.scale))
-        return np.concatenate(out, axis=2)
+    def _design(self, turn: Turn) -> tuple[Array, Array]:
+        """Outputs at the edges and closure by the windows' columns and the pool's.
+
+        Returns
+        -------
+        outputs : (m + 1, 6, k)
+        closure : (3, k)
+
+        """
+        out = np.zeros((len(turn.x), 6, len(self._fit.names)))
+        moved = np.zeros((3, len(self._fit.names)))
+        for j, sigma in enumerate(self._fit.sigma):
+            step = STEP * max(float(sigma), 1e-9)
+            up, down = (
+                self._there(turn, self._bench.shifted(self._fit, j, sign * step))
+                for sign in (1, -1)
+            )
+            out[:, :, j] = (up[0] - down[0]) / (2 * step)
+            moved[:, j] = (up[1] - down[1]) / (2 * step)
+        more = [
+            columns(t.effect, turn.x, scale=self._bench.scale)
+            for t in self.pool
+            if isinstance(t.effect, Motion | Sensor)
+        ]
+        width = sum(m.shape[2] for m in more)
+        still = np.zeros((3, width))
+        return np.concatenate([out, *more], axis=2), np.hstack([moved, still])
+
+    def _there(self, turn: Turn, state: State) -> tuple[Array, Array]:
+        """Outputs at the edges and the closure, with the windows' model at a state."""
+        x = state.experienced(self._bench.rows.x)
+        f, closure, _ = geometry(x, turn.positions, turn.attitude, turn.done)
+        return state.output(replace(turn.x, f=f)), closure
 
     def _whitener(self, turn: Turn) -> Array:
         """L^-1 of the accelerometers' rows on the way, (3 k, 3 k)."""

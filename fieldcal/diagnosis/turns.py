@@ -37,8 +37,12 @@ PIECE_S = 0.15
 PIECES = 60
 """Of one turn at most."""
 
-MARGIN_S = 0.3
+MARGIN_S = 0.6
 LONGEST_S = 60.0
+
+CLEARLY = 30.0
+"""How far motion has to stand out for its ends to be seen; else the gap is taken."""
+
 LEAST = np.deg2rad(1.0)
 
 
@@ -84,6 +88,7 @@ class Turn:
     closure : (3,) rad, phi_T as seen
     across : (3, 3) projection on what of the closure is known
     start_force : (3,) f_p, m/s^2
+    interval : s between the samples that `acc` is made of
 
     """
 
@@ -97,6 +102,7 @@ class Turn:
     closure: Array
     across: Array
     start_force: Array
+    interval: float
 
     @property
     def t(self) -> Array:
@@ -104,8 +110,17 @@ class Turn:
         return self.x.t
 
     def means(self, values: Array) -> Array:
-        """Means over the pieces of something known at the edges, (k, ...)."""
-        return trapezoid_means(self.t, values, self.cut)
+        """Means over the pieces of something known at the edges, (k, ...).
+
+        As the trapezoid rule takes them from samples `interval` apart, by the next term
+        of Euler and Maclaurin, -dt^2/12 (v'(b) - v'(a)).
+        """
+        mean = trapezoid_means(self.t, values, self.cut)
+        step = float(self.t[1] - self.t[0])
+        slope = np.gradient(values, self.t, axis=0)[self.cut]
+        length = np.diff(self.t[self.cut]).reshape(-1, *[1] * (values.ndim - 1))
+        bend: Array = np.diff(slope, axis=0) / length
+        return mean - (step**2 - self.interval**2) / 12 * bend
 
     def carried(self, off: Array) -> tuple[Array, Array]:
         """Phi less its share of the closure at the edges, and the closure.
@@ -158,7 +173,7 @@ def turns(source: Source, rows: Rows, fit: Fit, undo: Undo = NOTHING) -> list[Tu
 def _moving(
     source: Source, rows: Rows, q: int, first: int, last: int
 ) -> tuple[int, int] | None:
-    """Samples from just before the motion to just after it, if none is missing."""
+    """Samples of the gap, or of the motion in a long one, if none is missing."""
     block, rate = source.block, rate_of(source.block)
     gap, m = slice(first, last), max(2, round(0.1 * rate))
     if last - first < 4 * m or not source.usable[gap].all():
@@ -171,8 +186,8 @@ def _moving(
     level = np.abs(total[m:] - total[:-m]) / m
     limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
     at = np.flatnonzero((level > limit).any(axis=1))
-    if not len(at):
-        return None
+    if not level.max() > CLEARLY * limit.min():
+        return (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
     margin = round(MARGIN_S * rate)
     start = max(first, first + int(at[0]) - margin)
     end = min(last, first + int(at[-1]) + m + margin)
@@ -200,23 +215,20 @@ def _turn(
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
     earth = (1 - part) * x.w[rows_p].mean(axis=0) + part * x.w[rows_q].mean(axis=0)
     inertial = _undone(block, fit, undo, t)
-    angle = trapezoid_means(t, inertial - earth, edge) * np.diff(t[edge])[:, None]
+    angle = _angles(t, inertial - earth, edge)
     size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
-    if size[-1] < LEAST:
-        return None
     attitude, done = carry(angle), size / size[-1]
-    f_p, f_q = x.f[rows_p].mean(axis=0), x.f[rows_q].mean(axis=0)
-    back = attitude @ attitude[-1].T
-    f = (1 - done)[:, None] * (attitude @ f_p) + done[:, None] * (back @ f_q)
+    if np.arccos(np.clip((np.trace(attitude[-1]) - 1) / 2, -1, 1)) < LEAST:
+        return None
     each_piece = max(1, round(PIECE_S * rate / each), -(-count // PIECES))
     cut = np.append(np.arange(0, count - each_piece // 2, each_piece), count).astype(
         np.intp
     )
     acc = trapezoid_means(t, block.acc[first : first + len(t)], edge[cut])
-    closure, across = _closure(x, pair, attitude[-1], f_p)
+    f, closure, across = geometry(x, pair, attitude, done)
     return Turn(
         pair,
-        _edges(source, x, t[edge], f, inertial[edge]),
+        _edges(source, x, t[edge], f, inertial[edge], pair[1]),
         attitude,
         done,
         cut,
@@ -224,8 +236,21 @@ def _turn(
         rows.noise[:3] / np.sqrt(np.diff(edge[cut]))[:, None],
         closure,
         across,
-        f_p,
+        x.f[rows_p].mean(axis=0),
+        1 / rate,
     )
+
+
+def _angles(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
+    """Small turns between edges, (m, 3) rad: the trapezoid rule and its correction.
+
+    The next term of Euler and Maclaurin is -dt^2/12 (w'(b) - w'(a)).
+    """
+    step = float(np.median(np.diff(t)))
+    slope = np.gradient(w, t, axis=0)[edge]
+    length = np.diff(t[edge])[:, None]
+    out: Array = trapezoid_means(t, w, edge) * length
+    return out - step**2 / 12 * np.diff(slope, axis=0)
 
 
 def _undone(block: Block, fit: Fit, undo: Undo, t: Array) -> Array:
@@ -239,7 +264,10 @@ def _undone(block: Block, fit: Fit, undo: Undo, t: Array) -> Array:
     return rate
 
 
-def _edges(source: Source, x: Experience, t: Array, f: Array, w: Array) -> Experience:
+def _edges(
+    source: Source, x: Experience, t: Array, f: Array, w: Array, q: int
+) -> Experience:
+    since = t - source.arrived[q]
     unknown = np.full(len(t), np.nan)
     warming, heating = source.warmth.at(t)
     out = Experience.at_rest(
@@ -248,7 +276,7 @@ def _edges(source: Source, x: Experience, t: Array, f: Array, w: Array) -> Exper
         x.gravity,
         t=t,
         since_start=t - source.block.t[0],
-        since_turn=np.full(len(t), np.inf),
+        since_turn=np.where(since >= 0, since, np.inf),
         warming=warming,
         heating=heating,
         variance=np.full((len(t), 3), x.variance.min(axis=0)),
@@ -282,19 +310,28 @@ def carry(angle: Array) -> Array:
     return out
 
 
-def _closure(
-    x: Experience, pair: tuple[int, int], attitude: Array, f_p: Array
-) -> tuple[Array, Array]:
-    """Phi_T in the axes of p, and the projection on what of it is known."""
+def geometry(
+    x: Experience, pair: tuple[int, int], attitude: Array, done: Array
+) -> tuple[Array, Array, Array]:
+    """What a turn has to do with the positions at its ends.
+
+    Returns
+    -------
+    f : (m + 1, 3) force on the way, from both ends
+    closure : (3,) phi_T in the axes of p
+    across : (3, 3) projection on what of it is known
+
+    """
     p, q = (int(np.argmax(x.position == i)) for i in pair)
+    back = attitude @ attitude[-1].T
+    f = (1 - done)[:, None] * (attitude @ x.f[p]) + done[:, None] * (back @ x.f[q])
     if x.oriented[[p, q]].all():
         known = x.mounting.T @ turn(x.alpha[[p, q]], x.beta[[p, q]])
-        off = attitude.T @ known[1] @ known[0].T  # I + [phi]x
+        off = attitude[-1].T @ known[1] @ known[0].T  # I + [phi]x
         vee = np.array(
             [off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]]
         )
-        return vee / 2, np.eye(3)
-    up = f_p / np.linalg.norm(f_p)
-    seen = attitude.T @ x.f[q]
-    seen /= np.linalg.norm(seen)
-    return np.cross(up, seen), np.eye(3) - np.outer(up, up)
+        return f, vee / 2, np.eye(3)
+    up = x.f[p] / np.linalg.norm(x.f[p])
+    seen = attitude[-1].T @ x.f[q]
+    return f, np.cross(up, seen / np.linalg.norm(seen)), np.eye(3) - np.outer(up, up)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldcal.description import Description
 from fieldcal.diagnosis import locate, naming
-from fieldcal.diagnosis.aliases import aliases
+from fieldcal.diagnosis.aliases import aliases, undecided
 from fieldcal.diagnosis.chain import recording
 from fieldcal.diagnosis.common import common_scale
 from fieldcal.diagnosis.explain import Explanation, explain
@@ -55,7 +55,7 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
     first, then = before(block, explanation), after(explanation)
     unknown = _unknown(explanation, first, then)
     effects = _effects(explanation, lost, then)
-    verdict = _verdict(effects, unknown)
+    verdict = _verdict(explanation, effects, unknown)
     mismatch = tuple(_mismatch(block, explanation, lost, unknown))
     quality = _quality(explanation, first, then)
     words = paragraph(
@@ -99,8 +99,9 @@ def _effects(
             for n, v in tone.values.items()
         }
         found.append(Found(tone.effect.id, values, evidence={"delta_chi2": tone.chi2}))
-    found += naming.of_windows(explanation, lost, then, aliases(explanation))
-    found += naming.of_chance(explanation)
+    others = aliases(explanation)
+    found += naming.of_windows(explanation, lost, then, others)
+    found += naming.of_chance(explanation, others)
     found += naming.of_turns(explanation)
     if explanation.sees_earth:
         evidence = {"delta_chi2": 2 * explanation.earth}
@@ -110,10 +111,12 @@ def _effects(
     return found
 
 
-def _verdict(effects: Sequence[Found], unknown: Sequence[Unknown]) -> Verdict:
+def _verdict(
+    explanation: Explanation, effects: Sequence[Found], unknown: Sequence[Unknown]
+) -> Verdict:
     if unknown:
         return "unexplained"
-    if any(f.aliases for f in effects):
+    if any(f.id == "gravity_error" for f in effects) or undecided(explanation):
         return "ambiguous"
     return "left_out" if effects else "consistent"
 

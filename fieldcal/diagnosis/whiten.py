@@ -92,6 +92,15 @@ class Whitener:
             out[use, c] = np.tensordot(inverse, clean[use, c], 1)
         return out
 
+    def channel(self, values: Array, c: int) -> Array:
+        """Whiten (n, k) of one channel."""
+        use = self._used[:, c]
+        out = np.where(use[:, None], values, 0.0)
+        if c in self._inverse:
+            out[use] = self._inverse[c] @ out[use]
+            return out
+        return out * self._weight[:, c, None]
+
 
 def covariance(rows: Rows, errors: Errors, channel: int) -> Array:
     """Covariance of a channel's random parts, (n, n)."""

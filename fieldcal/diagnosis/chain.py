@@ -53,30 +53,33 @@ def check(block: Block, about: Description) -> Checked:
     """Look for every fault of the chain, and act on what is found."""
     usable = np.isfinite(block.six)
     faults: list[tuple[str, Fault]] = []
+    seen = recording(block, usable, about)
     for name in MENDING:
-        for fault in _find(name, block, usable, about):
+        for fault in _find(name, seen):
             faults.append((name, fault))
             if fault.mended is not None:
                 six = _mended(block, fault)
                 block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
+                seen = recording(block, usable, about)
     for name in MASKING:
-        for fault in _find(name, block, usable, about):
+        before = len(faults)
+        for fault in _find(name, seen):
             if name == "saturation" and _is_stuck(fault, faults):
                 continue
             faults.append((name, fault))
-            _mask(name, fault, usable, spans(block, about))
+            _mask(name, fault, usable, seen.windows)
+        if len(faults) > before:
+            seen = recording(block, usable, about)
     for name in NOTING:
-        faults += [(name, fault) for fault in _find(name, block, usable, about)]
+        faults += [(name, fault) for fault in _find(name, seen)]
     return Checked(block, usable, tuple(_once(faults)))
 
 
-def _find(
-    name: str, block: Block, usable: NDArray[np.bool_], about: Description
-) -> list[Fault]:
+def _find(name: str, seen: Recording) -> list[Fault]:
     effect = catalogue()[name]
     if not isinstance(effect, Chain):
         raise TypeError(f"{name} is no effect on samples")
-    return effect.find(recording(block, usable, about))
+    return effect.find(seen)
 
 
 def _mended(block: Block, fault: Fault) -> Array:

@@ -38,8 +38,8 @@ def arrivals(block: Block, about: Description, noise: Array) -> Array:
     before = 0
     for p, (first, last) in enumerate(windows):
         if last > first >= before:
-            gap = block.six[before:first]
-            moved = _moved(gap, block.six[first:last], noise, m)
+            gap = block[before:first].six
+            moved = _moved(gap, block[first:last].six, noise, m)
             out[p] = block.t[before + moved if before else 0]
             before = int(last)
     return out

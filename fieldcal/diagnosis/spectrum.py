@@ -116,7 +116,7 @@ def _pieces(source: Source, rows: Rows) -> _Pieces:
     for p, (a, b) in enumerate(spans(block, source.about)):
         if b - a >= 64 and p in first:
             kept.append(first[p])
-            six = np.where(source.usable[a:b], block.six[a:b], np.nan)
+            six = np.where(source.usable[a:b], block[a:b].six, np.nan)
             samples.append(_flat(block.t[a:b], six))
             times.append(block.t[a:b])
     x = rows.x

@@ -102,7 +102,7 @@ class Bump(Chain):
         for first, last in recording.windows:
             if last - first < 20:
                 continue
-            piece = recording.block.six[first:last]
+            piece = recording.block[first:last].six
             z = _quick(piece, rate) / recording.noise
             z = np.nan_to_num(z)
             for a, b in disturbed(z, max(2, round(0.1 * rate))):

@@ -88,7 +88,7 @@ class DecodeFault(Chain):
         """Channels that become smooth when a slip is undone."""
         out, t = [], recording.block.t
         for c, name in enumerate(CHANNELS):
-            values = recording.block.six[:, c]
+            values = recording.channel(c)
             if not np.isfinite(values).all() or not (lsb := lsb_of(values)):
                 continue
             if np.abs(values).max() > WIDEST * lsb:

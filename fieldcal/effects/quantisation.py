@@ -61,12 +61,12 @@ class Quantisation(Chain):
         return out
 
     def _step(self, recording: Recording, c: int) -> float:
-        values = recording.block.six[:, c]
+        values = recording.channel(c)
         lsb = lsb_of(values)
         return lsb if lsb > 2 * MATTERS * self._noise(recording, c) else 0.0
 
     @staticmethod
     def _noise(recording: Recording, c: int) -> float:
         """Noise before rounding, as far as it can be told."""
-        measured, lsb = recording.noise[c], lsb_of(recording.block.six[:, c])
+        measured, lsb = recording.noise[c], lsb_of(recording.channel(c))
         return float(np.sqrt(max(measured**2 - lsb**2 / 12, 0.0)))

@@ -47,6 +47,11 @@ class Recording:
             inside[first:last] = True
         return inside
 
+    def channel(self, c: int) -> Array:
+        """Samples of one output by its index in `samples.CHANNELS`, (n,)."""
+        triad = self.block.acc if c < 3 else self.block.gyr
+        return triad[:, c % 3]
+
     def position_of(self, row: int) -> int:
         """Index of the position whose window holds a sample, -1 if none does."""
         inside = (self.windows[:, 0] <= row) & (row < self.windows[:, 1])

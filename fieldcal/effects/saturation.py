@@ -63,7 +63,7 @@ class Saturation(Chain):
         """Channels with samples at a rail."""
         out = []
         for c, name in enumerate(CHANNELS):
-            values = recording.block.six[:, c]
+            values = recording.channel(c)
             if not np.isfinite(values).any():
                 continue
             at = rails(values, float(recording.limits[c // 3]))

@@ -63,7 +63,7 @@ class Stuck(Chain):
         step = float(np.median(np.diff(t)))
         still = recording.still
         for c, name in enumerate(CHANNELS):
-            values_of = recording.block.six[:, c]
+            values_of = recording.channel(c)
             coarse = lsb_of(values_of) > 2 * recording.noise[c]
             for first, last in repeats(values_of):
                 if coarse and still[first:last].all():

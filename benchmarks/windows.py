@@ -120,21 +120,38 @@ def draws(kind: str, seconds: float, rate: float, windows: int) -> Iterator[Arra
 
 
 def pulls(kind: str, seconds: float, rate: float, known: bool = False) -> Array:
-    """Pulls of SEEDS channels; `known`: with the noise of four windows before."""
+    """Pulls of SEEDS channels, (3, n): ours, by 24 batch means, by sd over root n.
+
+    `known`: ours has the noise of four windows before.
+    """
     found = []
     n = round(seconds * rate)
     lead = 4 if known else 0
     for x in draws(kind, (lead + 2) * seconds, rate, SEEDS // 6 + 1):
         noise: Noise | None = None
-        windows = []
-        for k in range(lead + 2):
+        parts = [block_of(x[k * n : (k + 1) * n], rate) for k in range(lead + 2)]
+        errors = []
+        for k, part in enumerate(parts):
             window = Window(noise=noise)
-            window.add(block_of(x[k * n : (k + 1) * n], rate))
+            window.add(part)
             noise = window.noise if k < lead else noise
-            windows.append(window)
-        a, b = windows[-2:]
-        found.append((b.mean - a.mean) / np.hypot(a.sigma, b.sigma))
-    return np.concatenate(found)
+            errors.append([window.sigma, by_batches(part.six), plain(part.six)])
+        change = parts[-1].six.mean(axis=0) - parts[-2].six.mean(axis=0)
+        found.append(change / np.hypot(errors[-1], errors[-2]))
+    return np.hstack(found)
+
+
+def by_batches(six: Array) -> Array:
+    """Standard error by the scatter of 24 batch means, (6,)."""
+    batches = [batch.mean(axis=0) for batch in np.array_split(six, 24)]
+    error: Array = np.std(batches, axis=0, ddof=1) / np.sqrt(24)
+    return error
+
+
+def plain(six: Array) -> Array:
+    """Standard error as if the noise were white, (6,)."""
+    error: Array = six.std(axis=0, ddof=1) / np.sqrt(len(six))
+    return error
 
 
 def rejected(kind: str, seconds: float, rate: float, size: float) -> float:
@@ -178,13 +195,14 @@ def main() -> None:
     """Print the tables."""
     began = perf_counter()
     print(f"pulls of {SEEDS} means at 100 Hz: standard deviation, share beyond 1.96")
-    print(f"{'':22s}{'30 s':>14s}{'60 s':>14s}{'30 s, fifth window':>20s}")
+    heads = ("30 s", "60 s", "fifth of 30 s", "24 batches", "sd/root n")
+    print(f"{'':22s}" + "".join(f"{head:>14s}" for head in heads))
     for kind in KINDS:
-        columns = [pulls(kind, 30, 100), pulls(kind, 60, 100)]
-        if "flicker" in kind or kind == "white":
-            columns.append(pulls(kind, 30, 100, known=True))
+        short, long = pulls(kind, 30, 100), pulls(kind, 60, 100)
+        later = pulls(kind, 30, 100, known=True)
+        columns = [short[0], long[0], later[0], long[1], long[2]]
         cells = [f"{p.std():.2f} {np.mean(abs(p) > 1.96):6.1%}" for p in columns]
-        print(f"{kind:22s}" + "".join(f"{c:>14s}" for c in cells), flush=True)
+        print(f"{kind:22s}" + "".join(f"{cell:>14s}" for cell in cells), flush=True)
     print(f"\nshare of {SEEDS} windows of 6 channels rejected: noise alone, and with")
     print(f"{DISTURBED:g} sigma of the raw noise for 0.5 s on one channel")
     for rate, seconds, kinds in JUDGED:

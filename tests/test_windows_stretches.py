@@ -130,3 +130,18 @@ def test_the_long_rests_of_a_hand_held_recording_are_found(shared: Path) -> None
     for start, end in zip(starts, ends, strict=True):
         if end - start > 1.5:
             assert any(a < end and b > start for a, b in found), f"{start} to {end} s"
+
+
+def test_a_real_device_at_rest_is_never_rejected_and_its_means_repeat(
+    shared: Path,
+) -> None:
+    folder = shared / "real" / "tomisuarez_mpu6050"
+    with gzip.open(folder / "example_data_tinit_calc.csv.gz", "rt") as file:
+        counts = np.loadtxt(file, delimiter=",", skiprows=5)
+    six = counts * np.repeat([9.81 / 16384, np.deg2rad(1 / 131)], 3)
+    block = Block.of(np.arange(len(six)) / 100, six[:, :3], six[:, 3:])
+    windows = [average(block.between(at, at + 30)) for at in range(0, 420, 30)]
+    change = np.diff([window.mean for window in windows], axis=0)
+    variance = np.array([window.sigma**2 for window in windows])
+    pulls = change / np.sqrt(variance[1:] + variance[:-1])
+    assert 0.8 < pulls.std() < 1.3

@@ -130,7 +130,7 @@ class Search:
         if len(model.chosen) + len(model.random) >= MOST:
             return None
         chance = max(wanders(model.bench, model.fit), key=lambda w: w.gain)
-        first = self.larger(model)
+        first = [*self.larger(model), *self._instead(model)]
         best = max(first, key=lambda m: m.objective, default=model)
         gain = best.objective - model.objective
         if max(gain, chance.gain - self.price) <= 0:
@@ -142,6 +142,24 @@ class Search:
         if by_chance > gain or (gain < WEAK and by_chance > gain - MARGIN):
             return self._with_random(model, chance)
         return best if gain > 0 else None
+
+    def _instead(self, model: Model) -> list[Model]:
+        """With the likeliest causes, and the random parts as small as these leave them.
+
+        A random part that was let in first has the size of all that was unexplained
+        then; held against it, a cause would seem to explain next to nothing.
+        """
+        if not model.random:
+            return []
+        bench = model.bench
+        for name in model.random:
+            bench = bench.but(errors=dropped(bench.errors, name))
+        bare = self.model(model.chosen, bench, model.fit, (), model.shaped)
+        ranked = sorted(self.larger(bare), key=lambda m: -m.objective)[:BEAM]
+        return [
+            self._anew(self.model(m.chosen, model.bench, m.fit, model.random, m.shaped))
+            for m in ranked
+        ]
 
     def _followed(self, model: Model, first: Sequence[Model]) -> Model:
         """The best of one or two more hypotheses."""

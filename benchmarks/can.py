@@ -109,3 +109,55 @@ def compare(
     slow, fast = (3 * SAMPLES / seconds / 1e3 for seconds in best)
     aim = f"{goal:4.0f}" if goal else ""
     print(f"{what:34} {slow:6.0f} k/s {fast:6.0f} k/s  {fast / slow:5.1f}  {aim}")
+
+
+def share() -> tuple[float, float]:
+    """Share of a processor that a device at 1 kHz takes, and samples a second."""
+    command = [sys.executable, "-m", "fieldcal", "sim", "--can", "slcan"]
+    command += ["--rate", "1000", "--once"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
+        if sim.stdout is None:
+            raise AssertionError
+        path = sim.stdout.readline().strip()
+        with open_driver(f"can:{path}?interface=slcan&dbc=virtual") as imu:
+            for _ in imu.blocks():
+                break
+            began, spent, n = perf_counter(), process_time(), imu.health.samples
+            for _ in imu.blocks():
+                if perf_counter() - began > WATCHED:
+                    break
+            took, spent = perf_counter() - began, process_time() - spent
+            heard = (imu.health.samples - n) / took
+        sim.terminate()
+    sleep(0.1)
+    return spent / took, heard
+
+
+def main() -> None:
+    """Print decoded frames a second of both, their ratio, and the load at 1 kHz."""
+    received = messages()
+    rows = as_rows(received)
+    pairs = [(m.arbitration_id, bytes(m.data)) for m in received]
+
+    def theirs() -> int:
+        return by_cantools(pairs)
+
+    print(f"{'frames':34} {'cantools':>10} {'fieldcal':>10}  ratio  goal")
+    compare("decoded, every signal", theirs, lambda: numbers(rows), GOAL)
+    compare("decoded, joined, timed", theirs, lambda: samples(rows))
+    compare("the same from can.Message", theirs, lambda: samples(as_rows(received)))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "frames.log"
+        with can.Logger(path) as log:
+            for message in received:
+                log(message)
+        compare(
+            "read from a candump log",
+            lambda: log_by_cantools(path),
+            lambda: log_by_driver(path),
+        )
+    load_, heard = share()
+    print(
+        f"slcan at 1 kHz: {heard:.0f} samples/s, {100 * load_:.1f} % of a core,"
+        f" {1 / load_:.0f} devices"
+    )

@@ -25,6 +25,7 @@ from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_log import Log, is_log
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Reader
+from fieldcal.drivers.skew import Skew
 from fieldcal.errors import InputError
 from fieldcal.samples import Array, Block, concat
 
@@ -36,7 +37,13 @@ LIMIT = 1 << 24
 
 
 class Imu(Driver):
-    """A CAN bus, or a log of one, and the samples that are in its frames."""
+    """A CAN bus, or a log of one, and the samples that are in its frames.
+
+    Attributes
+    ----------
+    skew : the device's clock against the host's
+
+    """
 
     def __init__(self, address: str) -> None:
         _check_installed()
@@ -53,6 +60,7 @@ class Imu(Driver):
         self._parts = read_map(options)
         self._samples = Samples(self._parts, self._counts, options)
         self._heard: set[int] = set()
+        self.skew = Skew()
         self._log: Log | None = None
         self._reader: Reader | None = None
         if is_log(channel):
@@ -89,6 +97,7 @@ class Imu(Driver):
                 blocks.append(self._samples.feed(frames, arrived))
             block = concat(block for block in blocks if block is not None)
             if len(block):
+                self.skew.add(block.t, block.t_host)
                 return block
             if monotonic() >= deadline:
                 return None

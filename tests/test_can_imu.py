@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import io
 import os
 import re
 import shutil
@@ -19,14 +20,19 @@ import numpy as np
 import pytest
 from can_wires import DBC, KEYED, numbers, stream
 
+from fieldcal import description, movers
 from fieldcal.cli import main
 from fieldcal.driver import Driver, open_driver
 from fieldcal.drivers.can_bus import why
 from fieldcal.drivers.can_frames import FRAME
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
+from fieldcal.engine import Engine
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
+from fieldcal.procedures import two_position
+from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block, concat
+from fieldcal.script import ScriptOperator
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link_can import BusLink
@@ -130,6 +136,29 @@ def test_the_windows_of_a_calibration_are_those_of_a_serial_device(
         assert [len(window) for window in windows] == [2990, 2990]
         means.append([window.six.mean(axis=0) for window in windows])
     assert np.abs(np.subtract(means[0], means[1])).max() < 5e-6
+
+
+def test_a_calibration_over_can_finds_the_truth_within_its_uncertainty(
+    tmp_path: Path,
+) -> None:
+    angles = [p.degrees or (0.0, 0.0) for p in two_position.POSITIONS]
+    where = [{"alpha_deg": alpha, "beta_deg": beta} for alpha, beta in angles]
+    site = {"latitude_deg": 50.45, "height_m": 170.0}
+    about = description.parse({"site": site, "position": where})
+    options = ["--can", "slcan", "--speed", "max", "--latitude=50.45", "--height=170"]
+    with (
+        movers.VirtualDevice(options) as device,
+        open_driver(f"can:{device.port}?{SLCAN}&reconnect=0") as imu,
+        Recorder(tmp_path / "s", {"format": 1}) as recorder,
+    ):
+        operator = ScriptOperator(device, io.StringIO())
+        engine = Engine(imu, operator, about, recorder, 90.0)
+        found = engine.run(two_position.plan(about, 20.0, None)).to_json()
+        truth = device.truth
+    for group in ("acc_bias", "acc_scale", "gyr_bias"):
+        result = found["parameters"][group]
+        pull = np.subtract(result["value"], truth[group]) / np.array(result["sigma"])
+        assert np.abs(pull).max() < 4.5, group
 
 
 def test_faults_of_the_line_cost_samples_and_make_none_up(

@@ -16,7 +16,7 @@ from fieldcal.drivers.can_frames import pack_message
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.serial_imu import POLL, reason
+from fieldcal.drivers.serial_imu import POLL, SerialPort, reason
 from fieldcal.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def settings(options: Options) -> dict[str, Any]:
         told["fd"] = True
     settle = options.number("settle", 0.0, 0.0, 10.0)
     if told["interface"] == "slcan":
-        told |= {"sleep_after_open": settle, "timeout": POLL}
+        told["sleep_after_open"] = settle
     return told
 
 
@@ -126,6 +126,9 @@ class SlcanSource:
     def __init__(self, bus: Any, health: CanHealth) -> None:
         self._bus, self._port = bus, bus.serialPortOrig
         self._lines = Lawicel(health)
+        self._port.timeout = POLL
+        if "://" not in self._port.port:
+            self._port.exclusive = True
 
     def read(self) -> bytes:
         """Return rows of the frames that came, waiting `POLL` seconds for the first."""
@@ -145,10 +148,11 @@ def open_source(
     channel: str, told: Settings, health: CanHealth
 ) -> BusSource | SlcanSource:
     """Open a bus for a reader; errors as in `connect`."""
-    bus = connect(channel, told)
-    if told["interface"] == "slcan":
-        return SlcanSource(bus, health)
-    return BusSource(bus)
+    if told["interface"] != "slcan":
+        return BusSource(connect(channel, told))
+    # first of all: what python-can sends would close another program's channel
+    SerialPort(channel, told.get("tty_baudrate", 115200)).close()
+    return SlcanSource(connect(channel, told), health)
 
 
 def why(interface: str, fault: BaseException) -> str:

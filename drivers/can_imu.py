@@ -26,7 +26,7 @@ from fieldcal.drivers.can_log import Log, is_log
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Reader
 from fieldcal.drivers.skew import Skew
-from fieldcal.errors import InputError
+from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Array, Block, concat
 
 ENOUGH = 10_000
@@ -112,7 +112,7 @@ class Imu(Driver):
     def _take(self, timeout: float) -> Iterator[tuple[Frames, Array, bool]]:
         """Frames, their arrivals, and whether the link was away before them."""
         if self._log:
-            frames = self._log.take(timeout)
+            frames = self._next(self._log, timeout)
             self.health.received += frames.nbytes
             yield frames, frames["t"], False
         if self._reader:
@@ -125,6 +125,15 @@ class Imu(Driver):
                 arrived = np.repeat([chunk.t_host for chunk in some], many)
                 self.health.received += frames.nbytes
                 yield frames, arrived, bool(some) and some[0].broken
+
+    def _next(self, log: Log, timeout: float) -> Frames:
+        """Return frames of the log; what is wrong if it ends without a sample."""
+        try:
+            return log.take(timeout)
+        except DeviceError as end:
+            if self._counts.samples:
+                raise
+            raise DeviceError(f"{end} without a sample: {self._missing()}") from end
 
     def _silence(self, timeout: float, before: Health) -> str:
         health = self._counts

@@ -8,6 +8,7 @@ or gained a byte for frames.
 from __future__ import annotations
 
 import errno
+import logging
 from collections.abc import Mapping
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,27 @@ MOST = 2000
 
 LONGEST = 0.02
 """Longest time that frames are collected before they are handed on, s."""
+
+_NO_CAN = (
+    "the kernel has no CAN; load it with `modprobe can_raw`, or use another interface,"
+    " such as interface=slcan"
+)
+_NO_CHANNEL = "there is no such CAN channel; see `ip link`"
+KERNEL = {
+    errno.EAFNOSUPPORT: _NO_CAN,
+    errno.EPROTONOSUPPORT: _NO_CAN,
+    errno.ENODEV: _NO_CHANNEL,
+    errno.ENXIO: _NO_CHANNEL,
+    errno.ENETDOWN: "it is down; `ip link set` it up with its bitrate",
+}
+MULTICAST = {
+    errno.ENODEV: "no network takes multicast; add a route for 224.0.0.0/4",
+    errno.ENETUNREACH: "no network takes multicast; add a route for 224.0.0.0/4",
+    errno.EADDRINUSE: "another program has the port; choose another with port=",
+}
+
+# what goes wrong is said in one sentence, not by python-can's log besides
+logging.getLogger("can").addHandler(logging.NullHandler())
 
 Settings = Mapping[str, Any]
 
@@ -159,14 +181,8 @@ def why(interface: str, fault: BaseException) -> str:
     """Say why a bus did not open, and what to do."""
     if interface == "slcan":
         return reason(fault)
-    number = fault.errno if isinstance(fault, OSError) else None
-    if number in (errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT):
-        return (
-            "the kernel has no CAN; load it with `modprobe can_raw`, or use another"
-            " interface, such as interface=slcan"
-        )
-    if number in (errno.ENODEV, errno.ENXIO):
-        return "there is no such CAN channel; see `ip link`"
-    if number == errno.ENETDOWN:
-        return "it is down; `ip link set` it up with its bitrate"
-    return str(fault)
+    below: BaseException | None = fault
+    while below is not None and not isinstance(below, OSError):
+        below = below.__cause__
+    known = MULTICAST if interface == "udp_multicast" else KERNEL
+    return known.get(below.errno or 0, str(fault)) if below else str(fault)

@@ -22,8 +22,9 @@ from can_wires import until_the_end
 from fieldcal import description, movers
 from fieldcal.cli import main
 from fieldcal.driver import Driver, open_driver
-from fieldcal.drivers.can_bus import why
+from fieldcal.drivers.can_bus import BusSource, why
 from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.can_imu import Imu
 from fieldcal.engine import Engine
 from fieldcal.errors import DeviceError, DeviceSilent
 from fieldcal.procedures import two_position
@@ -267,6 +268,29 @@ def test_a_bus_within_the_process(bus: tuple[BusLink, Driver]) -> None:
     assert (imu.health.gaps, imu.health.missing) == (1, 100)
 
 
+def test_a_bus_that_is_gone_is_said_by_the_device_and_mended_by_the_driver(
+    bus: tuple[BusLink, Driver],
+) -> None:
+    link, imu = bus
+    assert isinstance(imu, Imu) and imu._reader is not None
+    device = VirtualDevice(Profile(), seed=2)
+    pumped(link, device.take(30))
+    some(imu, 30)
+    broken = imu._reader._source
+    assert isinstance(broken, BusSource)
+    broken._bus.shutdown()
+    while imu._reader._source is broken:
+        assert imu.receive(0.05) is None
+    device.take(10)
+    pumped(link, device.take(10))
+    assert some(imu, 10).t[0] == pytest.approx(0.4)
+    assert (imu.health.gaps, imu.health.missing) == (1, 10)
+    assert link._bus is not None
+    link._bus.shutdown()
+    with pytest.raises(DeviceError, match="takes no frame"):
+        pumped(link, device.take(1))
+
+
 def test_faults_of_a_bus_are_lost_doubled_and_foreign_frames(
     bus: tuple[BusLink, Driver],
 ) -> None:
@@ -350,6 +374,27 @@ def test_a_kernel_without_can_and_channels_that_are_not_there(
         (100, "is down"),
     ):
         assert says in why("socketcan", OSError(number, "what the kernel says"))
+
+
+def test_a_network_without_multicast(
+    namespace: tuple[str, ...], tmp_path: Path
+) -> None:
+    subprocess.run([*namespace, *"ip route del 224.0.0.0/4".split()], check=True)
+    url = "can:239.74.163.2?interface=udp_multicast&dbc=virtual"
+    command = [sys.executable, "-m", "fieldcal"]
+    for arguments, says in (
+        (["run", "two_position", "--device", url, "-o", "s"], "add a route"),
+        (["sim", "--can", "udp_multicast:239.74.163.2"], "cannot join"),
+    ):
+        done = subprocess.run(
+            [*namespace, *command, *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+        )
+        assert done.returncode == 3 and says in done.stderr, done.stderr
+        assert done.stderr.count("\n") == 1
 
 
 def test_without_the_extra_one_sentence_tells_what_to_install(tmp_path: Path) -> None:

@@ -1,9 +1,12 @@
 """CAN frames into samples against python-can with cantools, as ratios in one run."""
 
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from time import perf_counter
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time, sleep
 
 import can
 import numpy as np
@@ -15,6 +18,7 @@ from fieldcal.drivers.can_map import SHIPPED, load, read_map
 from fieldcal.drivers.can_samples import Samples
 from fieldcal.drivers.options import Options
 from fieldcal.errors import DeviceError
+from fieldcal.samples import Block
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.can_packing import frames
 
@@ -23,6 +27,9 @@ SAMPLES = 30_000
 
 BATCH = 3000
 """Frames decoded at once: a second."""
+
+SPOILT = 999_999
+"""Frames of a bus in trouble."""
 
 RUNS = 5
 GOAL = 10.0
@@ -109,3 +116,98 @@ def compare(
     slow, fast = (3 * SAMPLES / seconds / 1e3 for seconds in best)
     aim = f"{goal:4.0f}" if goal else ""
     print(f"{what:34} {slow:6.0f} k/s {fast:6.0f} k/s  {fast / slow:5.1f}  {aim}")
+
+
+def share() -> tuple[float, float]:
+    """Share of a processor that a device at 1 kHz takes, and samples a second."""
+    command = [sys.executable, "-m", "fieldcal", "sim", "--can", "slcan"]
+    command += ["--rate", "1000", "--once"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
+        if sim.stdout is None:
+            raise AssertionError
+        path = sim.stdout.readline().strip()
+        with open_driver(f"can:{path}?interface=slcan&dbc=virtual") as imu:
+            for _ in imu.blocks():
+                break
+            began, spent, n = perf_counter(), process_time(), imu.health.samples
+            for _ in imu.blocks():
+                if perf_counter() - began > WATCHED:
+                    break
+            took, spent = perf_counter() - began, process_time() - spent
+            heard = (imu.health.samples - n) / took
+        sim.terminate()
+    sleep(0.1)
+    return spent / took, heard
+
+
+def spoilt(lost: float, doubled: float, moved: float) -> tuple[int, int, int]:
+    """Samples that a bus in trouble lets through, wrong ones, and incomplete ones.
+
+    Shares of the frames are lost, doubled, or come behind the next one.
+    """
+    rng = np.random.default_rng(99)
+    n = SPOILT // 3
+    six = np.round(rng.uniform(-30, 30, (n, 6)), 4)
+    seq = np.arange(n, dtype=float)
+    truth = Block.of(seq / 1000, six[:, :3], six[:, 3:], 0 * seq, seq)
+    packed = frames(truth)
+    rows = np.zeros(len(packed), FRAME)
+    rows["id"] = [frame.identifier for frame in packed]
+    rows["size"] = 8
+    joined = b"".join(frame.data for frame in packed)
+    rows["data"][:, :8] = np.frombuffer(joined, np.uint8).reshape(-1, 8)
+    copies = 1 - (rng.uniform(size=len(rows)) < lost).astype(int)
+    copies[rng.uniform(size=len(rows)) < doubled] = 2
+    late = np.arange(len(rows)) + 1.5 * (rng.uniform(size=len(rows)) < moved)
+    rows = np.repeat(rows, copies)[np.argsort(np.repeat(late, copies), kind="stable")]
+    options, health = Options("can", "dbc=virtual"), CanHealth()
+    decoder = Samples(read_map(options), health, options)
+    whole = wrong = 0
+    for i in range(0, len(rows), BATCH):
+        some = rows[i : i + BATCH]
+        block = decoder.feed(some, some["t"].astype(float))
+        if block is not None:
+            at = np.rint(block.t * 1000).astype(int)
+            off = np.abs(block.six - truth.six[at]).max(axis=1)
+            whole, wrong = whole + len(block), wrong + int(np.sum(off > 1e-3))
+    return whole, wrong, health.incomplete
+
+
+def main() -> None:
+    """Print decoded frames a second of both, their ratio, and the load at 1 kHz."""
+    received = messages()
+    rows = as_rows(received)
+    pairs = [(m.arbitration_id, bytes(m.data)) for m in received]
+
+    def theirs() -> int:
+        return by_cantools(pairs)
+
+    print(f"{'frames':34} {'cantools':>10} {'fieldcal':>10}  ratio  goal")
+    compare("decoded, every signal", theirs, lambda: numbers(rows), GOAL)
+    compare("decoded, joined, timed", theirs, lambda: samples(rows))
+    compare("the same from can.Message", theirs, lambda: samples(as_rows(received)))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "frames.log"
+        with can.Logger(path) as log:
+            for message in received:
+                log(message)
+        compare(
+            "read from a candump log",
+            lambda: log_by_cantools(path),
+            lambda: log_by_driver(path),
+        )
+    for what, shares in (
+        ("10 % of the frames lost", (0.1, 0.0, 0.0)),
+        ("10 % doubled", (0.0, 0.1, 0.0)),
+        ("3 % each lost, doubled, moved", (0.03, 0.03, 0.03)),
+    ):
+        whole, wrong, incomplete = spoilt(*shares)
+        print(
+            f"{SPOILT} frames, {what}: {whole} samples whole, {incomplete} incomplete,"
+            f" {wrong} wrong"
+        )
+    load_, heard = share()
+    print(
+        f"slcan at 1 kHz: {heard:.0f} samples/s, {100 * load_:.1f} % of a core,"
+        f" {1 / load_:.0f} devices"
+    )

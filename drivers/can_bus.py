@@ -8,6 +8,7 @@ or gained a byte for frames.
 from __future__ import annotations
 
 import errno
+import logging
 from collections.abc import Mapping
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ from fieldcal.drivers.can_frames import pack_message
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.serial_imu import POLL, reason
+from fieldcal.drivers.serial_imu import POLL, SerialPort, reason
 from fieldcal.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
@@ -27,6 +28,27 @@ MOST = 2000
 
 LONGEST = 0.02
 """Longest time that frames are collected before they are handed on, s."""
+
+_NO_CAN = (
+    "the kernel has no CAN; load it with `modprobe can_raw`, or use another interface,"
+    " such as interface=slcan"
+)
+_NO_CHANNEL = "there is no such CAN channel; see `ip link`"
+KERNEL = {
+    errno.EAFNOSUPPORT: _NO_CAN,
+    errno.EPROTONOSUPPORT: _NO_CAN,
+    errno.ENODEV: _NO_CHANNEL,
+    errno.ENXIO: _NO_CHANNEL,
+    errno.ENETDOWN: "it is down; `ip link set` it up with its bitrate",
+}
+MULTICAST = {
+    errno.ENODEV: "no network takes multicast; add a route for 224.0.0.0/4",
+    errno.ENETUNREACH: "no network takes multicast; add a route for 224.0.0.0/4",
+    errno.EADDRINUSE: "another program has the port; choose another with port=",
+}
+
+# what goes wrong is said in one sentence, not by python-can's log besides
+logging.getLogger("can").addHandler(logging.NullHandler())
 
 Settings = Mapping[str, Any]
 
@@ -46,7 +68,7 @@ def settings(options: Options) -> dict[str, Any]:
         told["fd"] = True
     settle = options.number("settle", 0.0, 0.0, 10.0)
     if told["interface"] == "slcan":
-        told |= {"sleep_after_open": settle, "timeout": POLL}
+        told["sleep_after_open"] = settle
     return told
 
 
@@ -126,6 +148,9 @@ class SlcanSource:
     def __init__(self, bus: Any, health: CanHealth) -> None:
         self._bus, self._port = bus, bus.serialPortOrig
         self._lines = Lawicel(health)
+        self._port.timeout = POLL
+        if "://" not in self._port.port:
+            self._port.exclusive = True
 
     def read(self) -> bytes:
         """Return rows of the frames that came, waiting `POLL` seconds for the first."""
@@ -145,24 +170,19 @@ def open_source(
     channel: str, told: Settings, health: CanHealth
 ) -> BusSource | SlcanSource:
     """Open a bus for a reader; errors as in `connect`."""
-    bus = connect(channel, told)
-    if told["interface"] == "slcan":
-        return SlcanSource(bus, health)
-    return BusSource(bus)
+    if told["interface"] != "slcan":
+        return BusSource(connect(channel, told))
+    # first of all: what python-can sends would close another program's channel
+    SerialPort(channel, told.get("tty_baudrate", 115200)).close()
+    return SlcanSource(connect(channel, told), health)
 
 
 def why(interface: str, fault: BaseException) -> str:
     """Say why a bus did not open, and what to do."""
     if interface == "slcan":
         return reason(fault)
-    number = fault.errno if isinstance(fault, OSError) else None
-    if number in (errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT):
-        return (
-            "the kernel has no CAN; load it with `modprobe can_raw`, or use another"
-            " interface, such as interface=slcan"
-        )
-    if number in (errno.ENODEV, errno.ENXIO):
-        return "there is no such CAN channel; see `ip link`"
-    if number == errno.ENETDOWN:
-        return "it is down; `ip link set` it up with its bitrate"
-    return str(fault)
+    below: BaseException | None = fault
+    while below is not None and not isinstance(below, OSError):
+        below = below.__cause__
+    known = MULTICAST if interface == "udp_multicast" else KERNEL
+    return known.get(below.errno or 0, str(fault)) if below else str(fault)

@@ -25,7 +25,8 @@ from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_log import Log, is_log
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Reader
-from fieldcal.errors import InputError
+from fieldcal.drivers.skew import Skew
+from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Array, Block, concat
 
 ENOUGH = 10_000
@@ -36,7 +37,13 @@ LIMIT = 1 << 24
 
 
 class Imu(Driver):
-    """A CAN bus, or a log of one, and the samples that are in its frames."""
+    """A CAN bus, or a log of one, and the samples that are in its frames.
+
+    Attributes
+    ----------
+    skew : the device's clock against the host's
+
+    """
 
     def __init__(self, address: str) -> None:
         _check_installed()
@@ -53,6 +60,7 @@ class Imu(Driver):
         self._parts = read_map(options)
         self._samples = Samples(self._parts, self._counts, options)
         self._heard: set[int] = set()
+        self.skew = Skew()
         self._log: Log | None = None
         self._reader: Reader | None = None
         if is_log(channel):
@@ -89,6 +97,7 @@ class Imu(Driver):
                 blocks.append(self._samples.feed(frames, arrived))
             block = concat(block for block in blocks if block is not None)
             if len(block):
+                self.skew.add(block.t, block.t_host)
                 return block
             if monotonic() >= deadline:
                 return None
@@ -103,7 +112,7 @@ class Imu(Driver):
     def _take(self, timeout: float) -> Iterator[tuple[Frames, Array, bool]]:
         """Frames, their arrivals, and whether the link was away before them."""
         if self._log:
-            frames = self._log.take(timeout)
+            frames = self._next(self._log, timeout)
             self.health.received += frames.nbytes
             yield frames, frames["t"], False
         if self._reader:
@@ -116,6 +125,15 @@ class Imu(Driver):
                 arrived = np.repeat([chunk.t_host for chunk in some], many)
                 self.health.received += frames.nbytes
                 yield frames, arrived, bool(some) and some[0].broken
+
+    def _next(self, log: Log, timeout: float) -> Frames:
+        """Return frames of the log; what is wrong if it ends without a sample."""
+        try:
+            return log.take(timeout)
+        except DeviceError as end:
+            if self._counts.samples:
+                raise
+            raise DeviceError(f"{end} without a sample: {self._missing()}") from end
 
     def _silence(self, timeout: float, before: Health) -> str:
         health = self._counts

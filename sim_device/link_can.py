@@ -9,6 +9,8 @@ fails its check and is not sent again.
 
 from __future__ import annotations
 
+import errno
+import logging
 import math
 from collections import deque
 from pathlib import Path
@@ -26,11 +28,17 @@ from fieldcal.sim_device.link_serial import SerialLink
 if TYPE_CHECKING:
     from can import BusABC
 
+# what goes wrong is said in one sentence, not by python-can's log besides
+logging.getLogger("can").addHandler(logging.NullHandler())
+
 BYTES = 13
 """Bytes that a waiting frame counts for: identifier, length, data."""
 
 BURST = 300
 """Frames sent before anything else is looked after."""
+
+FULL = (errno.ENOBUFS, errno.EAGAIN)
+"""What a system says whose queue is full."""
 
 LINGER_S = 0.1
 """Time that a host gets to take the last frames out of its socket, s."""
@@ -105,7 +113,14 @@ class BusLink(Link):
         return len(self._out) * BYTES
 
     def pump(self) -> None:
-        """Send what the bus takes."""
+        """Send what the bus takes.
+
+        Raises
+        ------
+        DeviceError
+            If the bus is gone.
+
+        """
         import can
 
         if self._bus is None:
@@ -119,8 +134,15 @@ class BusLink(Link):
                     )
                 )
                 self._out.popleft()
-        except (can.CanError, OSError):
-            return  # a full queue: the frame stays, and is sent the next time
+        except (can.CanError, OSError) as error:
+            # into a full queue the frame goes the next time
+            if (
+                not isinstance(error, can.CanTimeoutError)
+                and _number(error) not in FULL
+            ):
+                raise DeviceError(
+                    f"{self._interface} channel {self._channel} takes no frame: {error}"
+                ) from error
 
     def linger(self, seconds: float) -> None:
         """Send the rest; what a host does with it is not known."""
@@ -157,6 +179,13 @@ class BusLink(Link):
     def close(self) -> None:
         """Leave the bus; safe to call twice."""
         self.hang_up()
+
+
+def _number(error: BaseException | None) -> int | None:
+    """Number of the operating system's error behind one of python-can."""
+    while error is not None and not isinstance(error, OSError):
+        error = error.__cause__
+    return error.errno if error else None
 
 
 def open_link(spec: str, faults: LineFaults, port_link: Path | None = None) -> Link:

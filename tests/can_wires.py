@@ -6,12 +6,15 @@ import struct
 from functools import cache
 
 import numpy as np
+import pytest
 
+from fieldcal.driver import Driver
 from fieldcal.drivers.can_frames import FRAME, Frames, pack
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import Part, read_map
 from fieldcal.drivers.can_samples import Samples
 from fieldcal.drivers.options import Options
+from fieldcal.errors import DeviceError
 from fieldcal.samples import Array, Block, concat
 
 DBC = """\
@@ -100,3 +103,12 @@ def numbers(block: Block) -> list[int]:
     np.testing.assert_allclose(counts, whole, atol=1e-6)
     assert (whole == whole[:, :1]).all(), "frames of two samples in one"
     return [int(number) for number in whole[:, 0]]
+
+
+def until_the_end(imu: Driver) -> Block:
+    """All samples until the device goes."""
+    got = []
+    with pytest.raises(DeviceError, match="hung up|ended"):
+        for block in imu.blocks():
+            got.append(block)
+    return concat(got)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
+import io
 import os
 import re
 import shutil
@@ -17,16 +17,20 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from can_wires import DBC, KEYED, numbers, stream
+from can_wires import until_the_end
 
+from fieldcal import description, movers
 from fieldcal.cli import main
 from fieldcal.driver import Driver, open_driver
-from fieldcal.drivers.can_bus import why
-from fieldcal.drivers.can_frames import FRAME
+from fieldcal.drivers.can_bus import BusSource, why
 from fieldcal.drivers.can_groups import CanHealth
-from fieldcal.drivers.lawicel import Lawicel
-from fieldcal.errors import DeviceError, DeviceSilent, InputError
-from fieldcal.samples import Array, Block, concat
+from fieldcal.drivers.can_imu import Imu
+from fieldcal.engine import Engine
+from fieldcal.errors import DeviceError, DeviceSilent
+from fieldcal.procedures import two_position
+from fieldcal.recorder import Recorder
+from fieldcal.samples import Block, concat
+from fieldcal.script import ScriptOperator
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link_can import BusLink
@@ -63,15 +67,6 @@ def start(
     out = sims[-1].stdout
     assert out is not None
     return out.readline().strip(), out.readline().strip()
-
-
-def until_the_end(imu: Driver) -> Block:
-    """All samples until the device goes."""
-    got = []
-    with pytest.raises(DeviceError, match="hung up|ended"):
-        for block in imu.blocks():
-            got.append(block)
-    return concat(got)
 
 
 def some(imu: Driver, n: int) -> Block:
@@ -130,6 +125,29 @@ def test_the_windows_of_a_calibration_are_those_of_a_serial_device(
         assert [len(window) for window in windows] == [2990, 2990]
         means.append([window.six.mean(axis=0) for window in windows])
     assert np.abs(np.subtract(means[0], means[1])).max() < 5e-6
+
+
+def test_a_calibration_over_can_finds_the_truth_within_its_uncertainty(
+    tmp_path: Path,
+) -> None:
+    angles = [p.degrees or (0.0, 0.0) for p in two_position.POSITIONS]
+    where = [{"alpha_deg": alpha, "beta_deg": beta} for alpha, beta in angles]
+    site = {"latitude_deg": 50.45, "height_m": 170.0}
+    about = description.parse({"site": site, "position": where})
+    options = ["--can", "slcan", "--speed", "max", "--latitude=50.45", "--height=170"]
+    with (
+        movers.VirtualDevice(options) as device,
+        open_driver(f"can:{device.port}?{SLCAN}&reconnect=0") as imu,
+        Recorder(tmp_path / "s", {"format": 1}) as recorder,
+    ):
+        operator = ScriptOperator(device, io.StringIO())
+        engine = Engine(imu, operator, about, recorder, 90.0)
+        found = engine.run(two_position.plan(about, 20.0, None)).to_json()
+        truth = device.truth
+    for group in ("acc_bias", "acc_scale", "gyr_bias"):
+        result = found["parameters"][group]
+        pull = np.subtract(result["value"], truth[group]) / np.array(result["sigma"])
+        assert np.abs(pull).max() < 4.5, group
 
 
 def test_faults_of_the_line_cost_samples_and_make_none_up(
@@ -250,6 +268,29 @@ def test_a_bus_within_the_process(bus: tuple[BusLink, Driver]) -> None:
     assert (imu.health.gaps, imu.health.missing) == (1, 100)
 
 
+def test_a_bus_that_is_gone_is_said_by_the_device_and_mended_by_the_driver(
+    bus: tuple[BusLink, Driver],
+) -> None:
+    link, imu = bus
+    assert isinstance(imu, Imu) and imu._reader is not None
+    device = VirtualDevice(Profile(), seed=2)
+    pumped(link, device.take(30))
+    some(imu, 30)
+    broken = imu._reader._source
+    assert isinstance(broken, BusSource)
+    broken._bus.shutdown()
+    while imu._reader._source is broken:
+        assert imu.receive(0.05) is None
+    device.take(10)
+    pumped(link, device.take(10))
+    assert some(imu, 10).t[0] == pytest.approx(0.4)
+    assert (imu.health.gaps, imu.health.missing) == (1, 10)
+    assert link._bus is not None
+    link._bus.shutdown()
+    with pytest.raises(DeviceError, match="takes no frame"):
+        pumped(link, device.take(1))
+
+
 def test_faults_of_a_bus_are_lost_doubled_and_foreign_frames(
     bus: tuple[BusLink, Driver],
 ) -> None:
@@ -284,6 +325,17 @@ def test_the_right_frames_are_missing(bus: tuple[BusLink, Driver]) -> None:
             next(imu.blocks(0.2))
 
 
+def test_an_adapter_that_is_busy() -> None:
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    url = f"can:{os.ttyname(theirs)}?{SLCAN}"
+    with open_driver(url):
+        with pytest.raises(DeviceError, match="another program has it open"):
+            open_driver(url)
+    os.close(ours)
+    os.close(theirs)
+
+
 def test_only_error_frames(bus: tuple[BusLink, Driver]) -> None:
     link, imu = bus
     with can.Bus(link.address, interface="virtual") as other:
@@ -305,130 +357,6 @@ def test_an_adapter_at_the_wrong_baud_rate() -> None:
     os.close(theirs)
 
 
-def lines(rows: list[bytes]) -> bytes:
-    """The same frames as an adapter writes them."""
-    text = ""
-    for row in np.frombuffer(b"".join(rows), FRAME):
-        data = row["data"][: row["size"]].tobytes().hex().upper()
-        text += f"t{row['id']:03X}{row['size']}{data}\r"
-    return text.encode()
-
-
-def test_lines_of_an_adapter_in_any_pieces() -> None:
-    data = lines(stream(20))
-    for text, bad in ((data, 0), (data.replace(b"t021", b"t0218", 1), 1)):
-        health = CanHealth()
-        whole = Lawicel(health).feed(b"\a\rz\rV1013\r" + text)
-        assert health.bad == bad
-        decoder = Lawicel(CanHealth())
-        got = b"".join(decoder.feed(text[i : i + 1]) for i in range(len(text)))
-        a, b = np.frombuffer(whole, FRAME), np.frombuffer(got, FRAME)
-        for name in ("id", "size", "data"):
-            np.testing.assert_array_equal(a[name], b[name])
-        assert len(a) == 40 - bad
-
-
-def test_every_kind_of_line() -> None:
-    health = CanHealth()
-    kinds = b"t1232AABB\rT12345678100\rt1230ABCD\rd1239" + b"11" * 12 + b"\rr1238\r"
-    wrong = b"t1239" + b"0" * 18 + b"\rt12\rQ\rt123201\rt1231 A\r\xff\r"
-    rows = np.frombuffer(Lawicel(health).feed(kinds + wrong), FRAME)
-    assert rows["id"].tolist() == [0x123, 0x12345678 | 1 << 31, 0x123, 0x123]
-    assert rows["size"].tolist() == [2, 1, 0, 12]
-    assert health.bad == 6
-    decoder = Lawicel(health)
-    for _ in range(10):
-        decoder.feed(b"x" * 10_000)
-    assert len(decoder._rest) < 200
-
-
-def test_a_log_is_played_as_the_bus_was(tmp_path: Path) -> None:
-    dbc = tmp_path / "imu.dbc"
-    dbc.write_text(DBC)
-    query = f"dbc={dbc}&map={KEYED}&rate=100&speed=max"
-    for ending in (".log", ".asc", ".blf", ".trc"):
-        path = tmp_path / f"drive.day.1{ending}"
-        with can.Logger(path) as log:
-            for row in np.frombuffer(b"".join(stream(200)), FRAME):
-                log(
-                    can.Message(
-                        timestamp=1e9 + float(row["t"]),
-                        arbitration_id=int(row["id"]),
-                        is_extended_id=False,
-                        data=row["data"][: row["size"]].tobytes(),
-                        channel=0,
-                    )
-                )
-        packed = tmp_path / f"{path.name}.gz"
-        packed.write_bytes(gzip.compress(path.read_bytes()))
-        for name in (path, packed):
-            with open_driver(f"can:{name}?{query}") as imu:
-                assert numbers(until_the_end(imu)) == list(range(200)), name
-
-
-def test_a_log_takes_its_time(tmp_path: Path) -> None:
-    dbc, path = tmp_path / "imu.dbc", tmp_path / "x.log"
-    dbc.write_text(DBC)
-    rows = [f"({i}.000000) can0 020#{i:02X}00000000000{i:X}00" for i in range(9)]
-    rows = [row[:-16] + f"{i:02X}00" + "00" * 6 for i, row in enumerate(rows)]
-    path.write_text("\n".join(rows) + "\n")
-    with open_driver(f"can:{path}?dbc={dbc}&map=ax=ax&rate=1&speed=20") as imu:
-        assert imu.receive(0.0) is not None
-        assert imu.receive(0.01) is None
-        assert imu.host_time() == 0.0
-        block = until_the_end(imu)
-        np.testing.assert_allclose(block.t_host, np.arange(1, 9))
-        assert imu.host_time() == 8.0
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "says"),
-    [
-        ("none.log", None, "there is no such log"),
-        ("empty.log", b"", "holds no frame"),
-        ("text.log", b"hello\nworld\n", "is no CAN log of this kind"),
-        ("bad.blf", b"LOGGG", "is no CAN log of this kind"),
-        ("bad.log.gz", b"no gzip", "cannot be read"),
-    ],
-)
-def test_logs_that_are_none(
-    tmp_path: Path, name: str, content: bytes | None, says: str
-) -> None:
-    if content is not None:
-        (tmp_path / name).write_bytes(content)
-    with pytest.raises(InputError, match=says) as raised:
-        open_driver(f"can:{tmp_path / name}?dbc=virtual")
-    assert "\n" not in str(raised.value)
-
-
-def test_a_real_car_turns_as_the_phone_in_it_says(shared: Path) -> None:
-    folder = shared / "real" / "comma_rav4_can"
-    if not folder.is_dir():
-        pytest.skip("no recording of a car's CAN beside the project")
-    log = next(folder.glob("*.candump.log.gz"))
-    dbc = next(folder.glob("*.dbc"))
-    url = f"can:{log}?dbc={dbc}&map=gz=KINEMATICS.YAW_RATE&speed=max"
-    with pytest.raises(InputError, match="YAW_RATE has no unit"):
-        open_driver(url)
-    with open_driver(f"{url}&gyr_unit=0.244*deg/s") as imu:
-        block = until_the_end(imu)
-        assert len(block) > 4800 and imu.health.gaps == 0
-    t = block.t - 1533200000
-    phone = np.load(folder / "phone_imu.npz")
-    inside = (phone["gyro_t"] > t[0]) & (phone["gyro_t"] < t[-1])
-    car = np.interp(phone["gyro_t"][inside], t, block.gyr[:, 2])
-    down = -phone["gyro_value"][inside, 2]  # the phone's z points down
-    a, b = smooth(car), smooth(down)
-    assert np.corrcoef(a, b)[0, 1] > 0.95
-    assert 0.85 < np.polyfit(a, b, 1)[0] < 1.1
-    assert np.corrcoef(a[300:], b[:-300])[0, 1] < 0.8  # and at the same time
-
-
-def smooth(x: Array) -> Array:
-    """Means over half a second of the phone."""
-    return np.convolve(x, np.full(52, 1 / 52), "valid")
-
-
 def test_a_kernel_without_can_and_channels_that_are_not_there(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -446,6 +374,27 @@ def test_a_kernel_without_can_and_channels_that_are_not_there(
         (100, "is down"),
     ):
         assert says in why("socketcan", OSError(number, "what the kernel says"))
+
+
+def test_a_network_without_multicast(
+    namespace: tuple[str, ...], tmp_path: Path
+) -> None:
+    subprocess.run([*namespace, *"ip route del 224.0.0.0/4".split()], check=True)
+    url = "can:239.74.163.2?interface=udp_multicast&dbc=virtual"
+    command = [sys.executable, "-m", "fieldcal"]
+    for arguments, says in (
+        (["run", "two_position", "--device", url, "-o", "s"], "add a route"),
+        (["sim", "--can", "udp_multicast:239.74.163.2"], "cannot join"),
+    ):
+        done = subprocess.run(
+            [*namespace, *command, *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+        )
+        assert done.returncode == 3 and says in done.stderr, done.stderr
+        assert done.stderr.count("\n") == 1
 
 
 def test_without_the_extra_one_sentence_tells_what_to_install(tmp_path: Path) -> None:

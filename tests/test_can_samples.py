@@ -201,3 +201,24 @@ def test_stamps_put_frames_together_and_unwrap(tmp_path: Path) -> None:
     np.testing.assert_allclose(block.t, kept / 100, atol=1e-4)
     np.testing.assert_array_equal(block.acc[:, 0], block.gyr[:, 0])
     assert (health.incomplete, health.gaps, health.missing) == (1, 1, 1)
+
+
+@given(st.integers(0, 2**32), st.lists(st.integers(0, 300), max_size=20))
+@pytest.mark.parametrize("query", [f"map={KEYED}", f"map={TURNS}"])
+def test_frames_of_noise_break_nothing_however_they_are_cut(
+    dbc: Path, query: str, seed: int, cuts: list[int]
+) -> None:
+    rng = np.random.default_rng(seed)
+    rows = [
+        pack(
+            float(rng.uniform(0, 3)),
+            int(rng.choice([32, 33, 33, 34, 35])),
+            bool(rng.uniform() < 0.1),
+            rng.bytes(int(rng.choice([0, 7, 8, 8, 8, 64]))),
+        )
+        for _ in range(300)
+    ]
+    whole, _ = decode(dbc, query, rows)
+    pieces, _ = decode(dbc, query, rows, sorted(cuts))
+    same(whole, pieces)
+    assert (np.diff(whole.t) > 0).all()

@@ -43,6 +43,9 @@ HEARTBEAT = 3.0
 USUAL = 50.0
 """Rate that is asked for, Hz: a radio link carries it."""
 
+QUIET = 2.0
+"""Time without samples after which the rate is asked for again, s: a reboot."""
+
 RECENT = 256
 """Samples that the rate is told from."""
 
@@ -79,6 +82,7 @@ class Imu(Driver):
         self._line: Line | None = None
         self._early: list[Block] = []
         self._recent: deque[float] = deque(maxlen=RECENT)
+        self._last = monotonic()
         if is_log(endpoint):
             self._log = Log(Path(endpoint), _speed(options))
             options.finish()
@@ -176,9 +180,12 @@ class Imu(Driver):
     def _hear(self, timeout: float) -> Block | None:
         """Take what has come, answer it, and return the samples."""
         chunks = self._take(timeout)
-        if any(chunk.broken for chunk in chunks):
-            self._talk.again()
         block = self._decoder.feed_all(chunks)
+        quiet = monotonic() - self._last > QUIET
+        if block is not None or quiet:
+            self._last = monotonic()
+        if any(chunk.broken for chunk in chunks) or (quiet and self._talk.settled):
+            self._talk.again()
         for message in self._decoder.aside:
             self._talk.hear(message)
         self._decoder.aside.clear()

@@ -151,10 +151,12 @@ class Talk:
     def _fall_back(self, why: str) -> bytes:
         """Ask for the stream that the message is part of, as older programs know it."""
         name, _ = self._message
-        self.says.append(
+        says = (
             f"{self._rate:g} Hz of {name} asked for: the autopilot "
             f"{self._denied or why}, so the raw sensor stream was asked for instead"
         )
+        if says not in self.says:
+            self.says.append(says)
         self._next()
         rate, target = max(1, round(self._rate)), self.vehicle or (0, 0)
         return self._packed(

@@ -8,7 +8,8 @@ SCALED_IMU, 2, 3), ``system``, ``component`` and ``instance`` where there are se
 serial port, ``speed`` of a log.
 
 What an autopilot sends is not raw, whatever the message is called: the calibration it
-has is built in. That is read and kept in `Imu.installed`.
+has is built in. That is read and kept in `Imu.installed`; with ``installed=identity``
+it is set to none meanwhile, and given back when the link is closed.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ import numpy as np
 
 from fieldcal.driver import Driver, Health
 from fieldcal.drivers.mavlink_log import Log, is_log
+from fieldcal.drivers.mavlink_talk import Talk, listed
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Chunk, Reader
-from fieldcal.errors import DeviceError, InputError
+from fieldcal.errors import DeviceError, FieldcalError, InputError
 from fieldcal.samples import Block
 
 if TYPE_CHECKING:
@@ -42,6 +44,9 @@ HEARTBEAT = 3.0
 
 USUAL = 50.0
 """Rate that is asked for, Hz: a radio link carries it."""
+
+RETURN = 4.0
+"""How long giving back the installed calibration may take, s."""
 
 QUIET = 2.0
 """Time without samples after which the rate is asked for again, s: a reboot."""
@@ -64,7 +69,6 @@ class Imu(Driver):
     def __init__(self, address: str) -> None:
         _check_installed()
         from fieldcal.drivers.mavlink_samples import Decoder
-        from fieldcal.drivers.mavlink_talk import Talk
 
         endpoint, options = split(address, "mavlink")
         if not endpoint:
@@ -74,11 +78,17 @@ class Imu(Driver):
         self._asked = options.number("rate", USUAL, 0.0, 1e4)
         self.health: Health = self._decoder.health
         message = (self._decoder.message, self._decoder.kind.identifier)
+        without = options.choice("installed", ("keep", "identity"), "keep")
         self._talk = Talk(
-            message, self._asked, self._decoder.instance, self._decoder.wants
+            message,
+            self._asked,
+            self._decoder.instance,
+            self._decoder.wants,
+            without == "identity",
         )
         self._log: Log | None = None
         self._reader: Reader | None = None
+        self._closed = False
         self._line: Line | None = None
         self._early: list[Block] = []
         self._recent: deque[float] = deque(maxlen=RECENT)
@@ -168,9 +178,33 @@ class Imu(Driver):
                 return block
 
     def close(self) -> None:
-        """Release the link, or the log; safe to call twice."""
-        if self._reader:
+        """Give back what was changed, and release the link; safe to call twice.
+
+        It is a DeviceError if the autopilot does not take its calibration back.
+        """
+        if self._reader is None or self._closed:
+            return
+        self._closed = True
+        try:
+            self._give_back()
+        finally:
             self._reader.close()
+
+    def _give_back(self) -> None:
+        self._talk.give_back()
+        deadline = monotonic() + RETURN
+        fault: Exception | None = None
+        try:
+            while self._talk.unset and monotonic() < deadline:
+                self._say(self._talk.due(monotonic()))
+                self._listen(self._take(0.05))
+        except FieldcalError as error:
+            fault = error
+        if self._talk.unset:
+            raise DeviceError(
+                f"{self.name} could not be given back its calibration: set by hand "
+                f"{listed(self._talk.unset)}"
+            ) from fault
 
     def _take(self, timeout: float) -> list[Chunk]:
         if self._log:
@@ -178,17 +212,14 @@ class Imu(Driver):
         return self._reader.take(timeout) if self._reader else []
 
     def _hear(self, timeout: float) -> Block | None:
-        """Take what has come, answer it, and return the samples."""
+        """Return the samples that have come, and answer the rest."""
         chunks = self._take(timeout)
-        block = self._decoder.feed_all(chunks)
+        block = self._listen(chunks)
         quiet = monotonic() - self._last > QUIET
         if block is not None or quiet:
             self._last = monotonic()
         if any(chunk.broken for chunk in chunks) or (quiet and self._talk.settled):
             self._talk.again()
-        for message in self._decoder.aside:
-            self._talk.hear(message)
-        self._decoder.aside.clear()
         if self._talk.vehicle:
             self._decoder.choose(*self._talk.vehicle)
         self._check_one()
@@ -196,6 +227,14 @@ class Imu(Driver):
             self._say(self._talk.due(monotonic()))
         if block is not None:
             self._recent.extend(block.t.tolist())
+        return block
+
+    def _listen(self, chunks: list[Chunk]) -> Block | None:
+        """Decode, and tell the conversation what was said beside the samples."""
+        block = self._decoder.feed_all(chunks)
+        for message in self._decoder.aside:
+            self._talk.hear(message)
+        self._decoder.aside.clear()
         return block
 
     def _say(self, data: bytes) -> None:
@@ -216,6 +255,9 @@ class Imu(Driver):
                 if self._early:
                     return
                 raise DeviceError(self._silence(HEARTBEAT, Health()))
+        if self._talk.installed is not None and self._talk.installed.taken_out:
+            self._early.clear()  # these came before the calibration was out
+            self._decoder.drop()
 
     def _check_one(self) -> None:
         """Refuse to choose between several vehicles."""

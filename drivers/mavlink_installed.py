@@ -65,12 +65,14 @@ class Installed:
     autopilot : number of its program in the heartbeat
     instance : which of its sensors, from 0
     values : by name of the parameter, as far as they came
+    taken_out : whether the autopilot was told to do without, o = 0 and k = 1
 
     """
 
     autopilot: int
     instance: int
     values: dict[str, float] = field(default_factory=dict)
+    taken_out: bool = False
 
     @property
     def missing(self) -> list[str]:
@@ -111,11 +113,12 @@ class Installed:
                 f"{mounting} = {self.values[mounting]:g} turns the axes behind the "
                 "installed calibration: set it to 0, and record again"
             )
-        k = self.of("acc_scale")
+        there = 0.0 if self.taken_out else 1.0
+        k = self.of("acc_scale") ** there
         new = {
-            "acc_offset": self.of("acc_offset") + acc_bias / k,  # (2)
+            "acc_offset": there * self.of("acc_offset") + acc_bias / k,  # (2)
             "acc_scale": k / acc_scale,
-            "gyr_offset": self.of("gyr_offset") + gyr_bias,
+            "gyr_offset": there * self.of("gyr_offset") + gyr_bias,
         }
         return {
             name: float(value)
@@ -125,4 +128,19 @@ class Installed:
 
     def as_table(self) -> dict[str, Any]:
         """What a recording keeps of it."""
-        return {"parameters": self.values, "missing": self.missing}
+        return {
+            "parameters": self.values,
+            "missing": self.missing,
+            "taken_out": self.taken_out,
+        }
+
+
+def identity(installed: Installed) -> dict[str, float]:
+    """Parameters that are no calibration; none where not all are known."""
+    if installed.missing:
+        return {}
+    known = names(installed.autopilot, installed.instance)
+    nothing = {"acc_offset": 0.0, "acc_scale": 1.0, "gyr_offset": 0.0}
+    return {
+        name: value for what, value in nothing.items() for name in known.get(what, ())
+    }

@@ -142,6 +142,10 @@ class Decoder(Codec):
         """Take the samples of this one, if none was taken so far."""
         self._vehicle = self._vehicle or (system, component)
 
+    def drop(self) -> None:
+        """Forget the samples that wait for their unit."""
+        self._waiting = []
+
     def scan(self, data: Bytes) -> Candidates:
         """Say where packets may begin."""
         return candidates(data, self._extras)

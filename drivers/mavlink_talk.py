@@ -2,17 +2,20 @@
 
 Once a heartbeat tells who is there, the rate of the message is asked for
 (SET_MESSAGE_INTERVAL, and where that is denied or not answered the raw sensor stream,
-REQUEST_DATA_STREAM), then the parameters of the installed calibration are read. Our
-own heartbeat goes out every second, since some send nothing to who is silent.
+REQUEST_DATA_STREAM), then the parameters of the installed calibration are read, and
+where that is wanted set to no calibration until they are given back. Our own heartbeat
+goes out every second, since some send nothing to who is silent.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from math import inf
 from typing import Any
 
-from fieldcal.drivers.mavlink_installed import PX4, Installed, names
+from fieldcal.drivers.mavlink_installed import PX4, Installed, identity, names
+from fieldcal.errors import DeviceError
 
 EVERY = 1.0
 """Between two heartbeats, s."""
@@ -31,7 +34,7 @@ NO_AUTOPILOT, NO_RATE = 8, 511
 
 ACCEPTED, IN_PROGRESS = 0, 5
 RAW_SENSORS = 1
-INT32 = 6
+INT32, REAL32 = 6, 9
 
 PROGRAMS = {3: "ArduPilot", 12: "PX4"}
 
@@ -45,6 +48,7 @@ class Talk:
     rate : Hz; 0 to leave it as it is
     instance : which sensor's parameters are read
     wants : says of a system and a component whether they are meant
+    take_out : whether the installed calibration is to be set to none meanwhile
 
     Attributes
     ----------
@@ -61,6 +65,7 @@ class Talk:
         rate: float,
         instance: int,
         wants: Callable[[int, int], bool],
+        take_out: bool = False,
     ) -> None:
         from pymavlink.dialects.v20 import all as dialect
 
@@ -72,20 +77,38 @@ class Talk:
         self.installed: Installed | None = None
         self.others: set[tuple[int, int]] = set()
         self.says: list[str] = []
-        self._beat = self._asked = float("-inf")
+        self._beat = self._asked = -inf
         self._tries, self._denied = 0, ""
         self._rated = rate == 0
-        self._read = False
+        self._read, self._take_out = False, take_out
+        self._goal: dict[str, float] = {}
+        self._now: dict[str, float] = {}
 
     @property
     def settled(self) -> bool:
         """Whether all that is asked has been answered, or given up."""
-        return self.vehicle is not None and self._rated and self._read
+        answered = self.vehicle is not None and self._rated and self._read
+        return answered and not self._take_out and not self.unset
+
+    @property
+    def unset(self) -> dict[str, float]:
+        """Parameters that were to be set, and are not yet."""
+        return {
+            name: value
+            for name, value in self._goal.items()
+            if not abs(self._now.get(name, inf) - value) <= 1e-6 * max(1, abs(value))
+        }
+
+    def give_back(self) -> None:
+        """Set the parameters to what they were, if they were changed at all."""
+        self._take_out, self._tries, self._asked = False, -TRIES, -inf
+        if self._goal and self.installed is not None:
+            self._goal = {name: self.installed.values[name] for name in self._goal}
 
     def again(self) -> None:
         """Ask for the rate again: the link was away."""
         self._rated, self._tries = self._rate == 0, 0
-        self._asked = float("-inf")
+        self._asked = -inf
 
     def hear(self, message: Any) -> None:
         """Take note of a message, as pymavlink makes it."""
@@ -109,7 +132,9 @@ class Talk:
         if self.vehicle is None or self.settled or now - self._asked < PATIENCE:
             return out
         self._asked = now
-        return out + (self._ask_parameters() if self._rated else self._ask_rate())
+        if not self._rated:
+            return out + self._ask_rate()
+        return out + (self._set() if self._read else self._ask_parameters())
 
     def _packed(self, message: Any) -> bytes:
         packed: bytes = message.pack(self._out)
@@ -146,7 +171,7 @@ class Talk:
         why = results[result].name if result in results else f"result {result}"
         self._tries = TRIES
         self._denied = f"denies it ({why.removeprefix('MAV_RESULT_').lower()})"
-        self._asked = float("-inf")
+        self._asked = -inf
 
     def _fall_back(self, why: str) -> bytes:
         """Ask for the stream that the message is part of, as older programs know it."""
@@ -165,7 +190,7 @@ class Talk:
 
     def _next(self) -> None:
         self._rated, self._tries, self._denied = True, 0, ""
-        self._asked = float("-inf")
+        self._asked = -inf
 
     def _ask_parameters(self) -> bytes:
         if self.installed is None:
@@ -186,6 +211,30 @@ class Talk:
             for name in self.installed.missing
         )
 
+    def _set(self) -> bytes:
+        """Set the parameters that are not yet what they should be."""
+        if self._take_out and self.installed is not None:
+            self._take_out, self._tries = False, 0
+            self._goal = identity(self.installed)
+            self.installed.taken_out = bool(self._goal)
+            if not self._goal:
+                self.says.append(
+                    "the installed calibration stays, as it could not be read whole"
+                )
+        self._tries += 1
+        if self._tries > TRIES:
+            raise DeviceError(
+                f"the autopilot does not take parameters: {listed(self.unset)}; set "
+                "them by hand, or leave out installed=identity"
+            )
+        target = self.vehicle or (0, 0)
+        return b"".join(
+            self._packed(
+                self._out.param_set_encode(*target, name.encode(), value, REAL32)
+            )
+            for name, value in self.unset.items()
+        )
+
     def _value(self, message: Any) -> None:
         installed = self.installed
         if installed is None:
@@ -197,5 +246,13 @@ class Talk:
         if installed.autopilot == PX4 and message.param_type == INT32:
             # PX4 sends the bits of a whole number, others its value
             (value,) = struct.unpack("<i", struct.pack("<f", message.param_value))
-        installed.values[message.param_id] = float(value)
-        self._read = not installed.missing
+        self._now[message.param_id] = float(value)
+        if not self._read:
+            installed.values[message.param_id] = float(value)
+            self._read = not installed.missing
+            self._asked, self._tries = (-inf, 0) if self._read else (self._asked, 1)
+
+
+def listed(parameters: Mapping[str, float]) -> str:
+    """Write parameters as an operator types them."""
+    return ", ".join(f"{name} = {value:.9g}" for name, value in parameters.items())

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from threading import Thread
 from typing import Any
 
@@ -125,6 +126,48 @@ def test_installed_calibration_is_read_and_composed(
     with autopilot(place, *options) as (where, _), opened(f"mavlink:{where}") as imu:
         after = taken(imu, 1.0).acc.mean(axis=0)
     np.testing.assert_allclose(after, [0, -9.81, 0], atol=0.02)
+
+
+def test_the_installed_calibration_is_taken_out_and_given_back() -> None:
+    place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02"
+    with autopilot(place, "--speed", "5", *CONCEALED) as (where, _):
+        with opened(f"mavlink:{where}?installed=identity") as imu:
+            raw = taken(imu, 1.0).acc.mean(axis=0)
+            assert imu.installed is not None
+            new = imu.installed.next(BIAS, SCALE, np.zeros(3))
+        np.testing.assert_allclose(raw, BIAS + SCALE * [0, -9.81, 0], atol=0.02)
+        assert new["INS_ACCOFFS_X"] == 0.2
+        assert new["INS_ACCSCAL_Y"] == pytest.approx(1 / 0.992)
+        with opened(f"mavlink:{where}") as imu:
+            assert imu.installed is not None
+            np.testing.assert_allclose(imu.installed.of("acc_offset"), [0.5, 0, 0])
+            assert imu.installed.of("acc_scale")[1] == pytest.approx(1.02)
+
+
+def test_what_cannot_be_given_back_is_named() -> None:
+    place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5"
+    with autopilot(place) as (where, control):
+        imu = opened(f"mavlink:{where}?installed=identity&reconnect=0")
+        order(control, stop={})
+        with pytest.raises(DeviceError, match="hung up"):
+            list(imu.blocks())
+        with pytest.raises(DeviceError, match="by hand INS_ACCOFFS_X = 0.5"):
+            imu.close()
+        imu.close()
+
+
+def test_a_recording_keeps_what_is_installed(tmp_path: Path) -> None:
+    place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5"
+    with autopilot(place, "--speed", "50") as (where, _):
+        command = [sys.executable, "-m", "fieldcal", "run", "two_position"]
+        command += ["--headless", "--device", f"mavlink:{where}?rate=100"]
+        command += ["-o", str(tmp_path / "session")]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr  # nobody turned it
+    first = (tmp_path / "session" / "marks.jsonl").read_text().splitlines()[0]
+    mark = json.loads(first)
+    assert mark["event"] == "device" and mark["message"] == "HIGHRES_IMU"
+    assert mark["installed"]["parameters"]["INS_ACCOFFS_X"] == 0.5
 
 
 def test_a_turned_board_is_not_composed() -> None:

@@ -66,6 +66,10 @@ class SerialPort:
         data: bytes = self._serial.read(max(1, self._serial.in_waiting))
         return data
 
+    def write(self, data: bytes) -> None:
+        """Send."""
+        self._serial.write(data)
+
     def close(self) -> None:
         """Release the port."""
         self._serial.close()

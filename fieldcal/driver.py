@@ -12,12 +12,12 @@ shows in the times and in `Health`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
 from time import monotonic, time
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.samples import Block, concat
@@ -87,6 +87,11 @@ class Driver(ABC):
     def reconnecting(self) -> bool:
         """True while the link is broken and the driver still tries to mend it."""
         return False
+
+    @property
+    def notes(self) -> Mapping[str, Any]:
+        """What a recording keeps of the device beside its samples, as JSON."""
+        return {}
 
     def blocks(self, timeout: float = 3.0) -> Iterator[Block]:
         """Yield blocks as they come.

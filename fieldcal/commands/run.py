@@ -236,6 +236,8 @@ def _record(
         with _operator(args, task, mover) as operator:
             give_up = GIVE_UP if args.headless or args.virtual is not None else None
             engine = Engine(driver, operator, task.about, recorder, give_up)
+            if driver.notes:
+                recorder.mark("device", **driver.notes)
             try:
                 found = engine.run(plan(task.about, task.seconds, task.sigma))
             except FieldcalError as error:

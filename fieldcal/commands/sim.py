@@ -26,6 +26,7 @@ EXAMPLE = """\
   fieldcal sim --serial witmotion
   fieldcal sim --serial "text?separator=semicolon&checksum=xor" --speed 20
   fieldcal sim --can slcan --rate 1000
+  fieldcal sim --mavlink "udpin:127.0.0.1:14550?INS_ACCOFFS_X=0.1"
   fieldcal sim --base-tilt=-1,0.5 --with cross_coupling:k12=0.003,k21=-0.002
 """
 
@@ -47,6 +48,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="INTERFACE",
         help="on a CAN bus instead: slcan (an adapter on a pty), or any bus of"
         " python-can with its channel, as in udp_multicast:239.74.163.2",
+    )
+    add(
+        "--mavlink",
+        metavar="URL",
+        help="as an autopilot instead, at udpin:HOST:PORT, udpout:HOST:PORT or"
+        ' tcpin:HOST:PORT, with options as in "tcpin:127.0.0.1:5760?autopilot=px4"',
     )
     add("--port-link", type=Path, metavar="PATH", help="symbolic link to the pty")
     add(
@@ -123,7 +130,7 @@ def run(args: argparse.Namespace) -> int:
         with contextlib.ExitStack() as stack:
             stack.enter_context(_interruptible())
             faults = LineFaults(args.seed)
-            link = _link(args, faults)
+            link = _link(args, faults, device.rate)
             stack.callback(link.close)
             stream = Stream(device, link, faults, speed, duration, args.once, _say)
             control = Control(lambda order: carry_out(stream, order), args.control)
@@ -137,12 +144,16 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _link(args: argparse.Namespace, faults: LineFaults) -> Link:
+def _link(args: argparse.Namespace, faults: LineFaults, rate: float) -> Link:
     """Make what the device talks through."""
     if args.can:
         from fieldcal.sim_device.link_can import open_link
 
         return open_link(args.can, faults, args.port_link)
+    if args.mavlink:
+        from fieldcal.sim_device import link_mavlink
+
+        return link_mavlink.open_link(args.mavlink, faults, rate)
     from fieldcal.sim_device.link_serial import SerialLink
     from fieldcal.sim_device.wire import open_wire
 

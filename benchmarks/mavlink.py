@@ -1,0 +1,141 @@
+"""The MAVLink driver against a plain loop of pymavlink's recv_match, over TCP."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+
+from fieldcal.driver import open_driver
+from fieldcal.drivers.mavlink_samples import KINDS
+from fieldcal.samples import Block
+from fieldcal.sim_device.mavlink_packing import messages
+
+SAMPLES = 30_000
+RUNS = 7
+GOAL = 3.0
+"""What decoding of our own must gain over the library's; without it 1 would do."""
+
+WATCHED = 5.0
+"""Time over which the share of the processor is taken, s."""
+
+SENDER = """
+import socket, sys
+first, rest = (open(name, "rb").read() for name in sys.argv[1:3])
+server = socket.create_server(("127.0.0.1", 0))
+print(server.getsockname()[1], flush=True)
+while True:
+    call, _ = server.accept()
+    try:
+        call.sendall(first + rest)
+        call.shutdown(socket.SHUT_WR)
+        while call.recv(4096):
+            pass
+    except OSError:
+        pass
+    call.close()
+"""
+
+
+def stream(name: str) -> tuple[bytes, bytes]:
+    """Return a heartbeat, and packets of the samples, one after the other."""
+    from pymavlink.dialects.v20 import all as dialect
+
+    rng = np.random.default_rng(1)
+    sent = Block.of(
+        np.arange(1, SAMPLES + 1) / 1000,
+        rng.normal([0, 0, -9.8], 0.1, (SAMPLES, 3)),
+        rng.normal(0, 0.1, (SAMPLES, 3)),
+        np.full(SAMPLES, 25.0),
+    )
+    out = dialect.MAVLink(None, 1, 1)
+    packets = []
+    for message in messages(dialect, KINDS[name].identifier, sent):
+        packets.append(message.pack(out))
+        out.seq = (out.seq + 1) % 256
+    # a program that is not known is asked for no parameters
+    return dialect.MAVLink_heartbeat_message(2, 0, 0, 0, 4, 3).pack(out), b"".join(
+        packets
+    )
+
+
+@contextmanager
+def sender(parts: tuple[bytes, bytes]) -> Iterator[int]:
+    """Another process that sends them to whoever calls; yields its port."""
+    with TemporaryDirectory() as folder:
+        files = [Path(folder, name) for name in ("first", "rest")]
+        for file, part in zip(files, parts, strict=True):
+            file.write_bytes(part)
+        command = [sys.executable, "-c", SENDER, *map(str, files)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            if process.stdout is None:
+                raise AssertionError
+            yield int(process.stdout.readline())
+            process.terminate()
+
+
+def plain(port: int, name: str) -> float:
+    """Seconds until recv_match has returned all samples."""
+    from pymavlink import mavutil
+
+    began, got = perf_counter(), 0
+    link: Any = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}")
+    while got < SAMPLES:
+        message = link.recv_match(type=name, blocking=True)
+        if message.xacc is not None:
+            got += 1
+    took = perf_counter() - began
+    link.close()
+    return took
+
+
+def driven(port: int, name: str) -> float:
+    """Seconds until the driver has delivered all samples."""
+    began, got = perf_counter(), 0
+    url = f"mavlink:tcp:127.0.0.1:{port}?message={name}&rate=0&reconnect=0"
+    with open_driver(url) as imu:
+        for block in imu.blocks():
+            got += len(block)
+            if got >= SAMPLES:
+                return perf_counter() - began
+    raise AssertionError
+
+
+def share(name: str) -> float:
+    """Share of a processor that an autopilot at 1 kHz takes, in real time."""
+    command = [sys.executable, "-m", "fieldcal", "sim", "--rate", "1000"]
+    command += ["--mavlink", "tcpin:127.0.0.1:0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
+        if sim.stdout is None:
+            raise AssertionError
+        where = sim.stdout.readline().strip()
+        with open_driver(f"mavlink:{where}?message={name}&rate=1000") as imu:
+            began, spent = perf_counter(), process_time()
+            for _ in imu.blocks():
+                if perf_counter() - began > WATCHED:
+                    break
+            took, spent = perf_counter() - began, process_time() - spent
+        sim.terminate()
+    return spent / took
+
+
+def main() -> None:
+    """Print throughput of both, their ratio, and the load at 1 kHz."""
+    print(f"{'message':12} {'recv_match':>12} {'driver':>12}  ratio  goal  at 1 kHz")
+    for name in ("RAW_IMU", "HIGHRES_IMU"):
+        with sender(stream(name)) as port:
+            # in turn: other load on the machine meets both
+            pairs = [(plain(port, name), driven(port, name)) for _ in range(RUNS)]
+        loop, ours = (median(column) for column in zip(*pairs, strict=True))
+        ratio = median(a / b for a, b in pairs)
+        load = share(name)
+        print(
+            f"{name:12} {SAMPLES / loop / 1e3:8.0f} k/s {SAMPLES / ours / 1e3:8.0f} k/s"
+            f"  {ratio:5.1f}  {GOAL:4.1f}  {100 * load:4.1f} % of a core"
+        )

@@ -1,0 +1,299 @@
+"""An IMU in an autopilot: ``mavlink:udp:0.0.0.0:14550?message=HIGHRES_IMU&rate=100``.
+
+The endpoint is a serial port, ``udp:HOST:PORT``, ``udpout:HOST:PORT``,
+``tcp:HOST:PORT``, or a .tlog file. Options: ``message`` (HIGHRES_IMU, RAW_IMU,
+SCALED_IMU, 2, 3), ``system``, ``component`` and ``instance`` where there are several,
+``rate`` in Hz to ask for (0 to leave it; 50), ``acc_unit``, ``gyr_unit`` and
+``rounding=nearest`` for a sender that is no usual one, ``baud``, ``reconnect`` as for a
+serial port, ``speed`` of a log.
+
+What an autopilot sends is not raw, whatever the message is called: the calibration it
+has is built in. That is read and kept in `Imu.installed`; with ``installed=identity``
+it is set to none meanwhile, and given back when the link is closed.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from importlib.util import find_spec
+from math import inf
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fieldcal.driver import Driver, Health
+from fieldcal.drivers.mavlink_log import Log, is_log
+from fieldcal.drivers.mavlink_talk import Talk, listed
+from fieldcal.drivers.options import Options, split
+from fieldcal.drivers.reader import Chunk, Reader
+from fieldcal.errors import DeviceError, FieldcalError, InputError
+from fieldcal.samples import Block
+
+if TYPE_CHECKING:
+    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.drivers.mavlink_link import Line
+    from fieldcal.drivers.mavlink_units import Quantisation
+
+GREETING = 6.0
+"""Longest time until it is known who is there and what it has installed, s."""
+
+HEARTBEAT = 3.0
+"""How long a first heartbeat may take, s."""
+
+USUAL = 50.0
+"""Rate that is asked for, Hz: a radio link carries it."""
+
+RETURN = 4.0
+"""How long giving back the installed calibration may take, s."""
+
+QUIET = 2.0
+"""Time without samples after which the rate is asked for again, s: a reboot."""
+
+RECENT = 256
+"""Samples that the rate is told from."""
+
+Places = tuple[int, int]
+
+
+class Imu(Driver):
+    """A link to an autopilot, or a log of one, and the samples of one of its sensors.
+
+    Attributes
+    ----------
+    says : sentences for the operator: what was denied, what is missing
+
+    """
+
+    def __init__(self, address: str) -> None:
+        _check_installed()
+        from fieldcal.drivers.mavlink_samples import Decoder
+
+        endpoint, options = split(address, "mavlink")
+        if not endpoint:
+            raise InputError("mavlink: name a link, such as mavlink:udp:0.0.0.0:14550")
+        self.name = endpoint
+        self._decoder = Decoder(options)
+        self._asked = options.number("rate", USUAL, 0.0, 1e4)
+        self.health: Health = self._decoder.health
+        message = (self._decoder.message, self._decoder.kind.identifier)
+        without = options.choice("installed", ("keep", "identity"), "keep")
+        self._talk = Talk(
+            message,
+            self._asked,
+            self._decoder.instance,
+            self._decoder.wants,
+            without == "identity",
+        )
+        self._log: Log | None = None
+        self._reader: Reader | None = None
+        self._closed = False
+        self._line: Line | None = None
+        self._early: list[Block] = []
+        self._recent: deque[float] = deque(maxlen=RECENT)
+        self._last = monotonic()
+        if is_log(endpoint):
+            self._log = Log(Path(endpoint), _speed(options))
+            options.finish()
+            return
+        self._open(endpoint, options)
+
+    def _open(self, endpoint: str, options: Options) -> None:
+        from fieldcal.drivers.mavlink_link import opener
+
+        baud = int(options.number("baud", 57600, 50, 1e8))
+        patience = options.number("reconnect", 10.0, 0.0, 86400.0)
+        options.finish()
+        open_line = opener(endpoint, baud)
+
+        def connect() -> Line:
+            self._line = open_line()
+            return self._line
+
+        self._reader = Reader(endpoint, connect, patience)
+        try:
+            self._greet()
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def says(self) -> list[str]:
+        """Sentences for the operator."""
+        heard = [f"asked for {self._asked:g} Hz, got {self.rate:.4g} Hz"]
+        slow = self._log is None and self._asked > 0 and self.rate > 0
+        return self._talk.says + heard * slow
+
+    @property
+    def installed(self) -> Installed | None:
+        """The calibration that the autopilot has; None while it is not known."""
+        return self._talk.installed
+
+    @property
+    def quantisation(self) -> Quantisation:
+        """What the rounding of the message adds to each sample."""
+        return self._decoder.quantisation
+
+    @property
+    def rate(self) -> float:
+        """Rate of the samples that came last, Hz; 0 before there are any."""
+        steps = np.diff(np.array(self._recent))
+        return float(1 / np.median(steps)) if len(steps) else 0.0
+
+    @property
+    def notes(self) -> dict[str, Any]:
+        """What a recording keeps of the device."""
+        decoder, installed = self._decoder, self.installed
+        return {
+            "message": decoder.message,
+            "vehicle": decoder.vehicle,
+            "acc_unit": decoder.acc_unit,
+            "gyr_unit": decoder.gyr_unit,
+            "quantisation": list(self.quantisation),
+            "rate_hz": round(self.rate, 3),
+            "installed": installed.as_table() if installed else None,
+            "says": self.says,
+        }
+
+    @property
+    def reconnecting(self) -> bool:
+        """True while the link is gone and is being tried again."""
+        return self._reader is not None and self._reader.reconnecting
+
+    def host_time(self) -> float:
+        """Now, in s of the clock that stamps `Block.t_host`: for a log, its own."""
+        return self._log.now if self._log else super().host_time()
+
+    def receive(self, timeout: float) -> Block | None:
+        """Return what has come, or None if nothing whole came in `timeout` seconds."""
+        if self._early:
+            return self._early.pop(0)
+        deadline = monotonic() + timeout
+        while True:
+            left = max(0.0, deadline - monotonic())
+            # our own heartbeat is due once a second
+            block = self._hear(left if self._log else min(left, 0.5))
+            if block is not None or monotonic() >= deadline:
+                return block
+
+    def close(self) -> None:
+        """Give back what was changed, and release the link; safe to call twice.
+
+        It is a DeviceError if the autopilot does not take its calibration back.
+        """
+        if self._reader is None or self._closed:
+            return
+        self._closed = True
+        try:
+            self._give_back()
+        finally:
+            self._reader.close()
+
+    def _give_back(self) -> None:
+        self._talk.give_back()
+        deadline = monotonic() + RETURN
+        fault: Exception | None = None
+        try:
+            while self._talk.unset and monotonic() < deadline:
+                self._say(self._talk.due(monotonic()))
+                self._listen(self._take(0.05))
+        except FieldcalError as error:
+            fault = error
+        if self._talk.unset:
+            raise DeviceError(
+                f"{self.name} could not be given back its calibration: set by hand "
+                f"{listed(self._talk.unset)}"
+            ) from fault
+
+    def _take(self, timeout: float) -> list[Chunk]:
+        if self._log:
+            return self._log.take(timeout)
+        return self._reader.take(timeout) if self._reader else []
+
+    def _hear(self, timeout: float) -> Block | None:
+        """Return the samples that have come, and answer the rest."""
+        chunks = self._take(timeout)
+        block = self._listen(chunks)
+        quiet = monotonic() - self._last > QUIET
+        if block is not None or quiet:
+            self._last = monotonic()
+        if any(chunk.broken for chunk in chunks) or (quiet and self._talk.settled):
+            self._talk.again()
+        if self._talk.vehicle:
+            self._decoder.choose(*self._talk.vehicle)
+        self._check_one()
+        if self._log is None and self._line is not None:
+            self._say(self._talk.due(monotonic()))
+        if block is not None:
+            self._recent.extend(block.t.tolist())
+        return block
+
+    def _listen(self, chunks: list[Chunk]) -> Block | None:
+        """Decode, and tell the conversation what was said beside the samples."""
+        block = self._decoder.feed_all(chunks)
+        for message in self._decoder.aside:
+            self._talk.hear(message)
+        self._decoder.aside.clear()
+        return block
+
+    def _say(self, data: bytes) -> None:
+        try:
+            if data and self._line is not None:
+                self._line.write(data)
+        except OSError:
+            return  # the reader meets the same fault, and mends it
+
+    def _greet(self) -> None:
+        """Listen and ask until all is answered; samples that come meanwhile wait."""
+        began = monotonic()
+        while not self._talk.settled and monotonic() < began + GREETING:
+            block = self._hear(0.05)
+            if block is not None:
+                self._early.append(block)
+            if self._talk.vehicle is None and monotonic() > began + HEARTBEAT:
+                if self._early:
+                    return
+                raise DeviceError(self._silence(HEARTBEAT, Health()))
+        if self._talk.installed is not None and self._talk.installed.taken_out:
+            self._early.clear()  # these came before the calibration was out
+            self._decoder.drop()
+
+    def _check_one(self) -> None:
+        """Refuse to choose between several vehicles."""
+        several = {*self._decoder.sources, *self._talk.others}
+        if self._talk.vehicle:
+            several.add(self._talk.vehicle)
+        if len(several) > 1:
+            named = ", ".join(f"system={s}&component={c}" for s, c in sorted(several))
+            raise InputError(f"{self.name} carries several vehicles: name one, {named}")
+
+    def _silence(self, timeout: float, before: Health) -> str:
+        health, wanted = self.health, self._decoder.message
+        others = sorted(self._decoder.heard - {wanted})
+        if health.received == before.received:
+            cause = "not a byte came; check link, port and baud rate"
+        elif others and wanted not in self._decoder.heard:
+            cause = f"no {wanted} comes, but {others[0]}; try message={others[0]}"
+        elif wanted in self._decoder.heard and not health.samples:
+            cause = f"{wanted} comes, but of another sensor; check instance and system"
+        elif self._talk.vehicle:
+            cause = f"an autopilot is there, but sends no {wanted}; try another message"
+        else:
+            cause = "bytes come, but no heartbeat of an autopilot; check baud rate"
+        sent = "went silent" if health.samples else "has sent no sample"
+        asked = "".join(f" ({sentence})" for sentence in self._talk.says)
+        return f"{self.name} {sent} for {timeout:g} s: {cause}{asked}"
+
+
+def _speed(options: Options) -> float:
+    if options.text("speed") == "max":
+        return inf
+    return options.number("speed", 1.0, 1e-3, 1e6)
+
+
+def _check_installed() -> None:
+    if not all(find_spec(module) for module in ("pymavlink", "fastcrc")):
+        raise InputError(
+            "MAVLink needs pymavlink and fastcrc: pip install 'fieldcal[mavlink]'"
+        )

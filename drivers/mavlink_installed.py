@@ -1,0 +1,146 @@
+"""The calibration that an autopilot has built into what it sends, and the next one.
+
+An autopilot sends  U = (r - o) k  of the sensor's own output r, with the offset o and
+the scale k among its parameters, axis by axis.                                 (1)
+A recalibration from U finds  U = b + s f, so
+
+    f = (U - b) / s = (r - (o + b / k)) (k / s)                                 (2)
+
+and what to install is o' = o + b / k and k' = k / s; for a gyroscope without a
+scale k = 1, and s stays out. The axes of o and k are the sensor's, so (2) needs a
+board that is not mounted turned.
+
+Symbols: o offset m/s^2 or rad/s, k scale, b bias, s scale factor, f specific force.
+Frame: device axes. Source: parameter lists of ArduPilot (INS_*) and PX4 (CAL_*).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fieldcal.errors import InputError
+from fieldcal.samples import Array
+
+ARDUPILOT, PX4 = 3, 12
+"""Numbers of the programs in a heartbeat."""
+
+AXES = "XYZ"
+
+
+def names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
+    """Parameters with offsets, scales and mounting, by what they are.
+
+    >>> names(ARDUPILOT, 1)["acc_scale"]
+    ('INS_ACC2SCAL_X', 'INS_ACC2SCAL_Y', 'INS_ACC2SCAL_Z')
+    """
+    if autopilot == ARDUPILOT:
+        acc = "INS_ACC" if instance == 0 else f"INS_ACC{instance + 1}"
+        gyr = "INS_GYR" if instance == 0 else f"INS_GYR{instance + 1}"
+        return {
+            "acc_offset": tuple(f"{acc}OFFS_{axis}" for axis in AXES),
+            "acc_scale": tuple(f"{acc}SCAL_{axis}" for axis in AXES),
+            "gyr_offset": tuple(f"{gyr}OFFS_{axis}" for axis in AXES),
+            "rotation": ("AHRS_ORIENTATION",),
+        }
+    if autopilot == PX4:
+        return {
+            "acc_offset": tuple(f"CAL_ACC{instance}_{axis}OFF" for axis in AXES),
+            "acc_scale": tuple(f"CAL_ACC{instance}_{axis}SCALE" for axis in AXES),
+            "gyr_offset": tuple(f"CAL_GYRO{instance}_{axis}OFF" for axis in AXES),
+            "rotation": ("SENS_BOARD_ROT",),
+        }
+    return {}
+
+
+@dataclass(slots=True)
+class Installed:
+    """What an autopilot says of its own calibration.
+
+    Attributes
+    ----------
+    autopilot : number of its program in the heartbeat
+    instance : which of its sensors, from 0
+    values : by name of the parameter, as far as they came
+    taken_out : whether the autopilot was told to do without, o = 0 and k = 1
+
+    """
+
+    autopilot: int
+    instance: int
+    values: dict[str, float] = field(default_factory=dict)
+    taken_out: bool = False
+
+    @property
+    def missing(self) -> list[str]:
+        """Parameters that have not come."""
+        known = names(self.autopilot, self.instance).values()
+        return [name for some in known for name in some if name not in self.values]
+
+    def of(self, what: str) -> Array:
+        """Return ``acc_offset``, ``acc_scale`` or ``gyr_offset``, (3,), nan unknown."""
+        some = names(self.autopilot, self.instance).get(what, ("",) * 3)
+        return np.array([self.values.get(name, np.nan) for name in some])
+
+    def next(
+        self, acc_bias: Array, acc_scale: Array, gyr_bias: Array
+    ) -> Mapping[str, float]:
+        """Return the parameters to install after a recalibration, (2).
+
+        Parameters
+        ----------
+        acc_bias, acc_scale, gyr_bias : (3,) as found from what was sent, m/s^2, rad/s
+
+        Raises
+        ------
+        InputError
+            If a parameter is not known, or the board is mounted turned.
+
+        """
+        known = names(self.autopilot, self.instance)
+        if self.missing or not known:
+            lacking = ", ".join(self.missing) or "any parameter of this autopilot"
+            raise InputError(
+                f"what the autopilot has installed is not known, without {lacking}: "
+                "let it answer parameter requests, and record again"
+            )
+        (mounting,) = known["rotation"]
+        if self.values[mounting] != 0:
+            raise InputError(
+                f"{mounting} = {self.values[mounting]:g} turns the axes behind the "
+                "installed calibration: set it to 0, and record again"
+            )
+        there = 0.0 if self.taken_out else 1.0
+        k = self.of("acc_scale") ** there
+        new = {
+            "acc_offset": there * self.of("acc_offset") + acc_bias / k,  # (2)
+            "acc_scale": k / acc_scale,
+            "gyr_offset": there * self.of("gyr_offset") + gyr_bias,
+        }
+        return {
+            name: float(value)
+            for what, values in new.items()
+            for name, value in zip(known[what], values, strict=True)
+        }
+
+    def as_table(self) -> dict[str, Any]:
+        """What a recording keeps of it."""
+        return {
+            "parameters": self.values,
+            "missing": self.missing,
+            "taken_out": self.taken_out,
+        }
+
+
+def identity(installed: Installed) -> dict[str, float]:
+    """Parameters that are no calibration; none where not all are known."""
+    if installed.missing:
+        return {}
+    known = names(installed.autopilot, installed.instance)
+    nothing = {"acc_offset": 0.0, "acc_scale": 1.0, "gyr_offset": 0.0}
+    return {
+        name: value for what, value in nothing.items() for name in known.get(what, ())
+    }

@@ -1,0 +1,156 @@
+"""Ways to an autopilot that bytes take: a serial port, UDP, TCP.
+
+``udp:HOST:PORT`` (or ``udpin:``) waits there for an autopilot that sends, and answers
+where that came from; ``udpout:HOST:PORT`` speaks first; ``tcp:HOST:PORT`` calls; all
+else is a serial port. A peer that closes is an OSError, once, so that whoever reads can
+call again.
+"""
+
+from __future__ import annotations
+
+import select
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Protocol
+
+from fieldcal.drivers.reader import Source
+from fieldcal.drivers.serial_imu import POLL, SerialPort
+from fieldcal.errors import DeviceError, InputError
+
+WAITING = 1 << 20
+"""Bytes that the kernel is asked to keep for us."""
+
+MOST = 512
+"""Datagrams taken at once."""
+
+SIZE = 1 << 16
+CALL = 5.0
+"""How long a call may take to be answered, s."""
+
+
+class Line(Source, Protocol):
+    """A source that can also be spoken to."""
+
+    def write(self, data: bytes) -> None:
+        """Send; OSError if the other end is gone."""
+
+
+class Udp:
+    """Datagrams, from a peer that speaks first, or to one that waits.
+
+    Parameters
+    ----------
+    place : host and port
+    waits : whether the place is ours, and the peer speaks first
+
+    """
+
+    def __init__(self, place: tuple[str, int], waits: bool) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._peer = None if waits else place
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WAITING)
+            if waits:
+                self._socket.bind(place)
+            self._socket.setblocking(False)
+        except OSError as fault:
+            self._socket.close()
+            raise DeviceError(_cannot(place, fault)) from fault
+
+    def read(self) -> bytes:
+        """Return all datagrams that are there, waiting `POLL` s for the first."""
+        parts: list[bytes] = []
+        select.select([self._socket], [], [], POLL)
+        # a refused datagram is told on the next read: nobody is there yet
+        with suppress(BlockingIOError, ConnectionRefusedError):
+            while len(parts) < MOST:
+                data, peer = self._socket.recvfrom(SIZE)
+                self._peer = peer
+                parts.append(data)
+        return b"".join(parts)
+
+    def write(self, data: bytes) -> None:
+        """Send to the peer, once one is known."""
+        if self._peer is not None:
+            with suppress(BlockingIOError, ConnectionRefusedError):
+                self._socket.sendto(data, self._peer)
+
+    def close(self) -> None:
+        """Release the socket."""
+        self._socket.close()
+
+
+class Tcp:
+    """A call to an autopilot that waits for one."""
+
+    def __init__(self, place: tuple[str, int]) -> None:
+        self._place = place
+        try:
+            self._socket = socket.create_connection(place, CALL)
+        except OSError as fault:
+            raise DeviceError(_cannot(place, fault)) from fault
+
+    def read(self) -> bytes:
+        """Return all that is there, waiting `POLL` seconds for the first byte.
+
+        Raises
+        ------
+        OSError
+            If the peer has closed.
+
+        """
+        ready, _, _ = select.select([self._socket], [], [], POLL)
+        if not ready:
+            return b""
+        data = self._socket.recv(SIZE)
+        if not data:
+            raise ConnectionResetError(f"{self._place[0]}:{self._place[1]} has closed")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send."""
+        self._socket.sendall(data)
+
+    def close(self) -> None:
+        """Hang up."""
+        self._socket.close()
+
+
+def opener(endpoint: str, baud: int) -> Callable[[], Line]:
+    """Return what opens an endpoint, and opens it again.
+
+    Raises
+    ------
+    InputError
+        If a host or a port is missing.
+
+    """
+    scheme, _, rest = endpoint.partition(":")
+    if scheme in ("udp", "udpin"):
+        place = _place(endpoint, rest)
+        return lambda: Udp(place, waits=True)
+    if scheme == "udpout":
+        place = _place(endpoint, rest)
+        return lambda: Udp(place, waits=False)
+    if scheme == "tcp":
+        place = _place(endpoint, rest)
+        return lambda: Tcp(place)
+    return lambda: SerialPort(endpoint, baud)
+
+
+def _place(endpoint: str, rest: str) -> tuple[str, int]:
+    host, _, port = rest.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise InputError(
+            f"mavlink: {endpoint} needs host and port, as in udp:0.0.0.0:14550"
+        )
+    return host, int(port)
+
+
+def _cannot(place: tuple[str, int], fault: OSError) -> str:
+    why = fault.strerror or str(fault)
+    return (
+        f"cannot open {place[0]}:{place[1]}: {why}; check host and port, and that no "
+        "other program (a ground station) has it"
+    )

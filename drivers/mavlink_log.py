@@ -1,0 +1,109 @@
+"""A telemetry log (.tlog) played: each packet behind its host time.
+
+Eight bytes, big-endian: µs since 1970 at which the packet arrived; then the packet. A
+log that was cut off or spoiled goes on at the next byte that can begin a packet.
+"""
+
+from __future__ import annotations
+
+import gzip
+from bisect import bisect_right
+from math import inf
+from pathlib import Path
+from time import monotonic, sleep
+
+from fieldcal.drivers.mavlink_frames import HEADS, SECOND, SIGNATURE
+from fieldcal.drivers.reader import Chunk
+from fieldcal.errors import DeviceError, InputError
+
+STAMP = 8
+PIECE = 4096
+"""Packets delivered at once."""
+
+
+def is_log(place: str) -> bool:
+    """Tell whether an address names a log and no link.
+
+    >>> is_log("flight.tlog"), is_log("udp:0.0.0.0:14550")
+    (True, False)
+    """
+    return place.lower().removesuffix(".gz").endswith(".tlog")
+
+
+def split(data: bytes) -> list[Chunk]:
+    """Cut a log into packets with their arrivals, s since 1970."""
+    chunks, at, last = [], 0, len(data) - STAMP - 3
+    while at <= last:
+        body = at + STAMP
+        if data[body] not in HEADS:
+            at += 1
+            continue
+        signed = data[body] == SECOND and data[body + 2] & 1
+        size = HEADS[data[body]] + data[body + 1] + 2 + SIGNATURE * signed
+        stamp = int.from_bytes(data[at:body], "big") / 1e6
+        chunks.append(Chunk(stamp, data[body : body + size]))
+        at = body + size
+    return chunks
+
+
+class Log:
+    """A log that is played.
+
+    Parameters
+    ----------
+    path : the file, also .gz
+    speed : time of the log against the clock; inf for as fast as it is read
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is no log.
+
+    """
+
+    def __init__(self, path: Path, speed: float) -> None:
+        self._path, self._speed = path, speed
+        try:
+            data = path.read_bytes()
+            if path.suffix.lower() == ".gz":
+                data = gzip.decompress(data)
+        except (OSError, EOFError) as fault:
+            raise InputError(f"{path}: cannot be read: {fault}") from fault
+        self._chunks = split(data)
+        if not self._chunks:
+            raise InputError(f"{path}: holds no packet; check that it is a .tlog")
+        self._next, self._began = 0, -1.0
+        self.now = self._chunks[0].t_host
+
+    def take(self, timeout: float) -> list[Chunk]:
+        """Return the packets that are due, or none after `timeout` seconds.
+
+        Raises
+        ------
+        DeviceError
+            At the end of the log.
+
+        """
+        if self._next >= len(self._chunks):
+            seconds = self._chunks[-1].t_host - self._chunks[0].t_host
+            raise DeviceError(f"{self._path} has ended after {seconds:.3f} s")
+        end = min(self._next + PIECE, len(self._chunks))
+        if self._speed < inf:
+            end = self._due(end, timeout)
+        taken = self._chunks[self._next : end]
+        self._next = end
+        if taken:
+            self.now = taken[-1].t_host
+        return taken
+
+    def _due(self, end: int, timeout: float) -> int:
+        """Wait for the next packet; up to which they are due then."""
+        if self._began < 0:
+            self._began = monotonic()
+        first = self._chunks[0].t_host
+        wait = (self._chunks[self._next].t_host - first) / self._speed
+        sleep(max(0.0, min(self._began + wait - monotonic(), timeout)))
+        until = first + (monotonic() - self._began) * self._speed
+        return bisect_right(
+            self._chunks, until, self._next, end, key=lambda chunk: chunk.t_host
+        )

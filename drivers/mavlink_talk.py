@@ -1,0 +1,258 @@
+"""What is said to an autopilot, and what it answers; no I/O and no clock.
+
+Once a heartbeat tells who is there, the rate of the message is asked for
+(SET_MESSAGE_INTERVAL, and where that is denied or not answered the raw sensor stream,
+REQUEST_DATA_STREAM), then the parameters of the installed calibration are read, and
+where that is wanted set to no calibration until they are given back. Our own heartbeat
+goes out every second, since some send nothing to who is silent.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping
+from math import inf
+from typing import Any
+
+from fieldcal.drivers.mavlink_installed import PX4, Installed, identity, names
+from fieldcal.errors import DeviceError
+
+EVERY = 1.0
+"""Between two heartbeats, s."""
+
+PATIENCE = 0.7
+"""How long an answer may take before the question is put again, s."""
+
+TRIES = 3
+"""How often a question is put."""
+
+STATION = (255, 190)
+"""System and component that ground stations call themselves."""
+
+NO_AUTOPILOT, NO_RATE = 8, 511
+"""In a heartbeat, somebody who flies nothing; SET_MESSAGE_INTERVAL."""
+
+ACCEPTED, IN_PROGRESS = 0, 5
+RAW_SENSORS = 1
+INT32, REAL32 = 6, 9
+
+PROGRAMS = {3: "ArduPilot", 12: "PX4"}
+
+
+class Talk:
+    """A conversation with one autopilot.
+
+    Parameters
+    ----------
+    message : name and number of what is asked for
+    rate : Hz; 0 to leave it as it is
+    instance : which sensor's parameters are read
+    wants : says of a system and a component whether they are meant
+    take_out : whether the installed calibration is to be set to none meanwhile
+
+    Attributes
+    ----------
+    vehicle : system and component of the autopilot
+    installed : what its parameters say; None before there is a heartbeat
+    others : further autopilots that were heard
+    says : sentences for the operator
+
+    """
+
+    def __init__(
+        self,
+        message: tuple[str, int],
+        rate: float,
+        instance: int,
+        wants: Callable[[int, int], bool],
+        take_out: bool = False,
+    ) -> None:
+        from pymavlink.dialects.v20 import all as dialect
+
+        self._dialect = dialect
+        self._out = dialect.MAVLink(None, *STATION)
+        self._message, self._rate = message, rate
+        self._instance, self._wants = instance, wants
+        self.vehicle: tuple[int, int] | None = None
+        self.installed: Installed | None = None
+        self.others: set[tuple[int, int]] = set()
+        self.says: list[str] = []
+        self._beat = self._asked = -inf
+        self._tries, self._denied = 0, ""
+        self._rated = rate == 0
+        self._read, self._take_out = False, take_out
+        self._goal: dict[str, float] = {}
+        self._now: dict[str, float] = {}
+
+    @property
+    def settled(self) -> bool:
+        """Whether all that is asked has been answered, or given up."""
+        answered = self.vehicle is not None and self._rated and self._read
+        return answered and not self._take_out and not self.unset
+
+    @property
+    def unset(self) -> dict[str, float]:
+        """Parameters that were to be set, and are not yet."""
+        return {
+            name: value
+            for name, value in self._goal.items()
+            if not abs(self._now.get(name, inf) - value) <= 1e-6 * max(1, abs(value))
+        }
+
+    def give_back(self) -> None:
+        """Set the parameters to what they were, if they were changed at all."""
+        self._take_out, self._tries, self._asked = False, -TRIES, -inf
+        if self._goal and self.installed is not None:
+            self._goal = {name: self.installed.values[name] for name in self._goal}
+
+    def again(self) -> None:
+        """Ask for the rate again: the link was away."""
+        self._rated, self._tries = self._rate == 0, 0
+        self._asked = -inf
+
+    def hear(self, message: Any) -> None:
+        """Take note of a message, as pymavlink makes it."""
+        kind = message.get_type()
+        source = (message.get_srcSystem(), message.get_srcComponent())
+        if kind == "HEARTBEAT":
+            self._heartbeat(message, source)
+        elif source != self.vehicle:
+            return
+        elif kind == "COMMAND_ACK" and message.command == NO_RATE:
+            self._answered(message.result)
+        elif kind == "PARAM_VALUE" and self.installed is not None:
+            self._value(message)
+
+    def due(self, now: float) -> bytes:
+        """Bytes to send at `now`, s of any clock."""
+        out = b""
+        if now - self._beat >= EVERY:
+            self._beat = now
+            out += self._packed(self._out.heartbeat_encode(6, NO_AUTOPILOT, 0, 0, 4))
+        if self.vehicle is None or self.settled or now - self._asked < PATIENCE:
+            return out
+        self._asked = now
+        if not self._rated:
+            return out + self._ask_rate()
+        return out + (self._set() if self._read else self._ask_parameters())
+
+    def _packed(self, message: Any) -> bytes:
+        packed: bytes = message.pack(self._out)
+        self._out.seq = (self._out.seq + 1) % 256
+        return packed
+
+    def _heartbeat(self, message: Any, source: tuple[int, int]) -> None:
+        if message.autopilot == NO_AUTOPILOT or not self._wants(*source):
+            return
+        if self.vehicle is None:
+            self.vehicle = source
+            self.installed = Installed(message.autopilot, self._instance)
+            self._read = not self.installed.missing
+        elif source != self.vehicle:
+            self.others.add(source)
+
+    def _ask_rate(self) -> bytes:
+        name, number = self._message
+        target = self.vehicle or (0, 0)
+        self._tries += 1
+        if self._tries > TRIES:
+            return self._fall_back("does not answer SET_MESSAGE_INTERVAL")
+        interval = round(1e6 / self._rate)
+        values = (number, interval, 0, 0, 0, 0, 0)
+        return self._packed(self._out.command_long_encode(*target, NO_RATE, 0, *values))
+
+    def _answered(self, result: int) -> None:
+        if self._rated or result == IN_PROGRESS:
+            return
+        if result == ACCEPTED:
+            self._next()
+            return
+        results = self._dialect.enums["MAV_RESULT"]
+        why = results[result].name if result in results else f"result {result}"
+        self._tries = TRIES
+        self._denied = f"denies it ({why.removeprefix('MAV_RESULT_').lower()})"
+        self._asked = -inf
+
+    def _fall_back(self, why: str) -> bytes:
+        """Ask for the stream that the message is part of, as older programs know it."""
+        name, _ = self._message
+        says = (
+            f"{self._rate:g} Hz of {name} asked for: the autopilot "
+            f"{self._denied or why}, so the raw sensor stream was asked for instead"
+        )
+        if says not in self.says:
+            self.says.append(says)
+        self._next()
+        rate, target = max(1, round(self._rate)), self.vehicle or (0, 0)
+        return self._packed(
+            self._out.request_data_stream_encode(*target, RAW_SENSORS, rate, 1)
+        )
+
+    def _next(self) -> None:
+        self._rated, self._tries, self._denied = True, 0, ""
+        self._asked = -inf
+
+    def _ask_parameters(self) -> bytes:
+        if self.installed is None:
+            return b""
+        self._tries += 1
+        if self._tries > TRIES:
+            self._read = True
+            self.says.append(
+                "parameters that the autopilot did not answer: "
+                + ", ".join(self.installed.missing)
+            )
+            return b""
+        target = self.vehicle or (0, 0)
+        return b"".join(
+            self._packed(
+                self._out.param_request_read_encode(*target, name.encode(), -1)
+            )
+            for name in self.installed.missing
+        )
+
+    def _set(self) -> bytes:
+        """Set the parameters that are not yet what they should be."""
+        if self._take_out and self.installed is not None:
+            self._take_out, self._tries = False, 0
+            self._goal = identity(self.installed)
+            self.installed.taken_out = bool(self._goal)
+            if not self._goal:
+                self.says.append(
+                    "the installed calibration stays, as it could not be read whole"
+                )
+        self._tries += 1
+        if self._tries > TRIES:
+            raise DeviceError(
+                f"the autopilot does not take parameters: {listed(self.unset)}; set "
+                "them by hand, or leave out installed=identity"
+            )
+        target = self.vehicle or (0, 0)
+        return b"".join(
+            self._packed(
+                self._out.param_set_encode(*target, name.encode(), value, REAL32)
+            )
+            for name, value in self.unset.items()
+        )
+
+    def _value(self, message: Any) -> None:
+        installed = self.installed
+        if installed is None:
+            return
+        known = names(installed.autopilot, installed.instance).values()
+        if message.param_id not in {name for some in known for name in some}:
+            return
+        value = float(message.param_value)
+        if installed.autopilot == PX4 and message.param_type == INT32:
+            # PX4 sends the bits of a whole number, others its value
+            (value,) = struct.unpack("<i", struct.pack("<f", message.param_value))
+        self._now[message.param_id] = float(value)
+        if not self._read:
+            installed.values[message.param_id] = float(value)
+            self._read = not installed.missing
+            self._asked, self._tries = (-inf, 0) if self._read else (self._asked, 1)
+
+
+def listed(parameters: Mapping[str, float]) -> str:
+    """Write parameters as an operator types them."""
+    return ", ".join(f"{name} = {value:.9g}" for name, value in parameters.items())

@@ -224,7 +224,7 @@ class Engine:
             phase,
             hold,
             None,
-            window.motion,
+            window.meter,
             window.elapsed,
             window.sigma,
             "",

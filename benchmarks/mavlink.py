@@ -1,4 +1,4 @@
-"""The MAVLink driver against a plain loop of pymavlink's recv_match, over TCP."""
+"""MAVLink against a plain loop of recv_match, and a million spoilt frames."""
 
 import subprocess
 import sys
@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.fuzz import BATCH, FRAMES, spoil
 from fieldcal.driver import open_driver
-from fieldcal.drivers.mavlink_samples import KINDS
+from fieldcal.drivers.mavlink_samples import KINDS, Decoder
+from fieldcal.drivers.options import Options
 from fieldcal.samples import Block
 from fieldcal.sim_device.mavlink_packing import messages
 
@@ -43,16 +45,16 @@ while True:
 """
 
 
-def stream(name: str) -> tuple[bytes, bytes]:
+def stream(name: str, count: int = SAMPLES) -> tuple[bytes, bytes]:
     """Return a heartbeat, and packets of the samples, one after the other."""
     from pymavlink.dialects.v20 import all as dialect
 
     rng = np.random.default_rng(1)
     sent = Block.of(
-        np.arange(1, SAMPLES + 1) / 1000,
-        rng.normal([0, 0, -9.8], 0.1, (SAMPLES, 3)),
-        rng.normal(0, 0.1, (SAMPLES, 3)),
-        np.full(SAMPLES, 25.0),
+        np.arange(1, count + 1) / 1000,
+        rng.normal([0, 0, -9.8], 0.1, (count, 3)),
+        rng.normal(0, 0.1, (count, 3)),
+        np.full(count, 25.0),
     )
     out = dialect.MAVLink(None, 1, 1)
     packets = []
@@ -125,8 +127,29 @@ def share(name: str) -> float:
     return spent / took
 
 
+def spoilt(name: str) -> tuple[int, int, int]:
+    """Frames that came through a million, wrong samples, most bytes kept."""
+    rng = np.random.default_rng(99)
+    unit = "mg" if KINDS[name].whole else "m/s^2"
+    query = f"message={name}&acc_unit={unit}"
+    _, sent = stream(name, BATCH)
+    whole = Decoder(Options("fuzz", query)).feed(sent, 0.0)
+    if whole is None:
+        raise AssertionError
+    known = {row.tobytes() for row in whole.six}
+    through = wrong = kept = 0
+    for _ in range(FRAMES // BATCH):
+        decoder = Decoder(Options("fuzz", query))
+        got = decoder.feed(spoil(sent, rng), 0.0)
+        kept = max(kept, decoder.waiting)
+        if got is not None:
+            through += len(got)
+            wrong += sum(row.tobytes() not in known for row in got.six)
+    return through, wrong, kept
+
+
 def main() -> None:
-    """Print throughput of both, their ratio, and the load at 1 kHz."""
+    """Print throughput of both, their ratio, the load at 1 kHz, and what fuzz does."""
     print(f"{'message':12} {'recv_match':>12} {'driver':>12}  ratio  goal  at 1 kHz")
     for name in ("RAW_IMU", "HIGHRES_IMU"):
         with sender(stream(name)) as port:
@@ -138,4 +161,11 @@ def main() -> None:
         print(
             f"{name:12} {SAMPLES / loop / 1e3:8.0f} k/s {SAMPLES / ours / 1e3:8.0f} k/s"
             f"  {ratio:5.1f}  {GOAL:4.1f}  {100 * load:4.1f} % of a core"
+        )
+    for name in ("RAW_IMU", "HIGHRES_IMU"):
+        through, wrong, kept = spoilt(name)
+        print(
+            f"{name}: of {FRAMES} frames, most of them spoilt, {through} came through,"
+            f" {wrong} of them wrong (odds of the check: {FRAMES * 2**-16:.0f}),"
+            f" at most {kept} bytes waited"
         )

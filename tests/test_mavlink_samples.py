@@ -1,5 +1,6 @@
 """What autopilots do to their messages, decoded: stamps, units, vehicles, versions."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,11 @@ pytest.importorskip("pymavlink")
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
 
+from fieldcal.driver import open_driver
 from fieldcal.drivers.mavlink_samples import Decoder
 from fieldcal.drivers.mavlink_units import unbiased, variance
 from fieldcal.drivers.options import Options
-from fieldcal.errors import DeviceError
+from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device.mavlink_packing import HIGHRES, RAW, messages
 
@@ -149,6 +151,24 @@ def test_one_vehicle_and_one_sensor_are_taken() -> None:
     free = decoder("message=RAW_IMU")
     free.feed(data, 0.0)
     assert free.sources == {(1, 1), (2, 1)}
+
+
+def test_several_vehicles_are_not_chosen_from(tmp_path: Path) -> None:
+    out, stamp = tmp_path / "two.tlog", (10**6).to_bytes(8, "big")
+    packets = [
+        packed(RAW, at_rest(30)[i : i + 1], system, 1)
+        for i in range(30)
+        for system in (1, 2)
+    ]
+    out.write_bytes(b"".join(stamp + packet for packet in packets))
+    url = f"mavlink:{out}?speed=max&message=RAW_IMU"
+    with (
+        open_driver(url) as imu,
+        pytest.raises(InputError, match="name one, system=1&component=1, system=2"),
+    ):
+        list(imu.blocks())
+    with open_driver(f"{url}&system=2") as imu:
+        assert len(next(imu.blocks())) == 30
 
 
 def test_a_signed_packet_is_read_to_its_end() -> None:

@@ -26,6 +26,9 @@ KEPT = 0.62302
 MOST = 200_000
 """Differences that give a level to a third of a percent; more would only take time."""
 
+GRAIN = 2000
+"""Samples of a window in which the step of coarse outputs shows."""
+
 AGREE = 3.0
 ANCHOR_S = 1.0
 
@@ -50,7 +53,18 @@ def white(pieces: Sequence[Array], rate_hz: float) -> Array:
     out = np.full(channels, np.nan)
     for c in range(channels):
         out[c] = _pooled([v[c] for v in levels], [s[c] for s in spreads])
-    return out
+    # outputs coarser than their noise may not change at all while the device is held
+    noise: Array = np.maximum(out, _grain(pieces) / np.sqrt(12))
+    return noise
+
+
+def _grain(pieces: Sequence[Array]) -> Array:
+    """Smallest change of each channel from one sample to the next, (c,)."""
+    steps = [np.abs(np.diff(p[:GRAIN], axis=0)) for p in pieces]
+    some = np.concatenate(steps) if steps else np.zeros((0, 0))
+    changes = np.where(some > 0, some, np.inf).min(axis=0, initial=np.inf)
+    grain: Array = np.where(np.isfinite(changes), changes, 0.0)
+    return grain
 
 
 def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:

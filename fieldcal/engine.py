@@ -25,7 +25,7 @@ from fieldcal.plan import Hold, Note, Plan, Step
 from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block, concat
 from fieldcal.view import Operator, Phase, View
-from fieldcal.windows import Average, Stillness, Window
+from fieldcal.windows import Average, Noise, Stillness, Window
 
 R = TypeVar("R")
 
@@ -71,6 +71,7 @@ class Engine:
         self._recorder = recorder
         self._give_up = give_up
         self._held: Held | None = None
+        self._noise: Noise | None = None
         self._stream = self._record(driver)
         self._rate = np.nan
 
@@ -162,7 +163,7 @@ class Engine:
         self._operator.tell(arrival.problem)
 
     def _average(self, hold: Hold) -> Average:
-        window = Window()
+        window = Window(noise=self._noise)
         last = np.nan
         try:
             for block in self._stream:
@@ -191,6 +192,7 @@ class Engine:
             start_s=average.start,
             end_s=float(np.nextafter(average.end, np.inf)),
         )
+        self._noise = window.noise and window.noise.spectrum
         self._show_window(hold, block, window, "taken")
         return average
 

@@ -17,7 +17,7 @@ from fieldcal.errors import FieldcalError, Moved, SessionError
 from fieldcal.samples import Block
 from fieldcal.session import Session
 from fieldcal.solve.observations import Observations
-from fieldcal.windows import Average, average
+from fieldcal.windows import Average, Noise, Window, average
 
 SHORTEST = 5.0
 """Shortest calm part of a disturbed window that is worth using, s."""
@@ -99,9 +99,10 @@ def rests(session: Session) -> Rests:
         )
     block = session.block
     rows, averages, warnings = [], [], list(session.warnings)
+    noise: Noise | None = None
     for i, window in enumerate(session.windows):
         try:
-            found, said = _take(block, window)
+            found, noise, said = _take(block, window, noise)
         except FieldcalError as error:
             warnings.append(f"position {i} is left out: {error}")
             continue
@@ -140,28 +141,31 @@ def with_turns_between(
     return turns.offered(calibration, session.block, still.averages, seen.nominal)
 
 
-def _take(block: Block, window: tuple[float, float] | None) -> tuple[Average, str]:
-    if window is None:
+def _take(
+    block: Block, span: tuple[float, float] | None, noise: Noise | None
+) -> tuple[Average, Noise | None, str]:
+    """Average of a window, what it taught about the noise, and what must be said."""
+    if span is None:
         raise SessionError("its window was not taken before the recording ended")
-    part = block.between(*window)
+    part = block.between(*span)
     if len(part) < 2:
         raise SessionError(
-            f"no samples lie between {window[0]:g} and {window[1]:g} s; the recording"
+            f"no samples lie between {span[0]:g} and {span[1]:g} s; the recording"
             f" spans {block.t[0]:g} to {block.t[-1]:g} s"
         )
+    window = Window(noise=noise)
+    window.add(part)
     try:
-        return average(part), ""
+        return window.average(), window.noise and window.noise.spectrum, ""
     except Moved as moved:
-        calm = _calm(part, moved)
+        calm = _calm(part, moved, noise)
         if calm is None:
             raise
-        return calm, (
-            f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s is"
-            " used"
-        )
+        said = f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
+        return calm, noise, f"{said} is used"
 
 
-def _calm(block: Block, moved: Moved) -> Average | None:
+def _calm(block: Block, moved: Moved, noise: Noise | None) -> Average | None:
     """Average of the longest calm part, None if there is none worth it."""
     sides = [
         block.between(-float("inf"), moved.at),
@@ -173,12 +177,12 @@ def _calm(block: Block, moved: Moved) -> Average | None:
         if length < SHORTEST or (best and length <= best.end - best.start):
             continue
         try:
-            found: Average | None = average(side)
+            found: Average | None = average(side, noise=noise)
         except Moved as again:
             inside = side.t[0] < again.at < side.t[-1]
             # a disturbance lasts: what follows its first instant is disturbed as well
             shifted = again.at if inside else side.t[0] + 1.0
-            found = _calm(side, Moved(str(again), shifted, again.axis))
+            found = _calm(side, Moved(str(again), shifted, again.axis), noise)
         if found and (best is None or found.end - found.start > best.end - best.start):
             best = found
     return best

@@ -326,3 +326,25 @@ def test_a_window_too_short_has_no_error() -> None:
         average(block_of(white(np.random.default_rng(0), 50)))
     with pytest.raises(InputError, match="0 samples"):
         average(block_of(white(np.random.default_rng(0), 0)))
+
+
+def test_a_device_that_turns_a_little_in_the_hand_is_known_along_gravity() -> None:
+    """Across gravity its specific force wanders, along it only its noise is left."""
+    pulls, across = [], []
+    n = np.array([0.48, -0.8, 0.36])
+    aside = np.linalg.svd(n[None, :])[2][1:]
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        lean = np.cumsum(rng.standard_normal((500, 2)), axis=0) * 2e-4
+        f = 9.81 * (n + lean @ aside)
+        f *= 9.81 / np.linalg.norm(f, axis=1)[:, None]
+        six = np.hstack([f, np.zeros((500, 3))]) + 0.03 * white(rng, 500)
+        window = Window()
+        window.add(Block.of(np.arange(500) / 100, six[:, :3], six[:, 3:]))
+        mean, covariance = window.mean[:3], window.covariance[:3, :3]
+        along = mean / np.linalg.norm(mean)
+        pulls.append(np.linalg.norm(mean) - 9.81)
+        pulls[-1] /= np.sqrt(along @ covariance @ along)
+        across.append(aside[0] @ covariance @ aside[0] / (along @ covariance @ along))
+    assert 0.8 < np.std(pulls) < 1.15
+    assert np.median(across) > 4

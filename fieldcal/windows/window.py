@@ -1,8 +1,18 @@
-"""A window as it fills: mean, error, stillness and verdict after every block."""
+"""A window as it fills: mean, error, stillness and verdict after every block.
+
+A device that turns a little at rest, in a hand or on a sagging rest, moves gravity
+across itself: its specific force changes across the mean force, not along it. So the
+mean along n = f / |f| has a noise of its own, lower than that of the axes tells, and
+the covariance C of the axes takes it over:
+
+    C' = C - C n n^T C (1 / q - v / q^2),   q = n^T C n                          (1)
+
+with v the variance of the mean of n . f by the spectrum of n . f; then n^T C' n = v.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,13 +41,18 @@ class Noise:
 
     Attributes
     ----------
-    quiet : how much it wanders at rest
-    seen : (s, 6) log likelihood of the shapes of its spectrum
+    quiet : how much it wanders at rest; None where windows need not be alike in that
+    seen : (s, 7) log likelihood of the shapes of its spectra: axes, along the force
 
     """
 
-    quiet: Quiet
+    quiet: Quiet | None
     seen: Array
+
+    @property
+    def spectrum(self) -> Noise:
+        """What holds in more wind or another hand as well: the shape of the noise."""
+        return replace(self, quiet=None)
 
 
 class Window:
@@ -104,7 +119,9 @@ class Window:
         """Covariance of the mean so far, (6, 6); nan in the first second."""
         if len(self._cells) < FEWEST:
             return np.full((6, 6), np.nan)
-        covariance = self._mean_error().covariance + np.diag(self._rounding())
+        whole = self._mean_error().covariance
+        along = _known_along(whole[:6, :6], self._along, float(whole[6, 6]))
+        covariance = along + np.diag(self._rounding())
         known = np.isfinite(self._cells.means).mean(axis=0)
         share = np.where(known > 0, known, np.nan)
         widened: Array = covariance / np.outer(share, share)
@@ -145,7 +162,7 @@ class Window:
             )
         if self.elapsed < SETTLED or not np.isfinite(sigma).any():
             return None
-        twice = np.sqrt(self._mean_error().doubled ** 2 + self._rounding())[:3]
+        twice = np.sqrt(self._mean_error().doubled[:6] ** 2 + self._rounding())[:3]
         open_ = np.isfinite(sigma) & (sigma > (target or 0.0))
         if (twice[open_] > WORTH * sigma[open_]).all():
             return (
@@ -185,14 +202,35 @@ class Window:
     def _mean_error(self) -> MeanError:
         if self._error is None:
             before = self._before.seen if self._before else None
-            self._error = error_of_mean(self._cells.steady, self._cells.spacing, before)
+            means = self._cells.steady
+            seven = np.column_stack([means, means @ self._along])
+            self._error = error_of_mean(seven, self._cells.spacing, before)
         return self._error
+
+    @property
+    def _along(self) -> Array:
+        """Direction of the mean specific force among the channels, (6,)."""
+        f = np.nan_to_num(self.mean) * (np.arange(6) < 3)
+        length = np.linalg.norm(f)
+        return f / length if length > 0 else f
 
     def _rounding(self) -> Array:
         resolution = self._cells.resolution
         sampled = np.nan_to_num(self._cells.noise)
         before = np.sqrt(np.maximum(sampled**2 - resolution**2 / 12, 0.0))
         return rounding_variance(resolution, before)
+
+
+def _known_along(covariance: Array, n: Array, variance: float) -> Array:
+    """Covariance (6, 6) in which the variance along the direction n is this one."""
+    reach = covariance @ n
+    q = float(n @ reach)
+    if q <= 0:
+        return covariance
+    known: Array = covariance - np.outer(reach, reach) * (
+        1 / q - variance / q**2
+    )  # (1)
+    return known
 
 
 def average(

@@ -73,7 +73,8 @@ def stops_without_weights(folder: Path) -> np.ndarray:
 
 def norms_of_the_peer_s_model(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     matrix = np.array([[x[3], x[6], x[7]], [0, x[4], x[8]], [0, 0, x[5]]])
-    return np.linalg.norm(np.linalg.solve(matrix, (y - x[:3]).T), axis=0) - 9.81
+    f = np.linalg.solve(matrix, (y - x[:3]).T)
+    return np.asarray(np.linalg.norm(f, axis=0) - 9.81)
 
 
 @pytest.mark.parametrize("i", UNITS)

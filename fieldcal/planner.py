@@ -27,7 +27,8 @@ import numpy as np
 from fieldcal.errors import PlanError
 from fieldcal.positions import Position, forces
 from fieldcal.samples import Array
-from fieldcal.solve.design import Model, Tilt, design
+from fieldcal.solve.design import Model, design
+from fieldcal.solve.tilt import Tilt
 
 STARTS = 12
 """Random sets the exchange begins from; the best ends agree long before."""

@@ -25,9 +25,9 @@ from fieldcal.positions import FIVE, TWO, Position
 from fieldcal.samples import Array
 from fieldcal.solve import solve
 from fieldcal.solve.closed_form import two_position
-from fieldcal.solve.design import Tilt
 from fieldcal.solve.five_position import axis_estimates, five_position
 from fieldcal.solve.gyroscopes import bias, bias_and_scale
+from fieldcal.solve.tilt import Tilt
 
 LATITUDE = float(np.deg2rad(50.45))
 NOT_45 = (Position.deg(0, 0), Position.deg(30, 7))

@@ -18,8 +18,9 @@ from fieldcal.errors import InputError, NotObservable
 from fieldcal.positions import FIVE, SIX_FACES, TWO, WIDE, Position
 from fieldcal.samples import Array
 from fieldcal.solve import Observations, choose, scatter, solve
-from fieldcal.solve.design import Model, Tilt, design, predict
+from fieldcal.solve.design import Model, design, predict
 from fieldcal.solve.joint import Solution, estimate, joint
+from fieldcal.solve.tilt import Tilt
 from fieldcal.windows import Average
 
 SIGMA = 1e-3

@@ -11,6 +11,7 @@ scale factor where the grade is navigation.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
@@ -20,10 +21,11 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.errors import InputError, NotObservable
 from fieldcal.solve import closed_form, five_position, gyroscopes, least_squares, scalar
-from fieldcal.solve.design import Model, Tilt, ladder_remedy, loosely_set
+from fieldcal.solve.design import Model, ladder_remedy, loosely_set
 from fieldcal.solve.estimate import Estimate, combine, join
 from fieldcal.solve.joint import WRONG, joint
 from fieldcal.solve.observations import Index, Observations
+from fieldcal.solve.tilt import LEVEL, Base, Tilt
 
 METHODS = ("auto", "two_position", "five_position", "least_squares", "joint", "scalar")
 TILTS = ("auto", "none", "angle_offset", "base_tilt")
@@ -86,6 +88,11 @@ def solve(
             raise InputError(f"an uncertainty of {degrees:g}° is none: give 0 to 90°")
     if angle_sigma_deg:
         observations = loosely_set(observations, angle_sigma_deg)
+
+    def gyroscopes_by(acc: Estimate | None) -> Estimate | None:
+        base = _base(acc, level_sigma_deg)
+        return _gyroscopes(observations, heading_sigma_deg, as_printed, base)
+
     rows, notes = _usable(observations, method)
     acc = None
     chosen: Method = "least_squares"
@@ -93,18 +100,29 @@ def solve(
         still = observations[rows]
         wanted = _method(still) if method == "auto" else method
         try:
-            acc = _accelerometers(
+            fits = _accelerometers(
                 still, wanted, tilt, cross, as_printed, level_sigma_deg
-            ).spread(rows, len(observations))
+            )
+            acc = _better(fits, gyroscopes_by).spread(rows, len(observations))
             chosen = wanted
         except NotObservable as error:
             # a rate table has its gyroscopes' result all the same
             if not observations.rotating.any():
                 raise
             notes.append(f"the accelerometers are not calibrated: {error}")
-    gyr = _gyroscopes(observations, heading_sigma_deg, as_printed)
     good = acc is None or acc.dof <= 0 or acc.chi2 / acc.dof < WRONG
-    return combine(chosen, observations, acc, gyr, notes, good)
+    return combine(chosen, observations, acc, gyroscopes_by(acc), notes, good)
+
+
+def _base(acc: Estimate | None, level_sigma_deg: float | None) -> Base:
+    """How the base is tilted: by the accelerometers, or within what is known of it."""
+    if acc is not None:
+        found = Base.found(acc.names, acc.values, acc.covariance)
+        if found.tilt != "none":
+            return found
+    if level_sigma_deg:
+        return Base("base_tilt", np.zeros(2), level_sigma_deg**2 * np.eye(2))
+    return LEVEL
 
 
 def _usable(
@@ -136,61 +154,65 @@ def _accelerometers(
     cross: bool,
     as_printed: bool,
     level: float | None,
-) -> Estimate:
-    """Run one method on the positions at rest."""
+) -> list[Estimate]:
+    """Run one method on the positions at rest, with each tilt that could be."""
     if as_printed and method not in ("two_position", "five_position"):
         raise InputError(
             f"the paper prints no {method} method: as printed are two_position and "
             "five_position"
         )
     if method == "scalar":
-        return scalar.scalar(still, cross)
+        return [scalar.scalar(still, cross)]
     if method == "two_position":
         if tilt in ("angle_offset", "base_tilt") or cross:
             raise NotObservable(
                 "two positions give bias and scale factor only, not tilt or "
                 "cross-coupling: take five positions, each with another α or β"
             )
-        return closed_form.two_position(still, np.deg2rad(level or 0.0), as_printed)
+        return [closed_form.two_position(still, np.deg2rad(level or 0.0), as_printed)]
     if method == "least_squares":
-        return least_squares.accelerometers(still)
-    if method == "five_position":
-        if tilt == "none":
-            raise InputError("the five-position method estimates the tilt: use joint")
-        if tilt == "auto" and not as_printed:
-            return _better(
-                [
-                    five_position.five_position(still, t)
-                    for t in ("angle_offset", "base_tilt")
-                ]
-            )
-        return five_position.five_position(
-            still, "base_tilt" if tilt == "base_tilt" else "angle_offset", as_printed
-        )
-    return _joint(still, tilt, cross, level)
+        return [least_squares.accelerometers(still)]
+    if method == "joint":
+        return _joint(still, tilt, cross, level)
+    if tilt == "none":
+        raise InputError("the five-position method estimates the tilt: use joint")
+    models: list[Tilt] = ["angle_offset"] if tilt == "auto" else [tilt]
+    if tilt == "auto" and not as_printed:
+        models = ["angle_offset", "base_tilt"]
+    return [five_position.five_position(still, t, as_printed) for t in models]
 
 
 def _joint(
     still: Observations, tilt: Tilt | Literal["auto"], cross: bool, level: float | None
-) -> Estimate:
-    """Joint estimate; "auto" takes the tilt that the data prefer, if they show one."""
+) -> list[Estimate]:
+    """Joint estimates; for "auto" with each model of the tilt that shows one."""
     if level and tilt in ("auto", "none"):
-        return joint(still, Model("base_tilt", cross), level)
+        return [joint(still, Model("base_tilt", cross), level)]
     if tilt != "auto":
-        return joint(still, Model(tilt, cross), level)
+        return [joint(still, Model(tilt, cross), level)]
     usable = []
     for name in ("angle_offset", "base_tilt"):
         with suppress(NotObservable):
             found = joint(still, Model(name, cross))
             usable += [found] if _shows_tilt(found, cross) else []
+    if len(usable) == 1:
+        return [_told(usable[0], f"the tilt is taken as {_tilt_of(usable[0])}")]
     if usable:
-        return _better(usable)
+        return usable
     flat = joint(still, Model("none", cross))
     wanted = np.ones(len(Model("angle_offset", cross).names), dtype=bool)
     extra = ladder_remedy(still, wanted, Model("angle_offset", cross))
     cure = f"; add {join(extra)} to find it" if extra else ""
     note = f"these positions do not show the tilt, so the base is taken as level{cure}"
-    return replace(flat, warnings=(*flat.warnings, note))
+    return [_told(flat, note)]
+
+
+def _told(estimate: Estimate, note: str) -> Estimate:
+    return replace(estimate, warnings=(*estimate.warnings, note))
+
+
+def _tilt_of(estimate: Estimate) -> str:
+    return estimate.names[-1].partition(".")[0]
 
 
 def _shows_tilt(estimate: Estimate, cross: bool) -> bool:
@@ -201,25 +223,24 @@ def _shows_tilt(estimate: Estimate, cross: bool) -> bool:
     return bool((np.sqrt(np.diag(estimate.covariance))[tilt] < USEFUL_TILT).all())
 
 
-def _better(fits: list[Estimate]) -> Estimate:
-    """Take the model of the tilt that fits better.
+def _better(
+    fits: list[Estimate], gyroscopes_by: Callable[[Estimate], Estimate | None]
+) -> Estimate:
+    """Take the model of the tilt that fits better, gyroscopes included.
 
     Where the other one fits nearly as well, what the two differ by is in the
     covariance, weighted by how likely the other is.
     """
-    fits = sorted(fits, key=lambda e: e.chi2)
-    best = fits[0]
-    name = best.names[-1].partition(".")[0]
     if len(fits) == 1:
-        return replace(best, warnings=(*best.warnings, f"the tilt is taken as {name}"))
-    other = fits[1]
-    noise = max(1.0, best.chi2 / best.dof) if best.dof else 1.0
-    ahead = (other.chi2 - best.chi2) / noise
+        return fits[0]
+    beside = [gyroscopes_by(e) for e in fits]
+    ahead = _misfit(fits[1], fits[0]) + _misfit(beside[1], beside[0])
+    best, other = fits if ahead >= 0 else fits[::-1]
+    name, rival, ahead = _tilt_of(best), _tilt_of(other), abs(ahead)
     weight = 1 / (1 + np.exp(min(ahead / 2, 50.0)))
     # alpha0 turns about z and beta0 about x: the same angles in the other order
     twin = np.append(other.values[:-2], other.values[:-3:-1])
     apart = twin - best.values
-    rival = other.names[-1].partition(".")[0]
     if ahead > CLEAR:
         note = (
             f"the tilt is taken as {name}: {rival} fits worse, by {ahead:.0f} in chi2"
@@ -238,8 +259,20 @@ def _better(fits: list[Estimate]) -> Estimate:
     )
 
 
+def _misfit(one: Estimate | None, other: Estimate | None) -> float:
+    """By how much chi2 of one exceeds the other's, in units of the better one's."""
+    if one is None or other is None:
+        return 0.0
+    better = min((one, other), key=lambda e: e.chi2)
+    noise = max(1.0, better.chi2 / better.dof) if better.dof else 1.0
+    return (one.chi2 - other.chi2) / noise
+
+
 def _gyroscopes(
-    observations: Observations, heading_sigma_deg: float | None, as_printed: bool
+    observations: Observations,
+    heading_sigma_deg: float | None,
+    as_printed: bool,
+    base: Base,
 ) -> Estimate | None:
     """Gyroscopes by what their windows hold."""
     if not observations.has_gyr:
@@ -247,12 +280,12 @@ def _gyroscopes(
     if observations.rotating.any():
         return least_squares.gyroscopes(observations)
     known = observations.oriented.all() and observations.latitude is not None
-    if observations.grade == "navigation" and known and len(observations) > 1:
-        return gyroscopes.bias_and_scale(observations, as_printed)
     heading = (
         None if heading_sigma_deg is None else float(np.deg2rad(heading_sigma_deg))
     )
-    found = gyroscopes.bias(observations, heading, as_printed)
+    if observations.grade == "navigation" and known and len(observations) > 1:
+        return gyroscopes.bias_and_scale(observations, as_printed, base, heading or 0.0)
+    found = gyroscopes.bias(observations, heading, as_printed, base)
     note = gyroscopes.NO_SCALE
     if observations.grade == "navigation":
         note = (

@@ -24,11 +24,13 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.errors import NotObservable
+from fieldcal.frames import force_home
 from fieldcal.samples import Array
-from fieldcal.solve.design import RAD, ladder_remedy, tilted_forces
+from fieldcal.solve.design import ladder_remedy
 from fieldcal.solve.estimate import NO_DOF, Estimate, axes, not_determined
 from fieldcal.solve.linear import Mask
 from fieldcal.solve.observations import ACC, Observations
+from fieldcal.solve.tilt import RAD, tilted
 
 APART = 1e-4
 """Least difference of specific force between the positions, as a share of gravity."""
@@ -104,12 +106,9 @@ def printed_forces(observations: Observations) -> Array:
 
 def _tilted(observations: Observations, scale: Array) -> Array:
     """Change of the outputs by a tilt of the base about x and z, (n, 3, 2) per rad."""
-    _, by_tilt = tilted_forces(
-        "base_tilt",
-        observations.positions,
-        observations.gravity,
-        observations.mounting,
-        np.zeros(2),
+    home = force_home(observations.gravity)
+    _, by_tilt = tilted(
+        "base_tilt", observations.positions, home, observations.mounting, np.zeros(2)
     )
     return scale[:, None] * by_tilt / RAD
 

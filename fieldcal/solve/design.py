@@ -2,13 +2,8 @@
 
     U = b + (diag(k) + K) f,  K = [[0, k12, k13], [k21, 0, k23], [k31, k32, 0]]   (6)
 
-    tilt none            f = P^T A(a, b) (0, -g, 0)                                  (4)
-    tilt angle_offset    f = P^T A(a + a0, b + b0) (0, -g, 0)                       (15)
-    tilt base_tilt       f = P^T A(a, b) A(about_z, about_x) (0, -g, 0)
-
-U, b m/s^2 and k, K in device axes, a (alpha) and b (beta) in procedure axes, P the
-mounting. angle_offset is an error of the zeros of both turning joints, base_tilt a base
-that is tilted itself. Source: Avrutov and Pozniak 2023, with the sign of (5) corrected.
+with f as `tilt` has it for each model of the tilt. U, b m/s^2 and k, K in device axes.
+Source: Avrutov and Pozniak 2023, with the sign of (5) corrected.
 
 Every function takes arrays with any leading dimensions, so that many parameter vectors
 are evaluated at once; the planner calls them before anything is measured.
@@ -18,26 +13,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
-from fieldcal.frames import force_home, turn
-from fieldcal.positions import Position, angles
+from fieldcal.frames import force_home
+from fieldcal.positions import Position
 from fieldcal.samples import Array
 from fieldcal.solve import linear
 from fieldcal.solve.estimate import OFF_DIAGONAL, axes
 from fieldcal.solve.observations import Observations
-
-RAD = np.pi / 180
-
-Tilt = Literal["none", "angle_offset", "base_tilt"]
-
-TILT_NAMES: dict[Tilt, tuple[str, ...]] = {
-    "none": (),
-    "angle_offset": ("angle_offset.alpha0_deg", "angle_offset.beta0_deg"),
-    "base_tilt": ("base_tilt.about_x_deg", "base_tilt.about_z_deg"),
-}
+from fieldcal.solve.tilt import RAD, TILT_NAMES, Tilt, tilted
 
 LADDER = tuple(
     Position.deg(a, b)
@@ -90,49 +75,6 @@ def coupling(model: Model, x: Array) -> Array:
     return m
 
 
-def tilted_forces(
-    tilt: Tilt,
-    positions: Sequence[Position],
-    gravity: float,
-    mounting: Array,
-    degrees: Array,
-) -> tuple[Array, Array]:
-    """Specific force in device axes and its derivatives by the tilt.
-
-    Parameters
-    ----------
-    tilt : the model of the tilt
-    positions : n positions with known angles
-    gravity : m/s^2
-    mounting : (3, 3), procedure = mounting @ device
-    degrees : (..., 2) the tilt in the order of `TILT_NAMES`; (..., 0) for none
-
-    Returns
-    -------
-    f : (..., n, 3) m/s^2
-    by_tilt : (..., n, 3, 2) m/s^2 per degree; (..., n, 3, 0) for none
-
-    """
-    alpha, beta = angles(positions)
-    home = force_home(gravity)
-    to_device: Array = mounting.T
-    if tilt == "none":
-        f = turn(alpha, beta) @ home @ mounting  # (4)
-        each = np.broadcast_to(f, (*degrees.shape[:-1], *f.shape))
-        return each, np.zeros((*each.shape, 0))
-    first, second = np.moveaxis(np.deg2rad(degrees), -1, 0)[..., None]
-    if tilt == "base_tilt":
-        to_device = to_device @ turn(alpha, beta)
-        alpha, beta = second, first  # the base is turned about z, then about x
-    else:
-        alpha, beta = alpha + first, beta + second  # (15)
-    f = to_device @ (turn(alpha, beta) @ home)[..., None]
-    by_alpha = to_device @ (_by_alpha(alpha, beta) @ home)[..., None]
-    by_beta = to_device @ (_by_beta(alpha, beta) @ home)[..., None]
-    both = (by_beta, by_alpha) if tilt == "base_tilt" else (by_alpha, by_beta)
-    return f[..., 0], np.concatenate(both, axis=-1) * RAD
-
-
 def predict(
     model: Model,
     positions: Sequence[Position],
@@ -145,7 +87,8 @@ def predict(
     Parameters
     ----------
     x : (..., p) in the order of ``model.names``
-    model, positions, gravity, mounting : as in `tilted_forces`
+    model, positions, mounting : as in `tilted`
+    gravity : m/s^2
 
     Returns
     -------
@@ -154,9 +97,8 @@ def predict(
 
     """
     linear_count = 12 if model.cross else 6
-    f, by_tilt = tilted_forces(
-        model.tilt, positions, gravity, mounting, x[..., linear_count:]
-    )
+    home, degrees = force_home(gravity), x[..., linear_count:]
+    f, by_tilt = tilted(model.tilt, positions, home, mounting, degrees)
     m = coupling(model, x)
     u = x[..., None, :3] + f @ np.swapaxes(m, -1, -2)  # (6)
     design = np.zeros((*f.shape, x.shape[-1]))
@@ -211,19 +153,3 @@ def ladder_remedy(
 
     extra = linear.remedy(rows, observations.positions, LADDER, wanted)
     return [p.name for p in extra]
-
-
-def _by_alpha(a: Array, b: Array) -> Array:
-    """Derivative of `turn` by alpha, (..., 3, 3)."""
-    flat = np.zeros((3, 3))
-    flat[0, 1], flat[1, 0] = 1.0, -1.0
-    whole: Array = turn(a, b) @ flat
-    return whole
-
-
-def _by_beta(a: Array, b: Array) -> Array:
-    """Derivative of `turn` by beta, (..., 3, 3)."""
-    flat = np.zeros((3, 3))
-    flat[1, 2], flat[2, 1] = 1.0, -1.0
-    whole: Array = flat @ turn(a, b)
-    return whole

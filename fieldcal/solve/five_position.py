@@ -37,9 +37,10 @@ import numpy as np
 from fieldcal.errors import InputError, NotObservable
 from fieldcal.samples import Array
 from fieldcal.solve import linear, scatter
-from fieldcal.solve.design import RAD, Model, Tilt, ladder_remedy, predict
+from fieldcal.solve.design import Model, ladder_remedy, predict
 from fieldcal.solve.estimate import Estimate, not_determined
 from fieldcal.solve.observations import ACC, Observations
+from fieldcal.solve.tilt import RAD, Tilt
 
 Found = dict[str, Array]
 

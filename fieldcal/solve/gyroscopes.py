@@ -6,7 +6,9 @@ Tactical grade, (36): the mean output is the bias B. The Earth's rate is in it,
 
 so it is taken out with what is known of it: the vertical part by the latitude phi, the
 level part by the heading psi, or as an unknown of that size where psi is not known.
-s = 1 is near enough here, a scale error of 1 % makes 7e-7 rad/s.
+s = 1 is near enough here, a scale error of 1 % makes 7e-7 rad/s. A is that of the
+tilted base as the accelerometers found it, its uncertainty included: one degree turns
+1.3e-6 rad/s from one axis to another, ten times what a navigation gyroscope resolves.
 
 Navigation grade, (42)-(48): bias and scale factor from the Earth's rate,
 
@@ -24,11 +26,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.frames import EARTH_RATE, turn
+from fieldcal.frames import EARTH_RATE, earth_rate_home
 from fieldcal.samples import Array
 from fieldcal.solve import linear, scatter
 from fieldcal.solve.estimate import Estimate, axes, not_determined
 from fieldcal.solve.observations import ACC, GYR, Observations
+from fieldcal.solve.tilt import LEVEL, Base
 
 NO_SCALE = (
     "gyr_scale is not determined: the Earth's rate is too weak for it in windows like "
@@ -43,6 +46,7 @@ def bias(
     observations: Observations,
     heading_sigma: float | None = None,
     as_printed: bool = False,
+    base: Base = LEVEL,
 ) -> Estimate:
     """Bias of tactical gyroscopes, (36), weighted over all positions.
 
@@ -51,49 +55,63 @@ def bias(
     observations : n positions at rest
     heading_sigma : how well z points north, rad; None where it points anywhere
     as_printed : leave the Earth's rate in it
+    base : how it is tilted
 
     """
     n = len(observations)
     known: Array = np.zeros((n, 3))
     unknown: Array = np.zeros((n, 3, 0))
     if not as_printed:
-        known, unknown = _earth(observations, heading_sigma)
+        known, unknown = _earth(observations, heading_sigma, base)
     y = observations.mean[:, GYR] - known
 
     def run(seen: Observations) -> Estimate:
-        fit = _with_nuisance(y, seen.covariance[:, GYR, GYR], unknown)
+        ones = np.broadcast_to(np.eye(3), (n, 3, 3))
+        fit = _with_nuisance(ones, y, seen.covariance[:, GYR, GYR], unknown)
         return _estimate(axes("gyr_bias"), fit, n)
 
     return scatter.absorb(run, observations, GYR, "gyroscopes' means")
 
 
-def bias_and_scale(observations: Observations, as_printed: bool = False) -> Estimate:
+def bias_and_scale(
+    observations: Observations,
+    as_printed: bool = False,
+    base: Base = LEVEL,
+    heading_sigma: float = 0.0,
+) -> Estimate:
     """Bias and scale factor of navigation gyroscopes: (45)-(48) for two positions.
 
     More positions are solved by least squares. `as_printed` takes the reference as
-    printed in (40) and (41), to compare.
+    printed in (40) and (41), to compare; `base` says how the base is tilted,
+    `heading_sigma`, rad, how well its z points north.
 
     A scale factor that the Earth's rate gives to no better than `USEFUL` is left out,
     and with it what the bias owes to it stays in the bias' uncertainty.
+
+    Raises
+    ------
+    InputError
+        If the latitude is not known.
+
     """
+    w: Array = printed_earth_rate(observations) @ observations.mounting
+    unknown: Array = np.zeros((len(w), 3, 0))
+    if not as_printed:
+        w, unknown = _earth(observations, heading_sigma, base)
     return scatter.absorb(
-        lambda seen: _bias_and_scale(seen, as_printed),
+        lambda seen: _bias_and_scale(seen, w, unknown),
         observations,
         GYR,
         "gyroscopes' means",
     )
 
 
-def _bias_and_scale(observations: Observations, as_printed: bool) -> Estimate:
+def _bias_and_scale(observations: Observations, w: Array, unknown: Array) -> Estimate:
     n = len(observations)
-    w = observations.earth_rates
-    if as_printed:
-        w = printed_earth_rate(observations) @ observations.mounting
     y = observations.mean[:, GYR]
-    white = linear.whitener(observations.covariance[:, GYR, GYR])
     ones = np.broadcast_to(np.eye(3), (n, 3, 3))
     design = np.concatenate([ones, w[:, :, None] * np.eye(3)], axis=2)
-    fit = linear.fit(design, y, white)
+    fit = _with_nuisance(design, y, observations.covariance[:, GYR, GYR], unknown)
     names = (*axes("gyr_bias"), *axes("gyr_scale"))
     out = _estimate(names, fit, n)
     scale = np.array([name.startswith("gyr_scale") for name in out.names])
@@ -114,10 +132,8 @@ def _bias_and_scale(observations: Observations, as_printed: bool) -> Estimate:
 
 def printed_earth_rate(observations: Observations) -> Array:
     """Reference (40), (41) as printed, in procedure axes, (n, 3) rad/s; not for use."""
-    if observations.latitude is None:
-        return observations.earth_rates  # raises with the remedy
     a, b = observations.angles
-    up, north = (EARTH_RATE * f(observations.latitude) for f in (np.sin, np.cos))
+    up, north = (EARTH_RATE * f(observations.known_latitude) for f in (np.sin, np.cos))
     third = -up * np.sin(a) * np.sin(b) + north * np.cos(b)  # (41), sin for cos alpha
     third = np.where((a == 0) & (b == 0), -up, third)  # (40)
     second = up * np.cos(a) * np.cos(b) + north * np.sin(b)
@@ -125,7 +141,7 @@ def printed_earth_rate(observations: Observations) -> Array:
 
 
 def _earth(
-    observations: Observations, heading_sigma: float | None
+    observations: Observations, heading_sigma: float | None, base: Base
 ) -> tuple[Array, Array]:
     """Part of the Earth's rate that is known, (n, 3), and the rest.
 
@@ -134,12 +150,19 @@ def _earth(
     phi = observations.latitude
     if phi is None or not observations.oriented.all():
         return _earth_unoriented(observations)
-    north = EARTH_RATE * np.cos(phi)
-    seen = observations.mounting.T @ turn(*observations.angles)  # to device axes
-    if heading_sigma is not None:
-        return observations.earth_rates, seen[:, :, [0]] * north * heading_sigma
-    down = np.array([0.0, -EARTH_RATE * np.sin(phi), 0.0])
-    return seen @ down, seen[:, :, [0, 2]] * north * np.sqrt(0.5)
+    places, mounting = observations.positions, observations.mounting
+    east, _, north = (
+        base.seen(EARTH_RATE * np.cos(phi) * axis, places, mounting)[0]
+        for axis in np.eye(3)
+    )
+    if heading_sigma is None:
+        home: Array = earth_rate_home(phi) * [0.0, 1.0, 0.0]
+        level = [east * np.sqrt(0.5), north * np.sqrt(0.5)]
+    else:
+        home = earth_rate_home(phi)
+        level = [east * heading_sigma]
+    known, by_tilt = base.seen(home, places, mounting)
+    return known, np.concatenate([np.stack(level, axis=-1), by_tilt], axis=-1)
 
 
 def _earth_unoriented(observations: Observations) -> tuple[Array, Array]:
@@ -163,15 +186,17 @@ def _earth_unoriented(observations: Observations) -> tuple[Array, Array]:
     return known, unknown.reshape(n, 3, 3 * n)
 
 
-def _with_nuisance(y: Array, covariance: Array, unknown: Array) -> linear.LinearFit:
-    """Weighted mean of y, (n, 3), with unknown factors folded into its covariance."""
+def _with_nuisance(
+    design: Array, y: Array, covariance: Array, unknown: Array
+) -> linear.LinearFit:
+    """Fit of y, (n, 3), with unknown factors folded into its covariance."""
     n = len(y)
     columns = unknown.reshape(3 * n, -1)
     noise = columns @ columns.T
     for i, block in enumerate(covariance):
         noise[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += block
-    ones = np.tile(np.eye(3), (n, 1))
-    return linear.fit(ones[None], y.reshape(1, -1), linear.whitener(noise)[None])
+    rows = design.reshape(1, 3 * n, -1)
+    return linear.fit(rows, y.reshape(1, -1), linear.whitener(noise)[None])
 
 
 def _estimate(names: tuple[str, ...], fit: linear.LinearFit, n: int) -> Estimate:

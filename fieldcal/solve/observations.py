@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.calibration import Nominal
 from fieldcal.errors import InputError
-from fieldcal.frames import earth_rate, force
+from fieldcal.frames import force
 from fieldcal.positions import Position, angles
 from fieldcal.samples import CHANNELS, UNITS, Array
 from fieldcal.solve.linear import Mask
@@ -160,13 +160,13 @@ class Observations:
         return seen
 
     @property
-    def earth_rates(self) -> Array:
-        """Earth's rate in device axes with z north, (n, 3) rad/s.
+    def known_latitude(self) -> float:
+        """Latitude, rad.
 
         Raises
         ------
         InputError
-            If the latitude is not known.
+            If it is not known.
 
         """
         if self.latitude is None:
@@ -174,8 +174,7 @@ class Observations:
                 "the latitude is not known, so the Earth's rate cannot serve as the "
                 "reference of the gyroscopes: give the latitude of the site"
             )
-        seen: Array = earth_rate(*self.angles, self.latitude) @ self.mounting
-        return seen
+        return self.latitude
 
     @property
     def rates(self) -> Array:

@@ -1,0 +1,203 @@
+"""What the simulation leaves out, as diagnosis.json says.
+
+Every key but the verdict may be absent: an older file, or a diagnosis that had nothing
+to say of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration.wording import TITLES, number, pretty
+from fieldcal.report.blocks import (
+    Block,
+    Cell,
+    Facts,
+    Figure,
+    Note,
+    Section,
+    Text,
+    Tone,
+    table,
+)
+from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.gather import Material
+from fieldcal.samples import CHANNELS
+
+TONES: dict[str, Tone] = {
+    "consistent": "good",
+    "left_out": "warn",
+    "ambiguous": "warn",
+    "unexplained": "bad",
+}
+
+Json = Mapping[str, Any]
+
+
+def diagnosis(material: Material) -> Section | None:
+    """Verdict, mismatch, effects, improvement; None where none was made."""
+    found = material.diagnosis
+    if found is None:
+        return None
+    verdict = str(found.get("verdict", "unknown"))
+    said = str(found.get("says", ""))
+    lead = f"{verdict.replace('_', ' ').capitalize()}. {said}"
+    blocks: list[Block] = [Note(lead.strip(), TONES.get(verdict, "warn"))]
+    blocks += [Note(str(w)) for w in _list(found, "warnings")]
+    mismatch = [m for m in _list(found, "mismatch") if isinstance(m, Mapping)]
+    if mismatch:
+        blocks.append(_mismatch(mismatch))
+    effects = [e for e in _list(found, "effects") if isinstance(e, Mapping)]
+    if effects:
+        blocks.append(_effects(effects))
+        blocks += _fit(_map(found, "fit"))
+        blocks += _calibration(_map(found, "calibration"))
+    return Section("diagnosis", "Diagnosis", tuple(blocks))
+
+
+def _mismatch(rows: Sequence[Json]) -> Block:
+    sigmas = [_real(m.get("sigma")) for m in rows]
+    most = max((s for s in sigmas if math.isfinite(s)), default=1.0) or 1.0
+    cells: list[list[str | Cell]] = []
+    for m, sigma in zip(rows, sigmas, strict=True):
+        finite = math.isfinite(sigma)
+        size = Cell(
+            f"{sigma:.0f} σ" if finite else "beyond doubt",
+            bar=math.sqrt(min(sigma, most) / most) if finite else 1.0,
+        )
+        span = f"{_real(m.get('from_s')):.1f} – {_real(m.get('to_s')):.1f}"
+        cells.append(
+            [
+                str(m.get("channel", "")),
+                str(m.get("kind", "")),
+                ", ".join(str(p) for p in _list(m, "positions")),
+                span,
+                str(m.get("covariate", "")),
+                f"{_real(m.get('rms')):.3g}",
+                size,
+            ]
+        )
+    columns = ("channel", "kind", "positions", "time, s", "follows", ">rms")
+    return table(
+        "Where recording and simulation part", (*columns, ">significance"), cells
+    )
+
+
+def _effects(effects: Sequence[Json]) -> Block:
+    rows = []
+    for effect in effects:
+        evidence = _map(effect, "evidence")
+        proof = [
+            _shown(evidence.get("delta_chi2"), "{:.0f}"),
+            _shown(_times(evidence.get("held_out_gain"), -100), "{:+.0f} %"),
+            ", ".join(str(a) for a in _list(effect, "aliases")),
+        ]
+        values: list[tuple[str, Any]] = list(_map(effect, "parameters").items())
+        for i, (name, quantity) in enumerate(values or [("", {})]):
+            lead = str(effect.get("id", "")).replace("_", " ") if i == 0 else ""
+            rest = proof if i == 0 else ["", "", ""]
+            rows.append([lead, str(name), *_quantity(quantity), *rest])
+    columns = ("effect", "parameter", ">value", ">± 1σ", "unit")
+    return table("What is left out", (*columns, ">Δχ²", ">rms unseen", "or else"), rows)
+
+
+def _quantity(quantity: object) -> tuple[str, str, str]:
+    if not isinstance(quantity, Mapping):
+        return "", "", ""
+    value, sigma = quantity.get("value"), _real(quantity.get("sigma"))
+    unit = pretty(str(quantity.get("unit", "")))
+    if not isinstance(value, int | float):
+        return str(value if value is not None else ""), "", unit
+    return (*number(float(value), sigma), unit)
+
+
+def _fit(fit: Json) -> list[Block]:
+    before, after = _map(fit, "before"), _map(fit, "after")
+    if not before or not after:
+        return []
+    unit = pretty(str(fit.get("unit", "m/s^2")))
+    facts = [
+        (f"rms, {unit}", "rms", "{:.3g}"),
+        ("χ² per degree of freedom", "chi2_per_dof", "{:.2f}"),
+        (f"rms predicted unseen, {unit}", "held_out_rms", "{:.3g}"),
+    ]
+    blocks: list[Block] = [
+        Text("How well the simulation does before and after the effects are added:"),
+        Facts(
+            tuple(
+                (name, f"{_shown(before.get(k), f)} → {_shown(after.get(k), f)}")
+                for name, k, f in facts
+            )
+        ),
+    ]
+    chart = _by_channel(before, after)
+    if chart is not None:
+        caption = "rms of what was predicted without having been fitted to."
+        blocks.append(Figure(chart, caption))
+    return blocks
+
+
+def _by_channel(before: Json, after: Json) -> Chart | None:
+    first, then = (_map(q, "held_out_by_channel") for q in (before, after))
+    names = [c for c in CHANNELS if c in first and c in then]
+    if not names:
+        return None
+    x = np.arange(len(names), dtype=float)
+    series = []
+    for tone, (label, values) in enumerate((("before", first), ("after", then)), 1):
+        y = np.array([_real(values[c]) for c in names])
+        series.append(Series(label, x, y, tone))
+    pairs = [f"{c} {_real(first[c]):.2g} to {_real(then[c]):.2g}" for c in names]
+    return Chart(
+        "diagnosis-channels",
+        "Predicted unseen, before and after",
+        f"From before to after: {', '.join(pairs)} (m/s² and rad/s).",
+        Axis("channel", names=tuple(names)),
+        Axis("rms, m/s² or rad/s", log=True),
+        tuple(series),
+    )
+
+
+def _calibration(groups: Json) -> list[Block]:
+    rows: list[list[str]] = []
+    for name, group in groups.items():
+        if not isinstance(group, Mapping):
+            continue
+        unit = pretty(str(group.get("unit", "")))
+        triads = (_list(group, k) for k in ("value", "sigma"))
+        for axis, value, sigma in zip("xyz", *triads, strict=False):
+            if isinstance(value, int | float):
+                shown = number(float(value), _real(sigma))
+                rows.append([f"{TITLES.get(name, name)} {axis}", *shown, unit])
+    if not rows:
+        return []
+    columns = ("parameter", ">value", ">± 1σ", "unit")
+    return [table("Calibration with the effects", columns, rows)]
+
+
+def _map(table_: Json, key: str) -> Json:
+    value = table_.get(key)
+    return value if isinstance(value, Mapping) else {}
+
+
+def _list(table_: Json, key: str) -> list[Any]:
+    value = table_.get(key)
+    return value if isinstance(value, list) else []
+
+
+def _real(value: object) -> float:
+    known = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if known else math.nan  # type: ignore[arg-type]
+
+
+def _times(value: object, factor: float) -> float:
+    return _real(value) * factor
+
+
+def _shown(value: object, form: str) -> str:
+    real = _real(value)
+    return form.format(real) if math.isfinite(real) else "–"

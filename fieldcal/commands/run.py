@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.errors import FieldcalError, InputError, PlanError
@@ -77,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--headless", action="store_true", help="no operator: progress as JSON lines")
     add("--plain", action="store_true", help="lines instead of a screen")
     add("--json", action="store_true", help="print the result as one JSON object")
+    add("--no-report", action="store_true", help="write no report.html")
     add_site(parser)
 
 
@@ -100,7 +101,19 @@ def run(args: argparse.Namespace) -> int:
     else:
         show(found, truth)
         sys.stdout.write(f"recorded: {task.folder}\nwritten:  {written}\n")
+    if not args.no_report:
+        _report(task.folder, sys.stderr if args.json else sys.stdout)
     return 0 if found.good else 1
+
+
+def _report(folder: Path, out: IO[str]) -> None:
+    """Write the report; the calibration stands without it."""
+    from fieldcal.commands.report import write
+
+    try:
+        out.write(f"report:   {write(folder)}\n")
+    except FieldcalError as error:
+        sys.stderr.write(f"fieldcal run: no report: {error}\n")
 
 
 def make_task(args: argparse.Namespace) -> Task:

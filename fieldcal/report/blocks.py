@@ -116,3 +116,17 @@ def table(
         tuple(c if isinstance(c, Cell) else Cell(c) for c in row) for row in rows
     )
     return Table(caption, tuple(columns), cells)
+
+
+def folded(
+    caption: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str | Cell]],
+    most: int,
+) -> list[Block]:
+    """A table of the first rows; the reader opens the rest."""
+    first = table(caption, columns, rows[:most])
+    if len(rows) <= most:
+        return [first]
+    rest = table(f"{caption}, continued", columns, rows[most:])
+    return [first, Fold(f"{len(rows) - most} more", (rest,))]

@@ -1,7 +1,12 @@
 """What the simulation leaves out, as diagnosis.json says.
 
-Every key but the verdict may be absent: an older file, or a diagnosis that had nothing
-to say of it.
+Every key may be absent: an older file, or a diagnosis that had nothing to say of it.
+Besides the keys that `fieldcal.diagnosis.result` writes, three are shown where a
+diagnosis has them:
+
+    candidates   what was tried: id, delta_chi2, delta_bic, held_out_gain, why
+    curves       residuals over a covariate: channel, covariate, unit, x, before, after
+    next         what to do now, a text or a list of texts
 """
 
 from __future__ import annotations
@@ -13,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration.wording import TITLES, number, pretty
+from fieldcal.report import evidence
 from fieldcal.report.blocks import (
     Block,
     Cell,
@@ -22,11 +28,16 @@ from fieldcal.report.blocks import (
     Section,
     Text,
     Tone,
+    folded,
     table,
 )
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
+from fieldcal.report.loose import Json, list_at, objects_at, real, shown, table_at
 from fieldcal.samples import CHANNELS
+
+MOST = 10
+"""Rows of the mismatch that are shown; the rest can be opened."""
 
 TONES: dict[str, Tone] = {
     "consistent": "good",
@@ -34,8 +45,6 @@ TONES: dict[str, Tone] = {
     "ambiguous": "warn",
     "unexplained": "bad",
 }
-
-Json = Mapping[str, Any]
 
 
 def diagnosis(material: Material) -> Section | None:
@@ -47,20 +56,23 @@ def diagnosis(material: Material) -> Section | None:
     said = str(found.get("says", ""))
     lead = f"{verdict.replace('_', ' ').capitalize()}. {said}"
     blocks: list[Block] = [Note(lead.strip(), TONES.get(verdict, "warn"))]
-    blocks += [Note(str(w)) for w in _list(found, "warnings")]
-    mismatch = [m for m in _list(found, "mismatch") if isinstance(m, Mapping)]
+    blocks += [Note(str(w)) for w in list_at(found, "warnings")]
+    mismatch = objects_at(found, "mismatch")
     if mismatch:
-        blocks.append(_mismatch(mismatch))
-    effects = [e for e in _list(found, "effects") if isinstance(e, Mapping)]
+        blocks += _mismatch(mismatch)
+    blocks += evidence.curves(objects_at(found, "curves"))
+    effects = objects_at(found, "effects")
     if effects:
         blocks.append(_effects(effects))
-        blocks += _fit(_map(found, "fit"))
-        blocks += _calibration(_map(found, "calibration"))
+        blocks += _fit(table_at(found, "fit"))
+        blocks += _calibration(table_at(found, "calibration"))
+    blocks += evidence.candidates(objects_at(found, "candidates"))
+    blocks += evidence.next_steps(found)
     return Section("diagnosis", "Diagnosis", tuple(blocks))
 
 
-def _mismatch(rows: Sequence[Json]) -> Block:
-    sigmas = [_real(m.get("sigma")) for m in rows]
+def _mismatch(rows: Sequence[Json]) -> list[Block]:
+    sigmas = [real(m.get("sigma")) for m in rows]
     most = max((s for s in sigmas if math.isfinite(s)), default=1.0) or 1.0
     cells: list[list[str | Cell]] = []
     for m, sigma in zip(rows, sigmas, strict=True):
@@ -69,37 +81,43 @@ def _mismatch(rows: Sequence[Json]) -> Block:
             f"{sigma:.0f} σ" if finite else "beyond doubt",
             bar=math.sqrt(min(sigma, most) / most) if finite else 1.0,
         )
-        span = f"{_real(m.get('from_s')):.1f} – {_real(m.get('to_s')):.1f}"
+        span = f"{real(m.get('from_s')):.1f} – {real(m.get('to_s')):.1f}"
         cells.append(
             [
                 str(m.get("channel", "")),
                 str(m.get("kind", "")),
-                ", ".join(str(p) for p in _list(m, "positions")),
+                ", ".join(str(p) for p in list_at(m, "positions")),
                 span,
                 str(m.get("covariate", "")),
-                f"{_real(m.get('rms')):.3g}",
+                f"{real(m.get('rms')):.3g}",
                 size,
             ]
         )
-    columns = ("channel", "kind", "positions", "time, s", "follows", ">rms")
-    return table(
-        "Where recording and simulation part", (*columns, ">significance"), cells
+    columns: tuple[str, ...] = (
+        "channel",
+        "kind",
+        "positions",
+        "time, s",
+        "follows",
+        ">rms",
     )
+    columns += (">significance",)
+    return folded("Where recording and simulation part", columns, cells, MOST)
 
 
 def _effects(effects: Sequence[Json]) -> Block:
     rows = []
     for effect in effects:
-        evidence = _map(effect, "evidence")
-        proof = [
-            _shown(evidence.get("delta_chi2"), "{:.0f}"),
-            _shown(_times(evidence.get("held_out_gain"), -100), "{:+.0f} %"),
-            ", ".join(str(a) for a in _list(effect, "aliases")),
+        proof = table_at(effect, "evidence")
+        weight = [
+            shown(proof.get("delta_chi2"), "{:.0f}"),
+            shown(-100 * real(proof.get("held_out_gain")), "{:+.0f} %"),
+            ", ".join(str(a) for a in list_at(effect, "aliases")),
         ]
-        values: list[tuple[str, Any]] = list(_map(effect, "parameters").items())
+        values: list[tuple[str, Any]] = list(table_at(effect, "parameters").items())
         for i, (name, quantity) in enumerate(values or [("", {})]):
             lead = str(effect.get("id", "")).replace("_", " ") if i == 0 else ""
-            rest = proof if i == 0 else ["", "", ""]
+            rest = weight if i == 0 else ["", "", ""]
             rows.append([lead, str(name), *_quantity(quantity), *rest])
     columns = ("effect", "parameter", ">value", ">± 1σ", "unit")
     return table("What is left out", (*columns, ">Δχ²", ">rms unseen", "or else"), rows)
@@ -108,7 +126,7 @@ def _effects(effects: Sequence[Json]) -> Block:
 def _quantity(quantity: object) -> tuple[str, str, str]:
     if not isinstance(quantity, Mapping):
         return "", "", ""
-    value, sigma = quantity.get("value"), _real(quantity.get("sigma"))
+    value, sigma = quantity.get("value"), real(quantity.get("sigma"))
     unit = pretty(str(quantity.get("unit", "")))
     if not isinstance(value, int | float):
         return str(value if value is not None else ""), "", unit
@@ -116,7 +134,7 @@ def _quantity(quantity: object) -> tuple[str, str, str]:
 
 
 def _fit(fit: Json) -> list[Block]:
-    before, after = _map(fit, "before"), _map(fit, "after")
+    before, after = table_at(fit, "before"), table_at(fit, "after")
     if not before or not after:
         return []
     unit = pretty(str(fit.get("unit", "m/s^2")))
@@ -129,7 +147,7 @@ def _fit(fit: Json) -> list[Block]:
         Text("How well the simulation does before and after the effects are added:"),
         Facts(
             tuple(
-                (name, f"{_shown(before.get(k), f)} → {_shown(after.get(k), f)}")
+                (name, f"{shown(before.get(k), f)} → {shown(after.get(k), f)}")
                 for name, k, f in facts
             )
         ),
@@ -142,16 +160,16 @@ def _fit(fit: Json) -> list[Block]:
 
 
 def _by_channel(before: Json, after: Json) -> Chart | None:
-    first, then = (_map(q, "held_out_by_channel") for q in (before, after))
+    first, then = (table_at(q, "held_out_by_channel") for q in (before, after))
     names = [c for c in CHANNELS if c in first and c in then]
     if not names:
         return None
     x = np.arange(len(names), dtype=float)
     series = []
     for tone, (label, values) in enumerate((("before", first), ("after", then)), 1):
-        y = np.array([_real(values[c]) for c in names])
+        y = np.array([real(values[c]) for c in names])
         series.append(Series(label, x, y, tone))
-    pairs = [f"{c} {_real(first[c]):.2g} to {_real(then[c]):.2g}" for c in names]
+    pairs = [f"{c} {real(first[c]):.2g} to {real(then[c]):.2g}" for c in names]
     return Chart(
         "diagnosis-channels",
         "Predicted unseen, before and after",
@@ -168,36 +186,12 @@ def _calibration(groups: Json) -> list[Block]:
         if not isinstance(group, Mapping):
             continue
         unit = pretty(str(group.get("unit", "")))
-        triads = (_list(group, k) for k in ("value", "sigma"))
+        triads = (list_at(group, k) for k in ("value", "sigma"))
         for axis, value, sigma in zip("xyz", *triads, strict=False):
             if isinstance(value, int | float):
-                shown = number(float(value), _real(sigma))
+                shown = number(float(value), real(sigma))
                 rows.append([f"{TITLES.get(name, name)} {axis}", *shown, unit])
     if not rows:
         return []
     columns = ("parameter", ">value", ">± 1σ", "unit")
     return [table("Calibration with the effects", columns, rows)]
-
-
-def _map(table_: Json, key: str) -> Json:
-    value = table_.get(key)
-    return value if isinstance(value, Mapping) else {}
-
-
-def _list(table_: Json, key: str) -> list[Any]:
-    value = table_.get(key)
-    return value if isinstance(value, list) else []
-
-
-def _real(value: object) -> float:
-    known = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if known else math.nan  # type: ignore[arg-type]
-
-
-def _times(value: object, factor: float) -> float:
-    return _real(value) * factor
-
-
-def _shown(value: object, form: str) -> str:
-    real = _real(value)
-    return form.format(real) if math.isfinite(real) else "–"

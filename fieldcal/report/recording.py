@@ -11,11 +11,17 @@ from fieldcal.observing import Rests
 from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
 from fieldcal.report.charts import Mark, Record, Span
 from fieldcal.report.gather import Material
+from fieldcal.report.loose import Json, objects_at, real
 from fieldcal.report.packing import Columns, around, pack
 from fieldcal.samples import CHANNELS, Array
 
 CLOSE = 3.0
 """Stretch about each edge of a window that is packed sample by sample, s."""
+
+BRIEF = 5.0
+"""A mismatch shorter than this is marked where it begins, s."""
+
+MOST_MARKS = 30
 
 EVENTS = {
     "rejected": "window rejected",
@@ -77,12 +83,23 @@ def _chart(material: Material) -> Record:
 
 
 def _marks(material: Material) -> tuple[Mark, ...]:
-    """Events with a device time of their own."""
-    return tuple(
+    """Events with a device time of their own, and what a diagnosis found in samples."""
+    marks = [
         Mark(float(m["at_s"]), EVENTS[m["event"]])
         for m in material.marks
         if m.get("event") in EVENTS and isinstance(m.get("at_s"), int | float)
-    )
+    ]
+    return (*marks, *_transients(material.diagnosis or {}))
+
+
+def _transients(diagnosis: Json) -> list[Mark]:
+    found: dict[float, list[str]] = {}
+    for m in objects_at(diagnosis, "mismatch"):
+        at = real(m.get("from_s"))
+        brief = real(m.get("to_s")) - at < BRIEF
+        if m.get("kind") in ("samples", "transient") and brief:
+            found.setdefault(round(at, 1), []).append(str(m.get("channel", "")))
+    return [Mark(at, ", ".join(names)) for at, names in found.items()][:MOST_MARKS]
 
 
 def _alt(

@@ -1,8 +1,8 @@
 """What the simulation leaves out, as diagnosis.json says.
 
 Every key may be absent: an older file, or a diagnosis that had nothing to say of it.
-Besides the keys that `fieldcal.diagnosis.result` writes, three are shown where a
-diagnosis has them:
+Besides the keys that `fieldcal.diagnosis.result` writes and the twin's replay, three
+are shown where a diagnosis has them:
 
     candidates   what was tried: id, delta_chi2, delta_bic, held_out_gain, why
     curves       residuals over a covariate: channel, covariate, unit, x, before, after
@@ -66,6 +66,7 @@ def diagnosis(material: Material) -> Section | None:
         blocks.append(_effects(effects))
         blocks += _fit(table_at(found, "fit"))
         blocks += _calibration(table_at(found, "calibration"))
+    blocks += evidence.replay(table_at(found, "twin"))
     blocks += evidence.candidates(objects_at(found, "candidates"))
     blocks += evidence.next_steps(found)
     return Section("diagnosis", "Diagnosis", tuple(blocks))

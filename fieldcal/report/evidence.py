@@ -8,9 +8,11 @@ import numpy as np
 
 from fieldcal.calibration.wording import pretty
 from fieldcal.effects import catalogue
-from fieldcal.report.blocks import Block, Cell, Figure, Text, folded
-from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.loose import Json, list_at, objects_at, real, shown
+from fieldcal.report.blocks import Block, Cell, Figure, folded, table
+from fieldcal.report.charts import Axis, Chart, Mark, Series
+from fieldcal.report.cures import CURES
+from fieldcal.report.loose import Json, list_at, objects_at, real, shown, table_at
+from fieldcal.samples import Array
 
 MOST_CURVES = 6
 MOST_CANDIDATES = 12
@@ -48,6 +50,36 @@ def _rms(series: Series) -> float:
     return float(np.sqrt((known**2).mean())) if known.size else np.nan
 
 
+def replay(twin: Json) -> list[Block]:
+    """The session replayed by the virtual device: by position, without and with."""
+    places = objects_at(twin, "positions")
+    x = np.arange(len(places), dtype=float)
+    series = tuple(
+        Series(label, x, y, tone)
+        for tone, name, label in ((2, "refitted", "before"), (1, "twin", "twin"))
+        if np.isfinite(y := _agreement(places, name)).any()
+    )
+    if not series:
+        return []
+    names = tuple(str(p.get("position", "")) for p in places)
+    worst = [f"{s.name} {np.nanmax(s.y):.3g}" for s in series]
+    chart = Chart(
+        "replay",
+        "Replayed by the virtual device",
+        f"Largest χ² of a mean: {', '.join(worst)}.",
+        Axis("position", names=names),
+        Axis("χ² of a mean", log=True),
+        series,
+        (Mark(1.0, "noise"),),
+    )
+    return [Figure(chart, "How far a simulation with its own physics is off.")]
+
+
+def _agreement(places: Sequence[Json], name: str) -> Array:
+    chi2 = [real(table_at(p, name).get("chi2_per_mean")) for p in places]
+    return np.array([c if c > 0 else np.nan for c in chi2])
+
+
 def candidates(found: Sequence[Json]) -> list[Block]:
     """The league table: every effect that was tried, and why it lost."""
     columns = ("effect", ">Δχ²", ">ΔBIC", ">rms unseen", "what speaks against it")
@@ -68,8 +100,16 @@ def next_steps(found: Json) -> list[Block]:
     """What to do in the field now."""
     said = found.get("next")
     given = [said] if isinstance(said, str) else list_at(found, "next")
-    texts = [str(text) for text in given] or _decisions(found)
-    return [Text(f"Next: {text}") for text in texts if text]
+    rows: list[list[str | Cell]] = [["", str(text)] for text in given if text]
+    rows += _cures(found)
+    rows += [["to tell", text] for text in _decisions(found)] if not given else []
+    return [table("What to do next", ("for", "do"), rows)] if rows else []
+
+
+def _cures(found: Json) -> list[list[str | Cell]]:
+    """What helps against each effect that was found, once each."""
+    ids = dict.fromkeys(str(e.get("id", "")) for e in objects_at(found, "effects"))
+    return [[i.replace("_", " "), CURES[i]] for i in ids if i in CURES]
 
 
 def _decisions(found: Json) -> list[str]:
@@ -82,7 +122,7 @@ def _decisions(found: Json) -> list[str]:
         if name in known and others:
             listed = " or ".join(o.replace("_", " ") for o in others)
             texts.append(
-                f"to tell {name.replace('_', ' ')} from {listed}, record"
+                f"{name.replace('_', ' ')} from {listed}: record"
                 f" {known[name].decided_by}."
             )
     return texts

@@ -8,11 +8,12 @@ CURES = {
     "gyro_scale": "Let solve use the turns between the positions (--turns yes).",
     "quadratic": "Use the calibration that diagnose gives with it, and take the"
     " coefficients out of the forces.",
-    "cubic": "Use the calibration that diagnose gives with it, or keep to small forces.",
+    "cubic": "Use the calibration that diagnose gives with it, or keep to small"
+    " forces.",
     "scale_asymmetry": "Use the calibration that diagnose gives with it, and one scale"
     " factor for each sign.",
-    "pendulous_products": "Use the calibration that diagnose gives with it; positions that"
-    " load two axes at once sharpen it.",
+    "pendulous_products": "Use the calibration that diagnose gives with it; positions"
+    " that load two axes at once sharpen it.",
     "g_sensitivity": "Take the coefficients times the measured force out of the rates.",
     "g2_sensitivity": "Take the coefficients times the squared force out of the rates.",
     "gyro_products": "Turn about one axis at a time, or calibrate on a rate table.",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.errors import FieldcalError, InputError, PlanError
@@ -102,18 +102,21 @@ def run(args: argparse.Namespace) -> int:
         show(found, truth)
         sys.stdout.write(f"recorded: {task.folder}\nwritten:  {written}\n")
     if not args.no_report:
-        _report(task.folder, sys.stderr if args.json else sys.stdout)
+        page = _report(task.folder)
+        if page and not args.json:
+            sys.stdout.write(f"report:   {page}\n")
     return 0 if found.good else 1
 
 
-def _report(folder: Path, out: IO[str]) -> None:
+def _report(folder: Path) -> Path | None:
     """Write the report; the calibration stands without it."""
     from fieldcal.commands.report import write
 
     try:
-        out.write(f"report:   {write(folder)}\n")
+        return write(folder)
     except FieldcalError as error:
         sys.stderr.write(f"fieldcal run: no report: {error}\n")
+        return None
 
 
 def make_task(args: argparse.Namespace) -> Task:

@@ -118,7 +118,10 @@ class Chart:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Channels of a recording over device time, one panel each, zoomed together."""
+    """Channels of a recording over device time, one panel each, zoomed together.
+
+    `means` (spans, panels) are drawn across the spans, nan where there is none.
+    """
 
     id: str
     title: str
@@ -126,6 +129,7 @@ class Record:
     panels: tuple[tuple[str, str, int], ...]
     store: Mapping[str, Any]
     spans: tuple[Span, ...]
+    means: Array
     marks: tuple[Mark, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -138,6 +142,7 @@ class Record:
                 for label, unit, tone in self.panels
             ],
             "store": self.store,
+            "means": [numbers(row) for row in self.means],
             "spans": [s.to_json() for s in self.spans],
             "marks": [m.to_json() for m in self.marks],
         }

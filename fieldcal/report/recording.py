@@ -37,8 +37,8 @@ def recording(material: Material) -> Section:
     blocks: list[Block] = [
         Figure(
             chart,
-            "Shaded: the windows that were averaged. Drag to zoom in on a stretch; each"
-            " panel then fits what is seen.",
+            "Shaded: the windows that were averaged, with a line at the average. Drag"
+            " to zoom in on a stretch; each panel then fits what is seen.",
         )
     ]
     if material.still is not None:
@@ -78,8 +78,16 @@ def _chart(material: Material) -> Record:
         tuple(panels),
         pack(Columns(block.t, values), around(edges, CLOSE)),
         spans,
+        _means(material, used, values.shape[1]),
         marks,
     )
+
+
+def _means(material: Material, used: Sequence[int], panels: int) -> Array:
+    """Averages of the windows, (windows, panels)."""
+    averages = material.still.averages if material.still is not None else ()
+    rows = [[*(a.mean[i] for i in used), a.temperature] for a in averages]
+    return np.array(rows, dtype=float).reshape(len(rows), len(used) + 1)[:, :panels]
 
 
 def _marks(material: Material) -> tuple[Mark, ...]:

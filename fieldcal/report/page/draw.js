@@ -135,6 +135,11 @@ function drawRecord(plot) {
     const s = frame(svg, plot, box, { label: "", names: [] }, padded(lo, hi, 0.08), c === panels.length - 1);
     const g = clip(svg, plot, box, c);
     el(g, "path", { class: (found.level.raw ? "line" : "band") + " tone" + panel.tone, d: outline(found, c, s) });
+    plot.spec.spans.forEach((span, k) => {
+      const mean = plot.spec.means[k][c];
+      if (mean === null || span.to < x0 || span.from > x1) return;
+      el(g, "line", { class: "mean", x1: s.px(Math.max(span.from, x0)), x2: s.px(Math.min(span.to, x1)), y1: s.py(mean), y2: s.py(mean) });
+    });
     const unit = [s.factor, panel.unit].filter(Boolean).join(" ");
     el(svg, "text", { class: "name", x: LEFT + 7, y: box.y + 15 }, panel.label + ", " + unit);
   });

@@ -140,7 +140,7 @@ function listenKeys(plot) {
 function addTools(plot) {
   const tools = plot.figure.querySelector(".tools");
   const button = (text, label, act) => html(tools, "button", { type: "button", "aria-label": label, title: label }, text).addEventListener("click", act);
-  if (plot.spec.kind === "record" && plot.spec.spans.length && plot.spec.spans.length <= 16) {
+  if (plot.spec.kind === "record" && plot.spec.spans.length && plot.spec.spans.length <= 24) {
     for (const s of plot.spec.spans) {
       const beside = 0.12 * (s.to - s.from);
       button(s.label, "show the window of position " + s.label, () => setView(plot, s.from - beside, s.to + beside));

@@ -171,6 +171,33 @@ def test_a_session_without_anything_derived_still_gives_a_page(tmp_path: Path) -
     assert "correlation" not in [a["id"] for a in page.named("section")]
 
 
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "t,ax,ay,az\n0,1,2,3\n",
+        "t,gx,gy,gz,temperature\n0,1,2,3,\n1,1,2,3,\n2,,,,\n",
+        "t,ax,ay,az\n" + "".join(f"{2.5 * i},0,-9.8,{i % 2}\n" for i in range(99)),
+    ],
+    ids=["one sample", "no accelerometer, no temperature", "slow and coarse"],
+)
+def test_odd_recordings_give_a_page(tmp_path: Path, rows: str) -> None:
+    (tmp_path / "samples.csv").write_text(rows)
+    window = "[[position]]\nstart_s = 0.0\nend_s = 240.0\n"
+    (tmp_path / "session.toml").write_text(window)
+    assert "Provenance" in render(gather(tmp_path))
+
+
+def test_a_clock_of_dates_is_taken_off_the_charts(bench: Path, tmp_path: Path) -> None:
+    shutil.copyfile(bench / "session.toml", tmp_path / "session.toml")
+    rows = "".join(f"{1.7e9 + i / 50},0,-9.8,0\n" for i in range(3000))
+    (tmp_path / "samples.csv").write_text("t,ax,ay,az\n" + rows)
+    page = render(gather(tmp_path))
+    spec = re.findall(r'<script type="application/json">(.*?)</script>', page)[0]
+    chart = json.loads(spec)
+    assert chart["x"]["label"] == "device time − 1700000000"
+    assert chart["store"]["base"]["start"] == 0.0
+
+
 def test_no_text_of_the_session_gets_out_of_its_place(
     bench: Path, tmp_path: Path
 ) -> None:

@@ -127,6 +127,7 @@ class Record:
     title: str
     alt: str
     panels: tuple[tuple[str, str, int], ...]
+    clock: str
     store: Mapping[str, Any]
     spans: tuple[Span, ...]
     means: Array
@@ -141,6 +142,7 @@ class Record:
                 {"label": label, "unit": unit, "tone": tone}
                 for label, unit, tone in self.panels
             ],
+            "x": Axis(self.clock, "s").to_json(),
             "store": self.store,
             "means": [numbers(row) for row in self.means],
             "spans": [s.to_json() for s in self.spans],

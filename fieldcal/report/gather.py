@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fieldcal.calibration import Calibration
 from fieldcal.errors import FieldcalError, InputError, SessionError
 from fieldcal.observing import Rests, rests
@@ -15,6 +17,9 @@ from fieldcal.samples import Block
 from fieldcal.session import RESULT, Session
 
 DIAGNOSIS = "diagnosis.json"
+
+FAR = 1e6
+"""Device time from which on its digits hide what happens in a chart, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +62,17 @@ class Material:
     diagnosis: Mapping[str, Any] | None
     marks: tuple[Mapping[str, Any], ...]
     earlier: tuple[Earlier, ...] = ()
+
+    @property
+    def epoch(self) -> float:
+        """What is taken off device times in charts: all but 0 for a clock of dates."""
+        start = float(self.block.t[0])
+        return float(np.floor(start)) if abs(start) > FAR else 0.0
+
+    @property
+    def clock(self) -> str:
+        """What the time axis of a chart is called."""
+        return f"device time − {self.epoch:.0f}" if self.epoch else "device time"
 
     def position_name(self, row: int) -> str:
         """Name of a position with its number."""

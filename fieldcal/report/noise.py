@@ -32,11 +32,12 @@ def noise(material: Material) -> Section:
     block = material.block.between(*span)[:MOST]
     try:
         found = allan_deviation(block)
+        levels = _table(found)
     except InputError as error:
         parts = (Text(f"No Allan deviation: {error}."),)
     else:
         where = f"From {block.t[0]:.0f} to {block.t[-1]:.0f} s of device time."
-        parts = (*_figures(found, where), _table(found))
+        parts = (*_figures(found, where), levels)
     return Section("noise", "Noise", parts)
 
 

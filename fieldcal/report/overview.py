@@ -87,6 +87,8 @@ def _duration(seconds: float) -> str:
 
 
 def _rate(t: Array) -> str:
+    if len(t) < 2:
+        return "a single sample"
     steps = np.diff(t)
     gaps = int((steps > 5 * np.median(steps)).sum())
     holes = f", {gaps} gap{'s' * (gaps > 1)}" if gaps else ", no gap"

@@ -53,7 +53,8 @@ def windows(material: Material) -> tuple[Span, ...]:
     if material.still is None:
         return ()
     pairs = zip(material.still.rows, material.still.averages, strict=True)
-    return tuple(Span(a.start, a.end, str(row)) for row, a in pairs)
+    off = material.epoch
+    return tuple(Span(a.start - off, a.end - off, str(row)) for row, a in pairs)
 
 
 def _chart(material: Material) -> Record:
@@ -76,7 +77,8 @@ def _chart(material: Material) -> Record:
         "Samples over device time",
         _alt(panels, values, float(block.t[-1] - block.t[0]), spans),
         tuple(panels),
-        pack(Columns(block.t, values), around(edges, CLOSE)),
+        material.clock,
+        pack(Columns(block.t - material.epoch, values), around(edges, CLOSE)),
         spans,
         _means(material, used, values.shape[1]),
         marks,
@@ -93,20 +95,20 @@ def _means(material: Material, used: Sequence[int], panels: int) -> Array:
 def _marks(material: Material) -> tuple[Mark, ...]:
     """Events with a device time of their own, and what a diagnosis found in samples."""
     marks = [
-        Mark(float(m["at_s"]), EVENTS[m["event"]])
+        Mark(float(m["at_s"]) - material.epoch, EVENTS[m["event"]])
         for m in material.marks
         if m.get("event") in EVENTS and isinstance(m.get("at_s"), int | float)
     ]
-    return (*marks, *_transients(material.diagnosis or {}))
+    return (*marks, *_transients(material.diagnosis or {}, material.epoch))
 
 
-def _transients(diagnosis: Json) -> list[Mark]:
+def _transients(diagnosis: Json, epoch: float) -> list[Mark]:
     found: dict[float, list[str]] = {}
     for m in objects_at(diagnosis, "mismatch"):
         at = real(m.get("from_s"))
         brief = real(m.get("to_s")) - at < BRIEF
         if m.get("kind") in ("samples", "transient") and brief:
-            found.setdefault(round(at, 1), []).append(str(m.get("channel", "")))
+            found.setdefault(round(at - epoch, 1), []).append(str(m.get("channel", "")))
     return [Mark(at, ", ".join(names)) for at, names in found.items()][:MOST_MARKS]
 
 

@@ -40,9 +40,9 @@ def stillness(material: Material) -> Section | None:
         "stillness",
         "Restlessness over device time",
         f"Restlessness from {r.min():.2g} to {r.max():.2g} times that of rest.",
-        Axis("device time", "s"),
+        Axis(material.clock, "s"),
         Axis("spread over 1 s, times that of rest", log=True),
-        (Series("restlessness", *_thinned(t, r), 1, "line"),),
+        (Series("restlessness", *_thinned(t - material.epoch, r), 1, "line"),),
         (Mark(1.0, "rest"),),
         windows(material),
     )

@@ -90,7 +90,7 @@ function frame(svg, plot, box, yAxis, range, last) {
     el(svg, "line", { class: "grid", x1: box.x, x2: box.x + box.w, y1: py(tick.at), y2: py(tick.at) });
     el(svg, "text", { x: box.x - 7, y: py(tick.at) + 4, "text-anchor": "end" }, tick.text);
   }
-  const columns = ticksOf(plot.spec.x, x0, x1, Math.max(2, box.w / 90));
+  const columns = ticksOf(plot.spec.x, x0, x1, Math.max(3.5, box.w / 90));
   for (const tick of columns.ticks) {
     el(svg, "line", { class: "grid", x1: px(tick.at), x2: px(tick.at), y1: box.y, y2: box.y + box.h });
     if (last) el(svg, "text", { x: px(tick.at), y: box.y + box.h + 17, "text-anchor": "middle" }, tick.text);

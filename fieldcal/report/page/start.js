@@ -15,12 +15,11 @@ function fullOf(plot) {
   const u = plot.series.flatMap((s) => s.u).filter(Number.isFinite);
   const spans = plot.spec.spans.flatMap((s) => [s.from, s.to]).map(plot.u);
   const all = u.concat(plot.spec.x.names.length ? [-0.4, plot.spec.x.names.length - 0.6] : [], spans);
-  return padded(all.reduce((a, b) => Math.min(a, b), Infinity), all.reduce((a, b) => Math.max(a, b), -Infinity), 0.03);
+  return padded(all.reduce((a, b) => Math.min(a, b), Infinity), all.reduce((a, b) => Math.max(a, b), -Infinity), 0.05);
 }
 
 function plotOf(figure) {
   const spec = JSON.parse(figure.querySelector("script").textContent), record = spec.kind === "record";
-  if (record) spec.x = { label: "device time", unit: "s", log: false, names: [] };
   const plot = { figure, spec, canvas: figure.querySelector(".canvas"), width: 0, waiting: false };
   plot.u = logged(spec.x.log);
   plot.v = logged(!record && spec.y.log);

@@ -230,13 +230,15 @@ def _earlier(session: Path) -> tuple[Earlier, ...]:
     return (Earlier(HOSTILE, found),) if found else ()
 
 
-anything = st.recursive(
-    st.none() | st.booleans() | st.integers(-9, 9) | st.floats(allow_nan=False)
-    | st.text(max_size=8),
-    lambda inner: st.lists(inner, max_size=3)
-    | st.dictionaries(st.text(max_size=4), inner, max_size=3),
-    max_leaves=8,
-)  # fmt: skip
+leaf = (
+    st.none()
+    | st.booleans()
+    | st.integers(-9, 9)
+    | st.floats(allow_nan=False)
+    | st.text(max_size=8)
+)
+row = st.lists(leaf, max_size=3)
+anything = leaf | row | st.dictionaries(st.text(max_size=4), leaf | row, max_size=3)
 KEYS = (
     *("verdict", "says", "warnings", "mismatch", "effects", "fit", "calibration"),
     *("candidates", "curves", "next", "twin"),

@@ -4,8 +4,8 @@ Every key may be absent: an older file, or a diagnosis that had nothing to say o
 Besides the keys that `fieldcal.diagnosis.result` writes and the twin's replay, three
 are shown where a diagnosis has them:
 
-    candidates   what was tried: id, delta_chi2, delta_bic, held_out_gain, why
-    curves       residuals over a covariate: channel, covariate, unit, x, before, after
+    candidates   what was tried: id, delta_chi2, delta_bic, held_out_gain, chosen, why
+    curves       residuals: channel, covariate, unit, x, before, after, sigma
     next         what to do now, a text or a list of texts
 """
 

@@ -24,10 +24,11 @@ def curves(found: Sequence[Json]) -> list[Block]:
     blocks: list[Block] = []
     for i, curve in enumerate(found[:MOST_CURVES]):
         x = np.array([real(v) for v in list_at(curve, "x")])
+        sigma = _column(curve, "sigma", len(x))
         series = tuple(
-            Series(name, x, y, tone)
+            Series(name, x, y, tone, low=y - sigma, high=y + sigma)
             for tone, name in ((2, "before"), (1, "after"))
-            if len(y := np.array([real(v) for v in list_at(curve, name)])) == len(x)
+            if np.isfinite(y := _column(curve, name, len(x))).any()
         )
         if not len(x) or not series:
             continue
@@ -43,6 +44,12 @@ def curves(found: Sequence[Json]) -> list[Block]:
         )
         blocks.append(Figure(chart, "Before and after the effects are added."))
     return blocks
+
+
+def _column(curve: Json, name: str, n: int) -> Array:
+    """The numbers of a column, (n,); nan where they are missing."""
+    values = np.array([real(v) for v in list_at(curve, name)])
+    return values if len(values) == n else np.full(n, np.nan)
 
 
 def _rms(series: Series) -> float:
@@ -82,14 +89,16 @@ def _agreement(places: Sequence[Json], name: str) -> Array:
 
 def candidates(found: Sequence[Json]) -> list[Block]:
     """The league table: every effect that was tried, and why it lost."""
-    columns = ("effect", ">Δχ²", ">ΔBIC", ">rms unseen", "what speaks against it")
+    columns = ("effect", ">Δχ²", ">ΔBIC", ">rms unseen", "why")
     rows: list[list[str | Cell]] = [
         [
             str(c.get("id", "")).replace("_", " "),
             shown(c.get("delta_chi2"), "{:.0f}"),
             shown(c.get("delta_bic"), "{:.0f}"),
             shown(-100 * real(c.get("held_out_gain")), "{:+.0f} %"),
-            str(c.get("why", "")),
+            Cell("chosen", "good")
+            if c.get("chosen") is True
+            else str(c.get("why", "")),
         ]
         for c in found
     ]

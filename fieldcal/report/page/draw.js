@@ -198,15 +198,16 @@ function drawSeries(g, one, s) {
     }
     el(g, "path", { class: "line " + tone, d: "M" + rows.map((r) => r[0] + " " + r[1]).join("L") });
   }
-  if (one.draw === "line" || rows.length > 60) return;
+  if (one.draw === "line" || (one.draw === "both" && rows.length > 60)) return;
+  const many = rows.length > 60, bars = rows.length <= 200;
   for (const [x, y, i] of rows) {
-    if (one.lo && rows.length <= 60) el(g, "line", { class: "bar-line " + tone, x1: x, x2: x, y1: s.py(one.lo[i]), y2: s.py(one.hi[i]) });
-    el(g, "path", { class: "point " + tone, d: marker(one.tone, x, y) });
+    if (one.lo && bars) el(g, "line", { class: "bar-line " + tone, x1: x, x2: x, y1: s.py(one.lo[i]), y2: s.py(one.hi[i]) });
+    el(g, "path", { class: "point " + tone, d: marker(one.tone, x, y, many ? 2.4 : 4) });
   }
 }
 
-function marker(tone, x, y) {
-  const r = tone === 6 ? 8 : 4;
+function marker(tone, x, y, size) {
+  const r = tone === 6 ? 2 * size : size;
   if (tone === 2) return `M${x - r} ${y - r}h${2 * r}v${2 * r}h${-2 * r}Z`;
   if (tone === 3) return `M${x} ${y - r - 1}L${x + r + 1} ${y + r}H${x - r - 1}Z`;
   if (tone === 4) return `M${x} ${y - r - 1}L${x + r + 1} ${y}L${x} ${y + r + 1}L${x - r - 1} ${y}Z`;
@@ -236,7 +237,7 @@ function drawLegend(plot) {
     const item = html(legend, "span");
     const icon = el(item, "svg", { viewBox: "0 0 22 12", "aria-hidden": "true" });
     if (one.draw !== "points") el(icon, "path", { class: "line tone" + one.tone, d: "M1 6H21" });
-    if (one.draw !== "line") el(icon, "path", { class: "point tone" + one.tone, d: marker(one.tone === 6 ? 1 : one.tone, 11, 6), style: "--c:var(--t" + one.tone + ")" });
+    if (one.draw !== "line") el(icon, "path", { class: "point tone" + one.tone, d: marker(one.tone === 6 ? 1 : one.tone, 11, 6, 4), style: "--c:var(--t" + one.tone + ")" });
     item.append(one.name);
   }
 }

@@ -42,4 +42,5 @@ html_math_renderer = "mathml"
 
 def setup(app):  # noqa: D103, ANN001, ANN201
     pages.make(HERE / "made")
+    app.connect("source-read", pages.add_unlisted)
     mathematics.setup(app)

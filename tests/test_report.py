@@ -225,6 +225,20 @@ def test_no_text_of_the_session_gets_out_of_its_place(
     assert HOSTILE in hostile.text
 
 
+def test_a_decision_by_limits_stands_on_top(bench: Path, tmp_path: Path) -> None:
+    session = Path(shutil.copytree(bench, tmp_path / "decided"))
+    result = json.loads((session / "result.json").read_text())
+    checks = [
+        {"name": "acc_bias", "ok": False, "says": "0.3 m/s^2 of 0.2"},
+        {"name": "history", "ok": None, "says": "the first of this device"},
+    ]
+    result["decision"] = {"go": False, "reasons": ["Too much bias."], "checks": checks}
+    (session / "result.json").write_text(json.dumps(result))
+    text = Tags(render(gather(session))).text
+    assert "no-go" in text and "Too much bias." in text
+    assert "not kept" in text and "not checked" in text
+
+
 def _earlier(session: Path) -> tuple[Earlier, ...]:
     found = gather(session).calibration
     return (Earlier(HOSTILE, found),) if found else ()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import re
 from pathlib import Path
+from typing import Any
 
 from drawn.effects import given, picture
 from drawn.positions import drawings
@@ -26,6 +28,17 @@ def make(folder: Path) -> None:
     for effect in catalogue().values():
         _write(folder / "effects" / f"{effect.id}.svg", picture(effect))
     _write(folder / "effects.md", _page())
+
+
+def add_unlisted(app: Any, name: str, source: list[str]) -> None:
+    """List on the front page what it does not name, so that no page gets lost."""
+    if name != "index":
+        return
+    listed = set(re.findall(r"^[\w/-]+$", source[0], re.MULTILINE)) | {"index"}
+    more = sorted(n for n in app.env.found_docs if "/" not in n and n not in listed)
+    if more:
+        lines = "\n".join(more)
+        source[0] += f"\n```{{toctree}}\n:caption: More\n\n{lines}\n```\n"
 
 
 def _write(path: Path, text: str) -> None:

@@ -21,6 +21,7 @@ from fieldcal.report.blocks import (
     table,
 )
 from fieldcal.report.gather import Material
+from fieldcal.report.loose import list_at, objects_at, table_at
 from fieldcal.samples import Array
 
 WIDEST = 30.0
@@ -46,14 +47,22 @@ def head(material: Material) -> Head:
     serial = about.device.get("serial")
     under = [material.session.folder.resolve().name]
     under += [f"serial {serial}"] if serial else []
-    tone: Tone = "warn"
-    verdict, says = "not solved", "fieldcal solve has not been run yet."
-    if found is not None and found.good:
-        verdict, tone = "good", "good"
-        says = "The calibration can be used within its uncertainties."
-    elif found is not None:
-        verdict, tone, says = "bad", "bad", "Do not use these numbers."
+    verdict, tone, says = _verdict(found)
     return Head(name, " · ".join(under), verdict, tone, says, _facts(material))
+
+
+def _verdict(found: Calibration | None) -> tuple[str, Tone, str]:
+    """Verdict, its tone and a sentence; a decision by limits goes before."""
+    if found is None:
+        return "not solved", "warn", "fieldcal solve has not been run yet."
+    decision = table_at(found.info, "decision")
+    reasons = " ".join(str(r) for r in list_at(decision, "reasons"))
+    if decision.get("go") is False:
+        return "no-go", "bad", reasons or "A limit is not kept."
+    if not found.good:
+        return "bad", "bad", "Do not use these numbers."
+    says = "The calibration can be used within its uncertainties."
+    return "go" if decision.get("go") is True else "good", "good", says
 
 
 def _facts(material: Material) -> Facts:
@@ -103,6 +112,7 @@ def calibration(material: Material) -> Section | None:
     blocks: list[Block] = [_parameters(found, material.session.about.nominal)]
     if found.warnings:
         blocks += [Note(w) for w in found.warnings]
+    blocks += _checks(found)
     left = _without(found)
     if left:
         blocks.append(Text(left))
@@ -127,6 +137,25 @@ def _parameters(found: Calibration, nominal: Mapping[str, Array]) -> Table:
     else:
         rows = [row[:-1] for row in rows]
     return table(caption, columns, rows)
+
+
+def _checks(found: Calibration) -> list[Block]:
+    """What a decision by limits looked at; none where there was no decision."""
+    marks: dict[object, Cell] = {
+        True: Cell("kept", "good"),
+        False: Cell("not kept", "bad"),
+    }
+    checks = objects_at(table_at(found.info, "decision"), "checks")
+    rows: list[list[str | Cell]] = [
+        [
+            str(c.get("name", "")).replace("_", " "),
+            marks.get(c.get("ok"), Cell("not checked", "warn")),
+            str(c.get("says", "")),
+        ]
+        for c in checks
+        if not isinstance(c.get("ok"), list | dict)
+    ]
+    return [table("Limits", ("limit", "", "found"), rows)] if rows else []
 
 
 def _without(found: Calibration) -> str:

@@ -57,6 +57,7 @@ def diagnosis(material: Material) -> Section | None:
     lead = f"{verdict.replace('_', ' ').capitalize()}. {said}"
     blocks: list[Block] = [Note(lead.strip(), TONES.get(verdict, "warn"))]
     blocks += [Note(str(w)) for w in list_at(found, "warnings")]
+    blocks += evidence.next_steps(found)
     mismatch = objects_at(found, "mismatch")
     if mismatch:
         blocks += _mismatch(mismatch)
@@ -68,7 +69,6 @@ def diagnosis(material: Material) -> Section | None:
         blocks += _calibration(table_at(found, "calibration"))
     blocks += evidence.replay(table_at(found, "twin"))
     blocks += evidence.candidates(objects_at(found, "candidates"))
-    blocks += evidence.next_steps(found)
     return Section("diagnosis", "Diagnosis", tuple(blocks))
 
 
@@ -167,7 +167,7 @@ def _by_channel(before: Json, after: Json) -> Chart | None:
         return None
     x = np.arange(len(names), dtype=float)
     series = []
-    for tone, (label, values) in enumerate((("before", first), ("after", then)), 1):
+    for tone, (label, values) in ((2, ("before", first)), (1, ("after", then))):
         y = np.array([real(values[c]) for c in names])
         series.append(Series(label, x, y, tone))
     pairs = [f"{c} {real(first[c]):.2g} to {real(then[c]):.2g}" for c in names]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -31,17 +31,25 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("pages")
 
 
-def practice(folder: Path) -> Path:
-    source = SHARED / "practice" / "p05"
+def practice(folder: Path, name: str, code: int) -> Path:
+    source = SHARED / "practice" / name
     if not source.is_dir():
         pytest.skip(f"the practice session is not here: {source}")
-    session = folder / "p05"
+    session = folder / name
     session.mkdir(exist_ok=True)
     for file in source.iterdir():
         shutil.copyfile(file, session / file.name)
     main(["solve", str(session)])
-    assert main(["diagnose", str(session), "--report"]) == 1
+    assert main(["diagnose", str(session), "--report"]) == code
     return session / "report.html"
+
+
+def consistent(folder: Path) -> Path:
+    return practice(folder, "p01", 0)
+
+
+def left_out(folder: Path) -> Path:
+    return practice(folder, "p05", 1)
 
 
 def real(folder: Path) -> Path:
@@ -73,11 +81,10 @@ def view(browser: Browser) -> tuple[float, float]:
     return (found[0], found[1])
 
 
-@pytest.mark.parametrize("make", [practice, real])
+@pytest.mark.parametrize("make", [consistent, left_out, real])
 def test_every_plot_is_drawn_and_can_be_zoomed(
-    browser: Browser, folder: Path, make: object
+    browser: Browser, folder: Path, make: Callable[[Path], Path]
 ) -> None:
-    assert callable(make)
     opened(browser, make(folder))
     figures = browser.value("document.querySelectorAll('figure.plot').length")
     assert figures >= 5

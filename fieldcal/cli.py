@@ -20,6 +20,7 @@ COMMANDS = {
     "apply": ("take a calibration out of a recording", "apply"),
     "compare": ("say whether two calibrations differ", "compare"),
     "diagnose": ("say what physics the simulation leaves out", "diagnose"),
+    "report": ("make a page of a session that opens offline", "report"),
     "import": ("make a session of a recording from elsewhere", "import_recording"),
     "sim": ("be a virtual device on a link", "sim"),
     "ports": ("list the devices that are plugged in", "ports"),

@@ -65,7 +65,7 @@ def read(path: Path) -> Calibration:
 
 
 def _table(found: Comparison) -> str:
-    from fieldcal.commands.table import number
+    from fieldcal.calibration.wording import number
 
     width = max(len(n) for n in found.names)
     lines = [f"{'parameter':{width}}  second - first      ± 1σ       difference/σ"]

@@ -77,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--headless", action="store_true", help="no operator: progress as JSON lines")
     add("--plain", action="store_true", help="lines instead of a screen")
     add("--json", action="store_true", help="print the result as one JSON object")
+    add("--no-report", action="store_true", help="write no report.html")
     add_site(parser)
 
 
@@ -100,7 +101,22 @@ def run(args: argparse.Namespace) -> int:
     else:
         show(found, truth)
         sys.stdout.write(f"recorded: {task.folder}\nwritten:  {written}\n")
+    if not args.no_report:
+        page = _report(task.folder)
+        if page and not args.json:
+            sys.stdout.write(f"report:   {page}\n")
     return 0 if found.good else 1
+
+
+def _report(folder: Path) -> Path | None:
+    """Write the report; the calibration stands without it."""
+    from fieldcal.commands.report import write
+
+    try:
+        return write(folder)
+    except FieldcalError as error:
+        sys.stderr.write(f"fieldcal run: no report: {error}\n")
+        return None
 
 
 def make_task(args: argparse.Namespace) -> Task:

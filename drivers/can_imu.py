@@ -37,13 +37,7 @@ LIMIT = 1 << 24
 
 
 class Imu(Driver):
-    """A CAN bus, or a log of one, and the samples that are in its frames.
-
-    Attributes
-    ----------
-    skew : the device's clock against the host's
-
-    """
+    """A CAN bus, or a log of one, and the samples that are in its frames."""
 
     def __init__(self, address: str) -> None:
         _check_installed()
@@ -60,7 +54,7 @@ class Imu(Driver):
         self._parts = read_map(options)
         self._samples = Samples(self._parts, self._counts, options)
         self._heard: set[int] = set()
-        self.skew = Skew()
+        self._skew = Skew(self._counts)
         self._log: Log | None = None
         self._reader: Reader | None = None
         if is_log(channel):
@@ -97,7 +91,7 @@ class Imu(Driver):
                 blocks.append(self._samples.feed(frames, arrived))
             block = concat(block for block in blocks if block is not None)
             if len(block):
-                self.skew.add(block.t, block.t_host)
+                self._skew.add(block.t, block.t_host)
                 return block
             if monotonic() >= deadline:
                 return None

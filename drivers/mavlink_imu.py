@@ -28,6 +28,7 @@ from fieldcal.drivers.mavlink_log import Log, is_log
 from fieldcal.drivers.mavlink_talk import Talk, listed
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Chunk, Reader
+from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, FieldcalError, InputError
 from fieldcal.samples import Block
 
@@ -77,6 +78,7 @@ class Imu(Driver):
         self._decoder = Decoder(options)
         self._asked = options.number("rate", USUAL, 0.0, 1e4)
         self.health: Health = self._decoder.health
+        self._skew = Skew(self.health)
         message = (self._decoder.message, self._decoder.kind.identifier)
         without = options.choice("installed", ("keep", "identity"), "keep")
         self._talk = Talk(
@@ -227,6 +229,7 @@ class Imu(Driver):
             self._say(self._talk.due(monotonic()))
         if block is not None:
             self._recent.extend(block.t.tolist())
+            self._skew.add(block.t, block.t_host)
         return block
 
     def _listen(self, chunks: list[Chunk]) -> Block | None:

@@ -76,13 +76,7 @@ class SerialPort:
 
 
 class Imu(Driver):
-    """A serial port and the codec of what comes from it.
-
-    Attributes
-    ----------
-    skew : the device's clock against the host's
-
-    """
+    """A serial port and the codec of what comes from it."""
 
     faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)
 
@@ -94,8 +88,8 @@ class Imu(Driver):
         self._format = options.text("format", "witmotion")
         self._codec = open_codec(self._format, options)
         self._heard: list[Chunk] = []
-        self.skew = Skew()
         self.health = self._codec.health
+        self._skew = Skew(self.health)
         baud = int(options.number("baud", self._codec.bauds[0], 50, 1e8))
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
         options.finish()
@@ -114,7 +108,7 @@ class Imu(Driver):
             block = self._codec.feed_all(chunks)
             if block is not None:
                 self._heard = []
-                self.skew.add(block.t, block.t_host)
+                self._skew.add(block.t, block.t_host)
                 return block
             self._heard = [*self._heard, *chunks][-HEARD:]
             if monotonic() >= deadline:

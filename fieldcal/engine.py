@@ -21,6 +21,7 @@ from fieldcal.arrival import Arrival, Held, judge
 from fieldcal.description import Description
 from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, WrongPosition
+from fieldcal.link_marks import LinkMarks
 from fieldcal.plan import Hold, Note, Plan, Step
 from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block, concat
@@ -72,6 +73,7 @@ class Engine:
         self._give_up = give_up
         self._held: Held | None = None
         self._noise: Noise | None = None
+        self._link = LinkMarks(driver, recorder)
         self._stream = self._record(driver)
         self._rate = np.nan
 
@@ -94,6 +96,8 @@ class Engine:
         except StopIteration as done:
             result: R = done.value
             return result
+        finally:
+            self._link.end()
 
     def _do(self, step: Step) -> object:
         match step:
@@ -115,6 +119,7 @@ class Engine:
     def _record(self, driver: Driver) -> Iterator[Block]:
         for block in driver.blocks():
             self._recorder.append(block)
+            self._link.take(block)
             if len(block) > 1:
                 self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
             yield from _pieces(block)

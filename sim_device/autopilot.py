@@ -93,16 +93,21 @@ class Autopilot:
         self._mav = dialect.MAVLink(None, system, 1)
         self._mav.robust_parsing = True
         self._target = (system, 1)
-        self._every: dict[int, float] = {}
+        self._unasked: dict[int, float] = {}
         for name in filter(None, given.get("streams", "").split(",")):
             if name not in STREAMS:
                 raise InputError(f"streams={name!r} is none of {', '.join(STREAMS)}")
-            self._every[STREAMS[name]] = 0.0
+            self._unasked[STREAMS[name]] = 0.0
+        self._every = dict(self._unasked)
 
     @property
     def sends(self) -> bool:
         """Whether it was asked for any samples."""
         return bool(self._every)
+
+    def reboot(self) -> None:
+        """Send only what is sent unasked; parameters outlast it."""
+        self._every = dict(self._unasked)
 
     def heartbeat(self) -> bytes:
         """Say that it is there."""

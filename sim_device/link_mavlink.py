@@ -259,6 +259,10 @@ class MavlinkLink(Link):
                     return
             sleep(LOOK_S)
 
+    def reboot(self) -> None:
+        """Forget the rates that were asked for."""
+        self._autopilot.reboot()
+
     def hang_up(self) -> None:
         """Close the port."""
         if self._port is not None:

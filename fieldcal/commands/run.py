@@ -211,13 +211,15 @@ def _check(task: Task) -> None:
 @contextlib.contextmanager
 def _link(args: argparse.Namespace, task: Task) -> Iterator[tuple[Driver, Mover]]:
     """Open the device, and whoever turns it."""
+    from fieldcal.commands.virtual import address
     from fieldcal.driver import open_driver
     from fieldcal.movers import Nobody, VirtualDevice
 
     with contextlib.ExitStack() as stack:
         if args.virtual is not None:
-            device = stack.enter_context(VirtualDevice(_virtual(args, task)))
-            url = f"serial:{device.port}?format={VIRTUAL_FORMAT}"
+            options = _virtual(args, task)
+            device = stack.enter_context(VirtualDevice(options))
+            url = address(options, device.port)
             yield stack.enter_context(open_driver(url)), device
         elif task.device:
             yield stack.enter_context(open_driver(task.device)), Nobody()

@@ -40,8 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--serial",
         metavar="FORMAT",
         default="witmotion",
-        help="wire format of the pty: witmotion or text, with options as in"
+        help=f"wire format of the pty: {_formats()}; with options as in"
         ' "text?separator=tab&columns=t,ax,ay,az" (default: witmotion)',
+    )
+    add(
+        "--baud",
+        type=int,
+        metavar="BIT/S",
+        help="of the pty: a host at another rate hears garbage (default: at any)",
     )
     add(
         "--can",
@@ -78,6 +84,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="steps of the arrow keys in alpha and beta, deg (default: 22.5,2.5)",
     )
     _add_device(parser)
+
+
+def _formats() -> str:
+    """Names of the wire formats, without importing any."""
+    from fieldcal.sim_device.wire import formats
+
+    return ", ".join(formats())
 
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
@@ -157,7 +170,7 @@ def _link(args: argparse.Namespace, faults: LineFaults, rate: float) -> Link:
     from fieldcal.sim_device.link_serial import SerialLink
     from fieldcal.sim_device.wire import open_wire
 
-    return SerialLink(open_wire(args.serial), faults, args.port_link)
+    return SerialLink(open_wire(args.serial), faults, args.port_link, args.baud)
 
 
 def _profile(args: argparse.Namespace) -> Profile:

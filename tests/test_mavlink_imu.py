@@ -76,22 +76,6 @@ def test_same_truth_over_udp_and_tcp(place: str) -> None:
             assert np.all(np.isfinite(block.temperature))
 
 
-def test_a_minute_at_1_khz_over_tcp_without_a_loss() -> None:
-    options = ("--rate", "1000", "--duration", "60", "--speed", "max")
-    with autopilot("tcpin:127.0.0.1:0", *options) as (where, _):
-        blocks = []
-        url = f"mavlink:{where}?message=HIGHRES_IMU&rate=1000&reconnect=0"
-        with opened(url) as imu:
-            with pytest.raises(DeviceError, match="hung up"):
-                for block in imu.blocks(10.0):
-                    blocks.append(block)
-            health = imu.health
-    got = concat(blocks)
-    assert len(got) == health.samples == 60_000
-    assert health.bad == health.skipped == health.gaps == health.repeated == 0
-    np.testing.assert_allclose(np.diff(got.t), 1e-3, atol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("kind", "given", "name"),
     [

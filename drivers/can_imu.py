@@ -27,7 +27,7 @@ from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Reader
 from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Array, Block, concat
+from fieldcal.samples import Array, Block, Grain, concat
 
 ENOUGH = 10_000
 """Strange frames after which no more identifiers are kept."""
@@ -73,6 +73,11 @@ class Imu(Driver):
     def reconnecting(self) -> bool:
         """True while the bus is gone and is being tried again."""
         return self._reader is not None and self._reader.reconnecting
+
+    @property
+    def grain(self) -> Grain:
+        """One count of the signals."""
+        return self._samples.grain
 
     def host_time(self) -> float:
         """Now, in s of the clock that stamps `Block.t_host`: for a log, its own."""

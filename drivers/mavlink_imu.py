@@ -30,12 +30,11 @@ from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, FieldcalError, InputError
-from fieldcal.samples import Block
+from fieldcal.samples import Block, Grain
 
 if TYPE_CHECKING:
     from fieldcal.drivers.mavlink_installed import Installed
     from fieldcal.drivers.mavlink_link import Line
-    from fieldcal.drivers.mavlink_units import Quantisation
 
 GREETING = 6.0
 """Longest time until it is known who is there and what it has installed, s."""
@@ -133,9 +132,9 @@ class Imu(Driver):
         return self._talk.installed
 
     @property
-    def quantisation(self) -> Quantisation:
-        """What the rounding of the message adds to each sample."""
-        return self._decoder.quantisation
+    def grain(self) -> Grain:
+        """What the message rounds to, once its unit is known."""
+        return self._decoder.grain
 
     @property
     def rate(self) -> float:
@@ -152,7 +151,6 @@ class Imu(Driver):
             "vehicle": decoder.vehicle,
             "acc_unit": decoder.acc_unit,
             "gyr_unit": decoder.gyr_unit,
-            "quantisation": list(self.quantisation),
             "rate_hz": round(self.rate, 3),
             "installed": installed.as_table() if installed else None,
             "says": self.says,

@@ -24,14 +24,13 @@ from fieldcal.drivers.mavlink_frames import (
 from fieldcal.drivers.mavlink_units import (
     ACCELERATIONS,
     RATES,
-    Quantisation,
     refuse,
     told,
     unbiased,
 )
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.timebase import Stamps
-from fieldcal.samples import Array, Block, concat
+from fieldcal.samples import Array, Block, Grain, concat
 
 Fields = NDArray[np.void]
 
@@ -122,12 +121,11 @@ class Decoder(Codec):
             self._extras[number] = message.crc_extra
 
     @property
-    def quantisation(self) -> Quantisation:
-        """What the rounding of the message adds to each sample."""
+    def grain(self) -> Grain:
+        """What the message rounds to, once its unit is known."""
         if not self.kind.whole or not self.acc_unit:
-            return Quantisation(0.0, 0.0)
-        acc, gyr = ACCELERATIONS[self.acc_unit], RATES[self.gyr_unit]
-        return Quantisation(acc / 12**0.5, gyr / 12**0.5)
+            return Grain()
+        return Grain(ACCELERATIONS[self.acc_unit], RATES[self.gyr_unit], self._cut)
 
     @property
     def vehicle(self) -> tuple[int, int] | None:

@@ -19,7 +19,7 @@ from fieldcal.drivers.options import split
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Block
+from fieldcal.samples import Block, Grain
 
 POLL = 0.1
 """Longest wait for a byte before the reader looks whether it should end, s."""
@@ -99,6 +99,11 @@ class Imu(Driver):
     def reconnecting(self) -> bool:
         """True while the port is gone and is being tried again."""
         return self._reader.reconnecting
+
+    @property
+    def grain(self) -> Grain:
+        """What the wire format rounds to."""
+        return self._codec.grain
 
     def receive(self, timeout: float) -> Block | None:
         """Return what has come, or None if nothing whole came in `timeout` seconds."""

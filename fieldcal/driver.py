@@ -20,7 +20,7 @@ from time import monotonic, time
 from typing import Any, ClassVar, NamedTuple, Self
 
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
-from fieldcal.samples import Block, concat
+from fieldcal.samples import Block, Grain, concat
 
 _STARTED = time() - monotonic()
 
@@ -116,6 +116,11 @@ class Driver(ABC):
     def reconnecting(self) -> bool:
         """True while the link is broken and the driver still tries to mend it."""
         return False
+
+    @property
+    def grain(self) -> Grain:
+        """What the device rounds its outputs to, as far as it is known."""
+        return Grain()
 
     @property
     def notes(self) -> Mapping[str, Any]:

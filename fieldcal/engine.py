@@ -168,7 +168,7 @@ class Engine:
         self._operator.tell(arrival.problem)
 
     def _average(self, hold: Hold) -> Average:
-        window = Window(noise=self._noise)
+        window = Window(noise=self._noise, grain=self._driver.grain)
         last = np.nan
         try:
             for block in self._stream:

@@ -6,13 +6,14 @@ disk. So marks are joined over `EVERY` seconds; what is at least `LONG` is said 
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from time import monotonic
 from typing import Any, Protocol
 
 import numpy as np
 
 from fieldcal.driver import Driver
-from fieldcal.samples import Block
+from fieldcal.samples import Block, Grain
 
 EVERY = 1.0
 """Shortest time between two marks of the link, s of the host's clock."""
@@ -51,12 +52,16 @@ class LinkMarks:
         self._longest = 0.0
         self._marked = -EVERY
         self._clocked = monotonic()
+        self._grain = Grain()
 
     def take(self, block: Block) -> None:
         """Note what happened up to these samples."""
         edges = np.concatenate([[self._last], block.t])
         steps = np.diff(edges)
         self._last = float(block.t[-1])
+        if self._grain != self._driver.grain:
+            self._grain = self._driver.grain
+            self._recorder.mark("grain", **self._label, **asdict(self._grain))
         if self._counts() == self._before:
             self._clock()
             return

@@ -25,7 +25,7 @@ from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, headed, rows
 from fieldcal.drivers.layouts import Raw, in_order
 from fieldcal.drivers.options import Options
-from fieldcal.samples import Array, Block
+from fieldcal.samples import Array, Block, Grain
 
 SYNC = b"\xb5\x62"
 HEAD, TAIL, LONGEST = 6, 2, 4104
@@ -56,6 +56,11 @@ class Codec(Base):
         self._held = np.empty((0, 9))
         span = 2**32 * 1e-3 if meas else 2**TAG_BITS * tick
         self._clock = Clock(self.health, options, span=span)
+
+    @property
+    def grain(self) -> Grain:
+        """One count of 24 bits."""
+        return Grain(float(SCALES[0]), float(SCALES[3]))
 
     @classmethod
     def likeness(cls, data: bytes, seconds: float) -> Likeness | None:

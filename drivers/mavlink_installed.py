@@ -129,6 +129,8 @@ class Installed:
     def as_table(self) -> dict[str, Any]:
         """What a recording keeps of it."""
         return {
+            "autopilot": self.autopilot,
+            "instance": self.instance,
             "parameters": self.values,
             "missing": self.missing,
             "taken_out": self.taken_out,

@@ -83,6 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
     from fieldcal.observing import rests, with_turns_between
     from fieldcal.session import RESULT, Session
@@ -94,6 +95,7 @@ def run(args: argparse.Namespace) -> int:
         truth = getattr(mover, "truth", None)
     session = Session.open(task.folder)
     found = with_turns_between(found, session, rests(session))
+    found = with_installed(found, session)
     written = session.write_json(RESULT, found.to_json())
     if args.json:
         concealed = {"virtual": truth} if truth else {}
@@ -211,11 +213,13 @@ def _check(task: Task) -> None:
 @contextlib.contextmanager
 def _link(args: argparse.Namespace, task: Task) -> Iterator[tuple[Driver, Mover]]:
     """Open the device, and whoever turns it."""
+    from fieldcal.commands.signals import interruptible
     from fieldcal.commands.virtual import address
     from fieldcal.driver import open_driver
     from fieldcal.movers import Nobody, VirtualDevice
 
     with contextlib.ExitStack() as stack:
+        stack.enter_context(interruptible())
         if args.virtual is not None:
             options = _virtual(args, task)
             device = stack.enter_context(VirtualDevice(options))

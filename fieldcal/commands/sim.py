@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import json
 import math
-import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -128,6 +127,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command: run until told to stop, or interrupted."""
+    from fieldcal.commands.signals import interruptible
     from fieldcal.sim_device.control import Control
     from fieldcal.sim_device.device import VirtualDevice
     from fieldcal.sim_device.line_faults import LineFaults
@@ -141,7 +141,7 @@ def run(args: argparse.Namespace) -> int:
         _write(args.truth, device.concealed())
     try:
         with contextlib.ExitStack() as stack:
-            stack.enter_context(_interruptible())
+            stack.enter_context(interruptible())
             faults = LineFaults(args.seed)
             link = _link(args, faults, device.rate)
             stack.callback(link.close)
@@ -268,24 +268,6 @@ def _write(path: Path, concealed: dict[str, Any]) -> None:
 def _say(line: str) -> None:
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
-
-
-@contextlib.contextmanager
-def _interruptible() -> Iterator[None]:
-    """Treat being terminated, or losing the terminal, like an interrupt."""
-
-    def interrupt(number: int, frame: object) -> None:
-        for kind in kinds:
-            signal.signal(kind, signal.SIG_IGN)
-        raise KeyboardInterrupt
-
-    kinds = (signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(kind, interrupt) for kind in kinds]
-    try:
-        yield
-    finally:
-        for kind, handler in zip(kinds, before, strict=True):
-            signal.signal(kind, handler)
 
 
 @contextlib.contextmanager

@@ -21,9 +21,8 @@ from fieldcal.arrival import Arrival, Held, judge
 from fieldcal.description import Description
 from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, WrongPosition
-from fieldcal.link_marks import LinkMarks
+from fieldcal.link_marks import LinkMarks, Recording
 from fieldcal.plan import Hold, Note, Plan, Step
-from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block, concat
 from fieldcal.view import Operator, Phase, View
 from fieldcal.windows import Average, Noise, Stillness, Window
@@ -63,7 +62,7 @@ class Engine:
         driver: Driver,
         operator: Operator,
         about: Description,
-        recorder: Recorder,
+        recorder: Recording,
         give_up: float | None = None,
     ) -> None:
         self._driver = driver

@@ -34,6 +34,13 @@ class Marker(Protocol):
         """Append a mark."""
 
 
+class Recording(Marker, Protocol):
+    """Where an engine puts what happens."""
+
+    def append(self, block: Block) -> None:
+        """Record samples."""
+
+
 class LinkMarks:
     """Follows the health of a driver and marks what changes.
 

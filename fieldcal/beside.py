@@ -43,6 +43,11 @@ class Times:
         """Take samples that have come just now."""
         self._pairs.append((float(block.t[-1]), monotonic()))
 
+    @property
+    def known(self) -> bool:
+        """Whether any samples have come."""
+        return bool(self._pairs)
+
     def host(self, t: float) -> float:
         """Host time of a device time."""
         times, hosts = np.array(self._pairs).T
@@ -106,7 +111,8 @@ class Beside:
                     break
             marks.end()
         except FieldcalError as fault:
-            if not self._ends:
+            # what was only just silent when all was over has been heard enough
+            if not (self._ends and self._times.known):
                 self.failed = fault
                 self.mark("failed", text=str(fault))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.errors import DeviceError
+from fieldcal.errors import DeviceError, FieldcalError
 
 if TYPE_CHECKING:
     from fieldcal.beside import Beside
@@ -57,11 +57,14 @@ def solved(folder: Path) -> Calibration:
 
 def results(others: Sequence[Beside]) -> dict[str, Calibration]:
     """Results of the further devices that were heard to the end, by folder."""
-    return {
-        other.folder.name: solved(other.folder)
-        for other in others
-        if other.failed is None
-    }
+    found = {}
+    for other in others:
+        if other.failed is None:
+            try:
+                found[other.folder.name] = solved(other.folder)
+            except FieldcalError as fault:
+                other.failed = fault
+    return found
 
 
 def check_heard(others: Sequence[Beside]) -> None:

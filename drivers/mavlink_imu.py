@@ -124,7 +124,8 @@ class Imu(Driver):
         """Sentences for the operator."""
         heard = [f"asked for {self._asked:g} Hz, got {self.rate:.4g} Hz"]
         slow = self._log is None and self._asked > 0 and self.rate > 0
-        return self._talk.says + heard * slow
+        remark = [self.installed.remark] if self.installed else []
+        return [*self._talk.says, *filter(None, remark), *heard * slow]
 
     @property
     def installed(self) -> Installed | None:

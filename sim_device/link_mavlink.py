@@ -1,8 +1,8 @@
-"""A virtual autopilot on MAVLink, at udpin:, udpout: or tcpin:HOST:PORT.
+"""A virtual autopilot on MAVLink, at udpin:, udpout:, tcpin:HOST:PORT or a pty.
 
-Over TCP a slow host is waited for as on a serial line; over UDP nobody tells, so at a
-speed that a host does not follow it loses packets. Port 0 is any free one. Samples flow
-once a host has asked for some, see `autopilot`.
+Over TCP and a pty a slow host is waited for as on a serial line; over UDP nobody tells,
+so at a speed that a host does not follow it loses packets. Port 0 is any free one.
+Samples flow once a host has asked for some, see `autopilot`.
 """
 
 from __future__ import annotations
@@ -19,10 +19,13 @@ from fieldcal.samples import Block
 from fieldcal.sim_device.autopilot import Autopilot
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
+from fieldcal.sim_device.pty_port import PtyPort
 
 BEAT_S = 1.0
 GONE_S = 5.0
 """Silence after which a host on UDP counts as gone, s: five of its heartbeats."""
+
+DATAGRAMS = ("udpin", "udpout")
 
 TOGETHER = 10
 """Packets in a datagram."""
@@ -38,6 +41,7 @@ class Port(Protocol):
     """A socket that one host talks through."""
 
     address: str
+    place: tuple[str, int]
 
     def fileno(self) -> int:
         """File to watch; -1 while there is none."""
@@ -203,7 +207,7 @@ class MavlinkLink(Link):
         self._autopilot, self._faults, self._rate = autopilot, faults, rate
         self._out: deque[bytes] = deque()
         self._beat = -math.inf
-        self._port: UdpPort | TcpPort | None = None
+        self._port: Port | None = None
         self.come_back()
 
     @property
@@ -224,7 +228,7 @@ class MavlinkLink(Link):
         if not self.attached():
             return
         packets = self._autopilot.samples(block, self._rate)
-        together = len(packets) if self._scheme == "tcpin" else TOGETHER
+        together = TOGETHER if self._scheme in DATAGRAMS else len(packets)
         for first in range(0, len(packets), max(1, together)):
             part = b"".join(packets[first : first + together])
             self._out.append(self._faults.spoil(part))
@@ -255,7 +259,7 @@ class MavlinkLink(Link):
             if not self._out and not ended:
                 ended = True
                 self._port.finish()
-                if self._scheme != "tcpin":
+                if self._scheme in DATAGRAMS:
                     return
             sleep(LOOK_S)
 
@@ -277,6 +281,8 @@ class MavlinkLink(Link):
             return
         if self._scheme == "tcpin":
             self._port = TcpPort(self._place)
+        elif self._scheme == "pty":
+            self._port = PtyPort()
         else:
             self._port = UdpPort(self._place, self._scheme == "udpin")
 
@@ -297,11 +303,12 @@ def open_link(spec: str, faults: LineFaults, rate: float) -> MavlinkLink:
     where, _, query = spec.partition("?")
     scheme, _, rest = where.partition(":")
     host, _, port = rest.rpartition(":")
-    known = ("udpin", "udpout", "tcpin")
-    if scheme not in known or not host or not port.isdecimal() or int(port) > 65535:
+    known = (*DATAGRAMS, "tcpin")
+    placed = scheme in known and host and port.isdecimal() and int(port) < 65536
+    if where != "pty" and not placed:
         raise InputError(
             f"--mavlink {spec}: write {', '.join(known)} with host and port, as in "
-            "udpin:127.0.0.1:14550"
+            "udpin:127.0.0.1:14550, or pty"
         )
     try:
         autopilot = Autopilot(query)
@@ -311,7 +318,7 @@ def open_link(spec: str, faults: LineFaults, rate: float) -> MavlinkLink:
         ) from error
     except InputError as error:
         raise InputError(f"--mavlink: {error}") from error
-    return MavlinkLink(scheme, (host, int(port)), autopilot, faults, rate)
+    return MavlinkLink(scheme, (host, int(port or 0)), autopilot, faults, rate)
 
 
 def _opened(kind: int, place: tuple[str, int] | None) -> socket.socket:

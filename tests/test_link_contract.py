@@ -36,6 +36,7 @@ LINES = {
     "xsens": ("--serial xsens", "serial:{}?format=xsens"),
     "can": ("--can slcan", "can:{}?interface=slcan&dbc=virtual"),
     "mavlink": ("--mavlink tcpin:127.0.0.1:0", "mavlink:{}?rate=1000"),
+    "mavlink on a serial port": ("--mavlink pty", "mavlink:{}?rate=1000"),
     "mavlink in mg": (
         "--mavlink tcpin:127.0.0.1:0",
         "mavlink:{}?rate=1000&message=RAW_IMU",

@@ -80,10 +80,12 @@ def check_same(calibration: Calibration, session: Session) -> None:
 
 def _effective(there: Mapping[str, Any]) -> dict[str, float]:
     """Parameters as they were in the samples."""
-    from fieldcal.drivers.mavlink_installed import Installed, identity
+    from fieldcal.drivers.mavlink_installed import Installed, identity, names
 
     known = Installed(there["autopilot"], there["instance"], dict(there["parameters"]))
-    return {**known.values, **(identity(known) if there["taken_out"] else {})}
+    of_it = sum(names(known.autopilot, known.instance).values(), start=())
+    had = {name: value for name, value in known.values.items() if name in of_it}
+    return {**had, **(identity(known) if there["taken_out"] else {})}
 
 
 def _next(

@@ -281,6 +281,8 @@ def _record(
             engine = Engine(driver, operator, task.about, recorder, give_up)
             if driver.notes:
                 recorder.mark("device", **driver.notes)
+                for text in driver.notes.get("says", ()):
+                    operator.tell(text)
             try:
                 found = engine.run(plan(task.about, task.seconds, task.sigma))
             except FieldcalError as error:

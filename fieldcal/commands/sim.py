@@ -57,8 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--mavlink",
         metavar="URL",
-        help="as an autopilot instead, at udpin:HOST:PORT, udpout:HOST:PORT or"
-        ' tcpin:HOST:PORT, with options as in "tcpin:127.0.0.1:5760?autopilot=px4"',
+        help="as an autopilot instead, at udpin:HOST:PORT, udpout:HOST:PORT,"
+        " tcpin:HOST:PORT or pty, with options as in"
+        ' "tcpin:127.0.0.1:5760?autopilot=px4"',
     )
     add("--port-link", type=Path, metavar="PATH", help="symbolic link to the pty")
     add(

@@ -46,7 +46,8 @@ class Run:
 
     def __init__(self, folder: Path, link: str, *more: str, speed: str = "20") -> None:
         self.folder, self._control = folder / "session", folder / "control"
-        virtual = f"{LINKS[link].format(folder)} --control {self._control}"
+        name, _, conceals = link.partition(" ")
+        virtual = f"{LINKS[name].format(folder)} {conceals} --control {self._control}"
         self._process = subprocess.Popen(
             [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
             + ["--seconds", "10", "--json", "--speed", speed, *more]
@@ -103,6 +104,18 @@ def test_a_link_that_stumbles_costs_nothing_but_time(link: str, tmp_path: Path) 
     for at in np.flatnonzero(np.diff(block.t) > 1.5):
         gap = [m for m in marks if abs(m.get("from_s", -9) - block.t[at]) < 1e-3]
         assert len(gap) == 1 and abs(gap[0]["to_s"] - block.t[at + 1]) < 1e-3
+
+
+def test_a_link_that_loses_all_the_time_is_marked_now_and_then(tmp_path: Path) -> None:
+    run = Run(tmp_path, "serial --with dropped:fraction=0.05")
+    code, _, said = run.end()
+    assert code == 0, said
+    marks, block = run.marks("link"), Session.open(run.folder).block
+    lost = sum(mark["missing"] for mark in marks)
+    share = lost / (lost + len(block))
+    assert 0.03 < share < 0.07
+    seconds = marks[-1]["host_s"] - marks[0]["host_s"]
+    assert 1 <= len(marks) <= seconds + 2
 
 
 def failed(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, Found
+from fieldcal.drivers.framing import Bytes, Candidates, Found, widened
 from fieldcal.drivers.mavlink_frames import (
     LONGEST,
     Packets,
@@ -202,7 +202,7 @@ class Decoder(Codec):
         self._waiting.append((fields, t_host))
         fields = np.concatenate([some for some, _ in self._waiting])
         t_host = np.concatenate([some for _, some in self._waiting])
-        acc = fields["acc"].astype(float)
+        acc = widened(fields["acc"])
         for end in range(FEW, min(len(acc), ENOUGH) + 1, FEW):
             if unit := told(acc[end - FEW : end], self.kind.whole):
                 self.acc_unit, self._waiting = unit, []
@@ -214,7 +214,7 @@ class Decoder(Codec):
     def _block(self, fields: Fields, t_host: Array) -> Block | None:
         if not len(fields):
             return None
-        acc, gyr = fields["acc"].astype(float), fields["gyr"].astype(float)
+        acc, gyr = widened(fields["acc"]), widened(fields["gyr"])
         if self.kind.whole and self._cut:
             acc, gyr = unbiased(acc), unbiased(gyr)
         stamps = fields["t"] * self.kind.tick
@@ -235,7 +235,7 @@ class Decoder(Codec):
 
     def _temperature(self, fields: Fields) -> Array:
         """Temperature in deg C; nan where the message has none."""
-        degrees = fields["temperature"].astype(float)
+        degrees = widened(fields["temperature"])
         if self.kind.whole:
             return np.where(degrees == 0, np.nan, degrees / 100)
         said = fields["updated"]

@@ -21,8 +21,8 @@ from fieldcal.arrival import Arrival, Held, judge
 from fieldcal.description import Description
 from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, WrongPosition
+from fieldcal.link_marks import LinkMarks, Recording
 from fieldcal.plan import Hold, Note, Plan, Step
-from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block, concat
 from fieldcal.view import Operator, Phase, View
 from fieldcal.windows import Average, Noise, Stillness, Window
@@ -62,7 +62,7 @@ class Engine:
         driver: Driver,
         operator: Operator,
         about: Description,
-        recorder: Recorder,
+        recorder: Recording,
         give_up: float | None = None,
     ) -> None:
         self._driver = driver
@@ -72,6 +72,7 @@ class Engine:
         self._give_up = give_up
         self._held: Held | None = None
         self._noise: Noise | None = None
+        self._link = LinkMarks(driver, recorder)
         self._stream = self._record(driver)
         self._rate = np.nan
 
@@ -94,6 +95,8 @@ class Engine:
         except StopIteration as done:
             result: R = done.value
             return result
+        finally:
+            self._link.end()
 
     def _do(self, step: Step) -> object:
         match step:
@@ -115,6 +118,7 @@ class Engine:
     def _record(self, driver: Driver) -> Iterator[Block]:
         for block in driver.blocks():
             self._recorder.append(block)
+            self._link.take(block)
             if len(block) > 1:
                 self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
             yield from _pieces(block)
@@ -163,7 +167,7 @@ class Engine:
         self._operator.tell(arrival.problem)
 
     def _average(self, hold: Hold) -> Average:
-        window = Window(noise=self._noise)
+        window = Window(noise=self._noise, grain=self._driver.grain)
         last = np.nan
         try:
             for block in self._stream:

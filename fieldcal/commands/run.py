@@ -6,17 +6,19 @@ import argparse
 import contextlib
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.further import Devices
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.errors import FieldcalError, InputError, PlanError
 
 if TYPE_CHECKING:
+    from fieldcal.beside import Beside
     from fieldcal.calibration import Calibration
     from fieldcal.description import Description
     from fieldcal.driver import Driver
@@ -60,8 +62,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " and a table [run] of procedure, seconds, sigma, device)",
     )
     add(
-        "--device", metavar="URL", help='such as "serial:/dev/ttyUSB0?format=witmotion"'
+        "--device",
+        action=Devices,
+        metavar="URL",
+        help='such as "serial:/dev/ttyUSB0?format=witmotion"; again for each further'
+        " device that turns with the first",
     )
+    parser.set_defaults(further=[])
     add(
         "--virtual",
         nargs=argparse.OPTIONAL,
@@ -83,6 +90,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal.commands.further import check_heard, results
+    from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
     from fieldcal.observing import rests, with_turns_between
     from fieldcal.session import RESULT, Session
@@ -90,22 +99,31 @@ def run(args: argparse.Namespace) -> int:
     task = make_task(args)
     _check(task)
     with _link(args, task) as (driver, mover):
-        found = _record(args, task, driver, mover)
+        found, others = _record(args, task, driver, mover)
         truth = getattr(mover, "truth", None)
     session = Session.open(task.folder)
     found = with_turns_between(found, session, rests(session))
+    found = with_installed(found, session)
     written = session.write_json(RESULT, found.to_json())
+    further = results(others)
     if args.json:
-        concealed = {"virtual": truth} if truth else {}
-        sys.stdout.write(json.dumps({**found.to_json(), **concealed}) + "\n")
+        more: dict[str, Any] = {"virtual": truth} if truth else {}
+        if further:
+            more["further"] = {name: each.to_json() for name, each in further.items()}
+        sys.stdout.write(json.dumps({**found.to_json(), **more}) + "\n")
     else:
         show(found, truth)
+        for name, each in further.items():
+            sys.stdout.write(f"\n{name}\n")
+            show(each)
         sys.stdout.write(f"recorded: {task.folder}\nwritten:  {written}\n")
     if not args.no_report:
-        page = _report(task.folder)
-        if page and not args.json:
-            sys.stdout.write(f"report:   {page}\n")
-    return 0 if found.good else 1
+        for folder in (task.folder, *(task.folder / name for name in further)):
+            page = _report(folder)
+            if page and not args.json:
+                sys.stdout.write(f"report:   {page}\n")
+    check_heard(others)
+    return 0 if all(each.good for each in (found, *further.values())) else 1
 
 
 def _report(folder: Path) -> Path | None:
@@ -211,13 +229,17 @@ def _check(task: Task) -> None:
 @contextlib.contextmanager
 def _link(args: argparse.Namespace, task: Task) -> Iterator[tuple[Driver, Mover]]:
     """Open the device, and whoever turns it."""
+    from fieldcal.commands.signals import interruptible
+    from fieldcal.commands.virtual import address
     from fieldcal.driver import open_driver
     from fieldcal.movers import Nobody, VirtualDevice
 
     with contextlib.ExitStack() as stack:
+        stack.enter_context(interruptible())
         if args.virtual is not None:
-            device = stack.enter_context(VirtualDevice(_virtual(args, task)))
-            url = f"serial:{device.port}?format={VIRTUAL_FORMAT}"
+            options = _virtual(args, task)
+            device = stack.enter_context(VirtualDevice(options))
+            url = address(options, device.port)
             yield stack.enter_context(open_driver(url)), device
         elif task.device:
             yield stack.enter_context(open_driver(task.device)), Nobody()
@@ -242,18 +264,25 @@ def _virtual(args: argparse.Namespace, task: Task) -> list[str]:
 
 def _record(
     args: argparse.Namespace, task: Task, driver: Driver, mover: Mover
-) -> Calibration:
+) -> tuple[Calibration, Sequence[Beside]]:
+    from fieldcal.beside import beside
     from fieldcal.engine import Engine
     from fieldcal.observing import with_provenance
     from fieldcal.recorder import Recorder
 
     plan = import_module(f"fieldcal.procedures.{task.procedure}").plan
-    with Recorder(task.folder, task.tables) as recorder:
+    with (
+        Recorder(task.folder, task.tables) as own,
+        beside(args.further, own, task.tables) as recorder,
+    ):
         with _operator(args, task, mover) as operator:
+            recorder.tell = operator.tell
             give_up = GIVE_UP if args.headless or args.virtual is not None else None
             engine = Engine(driver, operator, task.about, recorder, give_up)
             if driver.notes:
                 recorder.mark("device", **driver.notes)
+                for text in driver.notes.get("says", ()):
+                    operator.tell(text)
             try:
                 found = engine.run(plan(task.about, task.seconds, task.sigma))
             except FieldcalError as error:
@@ -265,7 +294,7 @@ def _record(
                 sys.stderr.write(f"what was recorded is kept in {task.folder}\n")
                 raise
         recorder.mark("finished", verdict="good" if found.good else "bad")
-    return with_provenance(found, task.about)
+    return with_provenance(found, task.about), recorder.others
 
 
 @contextlib.contextmanager

@@ -59,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from dataclasses import replace
 
+    from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
     from fieldcal.observing import (
         observations,
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     if args.turns != "no" and not args.as_printed:
         found = with_turns_between(found, session, still, args.turns == "yes")
     found = replace(found, warnings=(*still.warnings, *found.warnings))
-    found = with_provenance(found, session.about)
+    found = with_installed(with_provenance(found, session.about), session)
     path = session.write_json(RESULT, found.to_json())
     if args.json:
         for warning in found.warnings:

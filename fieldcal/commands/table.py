@@ -8,6 +8,7 @@ from typing import IO, Any
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.wording import number, title
+from fieldcal.commands.installing import lines
 
 
 def show(
@@ -56,6 +57,8 @@ def _tell(console: Any, calibration: Calibration) -> None:
         console.print(text, markup=False, soft_wrap=True)
 
     line(_fit(calibration))
+    for told in lines(calibration):
+        line(told)
     for warning in calibration.warnings:
         line(f"! {warning}")
     good = "good" if calibration.good else "BAD: do not use these numbers"

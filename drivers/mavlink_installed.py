@@ -129,10 +129,32 @@ class Installed:
     def as_table(self) -> dict[str, Any]:
         """What a recording keeps of it."""
         return {
+            "autopilot": self.autopilot,
+            "instance": self.instance,
             "parameters": self.values,
             "missing": self.missing,
             "taken_out": self.taken_out,
         }
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> Installed:
+        """Read back what a recording kept.
+
+        Raises
+        ------
+        InputError
+            If it is not that.
+
+        """
+        try:
+            values = {str(k): float(v) for k, v in table["parameters"].items()}
+            places = int(table["autopilot"]), int(table["instance"])
+            return cls(*places, values, bool(table["taken_out"]))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(
+                f"what the device had installed is not told in full ({error!r}): "
+                "record again"
+            ) from error
 
 
 def identity(installed: Installed) -> dict[str, float]:

@@ -261,6 +261,11 @@ def _block(columns: dict[str, Array]) -> Block:
     return Block(columns["t"], triad["a"], triad["g"], *rest)
 
 
+def from_table(table: pa.Table) -> Block:
+    """Samples of a table with `COLUMNS` that was written here."""
+    return _block({n: table.column(n).to_numpy() for n in table.column_names})
+
+
 def schema() -> pa.Schema:
     """Columns of a samples file that is written here."""
     import pyarrow as pa

@@ -10,6 +10,7 @@ a window must pass, so that no sample of a turn gets in.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,10 @@ _RATE = 0.02
 Runs = list[tuple[int, int]]
 
 
+Between = Callable[[float, float], Iterable[Block]]
+"""Samples from a time up to another, s, in order, in blocks."""
+
+
 def still_stretches(
     block: Block, min_seconds: float = 2.0, limits: Limits | None = None
 ) -> list[tuple[float, float]]:
@@ -41,7 +46,28 @@ def still_stretches(
 
     Every stretch lasts `min_seconds`, at least 1 s, and passes `average`.
     """
-    cells = _cells(block)
+
+    def between(start: float, end: float) -> list[Block]:
+        return [block.between(start, end)]
+
+    return still_in(_cells([block]), between, min_seconds, limits)
+
+
+def still_in(
+    cells: Table,
+    between: Between,
+    min_seconds: float = 2.0,
+    limits: Limits | None = None,
+) -> list[tuple[float, float]]:
+    """`still_stretches` of a recording that does not fit into memory.
+
+    Parameters
+    ----------
+    cells : of all of it
+    between : gives the samples of a stretch of it
+    min_seconds, limits : as in `still_stretches`
+
+    """
     if len(cells) < 2 * _SPAN:
         return []
     means = cells.steady
@@ -53,7 +79,7 @@ def still_stretches(
     for first, last in _at_rest(spread, view.mean(axis=-1), limits.noise):
         start = float(cells.times[first + _SPAN // 2])
         end = float(cells.times[last - 1 + _SPAN // 2])
-        found += _passing(block.between(start, end), shortest, limits)
+        found += _passing(between, start, end, shortest, limits)
     return found
 
 
@@ -93,24 +119,31 @@ def _valley(ratio: Array) -> float:
 
 
 def _passing(
-    block: Block, shortest: float, limits: Limits
+    between: Between, start: float, end: float, shortest: float, limits: Limits
 ) -> list[tuple[float, float]]:
     """Parts of a stretch that pass as windows: it is cut where it was disturbed."""
-    if not len(block) or block.t[-1] - block.t[0] < shortest:
+    sums, times = Cells(), [np.nan, np.nan]
+    for block in between(start, end):
+        if len(block):
+            sums.add(block)
+            times = [np.fmin(times[0], block.t[0]), block.t[-1]]
+    first, last = float(times[0]), float(times[1])
+    if not last - first >= shortest:
         return []
-    worst = judge(_cells(block), limits).worst
+    worst = judge(sums.table, limits).worst
     if worst.ratio <= 1:
-        return [(float(block.t[0]), float(np.nextafter(block.t[-1], np.inf)))]
-    after = max(worst.at + worst.seconds, float(block.t[0]) + CELL)
+        return [(first, float(np.nextafter(last, np.inf)))]
+    after = max(worst.at + worst.seconds, first + CELL)
     return [
-        *_passing(block.between(-np.inf, worst.at), shortest, limits),
-        *_passing(block.between(after, np.inf), shortest, limits),
+        *_passing(between, start, min(worst.at, end), shortest, limits),
+        *_passing(between, max(after, start), end, shortest, limits),
     ]
 
 
-def _cells(block: Block) -> Table:
+def _cells(blocks: Iterable[Block]) -> Table:
     cells = Cells()
-    cells.add(block)
+    for block in blocks:
+        cells.add(block)
     return cells.table
 
 

@@ -70,7 +70,7 @@ def still_in(
     """
     if len(cells) < 2 * _SPAN:
         return []
-    means = cells.steady
+    means = cells.level
     view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
     spread = view.std(axis=-1)
     shortest = max(1.0, min_seconds)

@@ -14,11 +14,13 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Protocol, cast
 
+from fieldcal.calibration import COMPONENTS
 from fieldcal.errors import InputError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration, Nominal
     from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.samples import Array
     from fieldcal.session import Session
 
 
@@ -41,6 +43,34 @@ class Source:
     session: Session
     installed: Installed | None = field(default=None)
     instance: int = 0
+
+    def linear(self, sensor: str) -> tuple[Array, Array]:
+        """Bias (3,) and matrix (3, 3) of U = bias + matrix f of ``acc`` or ``gyr``."""
+        if sensor == "acc":
+            return self.calibration.accelerometers(self.nominal)
+        return self.calibration.gyroscopes(self.nominal)
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Biases and scale factors for which the nominal value is taken."""
+        every = [
+            f"{group}.{a}" for group, (axes, _) in COMPONENTS.items() for a in axes
+        ]
+        return [name for name in every if name not in self.calibration.names]
+
+    @property
+    def says(self) -> list[str]:
+        """What the user must know whatever the format, one sentence each."""
+        says = []
+        if self.undetermined:
+            names = ", ".join(self.undetermined)
+            says.append(f"not determined, the nominal value is taken: {names}")
+        if self.installed is not None and not self.installed.taken_out:
+            says.append(
+                "the device had a calibration of its own in use: the numbers are for "
+                "what it sends with that in use"
+            )
+        return says
 
 
 class Exporter(Protocol):

@@ -96,17 +96,16 @@ class File(Recording):
             reader = make_reader(
                 file, validate_crcs=True, decoder_factories=[DecoderFactory()]
             )
-            seen, frame, warm = 0, "", float("nan")
+            seen, warm = 0, dict[str, float]()
             try:
                 for _, channel, message, said in reader.iter_decoded_messages(
                     topics=[stream, *degrees]
                 ):
                     if channel.topic != stream:
-                        if said.header.frame_id == frame:
-                            warm = said.temperature
+                        warm[said.header.frame_id] = said.temperature
                         continue
-                    frame = said.header.frame_id
-                    rows.append(_row(said, warm, message.log_time))
+                    degrees_now = warm.get(said.header.frame_id, np.nan)
+                    rows.append(_row(said, degrees_now, message.log_time))
                     seen += 1
                     if len(rows) == MANY:
                         yield _block(rows)

@@ -78,8 +78,9 @@ class File(Recording):
         health = codec.health
         if not health.samples:
             raise InputError(
-                f"{self.path}: holds no sample of {self._name} that has a time; give the"
-                " rate with --rate where the device sends none, or check the options"
+                f"{self.path}: holds no sample of {self._name} that has a time; give"
+                " the rate with --rate where the device sends none, or check the"
+                " options"
             )
         lost = health.skipped + codec.waiting
         if lost or health.bad or health.gaps:

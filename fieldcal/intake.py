@@ -88,7 +88,13 @@ class Judge:
             axis=1
         )
         if empty.any():
-            yield "ax ay az gx gy gz", "hold only zeros", empty
+            columns = " ".join(
+                CHANNELS if np.isfinite(block.gyr).any() else CHANNELS[:3]
+            )
+            later = self._seen + np.arange(len(block)) > 0
+            unstamped = empty & (block.t == 0) & later
+            yield f"t {columns}", "hold only zeros", unstamped
+            yield columns, "hold only zeros", empty & ~unstamped
         yield "t", "is no time", ~np.isfinite(block.t)
         for name, column in zip(CHANNELS, six.T, strict=True):
             if (infinite := np.isinf(column)).any():

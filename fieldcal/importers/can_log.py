@@ -1,7 +1,8 @@
 """Logs of a CAN bus: candump (.log), Vector .asc and .blf, PEAK .trc; python-can.
 
 ``--options "dbc=imu.dbc&map=ax=Accel.X,…"`` says what is in the frames, as in a
-device's address, see `can_map`.
+device's address, see `can_map`. Where the frames carry no time, that of the bus counts,
+as it was logged.
 """
 
 from __future__ import annotations
@@ -79,10 +80,10 @@ class File(Recording):
         """Samples, some frames at a time."""
         from fieldcal.drivers.can_frames import FRAME
         from fieldcal.drivers.can_groups import CanHealth
-        from fieldcal.drivers.can_samples import Samples
+        from fieldcal.drivers.can_stamped import Stamped
 
         options, health = Options("options", self.wanted.options), CanHealth()
-        samples = Samples(self._parts(options), health, options)
+        samples = Stamped(self._parts(options), health, options)
         options.finish()
         for rows in self._rows():
             frames = np.frombuffer(b"".join(rows), FRAME)

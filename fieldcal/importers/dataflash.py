@@ -30,6 +30,9 @@ INSTANCES = {"IMU": 0, "IMU2": 1, "IMU3": 2}
 """Messages with samples; IMU says itself of which sensor, in logs since 2020."""
 
 
+SIX = {f"{kind}{axis}" for kind in ("Acc", "Gyr") for axis in "XYZ"}
+
+
 class Format(NamedTuple):
     """A kind of message: its bytes, and its fields as they stand behind the mark."""
 
@@ -107,7 +110,8 @@ class File(Recording):
                     continue
                 for row in table:
                     key = bytes(row["Name"]).rstrip(b"\0").decode("ascii", "replace")
-                    self._params[key] = float(row["Value"])
+                    if np.isfinite(row["Value"]):
+                        self._params[key] = float(row["Value"])
         self._scanned = True
 
     def _messages(
@@ -183,7 +187,12 @@ class File(Recording):
             form = Format(name, size, np.dtype(layout), factors)
         except (KeyError, ValueError, TypeError):
             form = Format("", size, np.dtype("u1"), {})
-        if name in (*INSTANCES, "PARM") and form.layout.itemsize != size:
+        there = set(form.layout.names or ())
+        needed = {"PARM": {"Name", "Value"}, **dict.fromkeys(INSTANCES, SIX)}
+        fits = form.layout.itemsize == size and there >= needed.get(name, set())
+        if name in INSTANCES:
+            fits = fits and bool(there & {"TimeUS", "TimeMS"})
+        if name in needed and not fits:
             self.damaged(f"byte {at}", f"defines {name} in a way that does not fit")
             return
         if size > 3 and self._formats.setdefault(kind, form).size == size:

@@ -40,6 +40,9 @@ COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
 NOT_UPDATED = 0x7FFFFFFF
 """What accelerometer_timestamp_relative says where nothing new came."""
 
+NEVER = 1 << 62
+"""Where nothing was appended."""
+
 Table = dict[str, Array]
 
 
@@ -119,6 +122,15 @@ class File(Recording):
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of a sensor, a piece of the log at a time."""
         self._scan()
+        try:
+            yield from self._blocks(stream)
+        except (KeyError, ValueError, TypeError) as error:
+            raise InputError(
+                f"{self.path}: {stream} is not defined as a sensor is ({error}); copy"
+                " it again from where it came"
+            ) from error
+
+    def _blocks(self, stream: str) -> Iterator[Block]:
         topic, _, number = stream.partition(".")
         if topic == COMBINED:
             wanted = {(COMBINED, int(number))}
@@ -230,14 +242,14 @@ class File(Recording):
         ids = {n for n, topic in self._ids.items() if topic in wanted}
         out, size = bytearray(), len(data)
         jumps = [offset - base for offset in self._appended if offset >= base]
-        jump = jumps[0] if jumps else size + 1
+        jump = jumps[0] if jumps else NEVER
         while at + 3 <= size:
             end = at + 3 + (data[at] | data[at + 1] << 8)
             kind = data[at + 2]
             if end > jump > at:
                 # what follows was appended after a crash had cut a message
                 at, jumps = jump, jumps[1:]
-                jump = jumps[0] if jumps else size + 1
+                jump = jumps[0] if jumps else NEVER
                 continue
             if kind not in KNOWN or end == at + 3:
                 back = data.find(SYNC, at)

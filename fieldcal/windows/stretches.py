@@ -29,6 +29,9 @@ _LEAST, _MOST = 4.0, 64.0
 _OWN = 4.0
 """Spread, in multiples of what is usual in a stretch, that still belongs to it."""
 
+_PART = 4096
+"""Spans looked at together: all of them at once would take ten times their memory."""
+
 _RATE = 0.02
 """Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
 
@@ -72,11 +75,13 @@ def still_in(
         return []
     means = cells.level
     view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
-    spread = view.std(axis=-1)
+    parts = [view[i : i + _PART] for i in range(0, len(view), _PART)]
+    spread = np.concatenate([part.std(axis=-1) for part in parts])
+    level = np.concatenate([part.mean(axis=-1) for part in parts])
     shortest = max(1.0, min_seconds)
     found: list[tuple[float, float]] = []
     limits = limits or Limits()
-    for first, last in _at_rest(spread, view.mean(axis=-1), limits.noise):
+    for first, last in _at_rest(spread, level, limits.noise):
         start = float(cells.times[first + _SPAN // 2])
         end = float(cells.times[last - 1 + _SPAN // 2])
         found += _passing(between, start, end, shortest, limits)

@@ -159,7 +159,14 @@ class Written:
         from fieldcal.sample_files import schema
 
         self._path = path
-        self._writer = pyarrow.parquet.ParquetWriter(path, schema())
+        # no two samples are alike: a dictionary of them only takes time
+        self._writer = pyarrow.parquet.ParquetWriter(
+            path,
+            schema(),
+            compression="lz4",
+            use_dictionary=False,
+            use_byte_stream_split=True,
+        )
         self._waiting: list[Block] = []
         self._many = 0
         self._groups: list[tuple[float, float]] = []

@@ -40,6 +40,8 @@ COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
 NOT_UPDATED = 0x7FFFFFFF
 """What accelerometer_timestamp_relative says where nothing new came."""
 
+DATA = ord("D")
+
 NEVER = 1 << 62
 """Where nothing was appended."""
 
@@ -62,7 +64,8 @@ class File(Recording):
         """Sensors that have samples in the log."""
         self._scan()
         found = []
-        for topic, number in sorted(self._counts):
+        there = {topic for n, topic in self._ids.items() if self._seen[n]}
+        for topic, number in sorted(there):
             if topic == ACCEL:
                 old = "x_raw" in self._fields(ACCEL)
                 what = "calibrated by the driver" if old else "raw, sensor's frame"
@@ -167,9 +170,8 @@ class File(Recording):
 
         self._head, self._subscribed = b"", b""
         self._ids: dict[int, tuple[str, int]] = {}
-        self._counts: dict[tuple[str, int], int] = {}
+        self._seen = [0] * 65536
         self._appended: list[int] = []
-        self._lost = 0
         for _ in self._messages(set(), scan=True):
             pass
         with contextlib.redirect_stdout(io.StringIO()):
@@ -243,9 +245,19 @@ class File(Recording):
         out, size = bytearray(), len(data)
         jumps = [offset - base for offset in self._appended if offset >= base]
         jump = jumps[0] if jumps else NEVER
+        counts = self._seen
         while at + 3 <= size:
             end = at + 3 + (data[at] | data[at + 1] << 8)
             kind = data[at + 2]
+            # nearly all messages are data, so these come first and go fast
+            if kind == DATA and at + 5 <= end <= size and not at < jump < end:
+                number = data[at + 3] | data[at + 4] << 8
+                if scan:
+                    counts[number] += 1
+                elif number in ids:
+                    out += data[at:end]
+                at = end
+                continue
             if end > jump > at:
                 # what follows was appended after a crash had cut a message
                 at, jumps = jump, jumps[1:]
@@ -262,15 +274,7 @@ class File(Recording):
                 continue
             if end > size:
                 break
-            if kind == 68:  # D
-                number = data[at + 3] | data[at + 4] << 8 if end > at + 4 else -1
-                if scan:
-                    topic = self._ids.get(number)
-                    if topic:
-                        self._counts[topic] = self._counts.get(topic, 0) + 1
-                elif number in ids:
-                    out += data[at:end]
-            elif scan:
+            if scan:
                 self._define(kind, data[at:end])
             at = end
         return bytes(out), at

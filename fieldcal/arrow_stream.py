@@ -26,14 +26,22 @@ END = MARKER + b"\0\0\0\0"
 
 
 class Encoder:
-    """Makes the bytes of a stream, a batch at a time."""
+    """Makes the bytes of a stream, a batch at a time.
 
-    def __init__(self, schema: pa.Schema) -> None:
+    Parameters
+    ----------
+    schema : columns of every batch
+    number, row : batches and rows that are there already, in a stream that goes on
+
+    """
+
+    def __init__(self, schema: pa.Schema, number: int = 0, row: int = 0) -> None:
         import pyarrow as pa
 
         self._sink = io.BytesIO()
         self._stream = pa.ipc.new_stream(self._sink, schema)
-        self._number = self._row = 0
+        self._number, self._row = number, row
+        self._there = schema.serialize().to_pybytes() if number else b""
 
     def batch(self, batch: pa.RecordBatch) -> bytes:
         """Bytes of the next batch, with those of the stream's head before the first."""
@@ -53,7 +61,8 @@ class Encoder:
         return self._taken()
 
     def _taken(self) -> bytes:
-        data = self._sink.getvalue()
+        data = self._sink.getvalue().removeprefix(self._there)
+        self._there = b""
         self._sink.seek(0)
         self._sink.truncate()
         return data
@@ -77,6 +86,7 @@ class Found(NamedTuple):
     batches : those that are whole, in order
     says : what is not whole, one sentence without the file's name each
     checked : whether every batch had a checksum
+    number, row : of the batch that would follow
 
     """
 
@@ -84,6 +94,24 @@ class Found(NamedTuple):
     batches: list[pa.RecordBatch]
     says: list[str]
     checked: bool
+    number: int
+    row: int
+
+
+def whole(data: bytes) -> int:
+    """Bytes up to the end of the last whole batch; 0 where there is none.
+
+    A stream that was closed in order ends behind that, with a marker.
+    """
+    import pyarrow as pa
+
+    source, end, batches = pa.BufferReader(data), 0, 0
+    try:
+        while True:
+            batches += pa.ipc.read_message(source).type == "record batch"
+            end = int(source.tell())
+    except (pa.ArrowException, EOFError, OSError):
+        return end if batches else 0
 
 
 def decode(data: bytes, usual: pa.Schema | None = None) -> Found:
@@ -118,7 +146,17 @@ class _Decoder:
         at = self._read_head()
         if self._schema is not None:
             self._read_all(at)
-        return Found(self._schema, self._batches, self._says, self._checked)
+        if not self._checked:
+            self._expected = len(self._batches)
+            self._row = sum(batch.num_rows for batch in self._batches)
+        return Found(
+            self._schema,
+            self._batches,
+            self._says,
+            self._checked,
+            self._expected,
+            self._row,
+        )
 
     def _read_head(self) -> int:
         """Where the first batch begins."""

@@ -201,6 +201,33 @@ def test_a_disk_that_takes_half_a_batch_is_left_with_whole_ones(
     assert not faults(tmp_path / "s", max(map(int, lines)))
 
 
+@pytest.mark.parametrize("cut", [0, 8, 100])
+def test_a_recording_that_broke_off_is_gone_on_with(tmp_path: Path, cut: int) -> None:
+    folder = tmp_path / "s"
+    with Recorder(folder, ABOUT) as recorder:
+        for first in (0, 50):
+            recorder.append(block(first))
+            recorder.flush()
+    path = folder / "samples.arrows"
+    path.write_bytes(path.read_bytes()[: -cut or None])
+    (folder / "marks.jsonl").write_text('{"event": "told", "text": "a"}\n{"eve')
+    there = 100 if cut <= 8 else 50
+    with Recorder(folder, None) as recorder:
+        recorder.append(block(5000))
+        recorder.append(block(5050))
+        recorder.mark("told", text="b")
+    found = Session.open(folder)
+    expected = [*range(there), *range(5000, 5100)]
+    np.testing.assert_array_equal(found.block.seq, expected)
+    assert [m["text"] for m in found.marks()] == ["a", "b"]
+    assert not found.warnings and not list(findings(folder))
+    with Recorder(folder, None) as recorder:
+        # its clock has begun anew, and goes on behind a break
+        shifted = recorder.append(block(0))
+    assert shifted.t[0] >= 5.099 + 1.0
+    assert (np.diff(Session.open(folder).block.t) > 0).all()
+
+
 def test_samples_of_a_device_that_falls_silent_are_written(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", ABOUT) as recorder:
         recorder.append(block(0))

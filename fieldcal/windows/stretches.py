@@ -29,6 +29,9 @@ _LEAST, _MOST = 4.0, 64.0
 _OWN = 4.0
 """Spread, in multiples of what is usual in a stretch, that still belongs to it."""
 
+_LONGEST = 36_000
+"""Cells of the longest stretch, an hour: a longer rest is several of them."""
+
 _PART = 4096
 """Spans looked at together: all of them at once would take ten times their memory."""
 
@@ -47,7 +50,8 @@ def still_stretches(
 ) -> list[tuple[float, float]]:
     """Find where the device was still, (start, end) in s of device time, in order.
 
-    Every stretch lasts `min_seconds`, at least 1 s, and passes `average`.
+    Every stretch lasts `min_seconds`, at least 1 s, an hour at most, and passes
+    `average`.
     """
 
     def between(start: float, end: float) -> list[Block]:
@@ -82,9 +86,10 @@ def still_in(
     found: list[tuple[float, float]] = []
     limits = limits or Limits()
     for first, last in _at_rest(spread, level, limits.noise):
-        start = float(cells.times[first + _SPAN // 2])
-        end = float(cells.times[last - 1 + _SPAN // 2])
-        found += _passing(between, start, end, shortest, limits)
+        for cut in range(first, last, _LONGEST):
+            start = float(cells.times[cut + _SPAN // 2])
+            end = float(cells.times[min(cut + _LONGEST, last - 1) + _SPAN // 2])
+            found += _passing(between, start, end, shortest, limits)
     return found
 
 

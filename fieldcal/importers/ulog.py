@@ -22,6 +22,7 @@ import numpy as np
 
 from fieldcal.drivers.mavlink_installed import PX4, Installed, names
 from fieldcal.errors import InputError
+from fieldcal.pairing import Pair
 from fieldcal.recording import Recording, Stream, pieces
 from fieldcal.samples import Array, Block
 
@@ -141,10 +142,12 @@ class File(Recording):
                 for table in tables.values():
                     yield _combined(table)
             return
-        pair = _Pair()
+        pair = Pair()
         for tables in self._tables({(ACCEL, int(number)), (GYRO, int(number))}):
+            accel, gyro = (tables.get((t, int(number))) for t in (ACCEL, GYRO))
             block = pair.feed(
-                tables.get((ACCEL, int(number))), tables.get((GYRO, int(number)))
+                _sensor(accel, "acc") if accel else None,
+                _sensor(gyro, "gyr") if gyro else None,
             )
             if len(block):
                 yield block
@@ -311,65 +314,9 @@ def _stamps(table: Table) -> Array:
     return np.asarray(table.get("timestamp_sample", table["timestamp"])) * 1e-6
 
 
-class _Pair:
-    """Puts each sample of an accelerometer beside the gyroscope's nearest in time.
-
-    Attributes
-    ----------
-    worst : longest time between the two of a pair, s
-
-    """
-
-    def __init__(self) -> None:
-        self._acc: list[Block] = []
-        self._gyr: list[Block] = []
-        self._period = np.nan
-        self.worst = 0.0
-
-    def feed(self, accel: Table | None, gyro: Table | None) -> Block:
-        """Return samples of which both sides are known."""
-        from fieldcal.samples import concat
-
-        if accel:
-            acc = _three(accel, "{}", "xyz")
-            degrees = accel.get("temperature")
-            self._acc.append(Block.of(_stamps(accel), acc, None, degrees))
-        if gyro:
-            gyr = _three(gyro, "{}", "xyz")
-            unknown = np.full(gyr.shape, np.nan)
-            self._gyr.append(Block.of(_stamps(gyro), unknown, gyr))
-        acc_all, gyr_all = concat(self._acc), concat(self._gyr)
-        until = gyr_all.t[-1] if len(gyr_all) else -np.inf
-        ready = int(np.searchsorted(acc_all.t, until))
-        self._acc = [acc_all[ready:]]
-        out = self._paired(acc_all[:ready], gyr_all)
-        if len(out):
-            keep = max(0, int(np.searchsorted(gyr_all.t, out.t[-1])) - 1)
-            self._gyr = [gyr_all[keep:]]
-        else:
-            self._gyr = [gyr_all]
-        return out
-
-    def rest(self) -> Block:
-        """Return the last samples."""
-        from fieldcal.samples import concat
-
-        return self._paired(concat(self._acc), concat(self._gyr))
-
-    def _paired(self, acc: Block, gyr: Block) -> Block:
-        if not len(acc):
-            return acc
-        if len(acc) > 1:
-            self._period = float(np.median(np.diff(acc.t)))
-        out = np.full((len(acc), 3), np.nan)
-        if len(gyr):
-            right = np.searchsorted(gyr.t, acc.t).clip(0, len(gyr) - 1)
-            left = (right - 1).clip(0)
-            nearer = np.abs(gyr.t[left] - acc.t) <= np.abs(gyr.t[right] - acc.t)
-            nearest = np.where(nearer, left, right)
-            apart = np.abs(gyr.t[nearest] - acc.t)
-            close = ~(apart > self._period / 2)
-            out[close] = gyr.gyr[nearest[close]]
-            if close.any():
-                self.worst = max(self.worst, float(apart[close].max()))
-        return Block.of(acc.t, acc.acc, out, acc.temperature)
+def _sensor(table: Table, kind: str) -> Block:
+    """Samples of one sensor; the other's are unknown."""
+    three, t = _three(table, "{}", "xyz"), _stamps(table)
+    if kind == "acc":
+        return Block.of(t, three, None, table.get("temperature"))
+    return Block.of(t, np.full(three.shape, np.nan), three)

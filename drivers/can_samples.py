@@ -30,6 +30,7 @@ from fieldcal.drivers.can_map import COLUMNS, Channel, Part
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
+from fieldcal.drivers.timebase import Timebase
 from fieldcal.errors import InputError
 from fieldcal.samples import CHANNELS, Array, Block, Grain
 
@@ -72,7 +73,9 @@ class Samples:
         stamp = self._channel("t")
         tick = stamp.field.scale * stamp.scale if stamp else 0.0
         span = tick * stamp.field.span if stamp else float("inf")
-        self._clock = Clock(health, options, tick if span < np.inf else 0.0, span)
+        self._clock: Timebase = Clock(
+            health, options, tick if span < np.inf else 0.0, span
+        )
         counter = self._channel("seq")
         self._sequence = Sequence(counter.field.span if counter else float("inf"))
         self._temperature = float("nan")

@@ -162,6 +162,26 @@ class Installed:
             "taken_out": self.taken_out,
         }
 
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> Installed:
+        """Read back what a recording kept.
+
+        Raises
+        ------
+        InputError
+            If it is not that.
+
+        """
+        try:
+            values = {str(k): float(v) for k, v in table["parameters"].items()}
+            places = int(table["autopilot"]), int(table["instance"])
+            return cls(*places, values, bool(table["taken_out"]))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(
+                f"what the device had installed is not told in full ({error!r}): "
+                "record again"
+            ) from error
+
 
 def identity(installed: Installed) -> dict[str, float]:
     """Parameters that are no calibration; none where not all are known."""

@@ -32,6 +32,15 @@ def is_log(place: str) -> bool:
 
 def split(data: bytes) -> list[Chunk]:
     """Cut a log into packets with their arrivals, s since 1970."""
+    chunks, at = cut(data)
+    rest = data[at + STAMP :]
+    if len(rest) >= 3 and rest[0] in HEADS:
+        chunks.append(Chunk(int.from_bytes(data[at : at + STAMP], "big") / 1e6, rest))
+    return chunks
+
+
+def cut(data: bytes) -> tuple[list[Chunk], int]:
+    """Cut a stretch of a log into whole packets; where the next one begins."""
     chunks, at, last = [], 0, len(data) - STAMP - 3
     while at <= last:
         body = at + STAMP
@@ -40,10 +49,12 @@ def split(data: bytes) -> list[Chunk]:
             continue
         signed = data[body] == SECOND and data[body + 2] & 1
         size = HEADS[data[body]] + data[body + 1] + 2 + SIGNATURE * signed
+        if body + size > len(data):
+            break
         stamp = int.from_bytes(data[at:body], "big") / 1e6
         chunks.append(Chunk(stamp, data[body : body + size]))
         at = body + size
-    return chunks
+    return chunks, at
 
 
 class Log:

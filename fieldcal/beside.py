@@ -137,14 +137,15 @@ class First:
         self._told: set[Path] = set()
         self.tell: Callable[[str], None] = lambda text: None
 
-    def append(self, block: Block) -> None:
-        """Record samples of the first device."""
-        self._times.add(block)
-        self._recorder.append(block)
+    def append(self, block: Block) -> Block:
+        """Record samples of the first device; returns them as recorded."""
+        recorded = self._recorder.append(block)
+        self._times.add(recorded)
         for other in self.others:
             if other.failed is not None and other.folder not in self._told:
                 self._told.add(other.folder)
                 self.tell(f"{other.folder.name}: {other.failed}")
+        return recorded
 
     def mark(self, event: str, **what: Any) -> None:
         """Append a mark, and a window to all sessions."""

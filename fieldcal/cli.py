@@ -22,6 +22,8 @@ COMMANDS = {
     "diagnose": ("say what physics the simulation leaves out", "diagnose"),
     "report": ("make a page of a session that opens offline", "report"),
     "import": ("make a session of a recording from elsewhere", "import_recording"),
+    "export": ("write a calibration for another program", "export"),
+    "verify": ("say whether a session is whole", "verify"),
     "sim": ("be a virtual device on a link", "sim"),
     "ports": ("list the devices that are plugged in", "ports"),
 }

@@ -37,8 +37,8 @@ class Marker(Protocol):
 class Recording(Marker, Protocol):
     """Where an engine puts what happens."""
 
-    def append(self, block: Block) -> None:
-        """Record samples."""
+    def append(self, block: Block) -> Block:
+        """Record samples; returns them as recorded."""
 
 
 class LinkMarks:

@@ -82,25 +82,16 @@ def _table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
 def _read_arrows(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     import pyarrow as pa
 
-    batches: list[pa.RecordBatch] = []
-    cut = False
-    with path.open("rb") as file:
-        try:
-            reader = pa.ipc.open_stream(file)
-        except (pa.ArrowInvalid, EOFError) as error:
-            raise SessionError(
-                f"{path}: holds no samples: it was cut off before the first were there"
-            ) from error
-        try:
-            for batch in reader:
-                batch.validate(full=True)
-                batches.append(batch)
-        except (pa.ArrowInvalid, OSError):
-            cut = True
-        table = pa.Table.from_batches(batches, reader.schema)
-    # a stream that was closed in order ends with a marker of 8 bytes
-    ended = path.read_bytes()[-8:] == b"\xff\xff\xff\xff\0\0\0\0"
-    return table, _cut_off(path, table) if cut or not ended else ()
+    from fieldcal.arrow_stream import decode
+
+    data = path.read_bytes()
+    found = decode(data, schema())
+    if found.schema is None:
+        raise SessionError(
+            f"{path}: holds no samples: it was cut off before the first were there"
+        )
+    table = pa.Table.from_batches(found.batches, found.schema)
+    return table, tuple(f"{path.name}: {sentence}" for sentence in found.says)
 
 
 def _read_parquet(path: Path) -> pa.Table:
@@ -268,6 +259,18 @@ def _block(columns: dict[str, Array]) -> Block:
     }
     rest = [columns.get(n, unknown) for n in ("temperature", "seq", "t_host")]
     return Block(columns["t"], triad["a"], triad["g"], *rest)
+
+
+def from_table(table: pa.Table) -> Block:
+    """Samples of a table with `COLUMNS` that was written here."""
+    return _block({n: table.column(n).to_numpy() for n in table.column_names})
+
+
+def schema() -> pa.Schema:
+    """Columns of a samples file that is written here."""
+    import pyarrow as pa
+
+    return pa.schema([(name, pa.float64()) for name in COLUMNS])
 
 
 def to_batch(block: Block) -> pa.RecordBatch:

@@ -15,6 +15,7 @@ import contextlib
 import json
 import os
 import tempfile
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -62,8 +63,9 @@ class Session:
         """
         folder = Path(folder)
         about = description.read(folder / DESCRIPTION)
-        marks = list(read_marks(folder / MARKS))
-        return cls(folder, _with_windows(about, marks))
+        says: list[str] = []
+        marks = list(read_marks(folder / MARKS, says))
+        return cls(folder, _with_windows(about, marks), tuple(says))
 
     @property
     def positions(self) -> tuple[Position, ...]:
@@ -138,28 +140,62 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
     return replace(about, windows=tuple(windows))
 
 
-def read_marks(path: Path) -> Iterator[dict[str, Any]]:
-    """Marks of a file; a last line that was cut off is left out, no file gives none.
+def mark_line(mark: Mapping[str, Any]) -> str:
+    r"""Return a mark as a line of marks.jsonl, with its checksum.
+
+    >>> mark_line({"event": "told"})
+    '{"event": "told", "crc32": "1a049d94"}\\n'
+    """
+    text = json.dumps(mark)
+    return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'
+
+
+def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:
+    """Marks of a file that are whole; no file gives none.
+
+    A line that was changed is left out, and so is a last one that was cut off.
+
+    Parameters
+    ----------
+    path : marks.jsonl
+    says : where what was left out is said, one sentence each
 
     Raises
     ------
     SessionError
-        If a line before the last is not a JSON object.
+        If the file cannot be read.
 
     """
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
     except FileNotFoundError:
         return
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be read: {error}") from error
     for number, line in enumerate(lines, start=1):
-        try:
-            mark = json.loads(line) if line.strip() else None
-        except ValueError as error:
-            if number == len(lines):
-                return
-            raise SessionError(f"{path}: line {number} is not JSON: {error}") from error
-        if isinstance(mark, dict):
+        if not line.strip():
+            continue
+        mark = _mark(line)
+        if mark is not None:
             yield mark
+        elif says is not None:
+            what = "was cut off" if number == len(lines) else "is damaged"
+            says.append(f"{path.name}: line {number} {what} and left out")
+
+
+def _mark(line: str) -> dict[str, Any] | None:
+    """Return a mark of a line; None if it is none, or not as it was written."""
+    try:
+        mark = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(mark, dict):
+        return None
+    told = mark.pop("crc32", None)
+    text = line.rpartition(', "crc32": ')[0] + "}"
+    if told is not None and told != f"{zlib.crc32(text.encode()):08x}":
+        return None
+    return mark
 
 
 def write_whole(path: Path, text: str) -> Path:

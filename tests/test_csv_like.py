@@ -11,10 +11,19 @@ from hypothesis import strategies as st
 from fieldcal.cli import main
 from fieldcal.errors import FieldcalError, InputError
 from fieldcal.gravity import G0
-from fieldcal.importers.csv_like import Layout, read
+from fieldcal.importers.csv_like import File
+from fieldcal.intake import Judge
+from fieldcal.recording import Wanted as Layout
+from fieldcal.samples import Block, concat
 from fieldcal.session import Session
 
 ACC = ("ax", "ay", "az")
+
+
+def read(path: Path, layout: Layout) -> Block:
+    recording = File(path, layout)
+    judge = Judge(str(path), recording.place, repair=False)
+    return concat(judge.good(block) for block in recording.blocks("0"))
 
 
 def file(folder: Path, text: str) -> Path:
@@ -78,7 +87,11 @@ def test_a_gz_is_read_as_such(tmp_path: Path) -> None:
         ("1,2,3\n", Layout(("ax", "ax", "ay"), 1), "named twice"),
         ("1,2,3\n", Layout(("t", "_", "_")), "neither ax ay az nor"),
         ("1,2,3\n", Layout(ACC, 1, acc_unit="furlong"), "'furlong' is none of"),
-        ("1,1,2,3\n1,1,2,3\n", Layout(("t", *ACC)), "line 2: its time is not later"),
+        (
+            "1,1,2,3\n1,1,2,3\n",
+            Layout(("t", *ACC)),
+            "line 2, column t: is not later than above",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_refused_in_words(

@@ -1,45 +1,46 @@
-"""`fieldcal import`: a session folder of a recording from elsewhere."""
+"""`fieldcal import`: session folders of recordings from elsewhere."""
 
 from __future__ import annotations
 
 import argparse
-import shutil
+import re
 import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
-from fieldcal.errors import InputError, SessionError
+from fieldcal.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.samples import Block
+    from fieldcal.recording import Recording, Wanted
 
 EXAMPLE = """\
   fieldcal import log.csv --columns t,ax,ay,az,gx,gy,gz --acc-unit g --gyr-unit deg/s
   fieldcal import imu0.log.gz --columns ax,ay,az,gx,gy,gz --rate 100 -o imu0
+  fieldcal import flight.ulg --list
+  fieldcal import flight.bin --instance IMU.0
+  fieldcal import drive.log --options "dbc=imu.dbc&map=ax=Accel.X,ay=Accel.Y,az=Accel.Z"
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
-    add("file", type=Path, metavar="FILE", help="text file with columns, or its .gz")
+    add("files", type=Path, nargs="+", metavar="FILE", help="recording, also as .gz")
     add("-o", "--output", type=Path, help="session folder (default: the file's name)")
+    add("--format", default="", metavar="NAME", help="instead of what the content says")
+    add("--list", action="store_true", help="only say which IMUs are in it")
     add(
-        "--columns",
-        required=True,
-        help="what each column is, separated by commas: t, ax ay az, gx gy gz,"
-        " temperature, seq, t_host, or _ to skip one",
+        "--instance",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="only this IMU, as --list names it (default: each into its own folder)",
     )
-    add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
-    add("--separator", help="between columns (default: found)")
-    add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
-    add("--acc-unit", default="m/s^2", help="m/s^2 (default), g, mg, V, count")
-    add("--gyr-unit", default="rad/s", help="rad/s (default), deg/s, mrad/s, V, count")
-    add("--time-unit", default="s", help="s (default), ms, us, ns")
-    add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
-    add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
+    add("--repair", action="store_true", help="leave out bad rows, and say which")
+    add("--join", action="store_true", help="FILEs hold channels of one IMU, same rows")
+    add("--options", default="", metavar="QUERY", help="as in a device's address")
+    _add_columns(parser)
     add(
         "--still",
         type=float,
@@ -50,13 +51,67 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_site(parser)
 
 
+def _add_columns(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument_group(
+        "files that do not say what is in them"
+    ).add_argument
+    add(
+        "--columns",
+        action="append",
+        default=[],
+        help="what each column is, separated by commas: t, ax ay az, gx gy gz,"
+        " temperature, seq, t_host, or _ to skip one; t=NAME,ax=NAME where they have"
+        " names; with --join once for each FILE",
+    )
+    add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
+    add("--separator", help="between columns (default: found)")
+    add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
+    add("--acc-unit", default="m/s^2", help="m/s^2 (default), g, mg, V, count")
+    add("--gyr-unit", default="rad/s", help="rad/s (default), deg/s, mrad/s, V, count")
+    add("--time-unit", default="s", help="s (default), ms, us, ns")
+    add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
+    add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
+
+
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.importers.csv_like import Layout, read
-    from fieldcal.windows import still_stretches
+    from fieldcal.joined import Joined
+    from fieldcal.recording import open_recording
 
-    layout = Layout(
-        tuple(name.strip() for name in args.columns.split(",")),
+    if len(args.columns) not in (0, 1, len(args.files)):
+        raise InputError("give --columns once, or once for each file")
+    opened: list[Recording] = [
+        open_recording(path, _wanted(args, i), args.format, args.repair)
+        for i, path in enumerate(args.files)
+    ]
+    if args.join:
+        opened = [Joined(opened)]
+    if args.list:
+        return _list(opened)
+    for recording in opened:
+        name = recording.path.name.split(".")[0]
+        folder = args.output or Path(name)
+        if args.output and len(opened) > 1:
+            folder = args.output / name
+        names = _chosen(recording, args.instance)
+        says, mended = list(recording.says), list(recording.mended)
+        for stream in names:
+            # what was said of one IMU of the file is no matter of another
+            recording.says, recording.mended = list(says), list(mended)
+            inner = re.sub(r"[^\w.-]+", "_", stream).strip("_")
+            _bring(
+                args, recording, stream, folder / inner if len(names) > 1 else folder
+            )
+    return 0
+
+
+def _wanted(args: argparse.Namespace, i: int) -> Wanted:
+    from fieldcal.recording import Wanted
+
+    given = args.columns[min(i, len(args.columns) - 1)] if args.columns else ""
+    columns = tuple(name.strip() for name in given.split(",")) if given else ()
+    return Wanted(
+        columns,
         args.rate,
         args.separator,
         args.skip,
@@ -65,54 +120,53 @@ def run(args: argparse.Namespace) -> int:
         args.time_unit,
         args.acc_lsb,
         args.gyr_lsb,
+        args.options,
     )
-    block = read(args.file, layout)
-    stretches = still_stretches(block, args.still)
-    folder = args.output or Path(args.file.name.split(".")[0])
-    about = {"format": 1, **site_tables(args, args.file.name.split(".")[0])}
+
+
+def _list(opened: list[Recording]) -> int:
+    for recording in opened:
+        for stream in recording.streams():
+            sys.stdout.write(f"{recording.path}\t{stream.name}\t{stream.says}\n")
+    return 0
+
+
+def _chosen(recording: Recording, wanted: list[str]) -> list[str]:
+    """Names of the streams that are brought in."""
+    there = [stream.name for stream in recording.streams()]
+    for name in wanted:
+        if name not in there:
+            raise InputError(
+                f"{recording.path}: has no {name}; there are {', '.join(there)}"
+            )
+    return wanted or there
+
+
+def _bring(
+    args: argparse.Namespace, recording: Recording, stream: str, folder: Path
+) -> None:
+    from fieldcal.importing import bring_in
+
+    name = recording.path.name.split(".")[0]
+    about: dict[str, Any] = {"format": 1, **site_tables(args, name)}
     units = {"acceleration": args.acc_unit, "angular_rate": args.gyr_unit}
     if kept := {k: u for k, u in units.items() if u in ("V", "count")}:
         about["units"] = kept
     if args.rate:
         about["sampling"] = {"rate_hz": args.rate}
-    about["position"] = [
-        {"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches
-    ]
-    _write(folder, about, block)
-    sys.stderr.write(
-        f"{folder}: {len(block)} samples over {block.t[-1] - block.t[0]:.1f} s,"
-        f" {len(stretches)} still stretches of {args.still:g} s or more\n"
+    brought = bring_in(recording, stream, folder, about, args.still)
+    err = sys.stderr.write
+    err(
+        f"{folder}: {stream}: {brought.facts.sentence()},"
+        f" {len(brought.stretches)} still stretches of {args.still:g} s or more\n"
     )
-    if not stretches:
-        sys.stderr.write(
+    for sentence in brought.says:
+        err(f"{folder}: {sentence}\n")
+    if brought.facts.left_out:
+        err(f"{folder}: {brought.facts.left_out} rows were left out\n")
+    if not brought.stretches:
+        err(
             "no still stretch was found: write the positions into session.toml, or try"
             " --still with a shorter time\n"
         )
     sys.stdout.write(f"{folder}\n")
-    return 0
-
-
-def _write(folder: Path, about: dict[str, Any], block: Block) -> None:
-    """Make the folder whole, or not at all."""
-    import pyarrow as pa
-    import pyarrow.parquet
-    import tomlkit
-
-    from fieldcal.sample_files import to_batch
-
-    if folder.exists() and any(folder.iterdir()):
-        raise InputError(f"{folder}: is not empty; name another folder with -o")
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        part = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
-        try:
-            table = pa.Table.from_batches([to_batch(block)])
-            pyarrow.parquet.write_table(table, part / "samples.parquet")
-            (part / "session.toml").write_text(tomlkit.dumps(about), encoding="utf-8")
-            part.chmod(0o755)
-            part.replace(folder)
-        except BaseException:
-            shutil.rmtree(part, ignore_errors=True)
-            raise
-    except OSError as error:
-        raise SessionError(f"{folder}: cannot be written: {error}") from error

@@ -2,140 +2,176 @@
 
 Nothing is guessed in silence: columns, rate and units come from the command line; only
 the separator and lines of names at the top are found by themselves. Times are made from
-the rate where the file has none.
+the rate where the file has none; otherwise they count from the first line.
 """
 
 from __future__ import annotations
 
-import gzip
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from fieldcal.description import ACC_UNITS, GYR_UNITS
+from fieldcal import columns
 from fieldcal.errors import InputError
-from fieldcal.sample_files import COLUMNS
+from fieldcal.recording import Recording, Stream, pieces
 from fieldcal.samples import Array, Block
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+WHAT = "text with columns"
 
-SKIP = "_"
-"""Stands for a column that is not wanted."""
+SEPARATORS = (",", ";", "\t")
 
+TOP = 1000
+"""Lines at the top among which the first of numbers is looked for."""
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """What the columns of a file are.
-
-    Attributes
-    ----------
-    columns : names out of `sample_files.COLUMNS` in the file's order, "_" to skip one
-    rate_hz : needed where no column is ``t``
-    separator : None finds comma, semicolon, tab or white space
-    skip : lines at the top to leave out; None leaves out those that hold no numbers
-    acc_unit, gyr_unit, time_unit : of the file
-    acc_lsb, gyr_lsb : counts in one unit, for raw counts
-
-    """
-
-    columns: tuple[str, ...]
-    rate_hz: float | None = None
-    separator: str | None = None
-    skip: int | None = None
-    acc_unit: str = "m/s^2"
-    gyr_unit: str = "rad/s"
-    time_unit: str = "s"
-    acc_lsb: float = 1.0
-    gyr_lsb: float = 1.0
-
-    def check(self) -> None:
-        """Refuse a layout that cannot give samples.
-
-        Raises
-        ------
-        InputError
-            Naming the column or unit.
-
-        """
-        for name in self.columns:
-            if name not in (*COLUMNS, SKIP):
-                raise InputError(
-                    f"column {name!r} is none of: {', '.join(COLUMNS)}, _ to skip one"
-                )
-        wanted = [c for c in self.columns if c != SKIP]
-        if len(set(wanted)) < len(wanted):
-            raise InputError(f"a column is named twice in {','.join(self.columns)}")
-        if not {"ax", "gx"} & set(wanted):
-            raise InputError("name the columns: neither ax ay az nor gx gy gz is there")
-        if "t" not in wanted and not self.rate_hz:
-            raise InputError("no column is t, the time: give the rate, e.g. --rate 100")
-        for unit, known in (
-            (self.acc_unit, ACC_UNITS),
-            (self.gyr_unit, GYR_UNITS),
-            (self.time_unit, TIME_UNITS),
-        ):
-            if unit not in known:
-                raise InputError(f"unit {unit!r} is none of: {', '.join(known)}")
+TEXT = 0.95
+"""Share of characters that a text has among its first bytes."""
 
 
-def read(path: Path, layout: Layout) -> Block:
-    """Samples of a file, in SI units (or counts and volts as they are).
-
-    Raises
-    ------
-    InputError
-        If the file or the layout cannot be used; names file, line and column.
-
-    """
-    layout.check()
-    lines = _lines(path)
-    skip = _heading(lines) if layout.skip is None else layout.skip
-    if skip >= len(lines):
-        raise InputError(f"{path}: holds no row of numbers; is it a text file?")
-    separator = layout.separator or _separator(lines[skip])
-    table = _numbers(path, lines, skip, separator)
-    if table.shape[1] != len(layout.columns):
-        raise InputError(
-            f"{path}: has {table.shape[1]} columns, {len(layout.columns)} are named;"
-            f" its line {skip + 1} is {lines[skip][:60]!r}"
-        )
-    columns = dict(zip(layout.columns, table.T, strict=True))
-    block = _block(columns, layout, len(table))
-    back = np.flatnonzero(np.diff(block.t) <= 0)
-    if len(back):
-        raise InputError(
-            f"{path}: line {skip + back[0] + 2}: its time is not later than that of the"
-            " line above; put the lines in time order, each time once"
-        )
-    return block
+def recognises(head: bytes, path: Path) -> bool:
+    """Whether these are the first bytes of a text."""
+    if b"\0" in head:
+        return False
+    plain = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
+    return plain >= TEXT * len(head)
 
 
-def _lines(path: Path) -> list[str]:
-    try:
-        data = path.read_bytes()
-        if data[:2] == b"\x1f\x8b":
-            data = gzip.decompress(data)
-    except (OSError, EOFError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-    return [line for line in data.decode(errors="replace").splitlines() if line.strip()]
+class File(Recording):
+    """A text file, with one IMU in it."""
+
+    _skip = 0
+
+    def streams(self) -> list[Stream]:
+        """Return the one IMU."""
+        if not self.wanted.columns:
+            raise InputError(
+                f"{self.path}: say what its columns are, such as --columns "
+                f"t,ax,ay,az,gx,gy,gz; its first line is {self._first_line()!r}"
+            )
+        columns.check(self.wanted)
+        return [Stream("0", f"columns in {columns.units(self.wanted)}")]
+
+    def notes(self, stream: str) -> dict[str, Any]:
+        """Return the units."""
+        return columns.notes(self.wanted)
+
+    def place(self, row: int) -> str:
+        """Name a line; empty ones are not counted."""
+        return f"line {self._skip + row + 1}"
+
+    def _first_line(self) -> str:
+        return next((line[:60] for lines in self._lines() for line in lines), "")
+
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """Samples, a piece of the file at a time."""
+        columns.check(self.wanted)
+        names = [c for c in self.wanted.columns]
+        use = [i for i, name in enumerate(names) if name != columns.SKIP]
+        samples, first, separator, seen = columns.Samples(self.wanted), None, None, 0
+        t0 = None
+        for lines in self._lines():
+            if first is None:
+                first = self._heading(lines, use)
+                if first >= len(lines):
+                    break
+                self._skip, lines = first, lines[first:]
+                separator = self.wanted.separator or _separator(lines[0])
+                self._check_width(lines[0], separator)
+            table = self._table(lines, use, separator, seen)
+            seen += len(table)
+            block = samples.block(
+                {names[i]: c for i, c in zip(use, table.T, strict=True)}, len(table)
+            )
+            t0 = block.t[0] if t0 is None else t0
+            yield replace(block, t=block.t - t0)
+        if not seen:
+            raise InputError(
+                f"{self.path}: holds no row of numbers; is it a text file?"
+            )
+
+    def _lines(self) -> Iterator[list[str]]:
+        """Lines of the file that are not empty."""
+        rest = b""
+        for data in pieces(self.path):
+            whole, newline, rest = (rest + data).rpartition(b"\n")
+            if newline:
+                yield _split(whole)
+        if rest:
+            yield _split(rest)
+
+    def _heading(self, lines: Sequence[str], use: Sequence[int]) -> int:
+        """How many lines at the top hold something else than numbers."""
+        if self.wanted.skip is not None:
+            return self.wanted.skip
+        width = len(self.wanted.columns)
+        full = max((_width(line, self._parted(line)) for line in lines[:50]), default=0)
+        for i, line in enumerate(lines[:TOP]):
+            separator = self._parted(line)
+            cells = [c.strip() for c in line.split(separator)]
+            wanted = [cells[j] for j in use if j < len(cells)]
+            whole = separator is None or len(cells) == full or len(cells) == width
+            if whole and any(wanted) and all(_is_number(c) for c in wanted if c):
+                return i
+        return len(lines)
+
+    def _parted(self, line: str) -> str | None:
+        return self.wanted.separator or _separator(line)
+
+    def _check_width(self, line: str, separator: str | None) -> None:
+        width, named = _width(line, separator), len(self.wanted.columns)
+        if width != named:
+            raise InputError(
+                f"{self.path}: has {width} columns, {named} are named;"
+                f" its line {self._skip + 1} is {line[:60]!r}"
+            )
+
+    def _table(
+        self, lines: list[str], use: list[int], separator: str | None, seen: int
+    ) -> Array:
+        """Numbers of the wanted columns, (n, len(use))."""
+        every = len(use) == len(self.wanted.columns)
+        how: dict[str, Any] = {"delimiter": separator, "ndmin": 2, "comments": None}
+        if not every:
+            how["usecols"] = use
+        try:
+            table: Array = np.loadtxt(lines, **how)
+            return table
+        except ValueError:
+            rows = [self._row(n, line, separator) for n, line in enumerate(lines, seen)]
+            return np.array([row for row in rows if row]).reshape(-1, len(use))
+
+    def _row(self, number: int, line: str, separator: str | None) -> list[float]:
+        """Numbers of one line, the slow way; nothing of one that is left out."""
+        cells = line.split(separator)
+        if len(cells) != len(self.wanted.columns):
+            what = f"has {len(cells)} columns, not {len(self.wanted.columns)}"
+            self.damaged(self.place(number), what)
+            return []
+        row = []
+        for name, cell in zip(self.wanted.columns, cells, strict=True):
+            if name == columns.SKIP:
+                continue
+            try:
+                row.append(float(cell.strip() or "nan"))
+            except ValueError:
+                what = f"{cell.strip()[:20]!r} is not a number"
+                self.damaged(f"{self.place(number)}, column {name}", what)
+                return []
+        return row
+
+
+def _split(data: bytes) -> list[str]:
+    return [x for x in data.decode(errors="replace").splitlines() if x.strip()]
 
 
 def _separator(line: str) -> str | None:
-    return next((s for s in (",", ";", "\t") if s in line), None)
+    return next((s for s in SEPARATORS if s in line), None)
 
 
-def _heading(lines: Sequence[str]) -> int:
-    """How many lines at the top hold something else than numbers, or fewer columns."""
-    full = max((line.count(s) for line in lines[:50] for s in (",", ";")), default=0)
-    for i, line in enumerate(lines):
-        separator = _separator(line)
-        cells = [c.strip() for c in line.split(separator)]
-        whole = separator not in (",", ";") or line.count(separator) == full
-        if whole and all(_is_number(c) for c in cells if c):
-            return i
-    return len(lines)
+def _width(line: str, separator: str | None) -> int:
+    return len(line.split(separator))
 
 
 def _is_number(cell: str) -> bool:
@@ -144,47 +180,3 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _numbers(
-    path: Path, lines: Sequence[str], skip: int, separator: str | None
-) -> Array:
-    rows = lines[skip:]
-    try:
-        table: Array = np.loadtxt(rows, delimiter=separator, ndmin=2, comments=None)
-    except ValueError:
-        try:
-            table = np.loadtxt(
-                rows,
-                delimiter=separator,
-                ndmin=2,
-                comments=None,
-                converters=lambda cell: float(cell.strip() or "nan"),
-            )
-        except ValueError as error:
-            raise InputError(
-                f"{path}: {error} (rows counted from line {skip + 1}, the first of"
-                " numbers)"
-            ) from error
-    return table
-
-
-def _block(columns: dict[str, Array], layout: Layout, n: int) -> Block:
-    def triad(kind: str, scale: float) -> Array:
-        unknown = np.full(n, np.nan)
-        axes = [columns.get(kind + axis, unknown) for axis in "xyz"]
-        return scale * np.column_stack(axes)
-
-    if "t" in columns:
-        t = columns["t"] * TIME_UNITS[layout.time_unit]
-        t = t - t[0]
-    else:
-        t = np.arange(n) / (layout.rate_hz or 1.0)
-    return Block.of(
-        t,
-        triad("a", ACC_UNITS[layout.acc_unit] / layout.acc_lsb),
-        triad("g", GYR_UNITS[layout.gyr_unit] / layout.gyr_lsb),
-        columns.get("temperature"),
-        columns.get("seq"),
-        columns.get("t_host"),
-    )

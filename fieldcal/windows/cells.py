@@ -87,6 +87,17 @@ class Table:
         return steady
 
     @property
+    def level(self) -> Array:
+        """Means as `means`, (m, 6); one of few values is that of the cell before.
+
+        Unlike `steady`, it is true of a device that was turned meanwhile: no line goes
+        through all of its positions.
+        """
+        counts = self.counts
+        usual = np.median(counts, axis=0)
+        return _held(np.where(counts < usual / 2, np.nan, self.means))
+
+    @property
     def whole(self) -> int:
         """Cells that are complete: all, or all but the last while it fills."""
         if len(self) < 2:

@@ -10,6 +10,7 @@ a window must pass, so that no sample of a turn gets in.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -28,10 +29,20 @@ _LEAST, _MOST = 4.0, 64.0
 _OWN = 4.0
 """Spread, in multiples of what is usual in a stretch, that still belongs to it."""
 
+_LONGEST = 36_000
+"""Cells of the longest stretch, an hour: a longer rest is several of them."""
+
+_PART = 4096
+"""Spans looked at together: all of them at once would take ten times their memory."""
+
 _RATE = 0.02
 """Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
 
 Runs = list[tuple[int, int]]
+
+
+Between = Callable[[float, float], Iterable[Block]]
+"""Samples from a time up to another, s, in order, in blocks."""
 
 
 def still_stretches(
@@ -39,21 +50,46 @@ def still_stretches(
 ) -> list[tuple[float, float]]:
     """Find where the device was still, (start, end) in s of device time, in order.
 
-    Every stretch lasts `min_seconds`, at least 1 s, and passes `average`.
+    Every stretch lasts `min_seconds`, at least 1 s, an hour at most, and passes
+    `average`.
     """
-    cells = _cells(block)
+
+    def between(start: float, end: float) -> list[Block]:
+        return [block.between(start, end)]
+
+    return still_in(_cells([block]), between, min_seconds, limits)
+
+
+def still_in(
+    cells: Table,
+    between: Between,
+    min_seconds: float = 2.0,
+    limits: Limits | None = None,
+) -> list[tuple[float, float]]:
+    """`still_stretches` of a recording that does not fit into memory.
+
+    Parameters
+    ----------
+    cells : of all of it
+    between : gives the samples of a stretch of it
+    min_seconds, limits : as in `still_stretches`
+
+    """
     if len(cells) < 2 * _SPAN:
         return []
-    means = cells.steady
+    means = cells.level
     view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
-    spread = view.std(axis=-1)
+    parts = [view[i : i + _PART] for i in range(0, len(view), _PART)]
+    spread = np.concatenate([part.std(axis=-1) for part in parts])
+    level = np.concatenate([part.mean(axis=-1) for part in parts])
     shortest = max(1.0, min_seconds)
     found: list[tuple[float, float]] = []
     limits = limits or Limits()
-    for first, last in _at_rest(spread, view.mean(axis=-1), limits.noise):
-        start = float(cells.times[first + _SPAN // 2])
-        end = float(cells.times[last - 1 + _SPAN // 2])
-        found += _passing(block.between(start, end), shortest, limits)
+    for first, last in _at_rest(spread, level, limits.noise):
+        for cut in range(first, last, _LONGEST):
+            start = float(cells.times[cut + _SPAN // 2])
+            end = float(cells.times[min(cut + _LONGEST, last - 1) + _SPAN // 2])
+            found += _passing(between, start, end, shortest, limits)
     return found
 
 
@@ -93,24 +129,31 @@ def _valley(ratio: Array) -> float:
 
 
 def _passing(
-    block: Block, shortest: float, limits: Limits
+    between: Between, start: float, end: float, shortest: float, limits: Limits
 ) -> list[tuple[float, float]]:
     """Parts of a stretch that pass as windows: it is cut where it was disturbed."""
-    if not len(block) or block.t[-1] - block.t[0] < shortest:
+    sums, times = Cells(), [np.nan, np.nan]
+    for block in between(start, end):
+        if len(block):
+            sums.add(block)
+            times = [np.fmin(times[0], block.t[0]), block.t[-1]]
+    first, last = float(times[0]), float(times[1])
+    if not last - first >= shortest:
         return []
-    worst = judge(_cells(block), limits).worst
+    worst = judge(sums.table, limits).worst
     if worst.ratio <= 1:
-        return [(float(block.t[0]), float(np.nextafter(block.t[-1], np.inf)))]
-    after = max(worst.at + worst.seconds, float(block.t[0]) + CELL)
+        return [(first, float(np.nextafter(last, np.inf)))]
+    after = max(worst.at + worst.seconds, first + CELL)
     return [
-        *_passing(block.between(-np.inf, worst.at), shortest, limits),
-        *_passing(block.between(after, np.inf), shortest, limits),
+        *_passing(between, start, min(worst.at, end), shortest, limits),
+        *_passing(between, max(after, start), end, shortest, limits),
     ]
 
 
-def _cells(block: Block) -> Table:
+def _cells(blocks: Iterable[Block]) -> Table:
     cells = Cells()
-    cells.add(block)
+    for block in blocks:
+        cells.add(block)
     return cells.table
 
 

@@ -1,0 +1,77 @@
+"""`fieldcal export`: a calibration for another program."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.session import Session
+
+EXAMPLE = """\
+  fieldcal export bench-7/today --format ardupilot
+  fieldcal export bench-7/today --format mcap -o bench-7.mcap
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    from fieldcal.exporters import formats
+
+    add = parser.add_argument
+    add("session", type=Path, metavar="SESSION", help="session folder, solved")
+    add("--format", required=True, choices=formats(), help="; ".join(formats()))
+    add("-o", "--output", type=Path, help="file (default: the session's name)")
+    add(
+        "--calibration",
+        type=Path,
+        help="another solved session, or its result.json; by default the session's own",
+    )
+    add(
+        "--instance",
+        type=int,
+        default=0,
+        metavar="N",
+        help="autopilots: sensor the numbers are for, from 0, where the recording"
+        " does not tell (default: 0)",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    from fieldcal.calibration import Nominal
+    from fieldcal.commands.compare import read
+    from fieldcal.errors import InputError
+    from fieldcal.exporters import Source, exporter
+    from fieldcal.session import Session
+
+    session = Session.open(args.session)
+    module = exporter(args.format)
+    name = args.session.resolve().name
+    path = args.output or Path(f"{name}{module.ENDING}")
+    if path.exists():
+        raise InputError(f"{path}: is there already; name another file with -o")
+    nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
+    source = Source(
+        read(args.calibration or args.session),
+        nominal,
+        session,
+        _installed(session),
+        args.instance,
+    )
+    for sentence in module.write(source, path):
+        sys.stderr.write(f"fieldcal export: {sentence}\n")
+    sys.stdout.write(f"{path}\n")
+    return 0
+
+
+def _installed(session: Session) -> Installed | None:
+    """What the device had taken out of the samples, as the recording tells."""
+    from fieldcal.drivers.mavlink_installed import Installed
+
+    tables = [m.get("installed") for m in session.marks() if m["event"] == "device"]
+    told = [table for table in tables if table]
+    return Installed.from_table(told[-1]) if told else None

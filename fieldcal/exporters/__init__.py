@@ -1,0 +1,100 @@
+"""Results for other programs, one format a file.
+
+To add one, write exporters/<name>.py with ``WHAT`` (a line for the help), ``ENDING``
+and ``write(source, path)``, which returns what the user must know, one sentence each.
+Sign and order of its convention stand at the top of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Protocol, cast
+
+from fieldcal.calibration import COMPONENTS
+from fieldcal.errors import InputError
+
+if TYPE_CHECKING:
+    from fieldcal.calibration import Calibration, Nominal
+    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.samples import Array
+    from fieldcal.session import Session
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What is exported.
+
+    Attributes
+    ----------
+    calibration : of the device, U = bias + M f in device axes
+    nominal : values for what was not determined
+    session : where it comes from
+    installed : what the device had taken out of its samples already, None if nothing
+    instance : which sensor of the device the numbers are for, from 0
+
+    """
+
+    calibration: Calibration
+    nominal: Nominal
+    session: Session
+    installed: Installed | None = field(default=None)
+    instance: int = 0
+
+    def linear(self, sensor: str) -> tuple[Array, Array]:
+        """Bias (3,) and matrix (3, 3) of U = bias + matrix f of ``acc`` or ``gyr``."""
+        if sensor == "acc":
+            return self.calibration.accelerometers(self.nominal)
+        return self.calibration.gyroscopes(self.nominal)
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Biases and scale factors for which the nominal value is taken."""
+        every = [
+            f"{group}.{a}" for group, (axes, _) in COMPONENTS.items() for a in axes
+        ]
+        return [name for name in every if name not in self.calibration.names]
+
+    @property
+    def says(self) -> list[str]:
+        """What the user must know whatever the format, one sentence each."""
+        says = []
+        if self.undetermined:
+            names = ", ".join(self.undetermined)
+            says.append(f"not determined, the nominal value is taken: {names}")
+        if self.installed is not None and not self.installed.taken_out:
+            says.append(
+                "the device had a calibration of its own in use: the numbers are for "
+                "what it sends with that in use"
+            )
+        return says
+
+
+class Exporter(Protocol):
+    """What a module of `exporters` offers."""
+
+    WHAT: str
+    ENDING: str
+    write: Callable[[Source, Path], list[str]]
+
+
+def formats() -> list[str]:
+    """Names of the formats there are."""
+    return sorted(module.name for module in iter_modules(__path__))
+
+
+def exporter(name: str) -> Exporter:
+    """Return the module of a format.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
+
+    """
+    if name not in formats():
+        raise InputError(f"no format {name!r}: there are {', '.join(formats())}")
+    return cast(Exporter, import_module(f"{__name__}.{name}"))

@@ -1,0 +1,163 @@
+"""ArduPilot parameters, a .param file: raw -> true.
+
+ArduPilot corrects a sample r of a sensor, axis by axis in the sensor's own frame,
+
+    accelerometer  f = (r - INS_ACCOFFS) INS_ACCSCAL                               (1)
+    gyroscope      w = r - INS_GYROFFS                                             (2)
+
+and turns it by AHRS_ORIENTATION afterwards. fieldcal has U = b + s f (true -> raw), so
+INS_ACCOFFS = b with the same sign, and INS_ACCSCAL = 1 / s. Where U had a calibration
+taken out already, the two are put together, see `mavlink_installed`. Cross-coupling and
+gyroscope scale have no place here: what that costs is said.
+
+Units: m/s^2, rad/s. Source: ArduPilot's parameter list, INS_*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.calibration import Calibration, Nominal
+from fieldcal.calibration.diagonal import Diagonal, diagonal
+from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, identity, names
+from fieldcal.errors import InputError
+from fieldcal.exporters import Source
+from fieldcal.session import write_whole
+
+WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
+ENDING = ".param"
+
+WIDEST_OFFSET, WIDEST_SCALE = 3.5, 0.2
+"""Largest offset, m/s^2, and difference of a scale from 1 that ArduPilot takes."""
+
+
+class Parameters(NamedTuple):
+    """Parameters to install, and what the user must know of them.
+
+    Attributes
+    ----------
+    values : by name
+    says : what was left out and what it costs, one sentence each
+
+    """
+
+    values: Mapping[str, float]
+    says: tuple[str, ...]
+
+
+def parameters(
+    calibration: Calibration,
+    nominal: Nominal | None = None,
+    installed: Installed | None = None,
+    instance: int = 0,
+) -> Parameters:
+    """Return the parameters that take this calibration out of what the sensor sends.
+
+    Parameters
+    ----------
+    calibration : U = b + M f of the samples as recorded
+    nominal : values for what was not determined
+    installed : what the autopilot had in use while U was recorded; None for raw samples
+    instance : which sensor, from 0, where `installed` does not say it
+
+    Raises
+    ------
+    InputError
+        If `installed` is not complete, of another program, or behind a turned board;
+        or if neither biases nor scales were determined.
+
+    """
+    found = converted(ARDUPILOT, calibration, nominal, installed, instance)
+    wide = [
+        f"{name} = {value:.4g} is beyond what ArduPilot takes: it will say that the "
+        "sensor is not calibrated"
+        for name, value in found.values.items()
+        if (
+            name.startswith("INS_ACC") and "OFFS" in name and abs(value) > WIDEST_OFFSET
+        )
+        or ("SCAL" in name and abs(value - 1) > WIDEST_SCALE)
+    ]
+    return Parameters(found.values, (*found.says, *wide))
+
+
+def converted(
+    autopilot: int,
+    calibration: Calibration,
+    nominal: Nominal | None,
+    installed: Installed | None,
+    instance: int,
+) -> Parameters:
+    """Return offsets and scales of any autopilot that corrects by (1) and (2)."""
+    if installed is not None and installed.autopilot != autopilot:
+        raise InputError(
+            "the recording has the calibration of another autopilot program taken "
+            "out: export the format of that program"
+        )
+    device = installed or _without(autopilot, instance)
+    acc, gyr = (diagonal(calibration, sensor, nominal) for sensor in ("acc", "gyr"))
+    every = device.next(acc.bias, acc.scale, gyr.bias)
+    known = names(autopilot, device.instance)
+    kept: list[str] = []
+    groups = set(calibration.groups)
+    if groups & {"acc_bias", "acc_scale"}:
+        kept += [*known["acc_offset"], *known["acc_scale"]]
+    if "gyr_bias" in groups:
+        kept += known["gyr_offset"]
+    if not kept:
+        raise InputError("the calibration has neither biases nor scales to install")
+    says = _left_out(calibration, acc, gyr)
+    return Parameters({name: every[name] for name in kept}, tuple(says))
+
+
+def _without(autopilot: int, instance: int) -> Installed:
+    """Return an autopilot that had nothing in use."""
+    nothing = Installed(autopilot, instance, {}, taken_out=True)
+    known = names(autopilot, instance)
+    nothing.values = {name: 0.0 for some in known.values() for name in some}
+    nothing.values |= identity(nothing)
+    return nothing
+
+
+def _left_out(calibration: Calibration, acc: Diagonal, gyr: Diagonal) -> list[str]:
+    says = []
+    if (worst := float(acc.left_out.max())) > 0:
+        says.append(
+            "cross_coupling has no place in these parameters: leaving it out makes "
+            f"errors up to {worst * 9.80665:.3g} m/s^2 at 1 g"
+        )
+    scale = np.abs(1 / gyr.scale - 1)
+    if "gyr_bias" in calibration.groups and (worst := float(scale.max())) > 0:
+        says.append(
+            "gyr_scale has no place in these parameters: leaving it out makes errors "
+            f"up to {worst:.3g} of the rate"
+        )
+    if (worst := float(gyr.left_out.max())) > 0:
+        says.append(
+            "gyro_cross_coupling has no place in these parameters: leaving it out "
+            f"makes errors up to {worst:.3g} of the rate"
+        )
+    for group in ("acc_bias", "acc_scale", "gyr_bias"):
+        if group not in calibration.groups:
+            says.append(
+                f"{group} was not determined: "
+                + ("not written" if group == "gyr_bias" else "the nominal one is used")
+            )
+    return says
+
+
+def write(source: Source, path: Path) -> list[str]:
+    """Write the file; what the user must know."""
+    found = parameters(
+        source.calibration, source.nominal, source.installed, source.instance
+    )
+    lines = [
+        "# fieldcal: true = (raw - OFFS) * SCAL, m/s^2 and rad/s, sensor axes",
+        *(f"# {sentence}" for sentence in found.says),
+        *(f"{name},{value:.9g}" for name, value in found.values.items()),
+    ]
+    write_whole(path, "\n".join(lines) + "\n")
+    return list(found.says)

@@ -1,0 +1,50 @@
+"""Matrices of imu_tk, two .calib files, accelerometers and gyroscopes: raw -> true.
+
+imu_tk corrects with a misalignment T of unit diagonal, a scale K and a bias B,
+
+    f = T K (U - B)                                                                (1)
+
+(its paper writes a = T K (a_S + b), so b = -B). fieldcal has U = b + M f, hence
+
+    B = b,  K = diag(M^-1),  T = M^-1 K^-1                                         (2)
+
+which is exact. T of the accelerometers is upper triangular where imu_tk estimates it
+itself; here it is what M is. Files hold T, K and B one after the other, as imu_tk reads
+them. Units: m/s^2, rad/s. Source: Tedaldi, Pretto, Menegatti, ICRA 2014.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fieldcal.exporters import Source
+from fieldcal.samples import Array
+from fieldcal.session import write_whole
+
+WHAT = "matrices of imu_tk (T, K, bias)"
+ENDING = "_acc.calib"
+
+
+def matrices(bias: Array, matrix: Array) -> tuple[Array, Array, Array]:
+    """T, K (3, 3) and B (3,) of U = bias + matrix f, (2)."""
+    inverse = np.linalg.inv(matrix)
+    scale = np.diag(np.diag(inverse))
+    return inverse @ np.linalg.inv(scale), scale, bias  # (2)
+
+
+def write(source: Source, path: Path) -> list[str]:
+    """Write both files; what the user must know."""
+    name = path.name.replace("_acc", "_gyro")
+    if name == path.name:
+        name = f"{path.stem}_gyro{path.suffix}"
+    for sensor, file in (("acc", path), ("gyr", path.with_name(name))):
+        parts = matrices(*source.linear(sensor))
+        write_whole(file, "\n\n".join(_text(part) for part in parts) + "\n")
+    return [*source.says, f"the gyroscopes are in {path.with_name(name)}"]
+
+
+def _text(array: Array) -> str:
+    rows = np.atleast_2d(array) if array.ndim == 2 else array[:, None]
+    return "\n".join(" ".join(f"{x:.12g}" for x in row) for row in rows)

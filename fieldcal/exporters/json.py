@@ -1,0 +1,69 @@
+"""One JSON object, as ``schemas/export.schema.json`` describes it: raw -> true.
+
+    f = matrix (U - bias),  matrix = M^-1                                          (1)
+
+with fieldcal's U = bias + M f. ``sigma`` is that of each parameter as it was estimated;
+``nominal`` names biases and scale factors that were not. Device axes, m/s^2 and
+rad/s.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal.exporters import Source
+from fieldcal.session import write_whole
+
+WHAT = "one JSON object, with a JSON Schema"
+ENDING = "_calibration.json"
+
+UNITS = {"acc": "m/s^2", "gyr": "rad/s"}
+
+
+def document(source: Source) -> dict[str, Any]:
+    """Return the object."""
+    found = source.calibration
+    triads = {
+        name: _triad(source, sensor)
+        for name, sensor in (("accelerometer", "acc"), ("gyroscope", "gyr"))
+    }
+    parameters = {
+        name: {"value": float(value), "sigma": float(sigma), "unit": unit}
+        for name, value, sigma, unit in zip(
+            found.names, found.values, found.sigma, found.units, strict=True
+        )
+    }
+    device = source.session.about.device
+    return {
+        "format": "fieldcal-calibration",
+        "version": 1,
+        "convention": "true = matrix (raw - bias)",
+        "device": {k: str(device[k]) for k in ("name", "serial") if k in device},
+        "verdict": "good" if found.good else "bad",
+        "method": found.method,
+        **triads,
+        "parameters": parameters,
+        "nominal": source.undetermined,
+        "warnings": list(found.warnings),
+        "notes": source.says,
+    }
+
+
+def _triad(source: Source, sensor: str) -> dict[str, Any]:
+    bias, matrix = source.linear(sensor)
+    return {
+        "bias": bias.tolist(),
+        "matrix": np.linalg.inv(matrix).tolist(),  # (1)
+        "unit": UNITS[sensor],
+    }
+
+
+def write(source: Source, path: Path) -> list[str]:
+    """Write the file; what the user must know."""
+    text = json.dumps(document(source), indent=2, allow_nan=False)
+    write_whole(path, text + "\n")
+    return source.says

@@ -1,0 +1,120 @@
+"""Kalibr's imu.yaml, with its scale and misalignment model: true -> raw.
+
+Kalibr predicts what the sensors say,
+
+    U = M_a f + b_a                                                                (1)
+    W = M_g C w + b_g,   C a rotation                                              (2)
+
+like fieldcal, so M_a = M is written as it is. Kalibr's M are lower triangular: for the
+gyroscopes M = M_g C is parted into such an M_g and a rotation C (exactly); M_a stays
+full where the recording says so. Biases stand beside, Kalibr estimates them anew.
+
+The noise density is that of means over 1 s within the windows of the session,
+
+    N^2 = <(y_k+1 - y_k)^2> / 2 * 1 s                                              (3)
+
+the largest axis of each triad. The random walk takes hours at rest to see: it is not
+filled in. Units: m/s^2, rad/s. Source: Kalibr wiki, IMU noise model and yaml formats.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fieldcal.exporters import Source
+from fieldcal.samples import Array, Block
+from fieldcal.session import Session, write_whole
+
+WHAT = "Kalibr's imu.yaml (noise, M, C, bias)"
+ENDING = "_imu.yaml"
+
+SECOND = 1.0
+"""Length of the means in (3), s."""
+
+
+def parted(matrix: Array) -> tuple[Array, Array]:
+    """Lower triangular M_g and rotation C with M_g C = matrix, (2)."""
+    q, r = np.linalg.qr(matrix.T)
+    # a negative diagonal would be a reflection
+    signs = np.diag(np.where(np.diag(r) < 0, -1.0, 1.0))
+    return (signs @ r).T, (q @ signs).T
+
+
+def density(session: Session) -> Array:
+    """Noise density of the six channels by (3), nan where no window is long enough."""
+    squares, many = np.zeros(6), np.zeros(6)
+    for window in session.windows:
+        if window is None:
+            continue
+        means = _means(session.block.between(*window))
+        steps = np.diff(means, axis=0) ** 2
+        squares += np.nansum(steps, axis=0)
+        many += np.isfinite(steps).sum(axis=0)
+    variance = squares / np.where(many > 0, 2 * many, np.nan)
+    return np.sqrt(variance * SECOND)  # (3)
+
+
+def _means(block: Block) -> Array:
+    """Means over 1 s, the last part left out, (k, 6)."""
+    if not len(block):
+        return np.empty((0, 6))
+    cells = ((block.t - block.t[0]) / SECOND).astype(int)
+    starts = np.searchsorted(cells, np.arange(cells[-1] + 1))
+    whole = [part for part in np.split(block.six, starts[1:])[:-1] if len(part)]
+    return np.array([part.mean(axis=0) for part in whole]).reshape(-1, 6)
+
+
+def write(source: Source, path: Path) -> list[str]:
+    """Write the file; what the user must know."""
+    noise = density(source.session)
+    says = list(source.says)
+    acc_bias, acc = source.linear("acc")
+    gyr_bias, gyr = source.linear("gyr")
+    lower, turn = parted(gyr)
+    lines = ["# fieldcal: raw = M true + bias (true -> raw), m/s^2 and rad/s"]
+    for name, values in (("accelerometer", noise[:3]), ("gyroscope", noise[3:])):
+        known = values[np.isfinite(values)]
+        if len(known):
+            lines.append(f"{name}_noise_density: {known.max():.6g}")
+        else:
+            lines.append(f"# {name}_noise_density: not determined")
+            says.append(
+                f"{name}_noise_density was not determined: no window of the session "
+                "lasts 2 s"
+            )
+        lines.append(f"# {name}_random_walk: not determined")
+    says.append(
+        "the random walks are not determined by windows of seconds: fill them in from "
+        "hours at rest"
+    )
+    rate = source.session.rate_hz
+    lines += [
+        "rostopic: /imu/raw",
+        f"update_rate: {rate:.6g}" if np.isfinite(rate) else "# update_rate: unknown",
+        "model: scale-misalignment",
+        "accelerometers:",
+        f"  M: {_text(acc)}",
+        f"  bias: {_text(acc_bias)}",
+        "gyroscopes:",
+        f"  M: {_text(lower)}",
+        f"  C_gyro_i: {_text(turn)}",
+        "  A: [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]",
+        f"  bias: {_text(gyr_bias)}",
+    ]
+    write_whole(path, "\n".join(lines) + "\n")
+    return says
+
+
+def _text(array: Array) -> str:
+    """Write an array as YAML; an exponent needs its point there."""
+    if array.ndim == 2:
+        return "[" + ", ".join(_text(row) for row in array) + "]"
+    return "[" + ", ".join(_number(float(x)) for x in array) + "]"
+
+
+def _number(value: float) -> str:
+    text = f"{value:.12g}"
+    mantissa, e, exponent = text.partition("e")
+    return f"{mantissa}{'' if '.' in mantissa else '.0'}{e}{exponent}"

@@ -1,0 +1,43 @@
+"""A yaml of ROS's imu_calib (apply_calib): raw -> true.
+
+imu_calib corrects  f = SM U - bias                                                (1)
+
+so that its bias is behind the matrix. fieldcal has U = b + M f, hence
+
+    SM = M^-1,  bias = M^-1 b                                                      (2)
+
+exactly. SM is written row by row. imu_calib itself reads the accelerometers' two keys;
+those of the gyroscopes, gyro_SM and gyro_bias, mean the same for nodes that take them.
+Units: m/s^2, rad/s, as in sensor_msgs/Imu. Source: imu_calib's documentation.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fieldcal.exporters import Source
+from fieldcal.samples import Array
+from fieldcal.session import write_whole
+
+WHAT = "yaml of ROS imu_calib (SM, bias)"
+ENDING = "_imu_calib.yaml"
+
+
+def matrices(bias: Array, matrix: Array) -> tuple[Array, Array]:
+    """SM (3, 3) and bias (3,) of U = bias + matrix f, (2)."""
+    inverse = np.linalg.inv(matrix)
+    return inverse, inverse @ bias  # (2)
+
+
+def write(source: Source, path: Path) -> list[str]:
+    """Write the file; what the user must know."""
+    lines = ["# fieldcal: true = SM raw - bias (raw -> true), m/s^2 and rad/s"]
+    for sensor, prefix in (("acc", ""), ("gyr", "gyro_")):
+        turned, bias = matrices(*source.linear(sensor))
+        for name, values in ((f"{prefix}SM", turned.ravel()), (f"{prefix}bias", bias)):
+            lines.append(f"{name}:")
+            lines += [f"  - {x:.12f}" for x in values]
+    write_whole(path, "\n".join(lines) + "\n")
+    return source.says

@@ -1,0 +1,122 @@
+"""Parquet and Arrow files: columns by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal import columns
+from fieldcal.errors import InputError
+from fieldcal.recording import ROWS, Recording, Stream, on_disk
+from fieldcal.sample_files import COLUMNS
+from fieldcal.samples import Array, Block
+
+WHAT = "Parquet and Arrow"
+
+PARQUET, FEATHER, STREAM = b"PAR1", b"ARROW1", b"\xff\xff\xff\xff"
+
+
+def recognises(head: bytes, path: Path) -> bool:
+    """Whether a file begins like one of them."""
+    return head.startswith((PARQUET, FEATHER, STREAM))
+
+
+class File(Recording):
+    """A table with named columns, with one IMU in it."""
+
+    def streams(self) -> list[Stream]:
+        """Return the one IMU."""
+        with self._batches() as (names, _):
+            self._named(names)
+        return [Stream("0", f"columns in {columns.units(self.wanted)}")]
+
+    def notes(self, stream: str) -> dict[str, Any]:
+        """Return the units."""
+        return columns.notes(self.wanted)
+
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """Samples, a batch at a time."""
+        import pyarrow as pa
+
+        samples = columns.Samples(self.wanted)
+        try:
+            with self._batches() as (names, batches):
+                named = self._named(names)
+                for batch in batches:
+                    batch.validate(full=True)
+                    table = {c: self._numbers(batch, n) for c, n in named.items()}
+                    yield samples.block(table, batch.num_rows)
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(
+                f"{self.path}: is not whole: {error}; copy it again from where it came"
+            ) from error
+
+    @contextmanager
+    def _batches(self) -> Iterator[tuple[list[str], Iterator[Any]]]:
+        """Names of its columns, and its batches."""
+        import pyarrow as pa
+        import pyarrow.parquet
+
+        with on_disk(self.path) as path, path.open("rb") as file:
+            magic = file.read(6)
+            file.seek(0)
+            try:
+                if magic.startswith(PARQUET):
+                    opened = pyarrow.parquet.ParquetFile(file)
+                    names = opened.schema_arrow.names
+                    wanted = [n for n in self._named(names).values()]
+                    yield names, opened.iter_batches(ROWS, columns=wanted)
+                elif magic == FEATHER:
+                    feather = pa.ipc.open_file(file)
+                    many = range(feather.num_record_batches)
+                    yield feather.schema.names, (feather.get_batch(i) for i in many)
+                else:
+                    stream = pa.ipc.open_stream(file)
+                    yield stream.schema.names, iter(stream)
+            except (pa.ArrowException, OSError) as error:
+                raise InputError(
+                    f"{self.path}: is not whole: {error}; copy it again from where it"
+                    " came"
+                ) from error
+
+    def _named(self, names: list[str]) -> dict[str, str]:
+        """Names in the file by column."""
+        pairs = [c.partition("=") for c in self.wanted.columns]
+        named = {column: name or column for column, _, name in pairs}
+        if not named:
+            named = {c: c for c in COLUMNS if c in names}
+        missing = [name for name in named.values() if name not in names]
+        if missing or not {"ax", "gx", "temperature"} & set(named):
+            what = f"no column {missing[0]}" if missing else "no column ax or gx"
+            raise InputError(
+                f"{self.path}: has {what}; say which are the channels with --columns "
+                f"t=…,ax=…: there are {', '.join(names[:30])}"
+            )
+        columns.check(self._with(tuple(named)))
+        return named
+
+    def _with(self, names: tuple[str, ...]) -> Any:
+        from dataclasses import replace
+
+        return replace(self.wanted, columns=names)
+
+    def _numbers(self, batch: Any, name: str) -> Array:
+        import pyarrow as pa
+
+        column = batch.column(name)
+        kind = column.type
+        if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
+            column = column.cast(pa.int64())
+        elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
+            raise InputError(
+                f"{self.path}: column {name} holds {kind}, not numbers; name another"
+                " with --columns"
+            )
+        values: Array = np.asarray(
+            column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+        )
+        return values

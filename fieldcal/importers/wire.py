@@ -1,0 +1,91 @@
+"""Bytes of a serial port kept in a file: VectorNav, MIP, WitMotion and the others.
+
+The wire format is found by what decodes; ``--options "format=mip"`` names it, with its
+options as in a device's address.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from fieldcal.drivers.codec import Codec, open_codec, recognise
+from fieldcal.drivers.options import Options
+from fieldcal.errors import FieldcalError, InputError
+from fieldcal.recording import Recording, Stream, pieces
+from fieldcal.samples import Block
+
+WHAT = "bytes of a serial port"
+
+CUT = 1 << 20
+"""Bytes decoded at once."""
+
+SECONDS = 1.0
+"""Time that the first bytes are taken for, where the format asks."""
+
+
+def recognises(head: bytes, path: Path) -> bool:
+    """Whether one of the wire formats fits."""
+    return recognise(head, SECONDS) is not None
+
+
+class File(Recording):
+    """The bytes of one device."""
+
+    _codec: Codec | None = None
+    _name = ""
+
+    def streams(self) -> list[Stream]:
+        """Return the one IMU."""
+        self._opened()
+        return [Stream("0", f"{self._name}, units of its format")]
+
+    def notes(self, stream: str) -> dict[str, Any]:
+        """Return the format."""
+        return {"format": self._name}
+
+    def _opened(self) -> Codec:
+        options = Options("options", self.wanted.options)
+        self._name = options.text("format")
+        if not self._name:
+            head = next(pieces(self.path, CUT), b"")
+            fits = recognise(head, SECONDS)
+            if fits is None:
+                raise InputError(
+                    f"{self.path}: say what bytes these are, such as --options "
+                    '"format=mip"'
+                )
+            self._name = fits[0]
+            query = self.wanted.options or fits[1].query
+            options = Options("options", query)
+        if self.wanted.rate_hz:
+            options = options.fixed(rate=str(self.wanted.rate_hz))
+        codec = open_codec(self._name, options)
+        options.finish()
+        return codec
+
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """Samples, some bytes at a time."""
+        codec = self._opened()
+        try:
+            for data in pieces(self.path, CUT):
+                block = codec.feed(data)
+                if block is not None:
+                    yield block
+        except FieldcalError as error:
+            raise InputError(f"{self.path}: {error}") from error
+        health = codec.health
+        if not health.samples:
+            raise InputError(
+                f"{self.path}: holds no sample of {self._name} that has a time; give"
+                " the rate with --rate where the device sends none, or check the"
+                " options"
+            )
+        lost = health.skipped + codec.waiting
+        if lost or health.bad or health.gaps:
+            self.says.append(
+                f"{lost} of {health.received} bytes belong to no whole frame,"
+                f" {health.bad} frames failed their check, {health.missing} samples"
+                f" are missing in {health.gaps} gaps"
+            )

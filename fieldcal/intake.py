@@ -1,0 +1,238 @@
+"""Samples of a recording on their way into a session: judged, mended, written.
+
+A row is refused whose time is not later than that of the row before, whose numbers are
+infinite, or which holds nothing but zeros (a buffer that was never filled): a missing
+value is no zero. Rows are written a group at a time, and found again by their time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.errors import InputError
+from fieldcal.samples import CHANNELS, Array, Block, concat
+
+GROUP = 1 << 16
+"""Rows of a row group."""
+
+MOST = 12
+"""Faults of a file that are listed one by one."""
+
+Rows = NDArray[np.bool_]
+
+
+class Judge:
+    """Looks at rows block by block.
+
+    Parameters
+    ----------
+    name : of the file, for errors
+    place : names a row, counted from 0
+    repair : whether bad rows are left out and said, or refused
+
+    """
+
+    def __init__(self, name: str, place: Callable[[int], str], repair: bool) -> None:
+        self._name, self._place, self._repair = name, place, repair
+        self._seen, self._last = 0, -np.inf
+        self._runs: list[tuple[str, str, int, int]] = []
+        self.left_out = 0
+
+    @property
+    def mended(self) -> list[str]:
+        """What was left out, run by run, a sentence each."""
+        says = [self._sentence(*run) for run in self._runs[:MOST]]
+        if len(self._runs) > MOST:
+            more = self._runs[MOST:]
+            rows = sum(run[3] for run in more)
+            says.append(f"{rows} more rows in {len(more)} more places")
+        return [f"{sentence}, left out" for sentence in says]
+
+    def good(self, block: Block) -> Block:
+        """Return the rows that can be used.
+
+        Raises
+        ------
+        InputError
+            For the first row that cannot, where no repair was asked for; names file,
+            row and column.
+
+        """
+        if not len(block):
+            return block
+        bad = np.zeros(len(block), dtype=bool)
+        for column, what, rows in self._faults(block):
+            self._note(column, what, rows & ~bad)
+            bad |= rows
+        bad |= self._backwards(block.t, bad)
+        self._seen += len(block)
+        if not bad.any():
+            return block
+        if not self._repair:
+            raise InputError(
+                f"{self._name}: {self._sentence(*self._runs[0])}; mend the file, or"
+                " leave such rows out with --repair"
+            )
+        self.left_out += int(bad.sum())
+        parts = np.split(np.arange(len(block)), np.flatnonzero(np.diff(bad)) + 1)
+        return concat(block[r[0] : r[-1] + 1] for r in parts if not bad[r[0]])
+
+    def _faults(self, block: Block) -> Iterator[tuple[str, str, Rows]]:
+        six = block.six
+        empty = (np.nan_to_num(six, nan=0.0) == 0).all(axis=1) & (block.acc == 0).all(
+            axis=1
+        )
+        if empty.any():
+            columns = " ".join(
+                CHANNELS if np.isfinite(block.gyr).any() else CHANNELS[:3]
+            )
+            later = self._seen + np.arange(len(block)) > 0
+            unstamped = empty & (block.t == 0) & later
+            yield f"t {columns}", "hold only zeros", unstamped
+            yield columns, "hold only zeros", empty & ~unstamped
+        yield "t", "is no time", ~np.isfinite(block.t)
+        for name, column in zip(CHANNELS, six.T, strict=True):
+            if (infinite := np.isinf(column)).any():
+                yield name, "is infinite", infinite
+
+    def _backwards(self, t: Array, bad: Rows) -> Rows:
+        """Rows that are not later than all good ones before them."""
+        rest = np.flatnonzero(~bad)
+        times = t[rest]
+        if not len(times):
+            return np.zeros(len(t), dtype=bool)
+        if times[0] > self._last and (np.diff(times) > 0).all():
+            self._last = float(times[-1])
+            return np.zeros(len(t), dtype=bool)
+        # one time that leaps ahead is wrong itself, not all that come after it
+        ahead = np.zeros(len(times), dtype=bool)
+        before = np.concatenate([[self._last], times[:-1]])[:-1]
+        ahead[:-1] = (times[:-1] > times[1:]) & (times[1:] > before)
+        newest = np.maximum.accumulate(
+            np.concatenate([[self._last], np.where(ahead, -np.inf, times)])
+        )
+        late = ~ahead & (times <= newest[:-1])
+        out = np.zeros(len(t), dtype=bool)
+        for which, what in (
+            (late, "is not later than above"),
+            (ahead, "is later than below"),
+        ):
+            rows = np.zeros(len(t), dtype=bool)
+            rows[rest[which]] = True
+            self._note("t", what, rows)
+            out |= rows
+        self._last = float(newest[-1])
+        return out
+
+    def _note(self, column: str, what: str, rows: Rows) -> None:
+        edges = np.flatnonzero(np.diff(rows.astype(int), prepend=0, append=0))
+        for start, end in edges.reshape(-1, 2).tolist():
+            first, count = self._seen + start, end - start
+            if self._runs:
+                *same, begin, n = self._runs[-1]
+                if same == [column, what] and begin + n == first:
+                    self._runs[-1] = (column, what, begin, n + count)
+                    continue
+            self._runs.append((column, what, first, count))
+
+    def _sentence(self, column: str, what: str, first: int, count: int) -> str:
+        rows = self._place(first)
+        if count > 1:
+            rows += f" to {self._place(first + count - 1)}"
+        return f"{rows}, column {column}: {what}"
+
+
+class Written:
+    """A samples.parquet that is written piece by piece, and read back by time.
+
+    A context manager; memory holds one group of rows.
+    """
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow.parquet
+
+        from fieldcal.sample_files import schema
+
+        self._path = path
+        # no two samples are alike: a dictionary of them only takes time
+        self._writer = pyarrow.parquet.ParquetWriter(
+            path,
+            schema(),
+            compression="lz4",
+            use_dictionary=False,
+            use_byte_stream_split=True,
+        )
+        self._waiting: list[Block] = []
+        self._many = 0
+        self._groups: list[tuple[float, float]] = []
+        self.rows = 0
+
+    def add(self, block: Block) -> None:
+        """Take in the block that follows."""
+        self._waiting.append(block)
+        self._many += len(block)
+        if self._many >= GROUP:
+            self._put()
+
+    def _put(self) -> None:
+        from fieldcal.sample_files import to_batch
+
+        whole = concat(self._waiting)
+        self._waiting, self._many = [], 0
+        for first in range(0, len(whole), GROUP):
+            part = whole[first : first + GROUP]
+            self._writer.write_batch(to_batch(part), row_group_size=GROUP)
+            self._groups.append((float(part.t[0]), float(part.t[-1])))
+            self.rows += len(part)
+
+    def close(self) -> None:
+        """Write what waits, and end the file."""
+        if self._many:
+            self._put()
+        self._writer.close()
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time, s."""
+        return self._groups[0][0], self._groups[-1][1]
+
+    def between(self, start: float, end: float) -> Iterator[Block]:
+        """Samples with start <= t < end, of a file that was closed."""
+        import pyarrow.parquet
+
+        from fieldcal.sample_files import from_table
+
+        with pyarrow.parquet.ParquetFile(self._path) as file:
+            for i, (first, last) in enumerate(self._groups):
+                if first < end and last >= start:
+                    yield from_table(file.read_row_group(i)).between(start, end)
+
+    def __enter__(self) -> Written:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._writer.close()
+
+
+def digest(path: Path) -> dict[str, Any]:
+    """Name, size and SHA-256 of a file."""
+    import hashlib
+
+    with path.open("rb") as file:
+        hashed = hashlib.file_digest(file, "sha256")
+    return {
+        "name": path.name, "sha256": hashed.hexdigest(), "bytes": path.stat().st_size
+    }  # fmt: skip
+
+
+def rate(blocks: Iterable[Block]) -> float:
+    """Rate of the first samples, Hz; nan of less than two."""
+    for block in blocks:
+        if len(block) > 1:
+            return float(1 / np.median(np.diff(block.t)))
+    return float("nan")

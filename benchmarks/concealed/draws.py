@@ -136,7 +136,7 @@ def _warmed(session: Session, name: str, rng: np.random.Generator) -> Session:
     if name not in HOT:
         return session
     span = session.windows[-1].end
-    times = np.linspace(0.0, span + 10.0, 12)
+    times = np.linspace(0.0, span + 10.0, 60)
     course = rng.choice([4.0, 10.0]) * np.sin(
         2 * np.pi * times / span * rng.uniform(0.4, 1.6) + rng.uniform(0, 6)
     )

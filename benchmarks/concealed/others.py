@@ -106,7 +106,7 @@ def chain(name: str, rng: np.random.Generator) -> Session:
     channel = str(rng.choice(["ax", "ay", "az", "gx", "gy", "gz"]))
     acc, gyr = one.noise.acc[0], one.noise.gyr[0]
     at = float(rng.uniform(w.start + 1, w.end - 6))
-    axes = ["+y+x-z", "-x-y+z", "+z+x+y", "-y+x+z", "+x-z+y", "-x+y-z"]
+    axes = ["+y+x-z", "-x-y+z", "+z+x+y", "-y-x+z", "+x+z+y", "-x+y-z"]
     kind = str(rng.choice(["low_byte_signed", "bytes_swapped"]))
     more: Mapping[str, dict[str, Any]] = {
         "bump": {"at_s": at, "for_s": float(rng.uniform(0.3, 1.5)),
@@ -154,6 +154,8 @@ def outside(name: str, rng: np.random.Generator, sigmas: float) -> Session:
 
             return add
 
+        if name == "fading scale":
+            session = replace(session, thermometer=False)
         there = size(replace(session, added=course_of(1e-3)))
         if there > 1e-6 and 1e-3 * sigmas / there < 0.1:
             return replace(
@@ -178,13 +180,9 @@ def _angles(session: Session, t: Array) -> tuple[Array, Array]:
     return alpha[at], beta[at]
 
 
-def _mechanical(session: Session, t: Array, channel: int, which: int) -> Array:
-    return np.sin(3 * _angles(session, t)[0])
-
-
-def _torsion(session: Session, t: Array, channel: int, which: int) -> Array:
-    alpha, beta = _angles(session, t)
-    return np.sin(2 * alpha) * np.cos(beta)
+def _tooth(session: Session, t: Array, channel: int, which: int) -> Array:
+    """A course around the joint that no force has."""
+    return np.sin(8 * _angles(session, t)[0] + 0.5)
 
 
 def _wave(session: Session, t: Array, channel: int, which: int) -> Array:
@@ -214,9 +212,7 @@ def _fading(session: Session, t: Array, channel: int, which: int) -> Array:
 
 
 def _force(session: Session) -> Array:
-    block = session.record(0, noise=False) if session.added is None else None
-    if block is None:
-        block = replace(session, added=None).record(0, noise=False)
+    block = replace(session, added=None).record(0, noise=False)
     middle = [(w.start + w.end) / 2 for w in session.windows]
     force: Array = block.acc[np.searchsorted(block.t, middle)]
     return force
@@ -224,8 +220,7 @@ def _force(session: Session) -> Array:
 
 Course = Callable[[Session, Array, int, int], Array]
 OUTSIDE: Mapping[str, Course] = {
-    "sin 3 alpha": _mechanical,
-    "torsion": _torsion,
+    "joint's tooth": _tooth,
     "wave in time": _wave,
     "cubic in time": _cubic,
     "one position off": _odd_one,

@@ -8,7 +8,8 @@ outputs, or failing that what the effect's own entry in the catalogue says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,24 +26,42 @@ TELLING = 5.0
 """Difference in white noise of a window's mean that decides."""
 
 
-def aliases(explanation: Explanation) -> dict[str, tuple[str, ...]]:
-    """Ids that stand for an effect as well as the one chosen, by id."""
+@dataclass(frozen=True, slots=True)
+class Aliases:
+    """What else would explain the same.
+
+    Attributes
+    ----------
+    ids : of other effects, by the id of the one chosen
+    open : chosen ids of which no other is second choice by its nature
+
+    """
+
+    ids: Mapping[str, tuple[str, ...]]
+    open: frozenset[str]
+
+
+def aliases(explanation: Explanation) -> Aliases:
+    """Other effects that would do, for each that was chosen."""
     found: dict[str, list[str]] = {}
-    mine = {h.effect.id for h, _ in explanation.model.chosen}
+    undecided = set()
+    cost = preferred(explanation.model)
+    mine = _causes(explanation.model)
     for rival in explanation.rivals:
-        theirs = {h.effect.id for h, _ in rival.chosen}
+        theirs = _causes(rival)
         for name in sorted(mine - theirs):
             _add(found, name, sorted(theirs - mine))
+            if theirs - mine and preferred(rival) <= cost:
+                undecided.add(name)
     for name, chance in _chances(explanation):
         _add(found, name, [chance])
-    return {name: tuple(ids) for name, ids in found.items() if ids}
+        undecided.add(name)
+    ids = {name: tuple(others) for name, others in found.items() if others}
+    return Aliases(ids, frozenset(undecided))
 
 
-def undecided(explanation: Explanation) -> bool:
-    """Whether a rival is no second choice by its nature, so that nothing decides."""
-    cost = preferred(explanation.model)
-    second = [m for m in explanation.rivals if preferred(m) > cost]
-    return len(second) < len(explanation.rivals) or any(_chances(explanation))
+def _causes(model: Model) -> set[str]:
+    return {h.effect.id for h, _ in model.chosen if not h.known}
 
 
 def _add(found: dict[str, list[str]], name: str, ids: list[str]) -> None:
@@ -54,9 +73,7 @@ def _chances(explanation: Explanation) -> Iterator[tuple[str, str]]:
     """Effects that chance would do for as well, and the other way about."""
     search, best = explanation.search, explanation.model
     for less in search.smaller(best):
-        gone = {h.effect.id for h, _ in best.chosen} - {
-            h.effect.id for h, _ in less.chosen
-        }
+        gone = _causes(best) - _causes(less)
         level = best.objective - CLOSE
         for name in gone:
             for wander in wanders(less.bench, less.fit):
@@ -66,8 +83,9 @@ def _chances(explanation: Explanation) -> Iterator[tuple[str, str]]:
         for name in set(best.random) - set(less.random):
             if (id_ := RANDOM.get(name.partition(":")[0])) is not None:
                 for other in search.larger(less):
-                    if other.objective > level:
-                        yield id_, other.chosen[-1][0].effect.id
+                    newest = other.chosen[-1][0]
+                    if other.objective > level and not newest.known:
+                        yield id_, newest.effect.id
 
 
 def telling_position(
@@ -103,14 +121,7 @@ def _with(explanation: Explanation, one: str, name: str) -> Model | None:
     search, best = explanation.search, explanation.model
     if name == one:
         return best
-    kept = [i for i, (h, _) in enumerate(best.chosen) if h.effect.id != one]
-    less = search.model(
-        tuple(best.chosen[i] for i in kept),
-        best.bench,
-        best.fit,
-        best.random,
-        tuple(best.shaped[i] for i in kept),
-    )
+    less = search.without(best, one)
     for hypothesis in search.pool:
         if hypothesis.effect.id == name:
             less = search.with_one(less, hypothesis)

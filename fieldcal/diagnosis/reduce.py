@@ -9,13 +9,13 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.noise import white
+from fieldcal.diagnosis.noise import rounding, white
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Experience
 from fieldcal.frames import earth_rate_home, force_home
@@ -126,11 +126,13 @@ def reduce(source: Source) -> Rows:
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
     six = np.where(source.usable, block.six, np.nan)
     pieces = [six[a:b] for a, b in windows[held]]
-    noise = white(pieces, rate)
+    noise, levels = _levels(pieces, rate)
     bounds = [_cut(block.t, a, b, rate, len(held)) for a, b in windows[held]]
     rows = [len(b) for b in bounds]
-    level = np.repeat(_levels(pieces, noise), rows, axis=0)
-    return averaged(source, np.concatenate(bounds), np.repeat(held, rows), level, noise)
+    level = np.repeat(levels, rows, axis=0)
+    off = np.sqrt(np.repeat(rows, rows))[:, None] * rounding(pieces, noise)
+    out = averaged(source, np.concatenate(bounds), np.repeat(held, rows), level, noise)
+    return replace(out, sd=np.hypot(out.sd, off))  # the same all through a window
 
 
 def averaged(
@@ -185,27 +187,40 @@ def _cut(t: Array, first: int, last: int, rate: float, windows: int) -> Array:
 
 def _means(six: Array, bound: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
     """Means between bounds, (n, 6), and how many samples are in each."""
-    centre = np.nanmedian(six[bound[0, 0] : bound[0, 1]], axis=0)
-    shifted = np.nan_to_num(six - np.nan_to_num(centre))
+    some = np.isfinite(six)
+    first = np.argmax(some, axis=0)
+    centre = np.nan_to_num(six[first, np.arange(six.shape[1])])
+    shifted = np.nan_to_num(six - centre)
     flat = bound.ravel()
     if flat[-1] == len(six):  # reduceat takes starts only; the end needs no start
         flat = flat[:-1]
     total = np.add.reduceat(shifted, flat, axis=0)[::2]
-    count = np.add.reduceat(np.isfinite(six).astype(np.intp), flat, axis=0)[::2]
-    mean = total / np.maximum(count, 1) + np.nan_to_num(centre)
+    count = np.add.reduceat(some.astype(np.intp), flat, axis=0)[::2]
+    mean = total / np.maximum(count, 1) + centre
     return np.where(count > 0, mean, np.nan), count
 
 
-def _levels(pieces: Sequence[Array], noise: Array) -> Array:
-    """Deviation of one sample in each window, (w, 6): the pooled one unless louder."""
-    out = np.empty((len(pieces), len(noise)))
+def _levels(pieces: Sequence[Array], rate: float) -> tuple[Array, Array]:
+    """Deviation of one sample: usual (6,), and in each window (w, 6).
+
+    The usual one is that of the quiet windows. Others have more, and vibration comes on
+    top of the noise, whatever the noise's colour.
+    """
+    out = np.full((len(pieces), pieces[0].shape[1]), np.nan)
     for i, piece in enumerate(pieces):
-        out[i] = np.sqrt(np.nanmean(np.diff(piece, axis=0) ** 2, axis=0) / 2)
-    usual = np.nanmedian(out, axis=0)
+        steps = np.diff(piece, axis=0) ** 2 / 2
+        count = np.isfinite(steps).sum(axis=0)
+        some = np.where(count > 0, np.nansum(steps, axis=0), np.nan)
+        out[i] = np.sqrt(some / np.maximum(count, 1))
+    low = np.sort(out, axis=0)[(len(out) - 1) // 4]  # nan comes last
     samples = np.array([[max(len(p), 2)] for p in pieces])
-    ratio = out / np.where(usual > 0, usual, np.nan)
-    plain = ~(np.abs(np.log(ratio)) > LOUDER / np.sqrt(samples))
-    return noise * np.where(plain, 1.0, ratio)
+    margin = LOUDER / np.sqrt(samples)
+    louder = out > low * np.exp(margin)
+    quiet = ~louder.any(axis=1)
+    few = [p for p, q in zip(pieces, quiet, strict=True) if q] or list(pieces)
+    noise = white(few, rate)
+    more = np.where(louder, out**2 - low**2, 0.0)
+    return noise, np.sqrt(noise**2 + np.maximum(more, 0.0))
 
 
 def _angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -24,7 +24,7 @@ from fieldcal.diagnosis.candidates import Hypothesis, instants
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.narrow import narrower
-from fieldcal.diagnosis.scatter import Wander, dropped, wanders
+from fieldcal.diagnosis.scatter import Wander, dropped, fees, wanders
 from fieldcal.diagnosis.steps import step_gains
 
 EXTRA = 6.9
@@ -40,7 +40,10 @@ BEAM = 3
 RIVAL = 0.3
 """Beginnings followed up have at least this part of the best one's gain."""
 
-MOST = 5
+AGAIN = 3.0
+"""What the second triad costs of an effect that the first has already, ln."""
+
+MOST = 6
 """Hypotheses in one model."""
 
 STEPS = 3
@@ -122,12 +125,15 @@ class Search:
     ) -> Model:
         """Fit some hypotheses."""
         fit = bench.fit([*self.always, *(t for _, t in chosen)], near)
-        cost = self.price * (len(chosen) + len(random)) + sum(shaped)
+        new = {h.effect.id for h, _ in chosen if not h.known}
+        again = sum(not h.known for h, _ in chosen) - len(new)
+        cost = self.price * (len(new) + len(random)) + AGAIN * again + sum(shaped)
+        cost += fees(bench.errors)
         return Model(chosen, bench, fit, fit.score - cost, random, shaped)
 
     def _grow(self, model: Model) -> Model | None:
         """The model with something more in it, if that is better."""
-        if len(model.chosen) + len(model.random) >= MOST:
+        if len(model.names) + len(model.random) >= MOST:
             return None
         chance = max(wanders(model.bench, model.fit), key=lambda w: w.gain)
         first = [*self.larger(model), *self._instead(model)]
@@ -189,7 +195,10 @@ class Search:
         Several variants are one hypothesis: their mean likelihood counts.
         """
         variants, cost = hypothesis.variants, hypothesis.cost
-        if "at_s" in variants[0].shape:
+        there = [t for h, t in model.chosen if h.effect is hypothesis.effect]
+        if there and there[0].shape:
+            variants = (replace(variants[0], shape=there[0].shape),)
+        if "at_s" in variants[0].shape and not there:
             variants, more = self._jumps(model, hypothesis)
             cost += more
         tried = [
@@ -243,12 +252,33 @@ class Search:
     def rivals(self, model: Model) -> list[Model]:
         """Models with one hypothesis exchanged for another."""
         out = []
-        for i in range(len(model.chosen)):
-            chosen = model.chosen[:i] + model.chosen[i + 1 :]
-            shaped = model.shaped[:i] + model.shaped[i + 1 :]
-            less = self.model(chosen, model.bench, model.fit, model.random, shaped)
-            out += [m for m in self.larger(less) if m.names != model.names]
+        for cause in {h.effect.id for h, _ in model.chosen if not h.known}:
+            less = self.without(model, cause)
+            parts = [h.part for h, _ in model.chosen if h.effect.id == cause]
+            for one in self.larger(less):
+                newest = one.chosen[-1][0]
+                if newest.effect.id != cause and not newest.known:
+                    out.append(self._whole(one, newest, parts))
         return out
+
+    def without(self, model: Model, cause: str) -> Model:
+        """The model without an effect, both its triads."""
+        kept = [i for i, (h, _) in enumerate(model.chosen) if h.effect.id != cause]
+        return self.model(
+            tuple(model.chosen[i] for i in kept),
+            model.bench,
+            model.fit,
+            model.random,
+            tuple(model.shaped[i] for i in kept),
+        )
+
+    def _whole(self, model: Model, newest: Hypothesis, parts: list[str]) -> Model:
+        """The model with the other triads of its newest effect, as far as wanted."""
+        for other in self.pool:
+            if other.effect is newest.effect and other.part in parts:
+                if other.name not in model.names:
+                    model = self.with_one(model, other)
+        return model
 
     def _anew(self, model: Model) -> Model:
         """With the random parts' sizes estimated beside what is in it now."""

@@ -11,7 +11,7 @@ R. Boorstyn, Single-tone parameter estimation, 1974.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.effects import Experience, Line, catalogue
+from fieldcal.frames import turn
 from fieldcal.samples import CHANNELS, Array, Block
 
 Complex = NDArray[np.complexfloating]
@@ -32,7 +33,7 @@ CYCLES = 2.5
 BESIDE = 40
 """Neighbours that give the floor, to either side."""
 
-ODDS = 1e-6
+ODDS = 1e-5
 """Of a line where there is none, over all frequencies and channels."""
 
 NEAR = 2.0
@@ -41,8 +42,18 @@ NEAR = 2.0
 STEADY = 0.5
 """Part of the energy that one amplitude and phase must take to be a line."""
 
+EXTRA = 6.9
+"""Of ln 1000: what a line has to be worth beyond the frequencies tried."""
+
+LOOKS = 10
+"""Spectra looked at."""
+
+COHERENT = 1 << 18
+"""Samples up to which windows are put together with one phase."""
+
+PARTS = 16
 MOST = 4
-CLEAR = 5.0
+SHOWS = 4.0
 """Standard deviations from which a channel is said to have the line."""
 
 
@@ -59,6 +70,7 @@ class Tone:
     channels : outputs in which it stands out
     amplitude : (6,) mean amplitude in the outputs
     chi2 : by how much the squares fall with it
+    gain : rise of ln Z, for a prior as wide as the causes are large
 
     """
 
@@ -70,6 +82,7 @@ class Tone:
     channels: tuple[str, ...]
     amplitude: Array
     chi2: float
+    gain: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,26 +157,65 @@ def _highest(pieces: _Pieces, taken: Sequence[float]) -> float | None:
 
     Near one that is taken already, what is left belongs to it.
     """
-    power, count, hz = _power(pieces)
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     low = max(0.05, CYCLES / shortest)
-    band = hz >= low
-    for other in taken:
-        band &= np.abs(hz - other) > NEAR / shortest
-    if band.sum() < 4 * BESIDE:
-        return None
     best, near = np.log(ODDS), None
-    for c in range(6):
-        channel = power[band, c]
-        if not channel.any():
+    for power, count, hz in _spectra(pieces):
+        band = hz >= low
+        for other in taken:
+            band &= np.abs(hz - other) > NEAR / shortest
+        if band.sum() < 4 * BESIDE:
             continue
-        # median of Gamma(W) over its mean, by Wilson and Hilferty
-        stands = channel / _floor(channel) * count * (1 - 1 / (9 * count)) ** 3
+        stands = np.zeros(int(band.sum()))
+        for channel in power[band].T:
+            # median of Gamma(W) over its mean, by Wilson and Hilferty
+            level = _floor(channel) / count / (1 - 1 / (9 * count)) ** 3
+            stands += channel / level
+        degrees = count * power.shape[1]
         at = int(np.argmax(stands))
-        odds = _beyond(float(stands[at]), count) + np.log(6 * len(channel))
+        odds = _beyond(float(stands[at]), degrees) + np.log(LOOKS * len(stands))
         if odds < best:
             best, near = odds, float(hz[band][at])
     return near
+
+
+def _spectra(pieces: _Pieces) -> Iterator[tuple[Array, int, Array]]:
+    """Power of one or more channels, periodograms summed in it, and frequencies, Hz.
+
+    Channel by channel window by window; and triads with one phase throughout, in
+    the device's axes and, where the angles are known, in the base's. Windows are
+    tapered: what settles at the start of each is no line, though it comes as often.
+    """
+    power, count, hz = _power(pieces)
+    used = np.flatnonzero(power.any(axis=0))
+    for c in used:
+        yield power[:, [c]], count, hz
+    if sum(map(len, pieces.samples)) > COHERENT or len(pieces.samples) < 2:
+        return
+    frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
+    if pieces.x.oriented.all():
+        turned = turn(pieces.x.alpha, pieces.x.beta)
+        frames.append(np.moveaxis(pieces.x.mounting.T @ turned, 1, 2))
+    for frame in frames:
+        whole, hz = _one_phase(pieces, frame)
+        for triad in ([0, 1, 2], [3, 4, 5], list(range(6))):
+            if set(triad) <= set(used.tolist()):
+                yield whole[:, triad], 1, hz
+
+
+def _one_phase(pieces: _Pieces, frame: Array) -> tuple[Array, Array]:
+    """Power of the whole recording, windows turned into a frame, nothing between."""
+    start, end = pieces.times[0][0], pieces.times[-1][-1]
+    whole = np.zeros((int(round((end - start) * pieces.rate)) + 1, 6))
+    for samples, t, to_frame in zip(pieces.samples, pieces.times, frame, strict=True):
+        at = np.round((t - start) * pieces.rate).astype(np.intp)
+        taper = np.hanning(len(t))[:, None]
+        whole[at, :3] = taper * samples[:, :3] @ to_frame.T
+        whole[at, 3:] = taper * samples[:, 3:] @ to_frame.T
+    n = 2 << (len(whole) - 1).bit_length()
+    return np.abs(np.fft.rfft(whole, n, axis=0)) ** 2, np.fft.rfftfreq(
+        n, 1 / pieces.rate
+    )
 
 
 def _power(pieces: _Pieces) -> tuple[Array, int, Array]:
@@ -205,66 +257,84 @@ def _wave(t: Array, hz: float) -> Complex:
 
 def _explained(pieces: _Pieces, near: float) -> Tone | None:
     """The line near a frequency under the explanation that needs least."""
-    hz, seen, counts = _tuned(pieces, near)
+    moments = _moments(pieces, near)
     tried = []
     for effect in catalogue().values():
-        if not isinstance(effect, Line) or not effect.band[0] <= hz <= effect.band[1]:
+        if not isinstance(effect, Line) or not effect.band[0] <= near <= effect.band[1]:
             continue
         if effect.kind == "motion" and not pieces.x.oriented.all():
             continue
-        tried.append(_fitted(pieces, effect, hz, seen, counts))
+        tried.append(_tuned(pieces, effect, near, moments))
     if not tried:
         return None
-    cost = np.log(sum(map(len, pieces.samples)))
-    best = max(tried, key=lambda tone: tone.chi2 / 2 - len(tone.causes) * cost)
-    if best.chi2 / 2 <= len(best.causes) * cost or not best.channels:
+    best = max(tried, key=lambda tone: tone.gain)
+    places = np.log(sum(map(len, pieces.samples)))
+    if best.gain <= places + EXTRA or not best.channels:
         return None
-    return best if _share(pieces, best, seen, counts) > STEADY else None
+    return best if _share(pieces, best, moments) > STEADY else None
 
 
-def _share(pieces: _Pieces, tone: Tone, seen: Complex, counts: Array) -> float:
+def _share(pieces: _Pieces, tone: Tone, moments: _Moments) -> float:
     """Part of the energy at a line's frequency that one steady line takes.
 
     A line keeps amplitude and phase through all windows. A hand that trembles or a base
     that is pushed has as much energy there, but another phase each time.
     """
     clear = [CHANNELS.index(name) for name in tone.channels]
-    energy = (counts[:, None] / 2 * np.abs(seen[:, clear]) ** 2).sum(axis=0)
-    modelled = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[:, clear]
-    left = (counts[:, None] / 2 * np.abs(seen[:, clear] - modelled) ** 2).sum(axis=0)
+    seen, half = moments.seen(tone.hz - moments.near), moments.counts[:, None] / 2
+    modelled = tone.effect.response(pieces.x, tone.hz) @ tone.causes
+    energy = (half * np.abs(seen[:, clear]) ** 2).sum(axis=0)
+    left = (half * np.abs((seen - modelled)[:, clear]) ** 2).sum(axis=0)
     weight = 1 / pieces.noise[clear] ** 2
-    return float(1 - (weight @ left) / (weight @ energy))
+    noise = 2.0 * len(half) * len(clear)
+    return float(1 - (weight @ left - noise) / max(weight @ energy - noise, 1e-9))
 
 
-def _tuned(pieces: _Pieces, near: float) -> tuple[float, Complex, Array]:
-    """Frequency refined over all windows; amplitudes (w, 6) in each, and counts."""
-    shortest = min(map(len, pieces.samples)) / pieces.rate
-    moments, middles, groups, counts = [], [], [], []
+@dataclass(frozen=True, slots=True)
+class _Moments:
+    """Sums of the samples times a wave of frequency `near`, over parts of windows."""
+
+    near: float
+    sums: Complex
+    middle: Array
+    apart: Array
+    counts: Array
+
+    def seen(self, offset: float) -> Complex:
+        """Amplitudes (w, 6) in each window at a frequency a little off."""
+        turned = self.sums * np.exp(-2j * np.pi * offset * self.middle)[:, None]
+        amplitude: Complex = 2 / self.counts[:, None] * (self.apart.T @ turned)
+        return amplitude
+
+
+def _moments(pieces: _Pieces, near: float) -> _Moments:
+    sums, middle, groups = [], [], []
     for i, (samples, t) in enumerate(zip(pieces.samples, pieces.times, strict=True)):
         wave = np.conj(_wave(t, near))
-        for part in np.array_split(np.arange(len(t)), 16):
-            moments.append(wave[part] @ samples[part])
-            middles.append(t[part].mean())
+        for part in np.array_split(np.arange(len(t)), PARTS):
+            sums.append(wave[part] @ samples[part])
+            middle.append(t[part].mean())
             groups.append(i)
-        counts.append(len(t))
-    moment, middle = np.array(moments), np.array(middles)
-    span = max(np.ptp(middle), shortest)
-    offsets = np.arange(-1.5 / shortest, 1.5 / shortest, 0.1 / span)
-    weight = 1 / np.where(pieces.noise > 0, pieces.noise, np.inf)
-    turned = np.exp(-2j * np.pi * np.outer(offsets, middle))
-    apart = np.array(groups)[:, None] == np.arange(len(counts))
-    energy = (np.abs(turned @ (moment * np.nan_to_num(weight))) ** 2).sum(axis=1)
-    if not pieces.x.oriented.all() or len(counts) > 1:
-        # what turns with the device keeps no phase in its axes: add window by window
-        alone = np.einsum(
-            "om,mw,mc->owc", turned, apart, moment * np.nan_to_num(weight)
-        )
-        energy = np.maximum(energy, (np.abs(alone) ** 2).sum(axis=(1, 2)))
-    best = int(np.argmax(energy))
-    wave = np.exp(-2j * np.pi * offsets[best] * middle)
-    count = np.array(counts, dtype=float)
-    seen = 2 / count[:, None] * (apart.T @ (moment * wave[:, None]))
-    return near + float(offsets[best]), seen, count
+    apart = np.equal.outer(groups, np.arange(len(pieces.samples))).astype(float)
+    counts = np.array([len(s) for s in pieces.samples], dtype=float)
+    return _Moments(near, np.array(sums), np.array(middle), apart, counts)
+
+
+def _tuned(pieces: _Pieces, effect: Line, near: float, moments: _Moments) -> Tone:
+    """The effect at the frequency, near the one given, at which it takes most."""
+    shortest = min(map(len, pieces.samples)) / pieces.rate
+    span = max(float(np.ptp(moments.middle)), shortest)
+    step = 0.2 / span
+    offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
+    for _ in range(3):
+        tones = [
+            _fitted(pieces, effect, near + o, moments.seen(o), moments.counts)
+            for o in offsets
+        ]
+        at = int(np.argmax([tone.chi2 for tone in tones]))
+        offsets = offsets[at] + np.linspace(-step, step, 11)
+        step /= 5
+    return tones[at]
 
 
 def _fitted(
@@ -278,20 +348,32 @@ def _fitted(
     normal += 1e-12 * np.trace(normal).real * np.eye(len(normal))
     causes = np.linalg.solve(normal, np.einsum("wcm,wc->m", weighted, seen))
     sigma = np.sqrt(np.diag(np.linalg.inv(normal)).real)
+    if effect.kind == "sensor":  # outputs of their own: those without it have none
+        causes = np.where(np.abs(causes) > SHOWS * sigma, causes, 0.0)
     left = seen - response @ causes
-    chi2 = float(
-        (half[:, :, 0] * weight * (np.abs(seen) ** 2 - np.abs(left) ** 2)).sum()
-    )
+    fallen = half[:, :, 0] * weight * (np.abs(seen) ** 2 - np.abs(left) ** 2)
+    chi2 = float(fallen.sum())
+    strength = np.abs(causes / sigma) ** 2
     amplitude = np.sqrt((np.abs(response @ causes) ** 2).mean(axis=0))
     error = pieces.noise * np.sqrt(2 / counts.sum())
     clear = [
-        n for n, a, e in zip(CHANNELS, amplitude, error, strict=True) if a > CLEAR * e
+        c for c, a, e in zip(CHANNELS, amplitude, error, strict=True) if a > SHOWS * e
     ]
-    spread = np.sqrt(np.mean([np.var(np.concatenate(pieces.times))]))
     values, sigmas = _named(effect, causes, sigma)
-    values["hz"] = hz
+    values["hz"] = float(hz)
+    spread = float(np.concatenate(pieces.times).std())
     sigmas["hz"] = float(1 / (2 * np.pi * spread * np.sqrt(max(chi2, 1.0))))
-    return Tone(effect, hz, causes, values, sigmas, tuple(clear), amplitude, chi2)
+    return Tone(
+        effect,
+        float(hz),
+        causes,
+        values,
+        sigmas,
+        tuple(clear),
+        amplitude,
+        chi2,
+        chi2 / 2 - float(np.log1p(strength / 2).sum()),
+    )
 
 
 def _named(
@@ -300,7 +382,7 @@ def _named(
     """Amplitudes by name: one for each cause, or one for all of them."""
     names = [p.name for p in effect.params]
     if len(names) == len(causes):
-        some = [i for i in range(len(names)) if abs(causes[i]) > CLEAR * sigma[i]]
+        some = np.flatnonzero(causes)
         return (
             {names[i]: float(abs(causes[i])) for i in some},
             {names[i]: float(sigma[i]) for i in some},

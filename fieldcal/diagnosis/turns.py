@@ -31,6 +31,9 @@ from fieldcal.samples import Array, Block
 FINE_S = 0.02
 """Step of the integration at high sampling rates."""
 
+SMOOTH_S = 0.1
+"""Means that the angular acceleration is taken from."""
+
 PIECE_S = 0.15
 """Means of the accelerometers on the way."""
 
@@ -285,7 +288,18 @@ def _edges(
         latitude=x.latitude,
         f=f,
     )
-    return replace(out, w=w, w_dot=np.gradient(w, t, axis=0))
+    return replace(out, w=w, w_dot=_accelerations(t, w))
+
+
+def _accelerations(t: Array, w: Array) -> Array:
+    """Angular acceleration at the edges, from means over `SMOOTH_S`."""
+    step = float(t[1] - t[0])
+    m = max(1, round(SMOOTH_S / step)) | 1
+    kernel = np.ones(m) / m
+    padded = np.pad(w, ((m // 2, m // 2), (0, 0)), mode="edge")
+    smooth = np.column_stack([np.convolve(c, kernel, "valid") for c in padded.T])
+    out: Array = np.gradient(smooth, t, axis=0)
+    return out
 
 
 def carry(angle: Array) -> Array:

@@ -15,13 +15,16 @@ import numpy as np
 
 from fieldcal.diagnosis.explain import CLOSE, Explanation, preferred
 from fieldcal.diagnosis.scatter import wanders
-from fieldcal.diagnosis.select import Model
+from fieldcal.diagnosis.select import MARGIN, TIE, Model, foretells
 from fieldcal.effects import Experience, catalogue
 from fieldcal.frames import turn
 
 RANDOM = {"walk": "random_walk", "setting": "angle_setting"}
 
 REACH = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
+SEVERAL = 3
+"""Causes that are looked at in the place of chance."""
+
 TELLING = 5.0
 """Difference in white noise of a window's mean that decides."""
 
@@ -72,20 +75,27 @@ def _add(found: dict[str, list[str]], name: str, ids: list[str]) -> None:
 def _chances(explanation: Explanation) -> Iterator[tuple[str, str]]:
     """Effects that chance would do for as well, and the other way about."""
     search, best = explanation.search, explanation.model
+    level, near = best.objective - CLOSE, best.objective - TIE
     for less in search.smaller(best):
         gone = _causes(best) - _causes(less)
-        level = best.objective - CLOSE
-        for name in gone:
-            for wander in wanders(less.bench, less.fit):
-                id_ = RANDOM.get(wander.name.partition(":")[0])
-                if id_ and less.objective + wander.gain - search.price > level:
-                    yield name, id_
+        for wander in wanders(less.bench, less.fit) if gone else ():
+            id_ = RANDOM.get(wander.name.partition(":")[0])
+            if id_ and less.objective + wander.gain - search.price > level:
+                if _foretells(best, search.with_random(less, wander)):
+                    yield from ((name, id_) for name in gone)
         for name in set(best.random) - set(less.random):
             if (id_ := RANDOM.get(name.partition(":")[0])) is not None:
-                for other in search.larger(less):
+                ranked = sorted(search.larger(less), key=lambda m: -m.objective)
+                for other in ranked[:SEVERAL]:
                     newest = other.chosen[-1][0]
-                    if other.objective > level and not newest.known:
-                        yield id_, newest.effect.id
+                    if other.objective > near and not newest.known:
+                        if _foretells(best, other):
+                            yield id_, newest.effect.id
+
+
+def _foretells(best: Model, other: Model) -> bool:
+    """Whether another model predicts positions left out about as well."""
+    return foretells(other) > foretells(best) - MARGIN
 
 
 def telling_position(

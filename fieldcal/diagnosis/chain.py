@@ -48,6 +48,12 @@ class Checked:
         """What was found and has a name in the catalogue, each once."""
         return tuple(dict.fromkeys(i for i, fault in self.faults if fault.values))
 
+    @property
+    def pace(self) -> float:
+        """Seconds of the device's clock in a true second."""
+        found = [f.values["ppm"] for i, f in self.faults if i == "clock_skew"]
+        return 1 + 1e-6 * float(found[0]) if found else 1.0
+
 
 def check(block: Block, about: Description) -> Checked:
     """Look for every fault of the chain, and act on what is found."""

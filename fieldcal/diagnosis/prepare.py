@@ -15,7 +15,8 @@ from fieldcal.diagnosis.dwell import arrivals, beginnings, clamped
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.noise import white
-from fieldcal.diagnosis.reduce import Source, rate_of, reduce, spans
+from fieldcal.diagnosis.hand import rows_of
+from fieldcal.diagnosis.reduce import Source, rate_of, spans
 from fieldcal.diagnosis.spectrum import Tone, tones, without
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Line, Scatter, catalogue
@@ -72,10 +73,11 @@ def prepare(block: Block, about: Description) -> Prepared:
     six = np.where(checked.usable, checked.block.six, np.nan)
     noise = white([six[a:b] for a, b in windows if b > a], rate)
     rest = arrivals(checked.block, about, noise)
+    warmth = Thermometer.of(checked.block)
     source = Source(
-        checked.block, about, checked.usable, rest, Thermometer.of(checked.block)
+        checked.block, about, checked.usable, rest, warmth, checked.pace
     )
-    rows = reduce(source)
+    rows = rows_of(source)
     found = tuple(tones(source, rows))
     if found:
         source = replace(source, block=without(source.block, source, rows, found))
@@ -88,7 +90,7 @@ def bench_of(source: Source) -> Bench:
     """The rows of a source with the calibration a simulation starts from."""
     nominal = source.about.nominal
     return Bench(
-        reduce(source),
+        rows_of(source),
         np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
         np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
     )

@@ -109,6 +109,7 @@ class Source:
     usable : (n, 6) samples that may be used
     arrived : (p,) instant from which the device was at rest in each position, s
     warmth : the temperature
+    pace : seconds of the device's clock in a true second
 
     """
 
@@ -117,6 +118,7 @@ class Source:
     usable: NDArray[np.bool_]
     arrived: Array
     warmth: Thermometer
+    pace: float = 1.0
 
 
 def reduce(source: Source) -> Rows:

@@ -10,7 +10,8 @@ top, nothing enters a recording that has nothing more often than exp(-EXTRA). Mo
 grow by one or two at a time, lose what has become idle, and swap. What is random (a
 walk, a scatter from window to window, angles set by hand), and a smooth function that
 no effect makes, compete on the same footing: a term has to beat them, not only white
-noise.
+noise. Where evidence comes near to a tie between chance and a cause, whichever predicts
+positions left out better is taken.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import numpy as np
 
 from fieldcal.diagnosis.candidates import Hypothesis, instants
 from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.heldout import foretold
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.narrow import narrower
 from fieldcal.diagnosis.scatter import Wander, dropped, fees, wanders
@@ -32,6 +34,9 @@ EXTRA = 6.9
 
 MARGIN, WEAK = 3.0, 8.0
 """How much better an effect has to be than something random, ln, if it is weak."""
+
+TIE = 12.0
+"""Difference in ln Z from which nothing is asked of positions left out."""
 
 OTHERS = 60
 """Random and smooth parts that are tried besides."""
@@ -81,6 +86,11 @@ class Model:
         return frozenset(h.name for h, _ in self.chosen)
 
     @property
+    def parts(self) -> frozenset[str]:
+        """Names of everything in it, causes and random parts."""
+        return self.names | {*self.random}
+
+    @property
     def leaves_nothing(self) -> bool:
         """Whether its rows are no further off than white noise."""
         spread = np.sqrt(2 * max(self.fit.dof, 1))
@@ -108,11 +118,15 @@ class Search:
     def run(self) -> Model:
         """The best model found."""
         best = self.model((), self.bench)
+        seen = {best.parts}
         while (grown := self._grow(best)) is not None:
             grown = self.model(
                 grown.chosen, grown.bench, grown.fit, grown.random, grown.shaped
             )
             best = self._tidied(self._anew(grown))
+            if best.parts in seen:  # what was let in went again, or the other way about
+                break
+            seen.add(best.parts)
         return best
 
     def model(
@@ -145,9 +159,24 @@ class Search:
         if by_chance > gain - MARGIN or not best.leaves_nothing:
             best = self._followed(model, first)
             gain = best.objective - model.objective
+        if by_chance > 0 and gain > 0 and abs(by_chance - gain) < TIE:
+            return self._foretelling(model, first, best, chance)
         if by_chance > gain or (gain < WEAK and by_chance > gain - MARGIN):
-            return self._with_random(model, chance)
+            return self.with_random(model, chance)
         return best if gain > 0 else None
+
+    def _foretelling(
+        self, model: Model, first: Sequence[Model], best: Model, chance: Wander
+    ) -> Model:
+        """Chance or a cause: whichever predicts the positions left out better."""
+        random = self.with_random(model, chance)
+        ranked = sorted(first, key=lambda m: -m.objective)[:BEAM]
+        causes = [m for m in ranked if m.objective > model.objective and m is not best]
+        cause = max([best, *causes], key=foretells)
+        more = foretells(cause) - foretells(random)
+        if more > MARGIN:
+            return cause
+        return random if more < -MARGIN or random.objective > best.objective else best
 
     def _instead(self, model: Model) -> list[Model]:
         """With the likeliest causes, and the random parts as small as these leave them.
@@ -233,7 +262,8 @@ class Search:
         at = instants(model.bench)
         return tuple(replace(term, shape={"at_s": float(at[i])}) for i in best), cost
 
-    def _with_random(self, model: Model, chance: Wander) -> Model:
+    def with_random(self, model: Model, chance: Wander) -> Model:
+        """The model with something random let in."""
         bench = model.bench.but(errors=chance.errors)
         random = (*model.random, chance.name)
         return self.model(model.chosen, bench, model.fit, random, model.shaped)
@@ -287,7 +317,7 @@ class Search:
             kept = tuple(r for r in model.random if r != name)
             less = self.model(model.chosen, bench, model.fit, kept, model.shaped)
             chance = {w.name: w for w in wanders(bench, less.fit)}.get(name)
-            model = self._with_random(less, chance) if chance else less
+            model = self.with_random(less, chance) if chance else less
         return model
 
     def smaller(self, model: Model) -> list[Model]:
@@ -302,6 +332,11 @@ class Search:
             bench = model.bench.but(errors=dropped(model.bench.errors, name))
             out.append(self.model(model.chosen, bench, model.fit, kept, model.shaped))
         return out
+
+
+def foretells(model: Model) -> float:
+    """How well a model predicts positions left out, ln."""
+    return foretold(model.bench, model.fit.terms, model.fit)
 
 
 def narrowed(model: Model) -> Model:

@@ -218,7 +218,7 @@ def _turn(
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
     earth = (1 - part) * x.w[rows_p].mean(axis=0) + part * x.w[rows_q].mean(axis=0)
     inertial = _undone(block, fit, undo, t)
-    angle = _angles(t, inertial - earth, edge)
+    angle = _angles(t, inertial - earth, edge) / source.pace
     size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
     attitude, done = carry(angle), size / size[-1]
     if np.arccos(np.clip((np.trace(attitude[-1]) - 1) / 2, -1, 1)) < LEAST:

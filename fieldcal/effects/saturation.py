@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.effects.recording import Rows
+from fieldcal.effects.recording import Rows, lsb_of
 from fieldcal.samples import CHANNELS, Array
 
 FEWEST = 5
@@ -27,10 +27,11 @@ BESIDE = 4.0
 """How much more often the rail is taken than the value next to it."""
 
 
-def rails(values: Array, limit: float) -> list[Rows]:
+def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
     """Samples at each rail of a channel; none where there is no rail.
 
-    `limit` is the declared full scale, nan where unknown.
+    `limit` is the declared full scale, nan where unknown; `coarse` says that any value
+    is taken again and again, so that this alone makes no rail.
     """
     out = []
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
@@ -39,7 +40,9 @@ def rails(values: Array, limit: float) -> list[Rows]:
     for edge in (low, high):
         at = np.flatnonzero(values == edge)
         declared = abs(abs(edge) - limit) < 1e-3 * limit
-        if len(at) >= FEWEST and (declared or _repeated(values, float(edge), at)):
+        if len(at) >= FEWEST and (
+            declared or (not coarse and _repeated(values, edge, at))
+        ):
             out.append(at)
     return out
 
@@ -71,7 +74,8 @@ class Saturation(Chain):
                 for c in range(first, first + 3):
                     values = recording.channel(c)
                     if c not in found and np.isfinite(values).any():
-                        if at := rails(values, limit):
+                        coarse = lsb_of(values) > recording.noise[c]
+                        if at := rails(values, limit, coarse):
                             found[c] = np.sort(np.concatenate(at))
                 if not found:
                     break

@@ -25,6 +25,7 @@ class Outcome:
     named : what it named, with the aliases it gave
     right : whether that is what was concealed
     aliased : whether it is so by an alias only
+    extra : effects named that are not there
     pulls : (value - truth) / sigma of every number given, by its name
     before, after : held-out rms
     seconds : that the diagnosis took
@@ -39,6 +40,7 @@ class Outcome:
     named: dict[str, tuple[str, ...]]
     right: bool
     aliased: bool
+    extra: tuple[str, ...] = ()
     pulls: dict[str, float] = field(default_factory=dict)
     before: float = np.nan
     after: float = np.nan
@@ -50,6 +52,7 @@ def judged(session: Session, seed: int, told: Diagnosis, seconds: float) -> Outc
     """Hold a diagnosis against what was concealed."""
     named = {e.id: tuple(e.aliases) for e in told.effects}
     where = tuple(f"{m.channel} {m.kind}" for m in told.mismatch[:3])
+    extra = _extra(session, named)
     right, aliased = _right(session, told.verdict, named, where)
     return Outcome(
         session.label,
@@ -59,6 +62,7 @@ def judged(session: Session, seed: int, told: Diagnosis, seconds: float) -> Outc
         named,
         right,
         aliased,
+        extra,
         dict(_pulls(session, told)),
         told.before.held_out_rms,
         told.after.held_out_rms,
@@ -77,16 +81,22 @@ def _right(
     if session.added is not None:
         located = bool(where) and where[0].split()[0] == session.channel
         return verdict == "unexplained" and located, False
-    extra = [
-        name
-        for name, others in named.items()
-        if name not in truth | ALWAYS and not truth & set(others)
-    ]
+    extra = _extra(session, named)
     if not truth:
         return not extra and verdict in ("consistent", "left_out"), False
     said = set(named).union(*named.values()) if named else set()
     good = truth <= said and not extra and verdict in ("left_out", "ambiguous")
     return good, good and not truth <= set(named)
+
+
+def _extra(session: Session, named: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Effects that are named and not there, nor stand for one that is."""
+    truth = set(session.concealed)
+    return tuple(
+        name
+        for name, others in named.items()
+        if name not in truth | ALWAYS and not truth & set(others)
+    )
 
 
 def _pulls(session: Session, told: Diagnosis) -> Iterator[tuple[str, float]]:

@@ -51,6 +51,8 @@ def aliases(explanation: Explanation) -> Aliases:
     cost = preferred(explanation.model)
     mine = _causes(explanation.model)
     for rival in explanation.rivals:
+        if not _foretells(explanation.model, rival):
+            continue
         theirs = _causes(rival)
         for name in sorted(mine - theirs):
             _add(found, name, sorted(theirs - mine))

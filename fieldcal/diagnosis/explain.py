@@ -131,7 +131,9 @@ def _with_turns(
             interval = 1 / rate_of(prepared.source.block)
             table = Turntable(model.bench, fit, made, interval)
             found = table.better((), search.price, closures=False)
-            gains.append(found.score - search.price * len(found.terms))
+            worth = found.score - search.price * len(found.terms)
+            # turns that nothing explains well do not tell much about the rest
+            gains.append(worth / max(1.0, found.chi2 / max(found.dof, 1)))
         else:
             gains.append(0.0)
     totals = [m.objective + g for m, g in zip(close, gains, strict=True)]

@@ -155,21 +155,22 @@ class Search:
         gain = best.objective - model.objective
         if max(gain, chance.gain - self.price) <= 0:
             return None
-        by_chance = chance.gain - self.price
+        # a fit that is not linear takes less of it than its linear part promises
+        random = self.with_random(model, chance)
+        by_chance = random.objective - model.objective
         if by_chance > gain - MARGIN or not best.leaves_nothing:
             best = self._followed(model, first)
             gain = best.objective - model.objective
         if by_chance > 0 and gain > 0 and abs(by_chance - gain) < TIE:
-            return self._foretelling(model, first, best, chance)
-        if by_chance > gain or (gain < WEAK and by_chance > gain - MARGIN):
-            return self.with_random(model, chance)
+            return self._foretelling(model, first, best, random)
+        if by_chance > gain or (0 < gain < WEAK and by_chance > gain - MARGIN):
+            return random if by_chance > 0 else None
         return best if gain > 0 else None
 
     def _foretelling(
-        self, model: Model, first: Sequence[Model], best: Model, chance: Wander
+        self, model: Model, first: Sequence[Model], best: Model, random: Model
     ) -> Model:
         """Chance or a cause: whichever predicts the positions left out better."""
-        random = self.with_random(model, chance)
         ranked = sorted(first, key=lambda m: -m.objective)[:BEAM]
         causes = [m for m in ranked if m.objective > model.objective and m is not best]
         cause = max([best, *causes], key=foretells)

@@ -161,15 +161,10 @@ def _windows(case: Case) -> list[Window]:
             alpha, beta = 0, 0
             turned = np.roll([0.5, 0.35 * (i % 4 > 1), 0.0], i) * (-1) ** (i // 3)
             rate = (float(turned[0]), float(turned[1]), float(turned[2]))
-        out.append(
-            Window(
-                *np.deg2rad([alpha, beta]).tolist(),
-                start,
-                start + case.long_s,
-                rate,
-                vibration=(0.6 if i % 3 == 1 else 0.0) if case.shaken else None,
-            )
-        )
+        shaking = (0.6 if i % 3 == 1 else 0.0) if case.shaken else None
+        a, b = np.deg2rad([alpha, beta]).tolist()
+        end = start + case.long_s
+        out.append(Window(a, b, start, end, rate, vibration=shaking))
     return out
 
 

@@ -1,6 +1,6 @@
 """Sessions with something concealed, drawn at random, and what the diagnosis says.
 
-    python -m benchmarks concealed [SESSIONS] [--quick] [--only LABEL]
+    python -m benchmarks concealed [SESSIONS] [--quick] [--only=LABEL]
 
 For every kind of session: how often it is named right or honestly aliased, how much of
 what is said is not there, how the numbers hold against their intervals, and by how much
@@ -62,7 +62,7 @@ def drawn(count: int, only: str = "") -> Iterator[tuple[int, Session]]:
     """Seeds and sessions, all kinds in turn."""
     some = {k: v for k, v in kinds().items() if only in k}
     total = sum(weight for _, weight in some.values())
-    for k, (name, (draw, weight)) in enumerate(some.items()):
+    for k, (draw, weight) in enumerate(some.values()):
         for i in range(max(1, round(count * weight / total))):
             seed = 1000 * k + i + SEED
             session = draw(np.random.default_rng(seed))
@@ -83,7 +83,7 @@ def outcome(seed: int, session: Session) -> Outcome:
 def main() -> None:
     """Print the tables."""
     words = sys.argv[2:]
-    only = words[words.index("--only") + 1] if "--only" in words else ""
+    only = "".join(w.removeprefix("--only=") for w in words if "=" in w)
     numbers = [int(w) for w in words if w.isdigit()]
     count = numbers[0] if numbers else QUICK if "--quick" in words else USUAL
     found = []

@@ -107,9 +107,7 @@ def single(name: str, rng: np.random.Generator, sigmas: float) -> Session:
         span = session.windows[-1].end
         values = sized(session, name, drawn(name, rng, span), sigmas)
         if values is not None:
-            return replace(
-                session.having({name: values}), label=name, sigmas=sigmas
-            )
+            return replace(session.having({name: values}), label=name, sigmas=sigmas)
 
 
 def suited(name: str, rng: np.random.Generator) -> Session:
@@ -124,7 +122,9 @@ def suited(name: str, rng: np.random.Generator) -> Session:
     if name == "heading_error":
         one = session.profile
         noise = replace(
-            one.noise, gyr=(10 ** rng.uniform(-4.5, -4),) * 3, gyr_instability=device.ZERO
+            one.noise,
+            gyr=(10 ** rng.uniform(-4.5, -4),) * 3,
+            gyr_instability=device.ZERO,
         )
         one = replace(one, noise=noise, device=device.Identity(grade="navigation"))
         return replace(session, profile=replace(one, effects=()))
@@ -140,7 +140,9 @@ def _warmed(session: Session, name: str, rng: np.random.Generator) -> Session:
     course = rng.choice([4.0, 10.0]) * np.sin(
         2 * np.pi * times / span * rng.uniform(0.4, 1.6) + rng.uniform(0, 6)
     )
-    points = tuple((float(t), 20.0 + float(k)) for t, k in zip(times, course, strict=True))
+    points = tuple(
+        (float(t), 20.0 + float(k)) for t, k in zip(times, course, strict=True)
+    )
     climate = device.Climate(points=points, self_heating_k=0.0)
     if name != "thermal_hysteresis" and rng.random() < 0.5:
         ramp = float(rng.choice([-1.0, 1.0]) * rng.uniform(3, 10) / span)
@@ -149,9 +151,7 @@ def _warmed(session: Session, name: str, rng: np.random.Generator) -> Session:
     return replace(session, profile=one, thermometer=True)
 
 
-def sized(
-    session: Session, name: str, values: Values, sigmas: float
-) -> Values | None:
+def sized(session: Session, name: str, values: Values, sigmas: float) -> Values | None:
     """The effect at that size; None if no device is that bad, or it does not show."""
     for _ in range(3):
         there = size(session.having({name: values}))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.draws import HOT, EQUATIONS, drawn, size, sized, suited
+from benchmarks.concealed.draws import EQUATIONS, HOT, drawn, size, sized, suited
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device.profile import FullScale
@@ -144,27 +144,30 @@ def outside(name: str, rng: np.random.Generator, sigmas: float) -> Session:
         session = _calm(plain(rng))
         channel = int(rng.integers(3))
         which = int(rng.integers(1, len(session.windows)))
-        course = OUTSIDE[name]
-
-        def course_of(amount: float) -> Callable[[Session, Block], Block]:
-            def add(session: Session, block: Block) -> Block:
-                acc = block.acc.copy()
-                acc[:, channel] += amount * course(session, block.t, channel, which)
-                return replace(block, acc=acc)
-
-            return add
-
         if name == "fading scale":
             session = replace(session, thermometer=False)
-        there = size(replace(session, added=course_of(1e-3)))
+        there = size(replace(session, added=_adding(name, channel, which, 1e-3)))
         if there > 1e-6 and 1e-3 * sigmas / there < 0.1:
             return replace(
                 session,
                 label=f"outside: {name}",
-                added=course_of(1e-3 * sigmas / there),
+                added=_adding(name, channel, which, 1e-3 * sigmas / there),
                 channel=("ax", "ay", "az")[channel],
                 sigmas=sigmas,
             )
+
+
+def _adding(
+    name: str, channel: int, which: int, amount: float
+) -> Callable[[Session, Block], Block]:
+    """What adds a course to one axis."""
+
+    def add(session: Session, block: Block) -> Block:
+        acc = block.acc.copy()
+        acc[:, channel] += amount * OUTSIDE[name](session, block.t, channel, which)
+        return replace(block, acc=acc)
+
+    return add
 
 
 def _held(session: Session, t: Array) -> Array:
@@ -182,33 +185,39 @@ def _angles(session: Session, t: Array) -> tuple[Array, Array]:
 
 def _tooth(session: Session, t: Array, channel: int, which: int) -> Array:
     """A course around the joint that no force has."""
-    return np.sin(8 * _angles(session, t)[0] + 0.5)
+    course: Array = np.sin(8 * _angles(session, t)[0] + 0.5)
+    return course
 
 
 def _wave(session: Session, t: Array, channel: int, which: int) -> Array:
-    return np.sin(2 * np.pi * t / 71.0)
+    course: Array = np.sin(2 * np.pi * t / 71.0)
+    return course
 
 
 def _cubic(session: Session, t: Array, channel: int, which: int) -> Array:
     part = 2 * t / t[-1] - 1
-    return part**3 - 0.6 * part
+    course: Array = part**3 - 0.6 * part
+    return course
 
 
 def _odd_one(session: Session, t: Array, channel: int, which: int) -> Array:
-    return (_held(session, t) == which).astype(float)
+    course: Array = (_held(session, t) == which).astype(float)
+    return course
 
 
 def _hysteresis(session: Session, t: Array, channel: int, which: int) -> Array:
     """A bias that depends on whether the load rose or fell when it was turned."""
     force = _force(session)[:, channel]
     rose = np.sign(np.diff(force, prepend=force[0] - 1.0))
-    return rose[_held(session, t)]
+    course: Array = rose[_held(session, t)]
+    return course
 
 
 def _fading(session: Session, t: Array, channel: int, which: int) -> Array:
     """A scale factor that warms up."""
     force = _force(session)[:, channel]
-    return force[_held(session, t)] * np.exp(-3 * t / t[-1])
+    course: Array = force[_held(session, t)] * np.exp(-3 * t / t[-1])
+    return course
 
 
 def _force(session: Session) -> Array:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal import description
 from fieldcal.description import Description
@@ -105,7 +106,7 @@ class Session:
         block = replace(block, temperature=warmth, seq=unknown, t_host=host)
         if (lost := self.profile.one("dropped")) is not None:
             kept = np.random.default_rng(seed).random(len(block)) >= lost["fraction"]
-            block = block[kept]
+            block = _only(block, kept)
         return self.added(self, block) if self.added is not None else block
 
     @property
@@ -138,6 +139,12 @@ class Session:
                 "position": positions,
             }
         )
+
+
+def _only(block: Block, kept: NDArray[np.bool_]) -> Block:
+    """The samples that were not lost."""
+    columns = (block.acc, block.gyr, block.temperature, block.seq, block.t_host)
+    return Block.of(block.t[kept], *(column[kept] for column in columns))
 
 
 def plain(
@@ -200,7 +207,7 @@ def _windows(
     for p in positions:
         angles, rate = p if place == "table" else (p, (0.0, 0.0, 0.0))
         alpha, beta = np.deg2rad(angles)
-        about = tuple(float(r) for r in np.deg2rad(rate))
-        out.append(Window(float(alpha), float(beta), start, start + long, about))
+        x, y, z = (float(r) for r in np.deg2rad(rate))
+        out.append(Window(float(alpha), float(beta), start, start + long, (x, y, z)))
         start += long + gap
     return tuple(out)

@@ -57,7 +57,9 @@ def confusion(found: Sequence[Outcome]) -> str:
         some = [o for o in found if o.label == label]
         wrong = Counter(_said(o) for o in some if not o.right)
         others = "; ".join(f"{name} ({n})" for name, n in wrong.most_common())
-        lines.append(f"| {label} | {sum(o.right for o in some)}/{len(some)} | {others} |")
+        lines.append(
+            f"| {label} | {sum(o.right for o in some)}/{len(some)} | {others} |"
+        )
     return "\n".join(lines)
 
 

@@ -10,12 +10,9 @@ rate over T s is the angle between its ends: with a wander of the direction of a
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from fieldcal.diagnosis.reduce import Rows, Source, averaged, rate_of, reduce, spans
-from fieldcal.samples import Array
 
 WANDERS = 6.0
 """Standard deviations of what the squares across the force have too many."""

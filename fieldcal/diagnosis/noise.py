@@ -120,7 +120,9 @@ def _pooled(levels: Sequence[float], spreads: Sequence[float]) -> float:
     for level, finer in zip(levels[1:], spreads[1:], strict=True):
         if not np.isfinite(best):
             best, spread = level, finer
-        elif not abs(level - best) <= AGREE * np.hypot(spread, finer) * max(level, best):
+        elif not abs(level - best) <= AGREE * np.hypot(spread, finer) * max(
+            level, best
+        ):
             break
         else:
             best, spread = level, finer

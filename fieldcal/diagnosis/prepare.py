@@ -13,9 +13,9 @@ from fieldcal.diagnosis.candidates import hypotheses
 from fieldcal.diagnosis.chain import Checked, check, checked_again
 from fieldcal.diagnosis.dwell import arrivals, beginnings, clamped
 from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.noise import white
-from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.reduce import Source, rate_of, spans
 from fieldcal.diagnosis.spectrum import Tone, tones, without
 from fieldcal.diagnosis.thermometer import Thermometer
@@ -74,9 +74,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     noise = white([six[a:b] for a, b in windows if b > a], rate)
     rest = arrivals(checked.block, about, noise)
     warmth = Thermometer.of(checked.block)
-    source = Source(
-        checked.block, about, checked.usable, rest, warmth, checked.pace
-    )
+    source = Source(checked.block, about, checked.usable, rest, warmth, checked.pace)
     rows = rows_of(source)
     found = tuple(tones(source, rows))
     if found:

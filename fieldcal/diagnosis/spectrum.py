@@ -234,9 +234,11 @@ def _power(pieces: _Pieces) -> tuple[Array, int, Array]:
 
 def _floor(power: Array) -> Array:
     """Running median, by stretches."""
-    parts = np.array_split(np.arange(len(power)), max(1, len(power) // (2 * BESIDE)))
-    level = [float(np.median(power[p])) for p in parts]
-    floor: Array = np.interp(np.arange(len(power)), [p.mean() for p in parts], level)
+    parts = max(1, len(power) // (2 * BESIDE))
+    each = len(power) // parts
+    level = np.median(power[: parts * each].reshape(parts, each), axis=1)
+    middle = (np.arange(parts) + 0.5) * each
+    floor: Array = np.interp(np.arange(len(power)), middle, level)
     return np.maximum(floor, 1e-300)
 
 

@@ -85,7 +85,9 @@ CASES = {
     "random_walk": Case({"ax": 8e-4, "ay": 8e-4, "az": 8e-4}),
     "settling": Case({"ax": 0.03, "ay": 0.02, "az": -0.03, "tau_s": 4.0}),
     "lever_arm": Case({"x": 0.2, "y": -0.15, "z": 0.1}),
-    "vibration_rectification": Case({"x": 0.03, "y": -0.04, "z": 0.03}, shaken=True),
+    "vibration_rectification": Case(
+        {"x": 0.08, "y": -0.09, "z": 0.08}, shaken=True, long_s=25.0
+    ),
     "hum": Case({"ax": 0.01, "ay": 0.008, "hz": 7.0}),
     "bump": Case({"at_s": 55.0, "for_s": 0.7}),
     "time_delay": Case({"seconds": 0.03}),
@@ -161,7 +163,7 @@ def _windows(case: Case) -> list[Window]:
             alpha, beta = 0, 0
             turned = np.roll([0.5, 0.35 * (i % 4 > 1), 0.0], i) * (-1) ** (i // 3)
             rate = (float(turned[0]), float(turned[1]), float(turned[2]))
-        shaking = (0.6 if i % 3 == 1 else 0.0) if case.shaken else None
+        shaking = (1.5 if i % 3 == 1 else 0.0) if case.shaken else None
         a, b = np.deg2rad([alpha, beta]).tolist()
         end = start + case.long_s
         out.append(Window(a, b, start, end, rate, vibration=shaking))

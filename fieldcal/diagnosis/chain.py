@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.noise import white
-from fieldcal.diagnosis.reduce import rate_of, spans
+from fieldcal.diagnosis.reduce import levels_of, rate_of, spans
 from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
 from fieldcal.frames import earth_rate_home, force_home
 from fieldcal.positions import angles
@@ -144,7 +143,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
     windows, rate = spans(block, about), rate_of(block)
     six = np.where(usable, block.six, np.nan)
     pieces = [six[a:b] for a, b in windows if b > a]
-    noise = white(pieces, rate) if pieces else np.full(6, np.nan)
+    noise = levels_of(pieces, rate)[0] if pieces else np.full(6, np.nan)
     if about.positions:
         alpha, beta = angles(about.positions)
     else:

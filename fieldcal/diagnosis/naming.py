@@ -24,6 +24,10 @@ MATERIAL = 44.0
 """Twice the rise of ln L from which what wanders is said: less only widens."""
 
 
+ARRIVAL_S = 0.3
+"""Standard uncertainty of the instant at which a turn by hand ends."""
+
+
 @dataclass(frozen=True, slots=True)
 class Removed:
     """What is lost when one effect is taken out of the windows' model.
@@ -64,6 +68,8 @@ def of_windows(
             n: Quantity(v, s, term.effect.unit(n))
             for n, (v, s) in sigmas(explanation.fit, term).items()
         }
+        if name == "settling":
+            parameters = _since_arrival(parameters)
         if "at_s" in term.shape:
             at, error = jump_instant(
                 explanation.prepared.source,
@@ -82,6 +88,18 @@ def of_windows(
             "held_out_gain": gain(without, then.held_out),
         }
         yield Found(name, parameters, tuple(aliases.get(name, ())), evidence)
+
+
+def _since_arrival(found: dict[str, Quantity]) -> dict[str, Quantity]:
+    """Amplitudes with the uncertainty of the instant that they are counted from."""
+    tau = found["tau_s"].value if "tau_s" in found else np.inf
+    out = dict(found)
+    for name in (n for n in found if n in CHANNELS):
+        value, sigma, unit = found[name].value, found[name].sigma, found[name].unit
+        if not isinstance(value, str) and not isinstance(tau, str):
+            unsure = abs(value) * ARRIVAL_S / max(tau, ARRIVAL_S)
+            out[name] = Quantity(value, float(np.hypot(sigma or 0.0, unsure)), unit)
+    return out
 
 
 def gain(without: Removed, now: Array) -> float:

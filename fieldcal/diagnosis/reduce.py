@@ -128,7 +128,7 @@ def reduce(source: Source) -> Rows:
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
     six = np.where(source.usable, block.six, np.nan)
     pieces = [six[a:b] for a, b in windows[held]]
-    noise, levels = _levels(pieces, rate)
+    noise, levels = levels_of(pieces, rate)
     bounds = [_cut(block.t, a, b, rate, len(held)) for a, b in windows[held]]
     rows = [len(b) for b in bounds]
     level = np.repeat(levels, rows, axis=0)
@@ -202,7 +202,7 @@ def _means(six: Array, bound: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]
     return np.where(count > 0, mean, np.nan), count
 
 
-def _levels(pieces: Sequence[Array], rate: float) -> tuple[Array, Array]:
+def levels_of(pieces: Sequence[Array], rate: float) -> tuple[Array, Array]:
     """Deviation of one sample: usual (6,), and in each window (w, 6).
 
     The usual one is that of the quiet windows. Others have more, and vibration comes on

@@ -243,7 +243,7 @@ class Turntable:
         swung = turn.swung(path) * state.scale[:3, None]
         on_way = turn.means(design[:, :3] + swung)
         spread = self._density * np.sqrt(turn.t[-1] - turn.t[0])
-        across = turn.across / spread[:, None]
+        across = turn.across / np.hypot(spread, turn.blur)[:, None]
         whiten = self._whitener(turn)
         z = np.concatenate(
             [across @ (turn.closure - end[:, 0]), whiten @ (turn.acc - seen).ravel()]

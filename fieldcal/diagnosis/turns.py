@@ -89,6 +89,7 @@ class Turn:
     cut : (k + 1,) edges between the pieces
     acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
     closure : (3,) rad, phi_T as seen
+    blur : rad, what sampling leaves open of it
     across : (3, 3) projection on what of the closure is known
     start_force : (3,) f_p, m/s^2
     interval : s between the samples that `acc` is made of
@@ -106,6 +107,7 @@ class Turn:
     across: Array
     start_force: Array
     interval: float
+    blur: float
 
     @property
     def t(self) -> Array:
@@ -216,11 +218,15 @@ def _turn(
     t = block.t[first : first + count * each + 1]
     edge = np.arange(count + 1) * each
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
-    earth = (1 - part) * x.w[rows_p].mean(axis=0) + part * x.w[rows_q].mean(axis=0)
+    ends = [x.w[at].mean(axis=0) for at in (rows_p, rows_q)]
+    earth = (1 - part) * ends[0] + part * ends[1]
     inertial = _undone(block, fit, undo, t)
-    angle = _angles(t, inertial - earth, edge) / source.pace
-    size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
-    attitude, done = carry(angle), size / size[-1]
+    for _ in range(2):  # the Earth's rate turns with the device, once it is known how
+        angle = _angles(t, inertial - earth, edge) / source.pace
+        size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
+        attitude, done = carry(angle), size / size[-1]
+        there = _between(attitude, done, *ends)
+        earth = np.column_stack([np.interp(t, t[edge], w) for w in there.T])
     if np.arccos(np.clip((np.trace(attitude[-1]) - 1) / 2, -1, 1)) < LEAST:
         return None
     each_piece = max(1, round(PIECE_S * rate / each), -(-count // PIECES))
@@ -241,7 +247,31 @@ def _turn(
         across,
         x.f[rows_p].mean(axis=0),
         1 / rate,
+        _blur(t, inertial - earth, each),
     )
+
+
+def _blur(t: Array, w: Array, each: int) -> float:
+    """How far the attitude is off for want of samples: twice as many would tell, rad.
+
+    From every other sample it comes out otherwise by so much; from all, the error is
+    of the same order at most.
+    """
+    whole = (len(t) - 1) // (2 * each) * 2 * each
+    ends = []
+    for skip in (1, 2):
+        some = slice(0, whole + 1, skip)
+        edge = np.arange(0, whole // skip + 1, max(each // skip, 1))
+        ends.append(carry(_angles(t[some], w[some], edge))[-1])
+    off = ends[0] @ ends[1].T
+    return float(np.linalg.norm([off[2, 1], off[0, 2], off[1, 0]]))
+
+
+def _between(attitude: Array, done: Array, start: Array, end: Array) -> Array:
+    """A vector of the base on the way, known at both ends, (m + 1, 3)."""
+    back = attitude @ attitude[-1].T
+    out: Array = (1 - done)[:, None] * (attitude @ start) + done[:, None] * (back @ end)
+    return out
 
 
 def _angles(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
@@ -337,8 +367,7 @@ def geometry(
 
     """
     p, q = (int(np.argmax(x.position == i)) for i in pair)
-    back = attitude @ attitude[-1].T
-    f = (1 - done)[:, None] * (attitude @ x.f[p]) + done[:, None] * (back @ x.f[q])
+    f = _between(attitude, done, x.f[p], x.f[q])
     if x.oriented[[p, q]].all():
         known = x.mounting.T @ turn(x.alpha[[p, q]], x.beta[[p, q]])
         off = attitude[-1].T @ known[1] @ known[0].T  # I + [phi]x

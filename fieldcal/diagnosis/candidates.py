@@ -84,6 +84,8 @@ def _shows(effect: Effect, bench: Bench, warming: bool, navigation: bool) -> boo
         return False
     if effect.id in RATED:
         return bench.rated
+    if effect.id == "settling" and not np.isfinite(x.since_turn).any():
+        return False
     if effect.id == "heading_error":
         return navigation and bool(x.oriented.any())
     if effect.id == "vibration_rectification":
@@ -126,7 +128,7 @@ def _grid(effect: Effect, bench: Bench) -> Iterator[dict[str, float]]:
         span = float(np.ptp(x.t))
         if effect.id == "settling":
             low, high = (
-                max(shape.low, x.since_turn.min() / 4),
+                max(shape.low, float(x.since_turn.min()) / 4),
                 min(shape.high, span / 3),
             )
         else:

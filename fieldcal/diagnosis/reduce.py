@@ -18,7 +18,7 @@ from fieldcal.description import Description
 from fieldcal.diagnosis.noise import rounding, white
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Experience
-from fieldcal.frames import earth_rate_home, force_home
+from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.positions import angles
 from fieldcal.samples import Array, Block
 
@@ -132,9 +132,14 @@ def reduce(source: Source) -> Rows:
     bounds = [_cut(block.t, a, b, rate, len(held)) for a, b in windows[held]]
     rows = [len(b) for b in bounds]
     level = np.repeat(levels, rows, axis=0)
-    off = np.sqrt(np.repeat(rows, rows))[:, None] * rounding(pieces, noise)
     out = averaged(source, np.concatenate(bounds), np.repeat(held, rows), level, noise)
-    return replace(out, sd=np.hypot(out.sd, off))  # the same all through a window
+    off = np.tile(rounding(pieces, noise), (len(out.x), 1))
+    # the Earth turns a device of unknown orientation about any of its axes
+    free = ~out.x.oriented
+    earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
+    off[free, 3:] = np.hypot(off[free, 3:], earth)
+    same = np.sqrt(np.repeat(rows, rows))[:, None] * off  # all through a window
+    return replace(out, sd=np.hypot(out.sd, same))
 
 
 def averaged(

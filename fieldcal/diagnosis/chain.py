@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.reduce import levels_of, rate_of, spans
+from fieldcal.diagnosis.reduce import levels_of, rate_of, spans, table_rate
 from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
 from fieldcal.frames import earth_rate_home, force_home
 from fieldcal.positions import angles
@@ -152,6 +152,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
         alpha,
         beta,
         about.gravity,
+        rate=table_rate(about, np.arange(len(alpha))),
         base_force=force_home(about.gravity),
         base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
         mounting=about.mounting,

@@ -175,7 +175,7 @@ def averaged(
         heating=heating,
         variance=np.nan_to_num(level[:, :3] ** 2),
         position=position,
-        rate=_table_rate(about, position),
+        rate=table_rate(about, position),
         base_force=force_home(about.gravity),
         base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
         mounting=about.mounting,
@@ -238,7 +238,8 @@ def _angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Arra
     return alpha[position], beta[position]
 
 
-def _table_rate(about: Description, position: NDArray[np.intp]) -> Array:
+def table_rate(about: Description, position: NDArray[np.intp]) -> Array:
+    """Rate that a table adds in some positions, (n, 3) rad/s about procedure axes."""
     if not about.positions:
         return np.zeros((len(position), 3))
     rates = np.array([p.rate or (0.0, 0.0, 0.0) for p in about.positions])

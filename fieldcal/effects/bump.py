@@ -101,12 +101,14 @@ class Bump(Chain):
         rate = 1 / float(np.median(np.diff(t)))
         steps = [lsb_of(recording.channel(c)) for c in range(6)]
         noise = np.maximum(recording.noise, 0.5 * np.array(steps))
-        for first, last in recording.windows:
+        for p, (first, last) in enumerate(recording.windows):
             if last - first < 20:
                 continue
             piece = recording.block[first:last].six
             z = _quick(piece, rate) / noise
             z = np.nan_to_num(z)
+            if recording.x.rate[p].any():
+                z[:, :3] = 0.0  # the force goes round with the table
             for a, b in disturbed(z, max(2, round(0.1 * rate))):
                 if b - a <= LONGEST_S * rate:
                     out.append(

@@ -1,4 +1,4 @@
-"""Run benchmarks: all of them, or those named."""
+"""Run benchmarks: all of them, or those named; numbers and --options are theirs."""
 
 import sys
 from importlib import import_module
@@ -7,7 +7,8 @@ from pkgutil import iter_modules
 import benchmarks
 
 available = [m.name for m in iter_modules(benchmarks.__path__) if m.name != "__main__"]
-wanted = sys.argv[1:] or available
+named = [word for word in sys.argv[1:] if word[0] != "-" and not word.isdigit()]
+wanted = named or available
 if unknown := set(wanted) - set(available):
     sys.exit(f"no benchmark {', '.join(sorted(unknown))}; there are {available}")
 for name in wanted:

@@ -8,41 +8,65 @@ outputs, or failing that what the effect's own entry in the catalogue says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from fieldcal.diagnosis.explain import CLOSE, Explanation, preferred
 from fieldcal.diagnosis.scatter import wanders
-from fieldcal.diagnosis.select import Model
+from fieldcal.diagnosis.select import MARGIN, TIE, Model, foretells
 from fieldcal.effects import Experience, catalogue
 from fieldcal.frames import turn
 
 RANDOM = {"walk": "random_walk", "setting": "angle_setting"}
 
 REACH = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
+SEVERAL = 3
+"""Causes that are looked at in the place of chance."""
+
 TELLING = 5.0
 """Difference in white noise of a window's mean that decides."""
 
 
-def aliases(explanation: Explanation) -> dict[str, tuple[str, ...]]:
-    """Ids that stand for an effect as well as the one chosen, by id."""
+@dataclass(frozen=True, slots=True)
+class Aliases:
+    """What else would explain the same.
+
+    Attributes
+    ----------
+    ids : of other effects, by the id of the one chosen
+    open : chosen ids of which no other is second choice by its nature
+
+    """
+
+    ids: Mapping[str, tuple[str, ...]]
+    open: frozenset[str]
+
+
+def aliases(explanation: Explanation) -> Aliases:
+    """Other effects that would do, for each that was chosen."""
     found: dict[str, list[str]] = {}
-    mine = {h.effect.id for h, _ in explanation.model.chosen}
+    undecided = set()
+    cost = preferred(explanation.model)
+    mine = _causes(explanation.model)
     for rival in explanation.rivals:
-        theirs = {h.effect.id for h, _ in rival.chosen}
+        if not _foretells(explanation.model, rival):
+            continue
+        theirs = _causes(rival)
         for name in sorted(mine - theirs):
             _add(found, name, sorted(theirs - mine))
+            if theirs - mine and preferred(rival) <= cost:
+                undecided.add(name)
     for name, chance in _chances(explanation):
         _add(found, name, [chance])
-    return {name: tuple(ids) for name, ids in found.items() if ids}
+        undecided.add(name)
+    ids = {name: tuple(others) for name, others in found.items() if others}
+    return Aliases(ids, frozenset(undecided))
 
 
-def undecided(explanation: Explanation) -> bool:
-    """Whether a rival is no second choice by its nature, so that nothing decides."""
-    cost = preferred(explanation.model)
-    second = [m for m in explanation.rivals if preferred(m) > cost]
-    return len(second) < len(explanation.rivals) or any(_chances(explanation))
+def _causes(model: Model) -> set[str]:
+    return {h.effect.id for h, _ in model.chosen if not h.known}
 
 
 def _add(found: dict[str, list[str]], name: str, ids: list[str]) -> None:
@@ -53,21 +77,27 @@ def _add(found: dict[str, list[str]], name: str, ids: list[str]) -> None:
 def _chances(explanation: Explanation) -> Iterator[tuple[str, str]]:
     """Effects that chance would do for as well, and the other way about."""
     search, best = explanation.search, explanation.model
+    level, near = best.objective - CLOSE, best.objective - TIE
     for less in search.smaller(best):
-        gone = {h.effect.id for h, _ in best.chosen} - {
-            h.effect.id for h, _ in less.chosen
-        }
-        level = best.objective - CLOSE
-        for name in gone:
-            for wander in wanders(less.bench, less.fit):
-                id_ = RANDOM.get(wander.name.partition(":")[0])
-                if id_ and less.objective + wander.gain - search.price > level:
-                    yield name, id_
+        gone = _causes(best) - _causes(less)
+        for wander in wanders(less.bench, less.fit) if gone else ():
+            id_ = RANDOM.get(wander.name.partition(":")[0])
+            if id_ and less.objective + wander.gain - search.price > level:
+                if _foretells(best, search.with_random(less, wander)):
+                    yield from ((name, id_) for name in gone)
         for name in set(best.random) - set(less.random):
             if (id_ := RANDOM.get(name.partition(":")[0])) is not None:
-                for other in search.larger(less):
-                    if other.objective > level:
-                        yield id_, other.chosen[-1][0].effect.id
+                ranked = sorted(search.larger(less), key=lambda m: -m.objective)
+                for other in ranked[:SEVERAL]:
+                    newest = other.chosen[-1][0]
+                    if other.objective > near and not newest.known:
+                        if _foretells(best, other):
+                            yield id_, newest.effect.id
+
+
+def _foretells(best: Model, other: Model) -> bool:
+    """Whether another model predicts positions left out about as well."""
+    return foretells(other) > foretells(best) - MARGIN
 
 
 def telling_position(
@@ -103,14 +133,7 @@ def _with(explanation: Explanation, one: str, name: str) -> Model | None:
     search, best = explanation.search, explanation.model
     if name == one:
         return best
-    kept = [i for i, (h, _) in enumerate(best.chosen) if h.effect.id != one]
-    less = search.model(
-        tuple(best.chosen[i] for i in kept),
-        best.bench,
-        best.fit,
-        best.random,
-        tuple(best.shaped[i] for i in kept),
-    )
+    less = search.without(best, one)
     for hypothesis in search.pool:
         if hypothesis.effect.id == name:
             less = search.with_one(less, hypothesis)

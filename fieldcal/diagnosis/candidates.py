@@ -40,13 +40,15 @@ class Hypothesis:
     """One explanation: an effect, or the part of it on one triad.
 
     `variants` are the terms to try, one for each value of the shape; `cost` is what it
-    pays more than others, ln.
+    pays more than others, ln; `known` says that it is bound to be there, and the
+    question is only whether it shows.
     """
 
     effect: Effect
     part: str
     variants: tuple[Term, ...]
     cost: float = 0.0
+    known: bool = False
 
     @property
     def name(self) -> str:
@@ -64,6 +66,10 @@ def hypotheses(bench: Bench, warming: bool, navigation: bool) -> list[Hypothesis
 
     """
     found: list[Hypothesis] = []
+    x, gyros = bench.rows.x, bench.rows.used[:, 3:]
+    if gyros.any() and x.oriented.any() and not x.base_rate.any():
+        effect = catalogue()["earth_rate"]
+        found.append(Hypothesis(effect, "", (Term(effect, ()),), known=True))
     for effect in catalogue().values():
         if isinstance(effect, Motion | Sensor) and effect.params:
             if _shows(effect, bench, warming, navigation):
@@ -78,6 +84,8 @@ def _shows(effect: Effect, bench: Bench, warming: bool, navigation: bool) -> boo
         return False
     if effect.id in RATED:
         return bench.rated
+    if effect.id == "settling" and not np.isfinite(x.since_turn).any():
+        return False
     if effect.id == "heading_error":
         return navigation and bool(x.oriented.any())
     if effect.id == "vibration_rectification":
@@ -120,7 +128,7 @@ def _grid(effect: Effect, bench: Bench) -> Iterator[dict[str, float]]:
         span = float(np.ptp(x.t))
         if effect.id == "settling":
             low, high = (
-                max(shape.low, x.since_turn.min() / 4),
+                max(shape.low, float(x.since_turn.min()) / 4),
                 min(shape.high, span / 3),
             )
         else:

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.noise import white
-from fieldcal.diagnosis.reduce import rate_of, spans
+from fieldcal.diagnosis.reduce import levels_of, rate_of, spans, table_rate
 from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
 from fieldcal.frames import earth_rate_home, force_home
 from fieldcal.positions import angles
@@ -48,6 +47,12 @@ class Checked:
         """What was found and has a name in the catalogue, each once."""
         return tuple(dict.fromkeys(i for i, fault in self.faults if fault.values))
 
+    @property
+    def pace(self) -> float:
+        """Seconds of the device's clock in a true second."""
+        found = [f.values["ppm"] for i, f in self.faults if i == "clock_skew"]
+        return 1 + 1e-6 * float(found[0]) if found else 1.0
+
 
 def check(block: Block, about: Description) -> Checked:
     """Look for every fault of the chain, and act on what is found."""
@@ -73,6 +78,14 @@ def check(block: Block, about: Description) -> Checked:
     for name in NOTING:
         faults += [(name, fault) for fault in _find(name, seen)]
     return Checked(block, usable, tuple(_once(faults)))
+
+
+def checked_again(checked: Checked, block: Block, about: Description) -> Checked:
+    """The same with what lines in the spectrum can feign looked at without them."""
+    faults = [(n, f) for n, f in checked.faults if n != "noise_level"]
+    seen = recording(block, checked.usable, about)
+    faults += [("noise_level", f) for f in _find("noise_level", seen)]
+    return replace(checked, faults=tuple(faults))
 
 
 def _find(name: str, seen: Recording) -> list[Fault]:
@@ -130,7 +143,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
     windows, rate = spans(block, about), rate_of(block)
     six = np.where(usable, block.six, np.nan)
     pieces = [six[a:b] for a, b in windows if b > a]
-    noise = white(pieces, rate) if pieces else np.full(6, np.nan)
+    noise = levels_of(pieces, rate)[0] if pieces else np.full(6, np.nan)
     if about.positions:
         alpha, beta = angles(about.positions)
     else:
@@ -139,6 +152,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
         alpha,
         beta,
         about.gravity,
+        rate=table_rate(about, np.arange(len(alpha))),
         base_force=force_home(about.gravity),
         base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
         mounting=about.mounting,

@@ -27,7 +27,7 @@ RATE, FORCE = 2e-3, 0.05
 BETTER = 8.0
 """Odds (ln) for a fixed lead over the end of motion."""
 
-LEADS = 40
+LEADS, FINE = 25, 21
 
 
 def arrivals(block: Block, about: Description, noise: Array) -> Array:
@@ -67,17 +67,28 @@ def clamped(source: Source, bench: Bench, fit: Fit) -> Array:
     still = _dwelling(source, bench.rows.noise)
     if still is None:
         return source.arrived
-    windows = source.about.windows or ((source.block.t[0], source.block.t[-1]),)
-    starts = np.array([w[0] if w is not None else np.nan for w in windows])
-    longest = float(np.nanmax(starts - source.arrived))
-    best, least = source.arrived, _squares(bench, fit, still, source.arrived)
-    least -= 2 * BETTER
-    for lead in np.linspace(0.0, longest, LEADS):
-        tried = np.fmax(source.arrived, starts - lead)
-        squares = _squares(bench, fit, still, tried)
-        if squares < least:
-            best, least = tried, squares
-    return best
+    starts = beginnings(source)
+    turned = np.isfinite(source.arrived)
+    longest = float(np.max((starts - source.arrived)[turned], initial=0.0))
+    plain = _squares(bench, fit, still, source.arrived)
+    leads, step = np.linspace(0.0, longest, LEADS), longest / (LEADS - 1)
+    for _ in range(2):
+        tried = [
+            np.where(turned, np.maximum(source.arrived, starts - lead), -np.inf)
+            for lead in leads
+        ]
+        squares = [_squares(bench, fit, still, arrived) for arrived in tried]
+        best = int(np.argmin(squares))
+        leads = leads[best] + np.linspace(-step, step, FINE)
+    better = squares[best] < plain - 2 * BETTER
+    return tried[best] if better else source.arrived
+
+
+def beginnings(source: Source) -> Array:
+    """Where each window begins, (p,) s; a position without one has its arrival."""
+    windows = source.about.windows
+    given = [np.nan if w is None else w[0] for w in windows] or [source.block.t[0]]
+    return np.where(np.isnan(given), source.arrived, given)
 
 
 def _dwelling(source: Source, noise: Array) -> Rows | None:
@@ -87,6 +98,8 @@ def _dwelling(source: Source, noise: Array) -> Rows | None:
     bounds, position = [], []
     for p, (first, last) in enumerate(spans(block, source.about)):
         start = int(np.searchsorted(block.t, source.arrived[p]))
+        if not np.isfinite(source.arrived[p]):
+            continue
         at = np.arange(start, first - m + 1, m)
         if last > first:
             bounds += [(a, a + m) for a in at]

@@ -11,33 +11,34 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
+from fieldcal.diagnosis.scatter import cautious
 
 RELAX = 20.0
 
 
 def estimate(
     bench: Bench, terms: Sequence[Term], near: Fit
-) -> tuple[Fit, tuple[str, ...]]:
-    """Fit with wide priors.
+) -> tuple[Bench, Fit, tuple[str, ...]]:
+    """Fit with wide priors, and with all the scatter that there may be.
 
     Returns
     -------
+    wide : rows with those priors and errors
     fit : with determined effects only
     left : names of parameters that the rows leave open
 
     """
     wide = bench.but(relax=RELAX)
+    wide = wide.but(errors=cautious(wide, wide.fit(terms, near)))
     now = [_free(t) for t in terms]
     left: list[str] = []
     while True:
         fit = wide.fit(now, near)
         open_ = _open(fit, now)
         if open_ is None:
-            return fit, tuple(left)
+            return wide, fit, tuple(left)
         i, j = open_
         left.append(f"{now[i].effect.id}.{now[i].effect.params[j].name}")
         kept = tuple(c for c in now[i].columns if c != j)
@@ -75,11 +76,3 @@ def sigmas(fit: Fit, term: Term) -> dict[str, tuple[float, float]]:
             at = fit.names.index(f"{term.effect.id}.{name}")
             out[name] = (float(value), float(fit.sigma[at]))
     return out
-
-
-def jump_sigma(bench: Bench, at: float) -> float:
-    """How well the instant of a jump is known: a row, or the gap between windows."""
-    t = bench.rows.x.t
-    after = int(np.searchsorted(t, at))
-    before = max(after - 1, 0)
-    return float((t[min(after, len(t) - 1)] - t[before]) / np.sqrt(12))

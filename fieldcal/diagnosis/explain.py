@@ -14,12 +14,9 @@ from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.prepare import Prepared, refined
 from fieldcal.diagnosis.reduce import rate_of
 from fieldcal.diagnosis.select import Model, Search
-from fieldcal.diagnosis.turning import Turning, Turntable
-from fieldcal.diagnosis.turns import Turn, turns
-from fieldcal.effects import catalogue
+from fieldcal.diagnosis.turning import CANDIDATES, Turning, Turntable
+from fieldcal.diagnosis.turns import NOTHING, Turn, turns
 from fieldcal.frames import EARTH_RATE
-
-PASSES = 2
 
 CLOSE = 4.6
 """Of ln 100: an explanation a hundred times less likely is no rival."""
@@ -38,16 +35,17 @@ class Explanation:
     Attributes
     ----------
     prepared : the rows it was found in
-    always : terms that are in every model: what the simulation has, the Earth
+    always : terms that are in every model: what the simulation has already
     search : the search, with what else was tried
     model : what the windows say
     rivals : models that explain windows and turns about as well
     base : the simulation alone, refitted
-    fit : with the effects of the windows, wide priors
+    wide : rows with wide priors, and all the scatter there may be
+    fit : in them, with the effects of the windows
     left : parameters that the rows leave open
     made : the turns
     table, turning : what the turns say; None where there are none
-    earth : by how much the Earth's rate raises ln Z; 0 where it is not in question
+    earth : by how much the Earth's rate raises ln Z; 0 where it is not in the model
 
     """
 
@@ -57,6 +55,7 @@ class Explanation:
     model: Model
     rivals: tuple[Model, ...]
     base: Fit
+    wide: Bench
     fit: Fit
     left: tuple[str, ...]
     made: tuple[Turn, ...]
@@ -81,7 +80,7 @@ class Explanation:
 
 def explain(prepared: Prepared) -> Explanation:
     """Find what explains a recording."""
-    always, earth = _always(prepared)
+    always = prepared.known
     search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
     model, rivals = _with_turns(prepared, search, search.run())
     if any(h.effect.id == "settling" for h, _ in model.chosen):
@@ -90,7 +89,7 @@ def explain(prepared: Prepared) -> Explanation:
         bench = prepared.bench.but(errors=errors)
         search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
         model = search.model(model.chosen, bench, None, model.random, model.shaped)
-    fit, left = _estimated(search, model)
+    wide, fit, left = _estimated(search, model)
     made, table, turning = _turned(prepared, model, fit, search.price)
     base = prepared.bench.fit(always)
     return Explanation(
@@ -100,16 +99,17 @@ def explain(prepared: Prepared) -> Explanation:
         model,
         rivals,
         base,
+        wide,
         fit,
         left,
         made,
         table,
         turning,
-        earth,
+        _earth(search, model),
     )
 
 
-def _estimated(search: Search, model: Model) -> tuple[Fit, tuple[str, ...]]:
+def _estimated(search: Search, model: Model) -> tuple[Bench, Fit, tuple[str, ...]]:
     whole = [replace(t, columns=h.variants[0].columns) for h, t in model.chosen]
     terms = [*search.always, *merged(whole)]
     return estimate(model.bench, terms, model.fit)
@@ -125,12 +125,15 @@ def _with_turns(
         return best, ()
     gains = []
     for model in close:
-        fit, _ = _estimated(search, model)
+        _, fit, _ = _estimated(search, model)
         made = turns(prepared.source, model.bench.rows, fit)
         if made:
             interval = 1 / rate_of(prepared.source.block)
-            found = Turntable(model.bench, fit, made, interval).best(search.price)
-            gains.append(found.score - search.price * len(found.terms))
+            table = Turntable(model.bench, fit, made, interval)
+            found = table.better((), search.price, closures=False)
+            worth = found.score - search.price * len(found.terms)
+            # turns that nothing explains well do not tell much about the rest
+            gains.append(worth / max(1.0, found.chi2 / max(found.dof, 1)))
         else:
             gains.append(0.0)
     totals = [m.objective + g for m, g in zip(close, gains, strict=True)]
@@ -149,17 +152,15 @@ def _pool(prepared: Prepared, bench: Bench) -> list[Hypothesis]:
     return hypotheses(bench, prepared.source.warmth.changes, prepared.navigation)
 
 
-def _always(prepared: Prepared) -> tuple[tuple[Term, ...], float]:
-    """What the simulation has, and the Earth's rate where the gyroscopes show it."""
-    known, bench = prepared.known, prepared.bench
-    seen = bench.rows.used[:, 3:].any() and bool(bench.rows.x.oriented.any())
-    there = any(t.effect.id == "earth_rate" for t in known)
-    if prepared.navigation or there or not seen:
-        return known, 0.0
-    earth = Term(catalogue()["earth_rate"], ())
-    plain = bench.fit(known)
-    gain = bench.fit([*known, earth], plain).score - plain.score
-    return ((*known, earth), gain) if gain > 0 else (known, 0.0)
+def _earth(search: Search, model: Model) -> float:
+    """By how much the Earth's rate raises ln Z, if it is in the model."""
+    there = [h.effect.id == "earth_rate" for h, _ in model.chosen]
+    if not any(there):
+        return 0.0
+    at = there.index(True)
+    chosen = model.chosen[:at] + model.chosen[at + 1 :]
+    less = search.model(chosen, model.bench, model.fit, model.random)
+    return model.fit.score - less.fit.score
 
 
 def merged(terms: Sequence[Term]) -> list[Term]:
@@ -176,37 +177,40 @@ def _turned(
     prepared: Prepared, model: Model, fit: Fit, price: float
 ) -> tuple[tuple[Turn, ...], Turntable | None, Turning | None]:
     """What the turns show beyond the windows."""
-    made = tuple(turns(prepared.source, model.bench.rows, fit))
-    if not made:
-        return (), None, None
-    interval = 1 / rate_of(prepared.source.block)
-    table = Turntable(model.bench, fit, made, interval)
-    found = table.best(price)
-    return made, table, _settled(prepared, model, fit, table, found, interval)
+    if any(t.effect.kind == "motion" for t in prepared.tones):
+        return (), None, None  # a base that rocks turns the device as well
+    made, table, found = _unwound(prepared, model, fit, price, closures=False)
+    if found is not None and not found.steady:
+        made, table, found = _unwound(prepared, model, fit, price, closures=True)
+    return made, table, found
 
 
-def _settled(
-    prepared: Prepared,
-    model: Model,
-    fit: Fit,
-    table: Turntable,
-    found: Turning,
-    interval: float,
-) -> Turning:
-    """The same effects with wide priors, gyroscope errors taken out and fitted again.
+def _unwound(
+    prepared: Prepared, model: Model, fit: Fit, price: float, closures: bool
+) -> tuple[tuple[Turn, ...], Turntable | None, Turning | None]:
+    """One effect after the other, as long as one more is worth it.
 
-    What is fitted is to first order in the errors; what is left after taking them out
-    is small.
+    What is fitted is to first order in the errors of the gyroscopes, so those found are
+    taken out before the turns are integrated again.
     """
-    out = table.fit(found.terms, found.rows, RELAX)
-    for _ in range(PASSES if found.terms else 0):
-        undo = table.undo(out)
-        rows = model.bench.rows
-        made = turns(prepared.source, rows, fit, undo)
-        again = Turntable(model.bench, fit, made, interval)
-        if len(again.turn) != len(found.rows):
+    rows, interval = model.bench.rows, 1 / rate_of(prepared.source.block)
+    made = tuple(turns(prepared.source, rows, fit))
+    table: Turntable | None = None
+    found: Turning | None = None
+    undo = NOTHING
+    terms: tuple[Term, ...] = ()
+    while made and len(terms) <= len(CANDIDATES):
+        table = Turntable(model.bench, fit, made, interval)
+        chosen = table.better(terms, price, closures)
+        more = table.fit(chosen.terms, chosen.rows, RELAX)
+        there = np.array([undo.of(name) for name in more.names])
+        found = replace(more, values=more.values + there)
+        undo, settled = table.undo(found), chosen.terms == terms
+        if settled:
             break
-        more = again.fit(found.terms, found.rows, RELAX)
-        there = [undo.of(name) for name in more.names]
-        out = replace(more, values=more.values + np.array(there))
-    return out
+        terms = chosen.terms
+        again = tuple(turns(prepared.source, rows, fit, undo))
+        if len(again) != len(made):
+            break
+        made = again
+    return made, table, found

@@ -295,6 +295,7 @@ class Bench:
             out[:, :, :k] = term.effect.design(x, shape)[:, :, list(term.columns)]
             numeric = range(k, len(term.names))
         steps = 1e-3 * term.prior
+        steps[k:] = 1e-3 * np.abs(state.values[i][k:])
         for j in numeric:
             values = [list(state.values), list(state.values)]
             for side, sign in zip(values, (1, -1), strict=True):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.diagnosis.estimate import RELAX, jump_sigma, sigmas
+from fieldcal.diagnosis.estimate import RELAX, sigmas
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import held_out, rms
@@ -15,11 +15,17 @@ from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.quality import Agreement
 from fieldcal.diagnosis.result import Found, Quantity
 from fieldcal.diagnosis.scatter import dropped, size_sigma, wanders
+from fieldcal.diagnosis.steps import jump_instant
+from fieldcal.diagnosis.unknown import wandering
 from fieldcal.effects import Fault, catalogue
 from fieldcal.samples import CHANNELS, Array
 
-MATERIAL = 2.0
-"""Scatter of window means over their white noise from which it is said."""
+MATERIAL = 44.0
+"""Twice the rise of ln L from which what wanders is said: less only widens."""
+
+
+ARRIVAL_S = 0.3
+"""Standard uncertainty of the instant at which a turn by hand ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +47,7 @@ class Removed:
 
 def removed(explanation: Explanation, term: Term) -> Removed:
     """Fit and predict without one effect."""
-    bench = explanation.model.bench.but(relax=RELAX)
+    bench = explanation.wide
     rest = [t for t in explanation.fit.terms if t.effect.id != term.effect.id]
     fit = bench.fit(rest, explanation.fit)
     squares = (fit.white**2).sum(axis=0) - (explanation.fit.white**2).sum(axis=0)
@@ -62,19 +68,38 @@ def of_windows(
             n: Quantity(v, s, term.effect.unit(n))
             for n, (v, s) in sigmas(explanation.fit, term).items()
         }
+        if name == "settling":
+            parameters = _since_arrival(parameters)
         if "at_s" in term.shape:
-            at = term.shape["at_s"]
-            error = jump_sigma(explanation.prepared.bench, at)
+            at, error = jump_instant(
+                explanation.prepared.source,
+                explanation.wide,
+                without.fit,
+                explanation.fit,
+                term,
+            )
             parameters["at_s"] = Quantity(at, error, "s")
         delta = without.fit.chi2 - explanation.fit.chi2
         count = len(term.names) + ("at_s" in term.shape)
-        rows = int(explanation.prepared.bench.rows.used.sum())
+        used = int(explanation.prepared.bench.rows.used.sum())
         evidence = {
             "delta_chi2": delta,
-            "delta_bic": delta - count * float(np.log(rows)),
+            "delta_bic": delta - count * float(np.log(used)),
             "held_out_gain": gain(without, then.held_out),
         }
         yield Found(name, parameters, tuple(aliases.get(name, ())), evidence)
+
+
+def _since_arrival(found: dict[str, Quantity]) -> dict[str, Quantity]:
+    """Amplitudes with the uncertainty of the instant that they are counted from."""
+    tau = found["tau_s"].value if "tau_s" in found else np.inf
+    out = dict(found)
+    for name in (n for n in found if n in CHANNELS):
+        value, sigma, unit = found[name].value, found[name].sigma, found[name].unit
+        if not isinstance(value, str) and not isinstance(tau, str):
+            unsure = abs(value) * ARRIVAL_S / max(tau, ARRIVAL_S)
+            out[name] = Quantity(value, float(np.hypot(sigma or 0.0, unsure)), unit)
+    return out
 
 
 def gain(without: Removed, now: Array) -> float:
@@ -106,33 +131,22 @@ def of_chance(
             tuple(aliases.get("angle_setting", ())),
             _rise(explanation, "setting"),
         )
-    walks = [
-        p for p in bench.errors.parts if p.kind == "walk" and _matters(explanation)
-    ]
-    if walks:
+    walks = [p for p in bench.errors.parts if p.kind == "walk"]
+    walks += wandering(explanation)
+    names = [n for n in model.random if n.startswith(("walk", "offset"))]
+    rise = _rise(explanation, *names) if walks else {}
+    if walks and rise["delta_chi2"] > MATERIAL:
         unit = catalogue()["random_walk"].unit
         found = {}
         for part in walks:
             name = CHANNELS[part.channel]
-            sigma = size_sigma(plain, explanation.fit, "walk", part.channel, part.size)
-            found[name] = Quantity(part.size, sigma, unit(name))
-        names = [n for n in model.random if n.startswith("walk")]
+            size = part.size
+            if part.kind == "offset":  # over the time from one window to the next
+                size /= float(np.sqrt(np.ptp(plain.rows.x.t) / plain.windows))
+            sigma = size_sigma(plain, explanation.fit, "walk", part.channel, size)
+            found[name] = Quantity(size, sigma, unit(name))
         others = tuple(aliases.get("random_walk", ()))
-        yield Found("random_walk", found, others, _rise(explanation, *names))
-
-
-def _matters(explanation: Explanation) -> bool:
-    """Whether what wanders is more than the white noise of a window's mean."""
-    rows = explanation.model.bench.rows
-    span = np.ptp(rows.x.t) / max(explanation.model.bench.windows, 1)
-    for part in explanation.model.bench.errors.parts:
-        if part.kind == "walk":
-            used = rows.used[:, part.channel]
-            white = 1 / np.sqrt((rows.sd[used, part.channel] ** -2.0).sum())
-            white *= np.sqrt(explanation.model.bench.windows)
-            if part.size * np.sqrt(span) > MATERIAL * white:
-                return True
-    return False
+        yield Found("random_walk", found, others, rise)
 
 
 def _rise(explanation: Explanation, *names: str) -> dict[str, float]:

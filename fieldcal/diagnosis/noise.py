@@ -17,6 +17,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldcal.effects.quantisation import bias_of
+from fieldcal.effects.recording import lsb_of
 from fieldcal.samples import Array
 
 KEEP = 0.9
@@ -67,6 +69,21 @@ def _grain(pieces: Sequence[Array]) -> Array:
     return grain
 
 
+def rounding(pieces: Sequence[Array], noise: Array) -> Array:
+    """How far off each mean may be because outputs were rounded, (c,).
+
+    Source: Widrow and Kollar, see `fieldcal.effects.quantisation`; the deviation of a
+    sine of that amplitude, as any place within a step is as likely.
+    """
+    off = np.zeros(len(noise))
+    for c, measured in enumerate(noise):
+        step = lsb_of(np.concatenate([p[:GRAIN, c] for p in pieces]))
+        if step > measured > 0:
+            before = np.sqrt(max(measured**2 - step**2 / 12, 0.0))
+            off[c] = bias_of(step, before) / np.sqrt(2)
+    return off
+
+
 def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
     """s^2(m) of each channel and its relative standard error."""
     most = max(MOST // len(pieces), 1)
@@ -103,7 +120,9 @@ def _pooled(levels: Sequence[float], spreads: Sequence[float]) -> float:
     for level, finer in zip(levels[1:], spreads[1:], strict=True):
         if not np.isfinite(best):
             best, spread = level, finer
-        elif not abs(level - best) <= AGREE * np.hypot(spread, finer) * best:
+        elif not abs(level - best) <= AGREE * np.hypot(spread, finer) * max(
+            level, best
+        ):
             break
         else:
             best, spread = level, finer

@@ -10,12 +10,13 @@ import numpy as np
 
 from fieldcal.description import Description
 from fieldcal.diagnosis.candidates import hypotheses
-from fieldcal.diagnosis.chain import Checked, check
-from fieldcal.diagnosis.dwell import arrivals, clamped
+from fieldcal.diagnosis.chain import Checked, check, checked_again
+from fieldcal.diagnosis.dwell import arrivals, beginnings, clamped
 from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.noise import white
-from fieldcal.diagnosis.reduce import Source, rate_of, reduce, spans
+from fieldcal.diagnosis.reduce import Source, rate_of, spans
 from fieldcal.diagnosis.spectrum import Tone, tones, without
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Line, Scatter, catalogue
@@ -72,13 +73,13 @@ def prepare(block: Block, about: Description) -> Prepared:
     six = np.where(checked.usable, checked.block.six, np.nan)
     noise = white([six[a:b] for a, b in windows if b > a], rate)
     rest = arrivals(checked.block, about, noise)
-    source = Source(
-        checked.block, about, checked.usable, rest, Thermometer.of(checked.block)
-    )
-    rows = reduce(source)
+    warmth = Thermometer.of(checked.block)
+    source = Source(checked.block, about, checked.usable, rest, warmth, checked.pace)
+    rows = rows_of(source)
     found = tuple(tones(source, rows))
     if found:
         source = replace(source, block=without(source.block, source, rows, found))
+        checked = checked_again(checked, source.block, about)
     source = _counted(source, known)
     return Prepared(checked, source, bench_of(source), known, found, rest)
 
@@ -87,7 +88,7 @@ def bench_of(source: Source) -> Bench:
     """The rows of a source with the calibration a simulation starts from."""
     nominal = source.about.nominal
     return Bench(
-        reduce(source),
+        rows_of(source),
         np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
         np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
     )
@@ -140,16 +141,21 @@ def _counted(source: Source, known: tuple[Term, ...]) -> Source:
     """With what settles counted from the instant that fits best.
 
     That is the end of the motion, or a fixed time before each window; any fixed time
-    gives the same course inside windows, so the windows' starts stand for it here.
+    gives the same course inside windows, so the windows' starts stand for it here. And
+    before the first window the device may have been turned, or not.
     """
     if not source.about.positions:
         return source
-    starts = np.array([w[0] if w is not None else np.nan for w in source.about.windows])
-    if np.nanmax(np.abs(starts - source.arrived), initial=0.0) < 1e-6:
-        return source
-    other = replace(source, arrived=np.where(np.isnan(starts), source.arrived, starts))
-    gain = _settles(other, known) - _settles(source, known)
-    return other if gain > BETTER else source
+    starts = beginnings(source)
+    held = np.flatnonzero(np.diff(spans(source.block, source.about), axis=1)[:, 0] > 0)
+    first = np.arange(len(starts)) == held[0]
+    best, most = source, _settles(source, known) + BETTER
+    for arrived in (source.arrived, starts):
+        for tried in (arrived, np.where(first, -np.inf, arrived)):
+            other = replace(source, arrived=tried)
+            if tried is not source.arrived and (gain := _settles(other, known)) > most:
+                best, most = other, gain
+    return best
 
 
 def _settles(source: Source, known: tuple[Term, ...]) -> float:
@@ -165,7 +171,9 @@ def _settles(source: Source, known: tuple[Term, ...]) -> float:
 
 def refined(prepared: Prepared, fit: Fit) -> Prepared:
     """With settling counted from the instant that the samples before windows show."""
-    plain = replace(prepared.source, arrived=prepared.rest)
+    turned = np.isfinite(prepared.source.arrived)
+    rest = np.where(turned, prepared.rest, -np.inf)
+    plain = replace(prepared.source, arrived=rest)
     arrived = clamped(plain, prepared.bench, fit)
     source = replace(prepared.source, arrived=arrived)
     return replace(prepared, source=source, bench=bench_of(source))

@@ -77,7 +77,7 @@ def before(block: Block, explanation: Explanation) -> Agreement:
 
 def after(explanation: Explanation) -> Agreement:
     """The simulation with the effects found in the windows."""
-    return agreement(explanation.model.bench.but(relax=20.0), explanation.fit)
+    return agreement(explanation.wide, explanation.fit)
 
 
 def raw_bench(block: Block, prepared: Prepared) -> Bench:

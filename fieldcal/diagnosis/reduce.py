@@ -9,16 +9,16 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.noise import white
+from fieldcal.diagnosis.noise import rounding, white
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Experience
-from fieldcal.frames import earth_rate_home, force_home
+from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.positions import angles
 from fieldcal.samples import Array, Block
 
@@ -109,6 +109,7 @@ class Source:
     usable : (n, 6) samples that may be used
     arrived : (p,) instant from which the device was at rest in each position, s
     warmth : the temperature
+    pace : seconds of the device's clock in a true second
 
     """
 
@@ -117,6 +118,7 @@ class Source:
     usable: NDArray[np.bool_]
     arrived: Array
     warmth: Thermometer
+    pace: float = 1.0
 
 
 def reduce(source: Source) -> Rows:
@@ -126,11 +128,18 @@ def reduce(source: Source) -> Rows:
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
     six = np.where(source.usable, block.six, np.nan)
     pieces = [six[a:b] for a, b in windows[held]]
-    noise = white(pieces, rate)
+    noise, levels = levels_of(pieces, rate)
     bounds = [_cut(block.t, a, b, rate, len(held)) for a, b in windows[held]]
     rows = [len(b) for b in bounds]
-    level = np.repeat(_levels(pieces, noise), rows, axis=0)
-    return averaged(source, np.concatenate(bounds), np.repeat(held, rows), level, noise)
+    level = np.repeat(levels, rows, axis=0)
+    out = averaged(source, np.concatenate(bounds), np.repeat(held, rows), level, noise)
+    off = np.tile(rounding(pieces, noise), (len(out.x), 1))
+    # the Earth turns a device of unknown orientation about any of its axes
+    free = ~out.x.oriented
+    earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
+    off[free, 3:] = np.hypot(off[free, 3:], earth)
+    same = np.sqrt(np.repeat(rows, rows))[:, None] * off  # all through a window
+    return replace(out, sd=np.hypot(out.sd, same))
 
 
 def averaged(
@@ -166,7 +175,7 @@ def averaged(
         heating=heating,
         variance=np.nan_to_num(level[:, :3] ** 2),
         position=position,
-        rate=_table_rate(about, position),
+        rate=table_rate(about, position),
         base_force=force_home(about.gravity),
         base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
         mounting=about.mounting,
@@ -185,27 +194,40 @@ def _cut(t: Array, first: int, last: int, rate: float, windows: int) -> Array:
 
 def _means(six: Array, bound: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
     """Means between bounds, (n, 6), and how many samples are in each."""
-    centre = np.nanmedian(six[bound[0, 0] : bound[0, 1]], axis=0)
-    shifted = np.nan_to_num(six - np.nan_to_num(centre))
+    some = np.isfinite(six)
+    first = np.argmax(some, axis=0)
+    centre = np.nan_to_num(six[first, np.arange(six.shape[1])])
+    shifted = np.nan_to_num(six - centre)
     flat = bound.ravel()
     if flat[-1] == len(six):  # reduceat takes starts only; the end needs no start
         flat = flat[:-1]
     total = np.add.reduceat(shifted, flat, axis=0)[::2]
-    count = np.add.reduceat(np.isfinite(six).astype(np.intp), flat, axis=0)[::2]
-    mean = total / np.maximum(count, 1) + np.nan_to_num(centre)
+    count = np.add.reduceat(some.astype(np.intp), flat, axis=0)[::2]
+    mean = total / np.maximum(count, 1) + centre
     return np.where(count > 0, mean, np.nan), count
 
 
-def _levels(pieces: Sequence[Array], noise: Array) -> Array:
-    """Deviation of one sample in each window, (w, 6): the pooled one unless louder."""
-    out = np.empty((len(pieces), len(noise)))
+def levels_of(pieces: Sequence[Array], rate: float) -> tuple[Array, Array]:
+    """Deviation of one sample: usual (6,), and in each window (w, 6).
+
+    The usual one is that of the quiet windows. Others have more, and vibration comes on
+    top of the noise, whatever the noise's colour.
+    """
+    out = np.full((len(pieces), pieces[0].shape[1]), np.nan)
     for i, piece in enumerate(pieces):
-        out[i] = np.sqrt(np.nanmean(np.diff(piece, axis=0) ** 2, axis=0) / 2)
-    usual = np.nanmedian(out, axis=0)
+        steps = np.diff(piece, axis=0) ** 2 / 2
+        count = np.isfinite(steps).sum(axis=0)
+        some = np.where(count > 0, np.nansum(steps, axis=0), np.nan)
+        out[i] = np.sqrt(some / np.maximum(count, 1))
+    low = np.sort(out, axis=0)[(len(out) - 1) // 4]  # nan comes last
     samples = np.array([[max(len(p), 2)] for p in pieces])
-    ratio = out / np.where(usual > 0, usual, np.nan)
-    plain = ~(np.abs(np.log(ratio)) > LOUDER / np.sqrt(samples))
-    return noise * np.where(plain, 1.0, ratio)
+    margin = LOUDER / np.sqrt(samples)
+    louder = out > low * np.exp(margin)
+    quiet = ~louder.any(axis=1)
+    few = [p for p, q in zip(pieces, quiet, strict=True) if q] or list(pieces)
+    noise = white(few, rate)
+    more = np.where(louder, out**2 - low**2, 0.0)
+    return noise, np.sqrt(noise**2 + np.maximum(more, 0.0))
 
 
 def _angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -216,7 +238,8 @@ def _angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Arra
     return alpha[position], beta[position]
 
 
-def _table_rate(about: Description, position: NDArray[np.intp]) -> Array:
+def table_rate(about: Description, position: NDArray[np.intp]) -> Array:
+    """Rate that a table adds in some positions, (n, 3) rad/s about procedure axes."""
     if not about.positions:
         return np.zeros((len(position), 3))
     rates = np.array([p.rate or (0.0, 0.0, 0.0) for p in about.positions])

@@ -28,6 +28,9 @@ VARIANCE = 2.0
 UNKNOWN = 6.0
 """What a function costs that no effect makes, ln: known causes come first."""
 
+LONE = 3.0
+"""What it costs, ln, that of three axes alike only one should wander."""
+
 FEWEST = 4
 """Windows from which their scatter can be told."""
 
@@ -68,6 +71,25 @@ def wanders(bench: Bench, fit: Fit) -> Iterator[Wander]:
         yield _of_angles(bench, fit)
 
 
+def cautious(bench: Bench, fit: Fit) -> Errors:
+    """The errors with whatever scatter of the windows there may be, proved or not.
+
+    Numbers that are reported are the more honest for it: an instability too small to be
+    named still moves the means.
+    """
+    errors = bench.errors
+    if bench.windows < FEWEST:
+        return errors
+    there = {p.channel for p in errors.parts}
+    parts = []
+    for c in np.flatnonzero(bench.rows.used.any(axis=0)):
+        if c not in there:
+            white = bench.whiten.channel(factor("offset", bench.rows.x, int(c)), int(c))
+            size, _ = raised(*projected_channel(fit, white, int(c)))
+            parts.append(Part("offset", int(c), size))
+    return errors.but(tuple(parts))
+
+
 def dropped(errors: Errors, name: str) -> Errors:
     """The errors without a part by its name."""
     if name == "setting":
@@ -102,7 +124,7 @@ def _known(bench: Bench, kind: str) -> bool:
         return bool(x.oriented.all()) and bench.windows >= FEWEST
     if kind == "temperature":
         return bool(np.isfinite(x.warming).all())
-    return kind != "force" or bench.windows >= FEWEST
+    return not kind.startswith("force") or bench.windows >= FEWEST
 
 
 def _of(
@@ -121,9 +143,21 @@ def _of(
         size, more = raised(*projected_channel(fit, white, c))
         if more > VARIANCE:
             found.append(Part(kind, c, size))
-            gain += more - VARIANCE
-    gain -= UNKNOWN if kind in SMOOTH or kind == "offset" and len(found) < 2 else 0.0
-    return Wander(f"{kind}:{label}", gain, bench.errors.but(tuple(found)))
+            gain += more
+    errors = bench.errors.but(tuple(found))
+    gain -= fees(errors) - fees(bench.errors)
+    return Wander(f"{kind}:{label}", gain, errors)
+
+
+def fees(errors: Errors) -> float:
+    """What the random parts cost, ln: variances, and more where no cause is known."""
+    total = VARIANCE * (len(errors.parts) + (errors.setting > 0))
+    for first in (0, 3):
+        parts = [p for p in errors.parts if first <= p.channel < first + 3]
+        total += UNKNOWN * sum(p.kind in SMOOTH for p in parts)
+        total += UNKNOWN * (sum(p.kind == "offset" for p in parts) == 1)
+        total += LONE * (sum(p.kind == "walk" for p in parts) == 1)
+    return float(total)
 
 
 def _of_angles(bench: Bench, fit: Fit) -> Wander:

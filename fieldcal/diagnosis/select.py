@@ -10,7 +10,8 @@ top, nothing enters a recording that has nothing more often than exp(-EXTRA). Mo
 grow by one or two at a time, lose what has become idle, and swap. What is random (a
 walk, a scatter from window to window, angles set by hand), and a smooth function that
 no effect makes, compete on the same footing: a term has to beat them, not only white
-noise.
+noise. Where evidence comes near to a tie between chance and a cause, whichever predicts
+positions left out better is taken.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ import numpy as np
 
 from fieldcal.diagnosis.candidates import Hypothesis, instants
 from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.heldout import foretold
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.narrow import narrower
-from fieldcal.diagnosis.scatter import Wander, dropped, wanders
+from fieldcal.diagnosis.scatter import Wander, dropped, fees, wanders
 from fieldcal.diagnosis.steps import step_gains
 
 EXTRA = 6.9
@@ -33,6 +35,9 @@ EXTRA = 6.9
 MARGIN, WEAK = 3.0, 8.0
 """How much better an effect has to be than something random, ln, if it is weak."""
 
+TIE = 12.0
+"""Difference in ln Z from which nothing is asked of positions left out."""
+
 OTHERS = 60
 """Random and smooth parts that are tried besides."""
 
@@ -40,7 +45,10 @@ BEAM = 3
 RIVAL = 0.3
 """Beginnings followed up have at least this part of the best one's gain."""
 
-MOST = 5
+AGAIN = 3.0
+"""What the second triad costs of an effect that the first has already, ln."""
+
+MOST = 6
 """Hypotheses in one model."""
 
 STEPS = 3
@@ -78,6 +86,11 @@ class Model:
         return frozenset(h.name for h, _ in self.chosen)
 
     @property
+    def parts(self) -> frozenset[str]:
+        """Names of everything in it, causes and random parts."""
+        return self.names | {*self.random}
+
+    @property
     def leaves_nothing(self) -> bool:
         """Whether its rows are no further off than white noise."""
         spread = np.sqrt(2 * max(self.fit.dof, 1))
@@ -105,11 +118,15 @@ class Search:
     def run(self) -> Model:
         """The best model found."""
         best = self.model((), self.bench)
+        seen = {best.parts}
         while (grown := self._grow(best)) is not None:
             grown = self.model(
                 grown.chosen, grown.bench, grown.fit, grown.random, grown.shaped
             )
             best = self._tidied(self._anew(grown))
+            if best.parts in seen:  # what was let in went again, or the other way about
+                break
+            seen.add(best.parts)
         return best
 
     def model(
@@ -122,12 +139,15 @@ class Search:
     ) -> Model:
         """Fit some hypotheses."""
         fit = bench.fit([*self.always, *(t for _, t in chosen)], near)
-        cost = self.price * (len(chosen) + len(random)) + sum(shaped)
+        new = {h.effect.id for h, _ in chosen if not h.known}
+        again = sum(not h.known for h, _ in chosen) - len(new)
+        cost = self.price * (len(new) + len(random)) + AGAIN * again + sum(shaped)
+        cost += fees(bench.errors)
         return Model(chosen, bench, fit, fit.score - cost, random, shaped)
 
     def _grow(self, model: Model) -> Model | None:
         """The model with something more in it, if that is better."""
-        if len(model.chosen) + len(model.random) >= MOST:
+        if len(model.names) + len(model.random) >= MOST:
             return None
         chance = max(wanders(model.bench, model.fit), key=lambda w: w.gain)
         first = [*self.larger(model), *self._instead(model)]
@@ -135,13 +155,29 @@ class Search:
         gain = best.objective - model.objective
         if max(gain, chance.gain - self.price) <= 0:
             return None
-        by_chance = chance.gain - self.price
+        # a fit that is not linear takes less of it than its linear part promises
+        random = self.with_random(model, chance)
+        by_chance = random.objective - model.objective
         if by_chance > gain - MARGIN or not best.leaves_nothing:
             best = self._followed(model, first)
             gain = best.objective - model.objective
-        if by_chance > gain or (gain < WEAK and by_chance > gain - MARGIN):
-            return self._with_random(model, chance)
+        if by_chance > 0 and gain > 0 and abs(by_chance - gain) < TIE:
+            return self._foretelling(model, first, best, random)
+        if by_chance > gain or (0 < gain < WEAK and by_chance > gain - MARGIN):
+            return random if by_chance > 0 else None
         return best if gain > 0 else None
+
+    def _foretelling(
+        self, model: Model, first: Sequence[Model], best: Model, random: Model
+    ) -> Model:
+        """Chance or a cause: whichever predicts the positions left out better."""
+        ranked = sorted(first, key=lambda m: -m.objective)[:BEAM]
+        causes = [m for m in ranked if m.objective > model.objective and m is not best]
+        cause = max([best, *causes], key=foretells)
+        more = foretells(cause) - foretells(random)
+        if more > MARGIN:
+            return cause
+        return random if more < -MARGIN or random.objective > best.objective else best
 
     def _instead(self, model: Model) -> list[Model]:
         """With the likeliest causes, and the random parts as small as these leave them.
@@ -189,7 +225,10 @@ class Search:
         Several variants are one hypothesis: their mean likelihood counts.
         """
         variants, cost = hypothesis.variants, hypothesis.cost
-        if "at_s" in variants[0].shape:
+        there = [t for h, t in model.chosen if h.effect is hypothesis.effect]
+        if there and there[0].shape:
+            variants = (replace(variants[0], shape=there[0].shape),)
+        if "at_s" in variants[0].shape and not there:
             variants, more = self._jumps(model, hypothesis)
             cost += more
         tried = [
@@ -224,7 +263,8 @@ class Search:
         at = instants(model.bench)
         return tuple(replace(term, shape={"at_s": float(at[i])}) for i in best), cost
 
-    def _with_random(self, model: Model, chance: Wander) -> Model:
+    def with_random(self, model: Model, chance: Wander) -> Model:
+        """The model with something random let in."""
         bench = model.bench.but(errors=chance.errors)
         random = (*model.random, chance.name)
         return self.model(model.chosen, bench, model.fit, random, model.shaped)
@@ -243,12 +283,33 @@ class Search:
     def rivals(self, model: Model) -> list[Model]:
         """Models with one hypothesis exchanged for another."""
         out = []
-        for i in range(len(model.chosen)):
-            chosen = model.chosen[:i] + model.chosen[i + 1 :]
-            shaped = model.shaped[:i] + model.shaped[i + 1 :]
-            less = self.model(chosen, model.bench, model.fit, model.random, shaped)
-            out += [m for m in self.larger(less) if m.names != model.names]
+        for cause in {h.effect.id for h, _ in model.chosen if not h.known}:
+            less = self.without(model, cause)
+            parts = [h.part for h, _ in model.chosen if h.effect.id == cause]
+            for one in self.larger(less):
+                newest = one.chosen[-1][0]
+                if newest.effect.id != cause and not newest.known:
+                    out.append(self._whole(one, newest, parts))
         return out
+
+    def without(self, model: Model, cause: str) -> Model:
+        """The model without an effect, both its triads."""
+        kept = [i for i, (h, _) in enumerate(model.chosen) if h.effect.id != cause]
+        return self.model(
+            tuple(model.chosen[i] for i in kept),
+            model.bench,
+            model.fit,
+            model.random,
+            tuple(model.shaped[i] for i in kept),
+        )
+
+    def _whole(self, model: Model, newest: Hypothesis, parts: list[str]) -> Model:
+        """The model with the other triads of its newest effect, as far as wanted."""
+        for other in self.pool:
+            if other.effect is newest.effect and other.part in parts:
+                if other.name not in model.names:
+                    model = self.with_one(model, other)
+        return model
 
     def _anew(self, model: Model) -> Model:
         """With the random parts' sizes estimated beside what is in it now."""
@@ -257,7 +318,7 @@ class Search:
             kept = tuple(r for r in model.random if r != name)
             less = self.model(model.chosen, bench, model.fit, kept, model.shaped)
             chance = {w.name: w for w in wanders(bench, less.fit)}.get(name)
-            model = self._with_random(less, chance) if chance else less
+            model = self.with_random(less, chance) if chance else less
         return model
 
     def smaller(self, model: Model) -> list[Model]:
@@ -272,6 +333,11 @@ class Search:
             bench = model.bench.but(errors=dropped(model.bench.errors, name))
             out.append(self.model(model.chosen, bench, model.fit, kept, model.shaped))
         return out
+
+
+def foretells(model: Model) -> float:
+    """How well a model predicts positions left out, ln."""
+    return foretold(model.bench, model.fit.terms, model.fit)
 
 
 def narrowed(model: Model) -> Model:

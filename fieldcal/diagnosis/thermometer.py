@@ -13,8 +13,15 @@ import numpy as np
 
 from fieldcal.samples import Array, Block
 
-VALUE_S, SLOPE_S = 12.0, 40.0
-"""Half spans of the lines for the value and for the rate."""
+VALUE_S = 12.0
+"""Half span of the line for the value."""
+
+SLOPES_S = (6.0, 10.0, 16.0, 25.0, 40.0)
+"""Half spans of the line for the rate, of which the first that noise allows is taken:
+a longer one flattens what changes faster than it."""
+
+PLAIN = 0.05
+"""Noise of the rate, of the rate's spread, that is allowed."""
 
 STEPS = 3600
 
@@ -49,9 +56,9 @@ class Thermometer:
         t, mean, count = _means(block.t[known], block.temperature[known])
         step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
         line = _line(t, mean, count, max(VALUE_S, 4 * step))
-        slope = _line(t, mean, count, max(SLOPE_S, 4 * step))
-        start = line[0][0] - line[1][0] * (t[0] - block.t[0])
         noise = float(np.std(mean - line[0]))
+        slope = _sharpest(t, mean, count, noise)
+        start = line[0][0] - line[1][0] * (t[0] - block.t[0])
         return cls(t, line[0] - start, slope[1], float(start), noise)
 
     @property
@@ -64,6 +71,18 @@ class Thermometer:
     def at(self, t: Array) -> tuple[Array, Array]:
         """Warming and heating at some instants, (n,) each."""
         return np.interp(t, self.t, self.warming), np.interp(t, self.t, self.heating)
+
+
+def _sharpest(t: Array, mean: Array, count: Array, noise: float) -> tuple[Array, Array]:
+    """Lines over the shortest span whose slopes are no noise."""
+    step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+    for half in SLOPES_S[:-1]:
+        half = max(half, 4 * step)
+        line = _line(t, mean, count, half)
+        error = noise * np.sqrt(12 * step / (2 * half) ** 3)
+        if error < PLAIN * float(np.std(line[1])):
+            return line
+    return _line(t, mean, count, max(SLOPES_S[-1], 4 * step))
 
 
 def _means(t: Array, values: Array) -> tuple[Array, Array, Array]:

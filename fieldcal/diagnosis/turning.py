@@ -13,14 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.diagnosis.attitude import geometry
 from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
 from fieldcal.diagnosis.model import State, Term
-from fieldcal.diagnosis.turns import Turn, Undo, geometry
+from fieldcal.diagnosis.turns import Turn, Undo
 from fieldcal.effects import Motion, Sensor, catalogue, columns
 from fieldcal.samples import CHANNELS, Array
 
@@ -71,6 +71,15 @@ class Turning:
     score: float
 
     @property
+    def steady(self) -> bool:
+        """Whether it leaves no more than a device that is only turned does.
+
+        A hand that carries the device shakes it as well; then the accelerometers on the
+        way say nothing.
+        """
+        return self.chi2 <= STEADY * max(self.dof, 1)
+
+    @property
     def ids(self) -> tuple[str, ...]:
         """Effects in it."""
         return tuple(t.effect.id for t in self.terms)
@@ -112,24 +121,21 @@ class Turntable:
                 effect = catalogue()[name]
                 yield Term(effect, tuple(range(len(effect.params))))
 
-    def best(self, price: float) -> Turning:
-        """The set of effects with the highest evidence, each paying the price.
+    def better(self, terms: tuple[Term, ...], price: float, closures: bool) -> Turning:
+        """The fit with the terms, or with the one more that is worth its price.
 
-        What the accelerometers see on the way counts only if it is explained: a hand
-        that carries the device shakes it as well.
+        `closures` leaves out what the accelerometers see on the way.
         """
-        best = self._best(self.pool, price, np.ones(len(self._z), dtype=bool))
-        if best.chi2 <= STEADY * best.dof:
-            return best
-        pool = tuple(t for t in self.pool if t.effect.id not in ON_THE_WAY)
-        return self._best(pool, price, self.closing)
-
-    def _best(
-        self, pool: Sequence[Term], price: float, rows: NDArray[np.bool_]
-    ) -> Turning:
-        sets = [c for n in range(len(pool) + 1) for c in combinations(pool, n)]
-        tried = [self.fit(terms, rows) for terms in sets]
-        return max(tried, key=lambda f: f.score - price * len(f.terms))
+        rows = self.closing if closures else np.ones(len(self._z), dtype=bool)
+        best = self.fit(terms, rows)
+        objective = best.score
+        for term in self.pool:
+            if term in terms or (closures and term.effect.id in ON_THE_WAY):
+                continue
+            tried = self.fit((*terms, term), rows)
+            if tried.score - price > objective:
+                best, objective = tried, tried.score - price
+        return best
 
     def fit(
         self, terms: Sequence[Term], rows: NDArray[np.bool_], relax: float = 1.0
@@ -238,7 +244,7 @@ class Turntable:
         swung = turn.swung(path) * state.scale[:3, None]
         on_way = turn.means(design[:, :3] + swung)
         spread = self._density * np.sqrt(turn.t[-1] - turn.t[0])
-        across = turn.across / spread[:, None]
+        across = turn.across / np.hypot(spread, turn.blur)[:, None]
         whiten = self._whitener(turn)
         z = np.concatenate(
             [across @ (turn.closure - end[:, 0]), whiten @ (turn.acc - seen).ravel()]

@@ -22,10 +22,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.diagnosis.attitude import (
+    accelerations,
+    between,
+    blur,
+    carry,
+    geometry,
+    small_turns,
+    trapezoid_means,
+)
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.effects import Experience
-from fieldcal.frames import turn
 from fieldcal.samples import Array, Block
 
 FINE_S = 0.02
@@ -86,6 +94,7 @@ class Turn:
     cut : (k + 1,) edges between the pieces
     acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
     closure : (3,) rad, phi_T as seen
+    blur : rad, what sampling leaves open of it
     across : (3, 3) projection on what of the closure is known
     start_force : (3,) f_p, m/s^2
     interval : s between the samples that `acc` is made of
@@ -103,6 +112,7 @@ class Turn:
     across: Array
     start_force: Array
     interval: float
+    blur: float
 
     @property
     def t(self) -> Array:
@@ -140,16 +150,6 @@ class Turn:
         crossed = np.cross(np.moveaxis(phi, 1, 2), force)
         out: Array = np.einsum("mij,mkj->mik", self.attitude, crossed)
         return out
-
-
-def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
-    """Means between cuts (indices) of a course given at instants."""
-    gaps = np.diff(t).reshape(-1, *[1] * (values.ndim - 1))
-    total = np.zeros_like(values, dtype=float)
-    total[1:] = np.cumsum((values[1:] + values[:-1]) / 2 * gaps, axis=0)
-    length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
-    mean: Array = np.diff(total[cut], axis=0) / length
-    return mean
 
 
 def turns(source: Source, rows: Rows, fit: Fit, undo: Undo = NOTHING) -> list[Turn]:
@@ -213,11 +213,15 @@ def _turn(
     t = block.t[first : first + count * each + 1]
     edge = np.arange(count + 1) * each
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
-    earth = (1 - part) * x.w[rows_p].mean(axis=0) + part * x.w[rows_q].mean(axis=0)
+    ends = [x.w[at].mean(axis=0) for at in (rows_p, rows_q)]
+    earth = (1 - part) * ends[0] + part * ends[1]
     inertial = _undone(block, fit, undo, t)
-    angle = _angles(t, inertial - earth, edge)
-    size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
-    attitude, done = carry(angle), size / size[-1]
+    for _ in range(2):  # the Earth's rate turns with the device, once it is known how
+        angle = small_turns(t, inertial - earth, edge) / source.pace
+        size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
+        attitude, done = carry(angle), size / size[-1]
+        there = between(attitude, done, *ends)
+        earth = np.column_stack([np.interp(t, t[edge], w) for w in there.T])
     if np.arccos(np.clip((np.trace(attitude[-1]) - 1) / 2, -1, 1)) < LEAST:
         return None
     each_piece = max(1, round(PIECE_S * rate / each), -(-count // PIECES))
@@ -238,19 +242,8 @@ def _turn(
         across,
         x.f[rows_p].mean(axis=0),
         1 / rate,
+        blur(t, inertial - earth, each),
     )
-
-
-def _angles(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
-    """Small turns between edges, (m, 3) rad: the trapezoid rule and its correction.
-
-    The next term of Euler and Maclaurin is -dt^2/12 (w'(b) - w'(a)).
-    """
-    step = float(np.median(np.diff(t)))
-    slope = np.gradient(w, t, axis=0)[edge]
-    length = np.diff(t[edge])[:, None]
-    out: Array = trapezoid_means(t, w, edge) * length
-    return out - step**2 / 12 * np.diff(slope, axis=0)
 
 
 def _undone(block: Block, fit: Fit, undo: Undo, t: Array) -> Array:
@@ -285,53 +278,4 @@ def _edges(
         latitude=x.latitude,
         f=f,
     )
-    return replace(out, w=w, w_dot=np.gradient(w, t, axis=0))
-
-
-def carry(angle: Array) -> Array:
-    """Attitudes from small turns, (m + 1, 3, 3), the first of them identity.
-
-    `angle` is (m, 3) rad; the turn of a body by it turns vectors seen in it back.
-
-    >>> quarter = carry(np.full((90, 3), [0.0, 0.0, np.pi / 180]))
-    >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0
-    array([ 0., -1.,  0.])
-    """
-    size = np.linalg.norm(angle, axis=1)[:, None, None]
-    axis = angle[:, :, None] / np.where(size > 0, size, 1.0)
-    x, y, z = axis[:, 0, 0], axis[:, 1, 0], axis[:, 2, 0]
-    zero = np.zeros_like(x)
-    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    steps = np.eye(3) - np.sin(size) * cross + (1 - np.cos(size)) * (cross @ cross)
-    out = np.empty((len(angle) + 1, 3, 3))
-    out[0] = np.eye(3)
-    for k, step in enumerate(steps):
-        out[k + 1] = step @ out[k]
-    return out
-
-
-def geometry(
-    x: Experience, pair: tuple[int, int], attitude: Array, done: Array
-) -> tuple[Array, Array, Array]:
-    """What a turn has to do with the positions at its ends.
-
-    Returns
-    -------
-    f : (m + 1, 3) force on the way, from both ends
-    closure : (3,) phi_T in the axes of p
-    across : (3, 3) projection on what of it is known
-
-    """
-    p, q = (int(np.argmax(x.position == i)) for i in pair)
-    back = attitude @ attitude[-1].T
-    f = (1 - done)[:, None] * (attitude @ x.f[p]) + done[:, None] * (back @ x.f[q])
-    if x.oriented[[p, q]].all():
-        known = x.mounting.T @ turn(x.alpha[[p, q]], x.beta[[p, q]])
-        off = attitude[-1].T @ known[1] @ known[0].T  # I + [phi]x
-        vee = np.array(
-            [off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]]
-        )
-        return f, vee / 2, np.eye(3)
-    up = x.f[p] / np.linalg.norm(x.f[p])
-    seen = attitude[-1].T @ x.f[q]
-    return f, np.cross(up, seen / np.linalg.norm(seen)), np.eye(3) - np.outer(up, up)
+    return replace(out, w=w, w_dot=accelerations(t, w))

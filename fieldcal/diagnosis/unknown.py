@@ -139,7 +139,10 @@ def _follows(x: Experience, residual: Array, part: Part) -> tuple[str, float]:
 
 def courses(x: Experience, part: Part) -> Mapping[str, Array]:
     """What a residual could follow, by name."""
-    if part.kind == "time":
+    if part.kind == "force and time":
+        force, t = x.f[:, part.channel % 3], x.since_start
+        return {f"force*time^{k}": force * t**k for k in (1, 2, 3)}
+    if part.kind.endswith("time"):
         t = x.since_start
         return {"time": t, "time^2": t**2, "time^3": t**3} | _waves(t)
     if part.kind == "temperature":
@@ -169,7 +172,7 @@ def _of_angle(name: str, angle: Array) -> dict[str, Array]:
 def _waves(t: Array) -> dict[str, Array]:
     span = float(np.ptp(t))
     out = {}
-    for cycles in np.arange(1.0, 8.01, 0.25):
+    for cycles in np.arange(1.0, 12.01, 0.25):
         for name, wave in (("sin", np.sin), ("cos", np.cos)):
             out[f"{name}(2*pi*time/{span / cycles:.3g} s)"] = wave(
                 2 * np.pi * cycles * t / span

@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldcal.description import Description
 from fieldcal.diagnosis import locate, naming
-from fieldcal.diagnosis.aliases import aliases, undecided
+from fieldcal.diagnosis.aliases import Aliases, aliases
 from fieldcal.diagnosis.chain import recording
 from fieldcal.diagnosis.common import common_scale
 from fieldcal.diagnosis.explain import Explanation, explain
@@ -54,8 +54,9 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
     lost = {t.effect.id: naming.removed(explanation, t) for t in explanation.terms}
     first, then = before(block, explanation), after(explanation)
     unknown = _unknown(explanation, first, then)
-    effects = _effects(explanation, lost, then)
-    verdict = _verdict(explanation, effects, unknown)
+    others = aliases(explanation)
+    effects = _effects(explanation, lost, then, others)
+    verdict = _verdict(effects, unknown, others)
     mismatch = tuple(_mismatch(block, explanation, lost, unknown))
     quality = _quality(explanation, first, then)
     words = paragraph(
@@ -89,7 +90,10 @@ def _unknown(
 
 
 def _effects(
-    explanation: Explanation, lost: dict[str, Removed], then: Agreement
+    explanation: Explanation,
+    lost: dict[str, Removed],
+    then: Agreement,
+    others: Aliases,
 ) -> list[Found]:
     prepared = explanation.prepared
     found = list(naming.of_samples(prepared.checked.faults))
@@ -99,9 +103,8 @@ def _effects(
             for n, v in tone.values.items()
         }
         found.append(Found(tone.effect.id, values, evidence={"delta_chi2": tone.chi2}))
-    others = aliases(explanation)
-    found += naming.of_windows(explanation, lost, then, others)
-    found += naming.of_chance(explanation, others)
+    found += naming.of_windows(explanation, lost, then, others.ids)
+    found += naming.of_chance(explanation, others.ids)
     found += naming.of_turns(explanation)
     if explanation.sees_earth:
         evidence = {"delta_chi2": 2 * explanation.earth}
@@ -112,11 +115,11 @@ def _effects(
 
 
 def _verdict(
-    explanation: Explanation, effects: Sequence[Found], unknown: Sequence[Unknown]
+    effects: Sequence[Found], unknown: Sequence[Unknown], others: Aliases
 ) -> Verdict:
     if unknown:
         return "unexplained"
-    if any(f.id == "gravity_error" for f in effects) or undecided(explanation):
+    if any(f.id == "gravity_error" or f.id in others.open for f in effects):
         return "ambiguous"
     return "left_out" if effects else "consistent"
 

@@ -6,9 +6,9 @@ Each part belongs to one channel. F of
 
 - "walk": a random walk through the rows, per sqrt(s), its increments on KNOTS spans;
 - "offset": one value for each window;
-- "time", "alpha", "beta", "joints", "force", "temperature", "since turn": a smooth
-  function of that, nothing more being known of it (a short series with smaller and
-  smaller terms).
+- "time", "faster time", "fast time", "alpha", "beta", "joints", "force", "force and
+  time", "temperature", "since turn": a smooth function of that, nothing more being
+  known of it (a short series with smaller and smaller terms).
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ from fieldcal.samples import Array
 
 KNOTS = 40
 HARMONICS = 4
-WAVES = 10
+SLOW = 5
+FASTER, FAST = 8.0, 20.0
+LONG_S = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,10 +134,28 @@ def _offset(x: Experience, channel: int) -> Array:
     return same
 
 
-def _time(x: Experience, channel: int) -> Array:
+def _time(x: Experience, waves: float) -> Array:
+    """Smooth over the length of the recording divided by `waves`.
+
+    A walk's terms fall as 1/k; these fall off like a Gaussian beyond `waves`, so that a
+    course that is smooth is not taken for a walk, nor the other way about.
+    """
     part = (x.t - x.t[0]) / max(np.ptp(x.t), 1e-9)
-    k = np.arange(1, WAVES + 1)
-    return np.cos(np.pi * np.outer(part, k)) / k
+    k = np.arange(1, round(2 * waves) + 1)
+    out: Array = np.cos(np.pi * np.outer(part, k)) * np.exp(-0.5 * (k / waves) ** 2)
+    return out
+
+
+def _slow(x: Experience) -> Array:
+    """Legendre's polynomials of time up to the fifth, the higher the smaller."""
+    part = 2 * (x.t - x.t[0]) / max(np.ptp(x.t), 1e-9) - 1
+    k = np.arange(1, SLOW + 1)
+    out: Array = np.polynomial.legendre.legvander(part, SLOW)[:, 1:] / k
+    return out
+
+
+def _fading(x: Experience, channel: int) -> Array:
+    return x.f[:, channel % 3, None] / x.gravity * _slow(x)
 
 
 def _angle(angle: Array) -> Array:
@@ -164,7 +184,7 @@ def _temperature(x: Experience, channel: int) -> Array:
 
 
 def _since_turn(x: Experience, channel: int) -> Array:
-    part = np.log1p(np.maximum(x.since_turn, 0.0))
+    part = np.log1p(np.clip(x.since_turn, 0.0, LONG_S))
     part = part / max(float(np.max(part)), 1e-9)
     return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
 
@@ -172,7 +192,10 @@ def _since_turn(x: Experience, channel: int) -> Array:
 _FACTORS: dict[str, Callable[[Experience, int], Array]] = {
     "walk": _walk,
     "offset": _offset,
-    "time": _time,
+    "time": lambda x, c: _slow(x),
+    "faster time": lambda x, c: _time(x, FASTER),
+    "fast time": lambda x, c: _time(x, FAST),
+    "force and time": _fading,
     "alpha": lambda x, c: _angle(x.alpha),
     "beta": lambda x, c: _angle(x.beta),
     "joints": _joints,

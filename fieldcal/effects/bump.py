@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.effects import Chain, Fault, Recording, Shape
-from fieldcal.effects.recording import runs
+from fieldcal.effects.recording import lsb_of, runs
 from fieldcal.samples import CHANNELS, Array
 
 LARGEST = 6.5
@@ -99,12 +99,16 @@ class Bump(Chain):
         """Disturbed stretches of every window."""
         t, out = recording.block.t, []
         rate = 1 / float(np.median(np.diff(t)))
-        for first, last in recording.windows:
+        steps = [lsb_of(recording.channel(c)) for c in range(6)]
+        noise = np.maximum(recording.noise, 0.5 * np.array(steps))
+        for p, (first, last) in enumerate(recording.windows):
             if last - first < 20:
                 continue
             piece = recording.block[first:last].six
-            z = _quick(piece, rate) / recording.noise
+            z = _quick(piece, rate) / noise
             z = np.nan_to_num(z)
+            if recording.x.rate[p].any():
+                z[:, :3] = 0.0  # the force goes round with the table
             for a, b in disturbed(z, max(2, round(0.1 * rate))):
                 if b - a <= LONGEST_S * rate:
                     out.append(

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.effects.recording import Rows
+from fieldcal.effects.recording import Rows, lsb_of
 from fieldcal.samples import CHANNELS, Array
 
 FEWEST = 5
@@ -27,16 +27,22 @@ BESIDE = 4.0
 """How much more often the rail is taken than the value next to it."""
 
 
-def rails(values: Array, limit: float) -> list[Rows]:
+def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
     """Samples at each rail of a channel; none where there is no rail.
 
-    `limit` is the declared full scale, nan where unknown.
+    `limit` is the declared full scale, nan where unknown; `coarse` says that any value
+    is taken again and again, so that this alone makes no rail.
     """
     out = []
-    for edge in (np.nanmin(values), np.nanmax(values)):
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    if low < 0 and abs(high + low) < 1e-3 * high and not np.isfinite(limit):
+        limit = high  # as far down as up: full scale, if it is taken again and again
+    for edge in (low, high):
         at = np.flatnonzero(values == edge)
         declared = abs(abs(edge) - limit) < 1e-3 * limit
-        if len(at) >= FEWEST and (declared or _repeated(values, float(edge), at)):
+        if len(at) >= FEWEST and (
+            declared or (not coarse and _repeated(values, edge, at))
+        ):
             out.append(at)
     return out
 
@@ -60,25 +66,36 @@ class Saturation(Chain):
     source = "model of this project"
 
     def find(self, recording: Recording) -> list[Fault]:
-        """Channels with samples at a rail."""
+        """Channels with samples at a rail, which the axes of a triad share."""
         out = []
-        for c, name in enumerate(CHANNELS):
-            values = recording.channel(c)
-            if not np.isfinite(values).any():
-                continue
-            at = rails(values, float(recording.limits[c // 3]))
-            if at:
-                rows = np.sort(np.concatenate(at))
-                limit = float(np.abs(values[rows]).max())
-                out.append(
-                    Fault(
-                        channel=name,
-                        values={"channel": name, "limit": limit},
-                        sigmas={"limit": float(recording.noise[c])},
-                        from_s=float(recording.block.t[rows[0]]),
-                        to_s=float(recording.block.t[rows[-1]]),
-                        rows=rows,
-                        size=limit,
-                    )
-                )
+        for first in (0, 3):
+            limit, found = float(recording.limits[first // 3]), {}
+            for _ in range(2):
+                for c in range(first, first + 3):
+                    values = recording.channel(c)
+                    if c not in found and np.isfinite(values).any():
+                        coarse = lsb_of(values) > recording.noise[c]
+                        if at := rails(values, limit, coarse):
+                            found[c] = np.sort(np.concatenate(at))
+                if not found:
+                    break
+                limit = float(max(_size(recording, c, at) for c, at in found.items()))
+            out += [_fault(recording, c, found[c]) for c in sorted(found)]
         return out
+
+
+def _size(recording: Recording, c: int, rows: Rows) -> float:
+    return float(np.abs(recording.channel(c)[rows]).max())
+
+
+def _fault(recording: Recording, c: int, rows: Rows) -> Fault:
+    limit, t = _size(recording, c, rows), recording.block.t
+    return Fault(
+        channel=CHANNELS[c],
+        values={"channel": CHANNELS[c], "limit": limit},
+        sigmas={"limit": float(recording.noise[c])},
+        from_s=float(t[rows[0]]),
+        to_s=float(t[rows[-1]]),
+        rows=rows,
+        size=limit,
+    )

@@ -27,6 +27,15 @@ ODDS = 1e-6
 MANY = 20
 """Runs from which their usual length can be told."""
 
+SHARE = 0.2
+"""Part of a window beside a run from which the window's own repeats can be told."""
+
+TURNED = 30.0
+"""Standard deviations that other axes go through while the device is turned."""
+
+JUMP = 2.5
+"""Steps by which a channel that stood still jumps when it goes on."""
+
 FEWEST = 8
 """Equal samples from which a run counts."""
 
@@ -64,9 +73,11 @@ class Stuck(Chain):
         still = recording.still
         for c, name in enumerate(CHANNELS):
             values_of = recording.channel(c)
-            coarse = lsb_of(values_of) > 2 * recording.noise[c]
+            step_of = lsb_of(values_of) / max(float(recording.noise[c]), 1e-300)
             for first, last in repeats(values_of):
-                if coarse and still[first:last].all():
+                if step_of > 2 and still[first:last].all():
+                    continue
+                if step_of > 1 and _usual(recording, c, int(first), int(last)):
                     continue
                 values: dict[str, float | str] = {
                     "channel": name,
@@ -85,3 +96,29 @@ class Stuck(Chain):
                     )
                 )
         return out
+
+
+def _usual(recording: Recording, c: int, first: int, last: int) -> bool:
+    """Whether a run is no wonder where steps are as coarse as the noise.
+
+    In a window whose mean is amid a step it is none; nor is it between windows as long
+    as the other axes show that the device is not turned, or the channel goes on from
+    where it stood.
+    """
+    values = recording.channel(c)
+    at = recording.position_of(first)
+    if at < 0 or at != recording.position_of(last - 1):
+        axes = [i for i in range(c - c % 3, c - c % 3 + 3) if i != c]
+        move = [np.ptp(recording.channel(i)[first:last]) for i in axes]
+        beside = [values[i] for i in (first - 1, last) if 0 <= i < len(values)]
+        jump = np.abs(np.array(beside) - values[first]).max(initial=0.0)
+        turned = max(move) > TURNED * recording.noise[axes].max()
+        return not (turned and jump > JUMP * lsb_of(values))
+    start, end = recording.windows[at]
+    equal = np.diff(values[start:end]) == 0
+    equal = np.delete(equal, slice(first - start, last - 1 - start))
+    if len(equal) < SHARE * (end - start):
+        return False
+    again = (equal.sum() + 1) / (len(equal) + 2)
+    odds = np.log(len(recording.block)) + (last - first) * np.log(again)
+    return bool(odds > np.log(ODDS))

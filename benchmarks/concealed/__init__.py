@@ -1,0 +1,95 @@
+"""Sessions with something concealed, drawn at random, and what the diagnosis says.
+
+    python -m benchmarks concealed [SESSIONS] [--quick] [--only=LABEL]
+
+For every kind of session: how often it is named right or honestly aliased, how much of
+what is said is not there, how the numbers hold against their intervals, and by how much
+positions left out are predicted better. Seeds and effects are not known to the
+diagnosis.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from benchmarks.concealed import draws, others
+from benchmarks.concealed.judging import Outcome, judged
+from benchmarks.concealed.sessions import Session, plain
+from benchmarks.concealed.tables import printed
+from fieldcal.diagnosis import diagnose
+
+Draw = Callable[[np.random.Generator], Session]
+
+USUAL, QUICK = 600, 100
+SIGMAS = (10.0, 30.0)
+
+
+def _sigmas(rng: np.random.Generator) -> float:
+    return float(np.exp(rng.uniform(*np.log(SIGMAS))))
+
+
+def _single(name: str) -> Draw:
+    return lambda rng: draws.single(name, rng, _sigmas(rng))
+
+
+def _outside(name: str) -> Draw:
+    return lambda rng: others.outside(name, rng, 2 * _sigmas(rng))
+
+
+def kinds() -> Mapping[str, tuple[Draw, int]]:
+    """Every kind of session by its label, with how often it is drawn."""
+    out: dict[str, tuple[Draw, int]] = {"nothing": (plain, 24)}
+    out["nothing, static"] = (lambda rng: plain(rng, ("static",)), 4)
+    for name in draws.EQUATIONS:
+        out[name] = (_single(name), 3)
+    for name in others.CHANCE:
+        out[name] = (lambda rng, n=name: others.chance(n, rng), 3)  # type: ignore[misc]
+    for name in others.SPECIAL:
+        out[name] = (lambda rng, n=name: others.special(n, rng), 3)  # type: ignore[misc]
+    for name in others.CHAIN:
+        out[name] = (lambda rng, n=name: others.chain(n, rng), 3)  # type: ignore[misc]
+    out["pair"] = (lambda rng: others.pair(rng, _sigmas(rng)), 18)
+    for name in others.OUTSIDE:
+        out[f"outside: {name}"] = (_outside(name), 3)
+    return out
+
+
+def drawn(count: int, only: str = "") -> Iterator[tuple[int, Session]]:
+    """Seeds and sessions, all kinds in turn."""
+    some = {k: v for k, v in kinds().items() if only in k}
+    total = sum(weight for _, weight in some.values())
+    for k, (draw, weight) in enumerate(some.values()):
+        for i in range(max(1, round(count * weight / total))):
+            seed = 1000 * k + i + SEED
+            session = draw(np.random.default_rng(seed))
+            yield seed, session
+
+
+SEED = 20_260_101
+
+
+def outcome(seed: int, session: Session) -> Outcome:
+    """Record a session, diagnose it and judge."""
+    block, about = session.record(seed), session.about
+    start = time.perf_counter()
+    told = diagnose(block, about)
+    return judged(session, seed, told, time.perf_counter() - start)
+
+
+def main() -> None:
+    """Print the tables."""
+    words = sys.argv[2:]
+    only = "".join(w.removeprefix("--only=") for w in words if "=" in w)
+    numbers = [int(w) for w in words if w.isdigit()]
+    count = numbers[0] if numbers else QUICK if "--quick" in words else USUAL
+    found = []
+    for seed, session in drawn(count, only):
+        one = outcome(seed, session)
+        found.append(one)
+        if not one.right:
+            print(f"{one.label} (seed {seed}): {one.verdict} {one.named}", flush=True)
+    printed(found)

@@ -1,0 +1,112 @@
+"""Whether a diagnosis says what was concealed, and how far its numbers are off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from benchmarks.concealed.sessions import Session
+from fieldcal.diagnosis import Diagnosis
+
+ALWAYS = frozenset({"earth_rate"})
+"""True of every session, so never a false alarm."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one session.
+
+    Attributes
+    ----------
+    label, sigmas, seed : of the session
+    verdict : of the diagnosis
+    named : what it named, with the aliases it gave
+    right : whether that is what was concealed
+    aliased : whether it is so by an alias only
+    extra : effects named that are not there
+    pulls : (value - truth) / sigma of every number given, by its name
+    before, after : held-out rms
+    seconds : that the diagnosis took
+    where : channels and kinds of the largest mismatches
+
+    """
+
+    label: str
+    sigmas: float
+    seed: int
+    verdict: str
+    named: dict[str, tuple[str, ...]]
+    right: bool
+    aliased: bool
+    extra: tuple[str, ...] = ()
+    pulls: dict[str, float] = field(default_factory=dict)
+    before: float = np.nan
+    after: float = np.nan
+    seconds: float = np.nan
+    where: tuple[str, ...] = ()
+
+
+def judged(session: Session, seed: int, told: Diagnosis, seconds: float) -> Outcome:
+    """Hold a diagnosis against what was concealed."""
+    named = {e.id: tuple(e.aliases) for e in told.effects}
+    where = tuple(f"{m.channel} {m.kind}" for m in told.mismatch[:3])
+    extra = _extra(session, named)
+    right, aliased = _right(session, told.verdict, named, where)
+    return Outcome(
+        session.label,
+        session.sigmas,
+        seed,
+        told.verdict,
+        named,
+        right,
+        aliased,
+        extra,
+        dict(_pulls(session, told)),
+        told.before.held_out_rms,
+        told.after.held_out_rms,
+        seconds,
+        where,
+    )
+
+
+def _right(
+    session: Session,
+    verdict: str,
+    named: dict[str, tuple[str, ...]],
+    where: tuple[str, ...],
+) -> tuple[bool, bool]:
+    truth = set(session.concealed)
+    if session.added is not None:
+        located = bool(where) and where[0].split()[0] == session.channel
+        return verdict == "unexplained" and located, False
+    extra = _extra(session, named)
+    if not truth:
+        return not extra and verdict in ("consistent", "left_out"), False
+    said = set(named).union(*named.values()) if named else set()
+    good = truth <= said and not extra and verdict in ("left_out", "ambiguous")
+    return good, good and not truth <= set(named)
+
+
+def _extra(session: Session, named: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Effects that are named and not there, nor stand for one that is."""
+    truth = set(session.concealed)
+    return tuple(
+        name
+        for name, others in named.items()
+        if name not in truth | ALWAYS and not truth & set(others)
+    )
+
+
+def _pulls(session: Session, told: Diagnosis) -> Iterator[tuple[str, float]]:
+    """How far numbers are off, in their standard deviations."""
+    for effect in told.effects:
+        truth = session.concealed.get(effect.id)
+        if truth is None:
+            continue
+        for name, quantity in effect.parameters.items():
+            value, sigma = quantity.value, quantity.sigma
+            if isinstance(value, str) or not sigma:
+                continue
+            yield f"{effect.id}.{name}", (value - truth.get(name, 0.0)) / sigma

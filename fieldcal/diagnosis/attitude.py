@@ -1,0 +1,124 @@
+"""Kinematics of a turn: attitudes from small turns, what is known at both ends.
+
+    R_k = exp(-[w dt]x) R_{k-1}
+
+R (3, 3) takes vectors of the attitude at the start to that at the k-th edge; angles in
+rad, t in s. Source: kinematics of rotation; the trapezoid rule with the next term of
+Euler and Maclaurin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.effects import Experience
+from fieldcal.frames import turn
+from fieldcal.samples import Array
+
+SMOOTH_S = 0.1
+"""Means that the angular acceleration is taken from."""
+
+
+def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
+    """Means between cuts (indices) of a course given at instants."""
+    gaps = np.diff(t).reshape(-1, *[1] * (values.ndim - 1))
+    total = np.zeros_like(values, dtype=float)
+    total[1:] = np.cumsum((values[1:] + values[:-1]) / 2 * gaps, axis=0)
+    length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
+    mean: Array = np.diff(total[cut], axis=0) / length
+    return mean
+
+
+def carry(angle: Array) -> Array:
+    """Attitudes from small turns, (m + 1, 3, 3), the first of them identity.
+
+    `angle` is (m, 3) rad; the turn of a body by it turns vectors seen in it back.
+
+    >>> quarter = carry(np.full((90, 3), [0.0, 0.0, np.pi / 180]))
+    >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0
+    array([ 0., -1.,  0.])
+    """
+    size = np.linalg.norm(angle, axis=1)[:, None, None]
+    axis = angle[:, :, None] / np.where(size > 0, size, 1.0)
+    x, y, z = axis[:, 0, 0], axis[:, 1, 0], axis[:, 2, 0]
+    zero = np.zeros_like(x)
+    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    steps = np.eye(3) - np.sin(size) * cross + (1 - np.cos(size)) * (cross @ cross)
+    out = np.empty((len(angle) + 1, 3, 3))
+    out[0] = np.eye(3)
+    for k, step in enumerate(steps):
+        out[k + 1] = step @ out[k]
+    return out
+
+
+def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
+    """Small turns between edges, (m, 3) rad: the trapezoid rule and its correction.
+
+    The next term of Euler and Maclaurin is -dt^2/12 (w'(b) - w'(a)).
+    """
+    step = float(np.median(np.diff(t)))
+    slope = np.gradient(w, t, axis=0)[edge]
+    length = np.diff(t[edge])[:, None]
+    out: Array = trapezoid_means(t, w, edge) * length
+    return out - step**2 / 12 * np.diff(slope, axis=0)
+
+
+def between(attitude: Array, done: Array, start: Array, end: Array) -> Array:
+    """A vector of the base on the way, known at both ends, (m + 1, 3)."""
+    back = attitude @ attitude[-1].T
+    out: Array = (1 - done)[:, None] * (attitude @ start) + done[:, None] * (back @ end)
+    return out
+
+
+def blur(t: Array, w: Array, each: int) -> float:
+    """How far the attitude is off for want of samples: twice as many would tell, rad.
+
+    From every other sample it comes out otherwise by so much; from all, the error is
+    of the same order at most.
+    """
+    whole = (len(t) - 1) // (2 * each) * 2 * each
+    ends = []
+    for skip in (1, 2):
+        some = slice(0, whole + 1, skip)
+        edge = np.arange(0, whole // skip + 1, max(each // skip, 1))
+        ends.append(carry(small_turns(t[some], w[some], edge))[-1])
+    off = ends[0] @ ends[1].T
+    return float(np.linalg.norm([off[2, 1], off[0, 2], off[1, 0]]))
+
+
+def accelerations(t: Array, w: Array) -> Array:
+    """Angular acceleration at the edges, from means over `SMOOTH_S`."""
+    step = float(t[1] - t[0])
+    m = max(1, round(SMOOTH_S / step)) | 1
+    kernel = np.ones(m) / m
+    padded = np.pad(w, ((m // 2, m // 2), (0, 0)), mode="edge")
+    smooth = np.column_stack([np.convolve(c, kernel, "valid") for c in padded.T])
+    out: Array = np.gradient(smooth, t, axis=0)
+    return out
+
+
+def geometry(
+    x: Experience, pair: tuple[int, int], attitude: Array, done: Array
+) -> tuple[Array, Array, Array]:
+    """What a turn has to do with the positions at its ends.
+
+    Returns
+    -------
+    f : (m + 1, 3) force on the way, from both ends
+    closure : (3,) phi_T in the axes of p
+    across : (3, 3) projection on what of it is known
+
+    """
+    p, q = (int(np.argmax(x.position == i)) for i in pair)
+    f = between(attitude, done, x.f[p], x.f[q])
+    if x.oriented[[p, q]].all():
+        known = x.mounting.T @ turn(x.alpha[[p, q]], x.beta[[p, q]])
+        off = attitude[-1].T @ known[1] @ known[0].T  # I + [phi]x
+        vee = np.array(
+            [off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]]
+        )
+        return f, vee / 2, np.eye(3)
+    up = x.f[p] / np.linalg.norm(x.f[p])
+    seen = attitude[-1].T @ x.f[q]
+    return f, np.cross(up, seen / np.linalg.norm(seen)), np.eye(3) - np.outer(up, up)

@@ -1,0 +1,62 @@
+"""A device that is held by hand turns a little all the time.
+
+Where orientations are not known, only the length of the force says something about the
+accelerometers. On a table its direction stays within the noise of the rows of a window;
+in a hand it wanders, and would pass for biases that do. Then each window is one row:
+the mean of the force over it is as long as ever, to second order in the angle. The mean
+rate over T s is the angle between its ends: with a wander of the direction of a rad
+(rms) it is off by sqrt(2) a / T.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.diagnosis.reduce import Rows, Source, averaged, rate_of, reduce, spans
+
+WANDERS = 6.0
+"""Standard deviations of what the squares across the force have too many."""
+
+MORE = 1.5
+"""And by how much more than along the force."""
+
+
+def rows_of(source: Source) -> Rows:
+    """Rows of a recording, one for each window of a device held by hand."""
+    rows = reduce(source)
+    angle = wander(rows)
+    if not angle:
+        return rows
+    held = np.unique(rows.x.position)
+    samples = rows.length[:, None] * rate_of(source.block)
+    level = [
+        np.median((rows.sd * np.sqrt(samples))[rows.x.position == p], axis=0)
+        for p in held
+    ]
+    bound = spans(source.block, source.about)[held]
+    one = averaged(source, bound, held, np.array(level), rows.noise)
+    unsteady = np.sqrt(2.0) * angle / one.length
+    one.sd[:, 3:] = np.hypot(one.sd[:, 3:], unsteady[:, None])
+    return one
+
+
+def wander(rows: Rows) -> float:
+    """Rms angle by which the force turns within windows, rad; 0 on a table."""
+    x, some = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
+    along, across, dof, angle = 0.0, 0.0, 0, []
+    for p in np.unique(x.position[some]):
+        at = some & (x.position == p)
+        if at.sum() < 2:
+            continue
+        off = rows.y[at, :3] - rows.y[at, :3].mean(axis=0)
+        up = x.f[at][0] / np.linalg.norm(x.f[at][0])
+        sd = rows.sd[at, :3]
+        part = np.outer(off @ up, up)
+        along += float(((part / sd) ** 2).sum())
+        across += float((((off - part) / sd) ** 2).sum())
+        dof += int(at.sum()) - 1
+        length = np.linalg.norm(rows.y[at, :3].mean(axis=0))
+        angle.append(((off - part) ** 2).sum() / (2 * (at.sum() - 1)) / length**2)
+    if not dof or across / 2 < max(dof + WANDERS * np.sqrt(dof), MORE * along):
+        return 0.0
+    return float(np.sqrt(np.mean(angle)))

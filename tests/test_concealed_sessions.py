@@ -1,0 +1,47 @@
+"""The benchmark's sessions are what they say: size, seeds, judgement."""
+
+import numpy as np
+import pytest
+
+from benchmarks.concealed import kinds
+from benchmarks.concealed.draws import size
+from benchmarks.concealed.judging import judged
+from benchmarks.concealed.others import OUTSIDE
+from benchmarks.concealed.tables import GROUPS, groups
+from fieldcal.diagnosis import diagnose
+from fieldcal.effects import catalogue
+
+
+def test_every_id_of_the_catalogue_is_concealed_in_some_kind() -> None:
+    assert set(catalogue()) <= set(kinds())
+    assert {f"outside: {name}" for name in OUTSIDE} <= set(kinds())
+
+
+@pytest.mark.parametrize("name", ["quadratic", "gyro_scale", "hum"])
+def test_the_size_is_the_one_asked_for(name: str) -> None:
+    session = kinds()[name][0](np.random.default_rng(5))
+    assert 10 <= session.sigmas <= 30
+    assert size(session) == pytest.approx(session.sigmas, rel=0.02)
+
+
+def test_a_seed_gives_one_recording() -> None:
+    one, two = (kinds()["pair"][0](np.random.default_rng(3)) for _ in range(2))
+    assert one.concealed == two.concealed
+    assert np.array_equal(one.record(7).six, two.record(7).six)
+    assert not np.array_equal(one.record(7).six, two.record(8).six)
+
+
+def test_a_bump_is_judged_by_name_and_by_number() -> None:
+    session = kinds()["bump"][0](np.random.default_rng(2))
+    told = diagnose(session.record(2), session.about)
+    one = judged(session, 2, told, 0.0)
+    assert one.right and not one.aliased and not one.extra
+    assert set(one.pulls) == {"bump.at_s", "bump.for_s"}
+    assert "100.0 %" in groups([one])
+    other = judged(session.having({"stuck": _stuck()}), 2, told, 0.0)
+    assert not other.right and other.extra == ("bump",)
+    assert sum(belongs(one) for belongs in GROUPS.values()) == 1
+
+
+def _stuck() -> dict[str, object]:
+    return {"channel": "ax", "from_s": 1.0, "to_s": 2.0}

@@ -66,6 +66,7 @@ def read(path: Path) -> tuple[Block, tuple[str, ...]]:
     except OSError as error:
         raise SessionError(f"{path}: cannot be read: {error}") from error
     columns = {name: _numbers(path, table, name) for name in table.column_names}
+    del table  # an hour of samples need not be in memory three times
     _check_columns(path, columns)
     _check_rows(path, columns)
     return _block(columns), warnings
@@ -252,9 +253,10 @@ def _check_rows(path: Path, columns: dict[str, Array]) -> None:
 
 
 def _block(columns: dict[str, Array]) -> Block:
+    """Samples of columns, which are used up."""
     unknown = np.full(len(columns["t"]), np.nan)
     triad = {
-        kind: np.column_stack([columns.get(kind + axis, unknown) for axis in "xyz"])
+        kind: np.column_stack([columns.pop(kind + axis, unknown) for axis in "xyz"])
         for kind in "ag"
     }
     rest = [columns.get(n, unknown) for n in ("temperature", "seq", "t_host")]

@@ -116,9 +116,13 @@ class Session:
         raw, cut = sample_files.read(sample_files.find(self.folder))
         self.warnings += cut
         units = self.about.units
-        acc = raw.acc * ACC_UNITS[units["acceleration"]]
-        gyr = raw.gyr * GYR_UNITS[units["angular_rate"]]
-        return replace(raw, acc=acc, gyr=gyr)
+        for triad, unit in (
+            (raw.acc, ACC_UNITS[units["acceleration"]]),
+            (raw.gyr, GYR_UNITS[units["angular_rate"]]),
+        ):
+            if unit != 1.0:
+                np.multiply(triad, unit, out=triad)
+        return raw
 
     def marks(self) -> Iterator[dict[str, Any]]:
         """What happened, in order."""

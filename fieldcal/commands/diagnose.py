@@ -6,13 +6,23 @@ import argparse
 import json
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fieldcal.diagnosis import Diagnosis
+    from fieldcal.diagnosis.explain import Explanation
+    from fieldcal.session import Session
+    from fieldcal.twin import Rerun
 
 HELP = "say what physics the simulation leaves out of a recording"
 
 EXAMPLE = """\
   fieldcal diagnose bench-7/2026-03-01
   fieldcal diagnose bench-7/2026-03-01 --json > diagnosis.json
+  fieldcal diagnose bench-7/2026-03-01 --twin bench-7.toml
+  fieldcal sim --profile bench-7.toml
 """
 
 DIAGNOSIS = "diagnosis.json"
@@ -24,18 +34,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("session", type=Path, metavar="SESSION", help="session folder")
     add("--json", action="store_true", help="print diagnosis.json instead of the view")
     add("--report", action="store_true", help="write report.html as well")
+    add(
+        "--twin",
+        type=Path,
+        metavar="FILE",
+        help="write the virtual device with everything that was found, for fieldcal sim"
+        " --profile FILE, and replay the session on it",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command: 0 consistent, 1 something is left out or unexplained."""
     # small matrices by the thousand: threads would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from fieldcal.diagnosis import diagnose
+    from fieldcal.diagnosis.explain import explain
+    from fieldcal.diagnosis.prepare import prepare
+    from fieldcal.diagnosis.verdict import concluded
     from fieldcal.session import Session
 
     session = Session.open(args.session)
-    found = diagnose(session.block, session.about)
+    explanation = explain(prepare(session.block, session.about))
+    found = concluded(session.block, explanation)
+    again = _replayed(args.twin, session, explanation, found) if args.twin else None
+    if again is not None:
+        found = replace(found, says=f"{found.says} {again.says}")
     content = found.to_json()
+    if again is not None:
+        content["twin"] = again.to_json(str(args.twin))
     path = session.write_json(DIAGNOSIS, content)
     for warning in (*session.warnings, *found.warnings):
         sys.stderr.write(f"fieldcal diagnose: {warning}\n")
@@ -44,11 +69,28 @@ def run(args: argparse.Namespace) -> int:
     else:
         from fieldcal.commands.diagnosis_view import show
 
-        show(found)
+        show(found, again)
         sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.commands.report import write
 
         page = write(args.session)
         (sys.stderr if args.json else sys.stdout).write(f"written: {page}\n")
+        if args.twin:
+            sys.stdout.write(f"written: {args.twin}\n")
     return 0 if found.verdict == "consistent" else 1
+
+
+def _replayed(
+    path: Path, session: Session, explanation: Explanation, found: Diagnosis
+) -> Rerun:
+    """Replay the session on its twin, and write the twin's device file."""
+    from fieldcal.diagnosis.quality import raw_bench
+    from fieldcal.session import write_whole
+    from fieldcal.sim_device.profile_file import to_toml
+    from fieldcal.twin import rerun
+
+    raw = raw_bench(session.block, explanation.prepared)
+    again = rerun(explanation, found, raw)
+    write_whole(path, to_toml(again.profile))
+    return again

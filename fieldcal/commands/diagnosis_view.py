@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from fieldcal.diagnosis import Diagnosis
+from fieldcal.diagnosis.quality import UNITS
 from fieldcal.diagnosis.result import Found, Mismatch, Quantity
 from fieldcal.diagnosis.words import said
+
+if TYPE_CHECKING:
+    from fieldcal.twin import Rerun
 
 STYLES = {
     "consistent": "bold green",
@@ -19,8 +23,10 @@ WIDEST = 24
 """Cells of the bar that shows how significant a mismatch is."""
 
 
-def show(diagnosis: Diagnosis, out: IO[str] | None = None) -> None:
-    """Print verdict, mismatch, effects, improvement and calibration."""
+def show(
+    diagnosis: Diagnosis, again: Rerun | None = None, out: IO[str] | None = None
+) -> None:
+    """Print verdict, mismatch, effects, improvement, calibration, and the replay."""
     from rich.console import Console
     from rich.text import Text
 
@@ -34,6 +40,8 @@ def show(diagnosis: Diagnosis, out: IO[str] | None = None) -> None:
         console.print(_effects(diagnosis.effects))
     console.print(_fit(diagnosis))
     console.print(_calibration(diagnosis))
+    if again is not None:
+        console.print(_replays(again))
 
 
 def _mismatch(mismatch: tuple[Mismatch, ...]) -> object:
@@ -129,4 +137,28 @@ def _calibration(diagnosis: Diagnosis) -> object:
                 shown = number(value, sigma)
                 moved = f"{change / sigma:+.1f} σ" if sigma > 0 else ""
                 table.add_row(f"{TITLES[name]} {axis}", *shown, group.unit, moved)
+    return table
+
+
+def _replays(again: Rerun) -> object:
+    from rich.table import Table
+
+    unit = UNITS[again.triad]
+    table = Table(
+        title=f"Replayed by the virtual device: rms {unit} (χ² a mean)",
+        title_justify="left",
+    )
+    table.add_column("position", justify="right")
+    for name in ("as session.toml has it", "refitted", "twin"):
+        table.add_column(name, justify="right")
+    runs = list(again.runs.values())
+    for i, position in enumerate(again.positions):
+        cells = [
+            f"{run.by_position[i, again.triad]:.2g} ({run.chi2_by_position[i]:.3g})"
+            for run in runs
+        ]
+        table.add_row(str(position), *cells)
+    table.add_section()
+    whole = [f"{r.rms[again.triad]:.2g} ({r.chi2_per_dof:.3g})" for r in runs]
+    table.add_row("all", *whole)
     return table

@@ -111,9 +111,9 @@ def telling_position(
 
     """
     models = {name: _with(explanation, one, name) for name in (one, other)}
-    if any(m is None for m in models.values()):
-        return None
     rows = explanation.prepared.bench.rows
+    if any(m is None for m in models.values()) or not rows.x.oriented.all():
+        return None
     x, best = rows.x, None
     sd = np.nanmedian(rows.sd, axis=0) / np.sqrt(
         max(len(x) / max(x.position[-1], 1), 1)

@@ -19,6 +19,9 @@ from fieldcal.samples import Array
 SMOOTH_S = 0.1
 """Means that the angular acceleration is taken from."""
 
+ASTRAY = 0.3
+"""Misclosure that no gyroscope makes, rad: clipped, or turned in another way."""
+
 
 def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
     """Means between cuts (indices) of a course given at instants."""
@@ -98,6 +101,13 @@ def accelerations(t: Array, w: Array) -> Array:
     return out
 
 
+def astray(x: Experience, pair: tuple[int, int], attitude: Array) -> bool:
+    """Whether the gyroscopes lost track of the vertical in a turn."""
+    p, q = (x.f[int(np.argmax(x.position == i))] for i in pair)
+    along = float(p @ (attitude.T @ q)) / float(np.linalg.norm(p) * np.linalg.norm(q))
+    return bool(along < np.cos(ASTRAY))
+
+
 def geometry(
     x: Experience, pair: tuple[int, int], attitude: Array, done: Array
 ) -> tuple[Array, Array, Array]:
@@ -118,7 +128,8 @@ def geometry(
         vee = np.array(
             [off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]]
         )
-        return f, vee / 2, np.eye(3)
+        if (np.trace(off) - 1) / 2 > np.cos(ASTRAY):
+            return f, vee / 2, np.eye(3)
     up = x.f[p] / np.linalg.norm(x.f[p])
     seen = attitude[-1].T @ x.f[q]
     return f, np.cross(up, seen / np.linalg.norm(seen)), np.eye(3) - np.outer(up, up)

@@ -106,7 +106,7 @@ def _parts(effect: Effect, bench: Bench) -> Iterator[Hypothesis]:
                 for j, n in enumerate(names)
                 if n[0] == letter and seen[CHANNELS.index(n)]
             )
-            if columns:
+            if columns and shapes:
                 variants = tuple(Term(effect, columns, shape) for shape in shapes)
                 yield Hypothesis(effect, part, variants)
     else:
@@ -127,10 +127,10 @@ def _grid(effect: Effect, bench: Bench) -> Iterator[dict[str, float]]:
             continue
         span = float(np.ptp(x.t))
         if effect.id == "settling":
-            low, high = (
-                max(shape.low, float(x.since_turn.min()) / 4),
-                min(shape.high, span / 3),
-            )
+            soonest = float(x.since_turn.min())
+            if not np.isfinite(soonest):  # it was never turned
+                return
+            low, high = max(shape.low, soonest / 4), min(shape.high, span / 3)
         else:
             low, high = max(shape.low, span / 20), min(shape.high, 3 * span)
         for tau in np.geomspace(low, max(high, low * 1.01), POINTS):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.reduce import levels_of, rate_of, spans, table_rate
+from fieldcal.diagnosis.reduce import levels_of, masked, rate_of, spans, table_rate
 from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
 from fieldcal.frames import earth_rate_home, force_home
 from fieldcal.positions import angles
@@ -35,12 +35,14 @@ class Checked:
     block : samples put right
     usable : (n, 6) samples that can be used
     faults : what was found, by the effect's id
+    noise : (6,) standard deviation of one usable sample in the windows
 
     """
 
     block: Block
     usable: NDArray[np.bool_]
     faults: tuple[tuple[str, Fault], ...]
+    noise: Array
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -56,7 +58,7 @@ class Checked:
 
 def check(block: Block, about: Description) -> Checked:
     """Look for every fault of the chain, and act on what is found."""
-    usable = np.isfinite(block.six)
+    usable = np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)])
     faults: list[tuple[str, Fault]] = []
     seen = recording(block, usable, about)
     for name in MENDING:
@@ -77,7 +79,7 @@ def check(block: Block, about: Description) -> Checked:
             seen = recording(block, usable, about)
     for name in NOTING:
         faults += [(name, fault) for fault in _find(name, seen)]
-    return Checked(block, usable, tuple(_once(faults)))
+    return Checked(block, usable, tuple(_once(faults)), seen.noise)
 
 
 def checked_again(checked: Checked, block: Block, about: Description) -> Checked:
@@ -141,9 +143,8 @@ def _once(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault]]:
 def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Recording:
     """What the checks look at."""
     windows, rate = spans(block, about), rate_of(block)
-    six = np.where(usable, block.six, np.nan)
-    pieces = [six[a:b] for a, b in windows if b > a]
-    noise = levels_of(pieces, rate)[0] if pieces else np.full(6, np.nan)
+    block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
+    noise = levels_of(block, held, rate)[0] if len(held) else np.full(6, np.nan)
     if about.positions:
         alpha, beta = angles(about.positions)
     else:
@@ -160,7 +161,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
     )
     limits = [about.limits.get(k, np.nan) for k in ("acceleration", "angular_rate")]
     return Recording(
-        block=replace(block, acc=six[:, :3], gyr=six[:, 3:]),
+        block=block,
         windows=windows,
         x=x,
         scale=np.concatenate([about.nominal["acc_scale"], about.nominal["gyr_scale"]]),

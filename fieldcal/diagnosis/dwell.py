@@ -38,22 +38,24 @@ def arrivals(block: Block, about: Description, noise: Array) -> Array:
     before = 0
     for p, (first, last) in enumerate(windows):
         if last > first >= before:
-            gap = block[before:first].six
-            moved = _moved(gap, block[first:last].six, noise, m)
+            held = np.concatenate(
+                [triad[first:last].mean(axis=0) for triad in (block.acc, block.gyr)]
+            )
+            moved = _moved(block[before:first].six, held, noise, m)
             out[p] = block.t[before + moved if before else 0]
             before = int(last)
     return out
 
 
-def _moved(gap: Array, window: Array, noise: Array, m: int) -> int:
-    """Samples of a gap up to the last sign of motion."""
+def _moved(gap: Array, held: Array, noise: Array, m: int) -> int:
+    """Samples of a gap up to the last sign of motion; `held` is the window's mean."""
     whole = len(gap) // m
     if not whole:
         return len(gap)
     start = len(gap) - whole * m
     mean = gap[start:].reshape(whole, m, 6).mean(axis=1)
     limit = np.maximum(MOVING * noise / np.sqrt(m), [FORCE] * 3 + [RATE] * 3)
-    moving = np.abs(mean - window.mean(axis=0)) > limit
+    moving = np.abs(mean - held) > limit
     rated = bool(np.isfinite(mean[:, 3:]).all())
     at = np.flatnonzero((moving[:, 3:] if rated else moving[:, :3]).any(axis=1))
     return start + (int(at[-1]) + 1) * m if len(at) else 0

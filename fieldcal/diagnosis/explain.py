@@ -71,11 +71,13 @@ class Explanation:
     @property
     def sees_earth(self) -> bool:
         """Whether tactical gyroscopes see the Earth's rate in a single window."""
+        if self.earth <= self.search.price:
+            return False
         bench = self.prepared.bench
         samples = bench.rows.length.sum() / bench.windows
         samples *= rate_of(self.prepared.source.block)
         ratio = EARTH_RATE / (np.nanmax(bench.rows.noise[3:]) / np.sqrt(samples))
-        return self.earth > self.search.price and bool(ratio > SEES_EARTH)
+        return bool(ratio > SEES_EARTH)
 
 
 def explain(prepared: Prepared) -> Explanation:

@@ -17,6 +17,9 @@ from fieldcal.diagnosis.reduce import Rows, Source, averaged, rate_of, reduce, s
 WANDERS = 6.0
 """Standard deviations of what the squares across the force have too many."""
 
+FEWEST = 4
+"""Windows of a device in a hand; what lies still for long drifts by itself."""
+
 MORE = 1.5
 """And by how much more than along the force."""
 
@@ -24,10 +27,10 @@ MORE = 1.5
 def rows_of(source: Source) -> Rows:
     """Rows of a recording, one for each window of a device held by hand."""
     rows = reduce(source)
-    angle = wander(rows)
+    held = np.unique(rows.x.position)
+    angle = wander(rows) if len(held) >= FEWEST else 0.0
     if not angle:
         return rows
-    held = np.unique(rows.x.position)
     samples = rows.length[:, None] * rate_of(source.block)
     level = [
         np.median((rows.sd * np.sqrt(samples))[rows.x.position == p], axis=0)

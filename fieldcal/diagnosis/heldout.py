@@ -76,19 +76,25 @@ def _residuals(
     rows, out = bench.rows, np.full(bench.rows.y.shape, np.nan)
     if fold.max() == 0:
         return out
-    base = [not n.startswith("aside") for n in fit.names]
+    told = _told(fit)
     for i in np.unique(fold):
         left = fold == i
         rest = bench.but(
             rows=replace(rows, sd=np.where(left[:, None], np.nan, rows.sd))
         )
         seen = rest.fit(terms, fit)
-        if (fit.determined & ~seen.determined)[base].any():
+        if told - _told(seen):
             continue
         apart = rows.y - seen.state.predict(rows.x)
         apart = apart - _reached(bench, left, apart)
         out[left] = _turned_off(bench, seen, left, apart)[left]
     return np.where(rows.used, out, np.nan)
+
+
+def _told(fit: Fit) -> set[str]:
+    """Names of the columns that a fit determines, positions' own turns aside."""
+    pairs = zip(fit.names, fit.determined, strict=True)
+    return {n for n, known in pairs if known and not n.startswith("aside")}
 
 
 def _reached(bench: Bench, left: NDArray[np.bool_], apart: Array) -> Array:

@@ -18,7 +18,7 @@ from fieldcal.diagnosis.naming import Removed
 from fieldcal.diagnosis.reduce import spans
 from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.diagnosis.unknown import Unknown
-from fieldcal.effects import Fault, Recording, catalogue
+from fieldcal.effects import Fault, catalogue
 from fieldcal.samples import CHANNELS, Array
 
 CLEAR = 25.0
@@ -137,16 +137,14 @@ def _stretch(explanation: Explanation, positions: Sequence[int]) -> tuple[float,
 
 
 def of_faults(
-    recording: Recording, faults: Sequence[tuple[str, Fault]]
+    t: Array, windows: NDArray[np.intp], faults: Sequence[tuple[str, Fault]]
 ) -> Iterator[Mismatch]:
     """What happened to samples."""
     for name, fault in faults:
         inside = [
             p
-            for p, (a, b) in enumerate(recording.windows)
-            if b > a
-            and recording.block.t[a] <= fault.to_s
-            and recording.block.t[b - 1] >= fault.from_s
+            for p, (a, b) in enumerate(windows)
+            if b > a and t[a] <= fault.to_s and t[b - 1] >= fault.from_s
         ]
         for channel in fault.channels or (fault.channel,):
             yield Mismatch(

@@ -16,10 +16,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.effects.quantisation import bias_of
 from fieldcal.effects.recording import lsb_of
-from fieldcal.samples import Array
+from fieldcal.samples import Array, Block
 
 KEEP = 0.9
 KEPT = 0.62302
@@ -60,6 +61,14 @@ def white(pieces: Sequence[Array], rate_hz: float) -> Array:
     return noise
 
 
+def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Array:
+    """White noise of one sample of each output inside windows, (6,)."""
+    held = [slice(a, b) for a, b in windows if b > a]
+    return np.concatenate(
+        [white([triad[w] for w in held], rate_hz) for triad in (block.acc, block.gyr)]
+    )
+
+
 def _grain(pieces: Sequence[Array]) -> Array:
     """Smallest change of each channel from one sample to the next, (c,)."""
     steps = [np.abs(np.diff(p[:GRAIN], axis=0)) for p in pieces]
@@ -69,15 +78,17 @@ def _grain(pieces: Sequence[Array]) -> Array:
     return grain
 
 
-def rounding(pieces: Sequence[Array], noise: Array) -> Array:
-    """How far off each mean may be because outputs were rounded, (c,).
+def rounding(block: Block, windows: NDArray[np.intp], noise: Array) -> Array:
+    """How far off each mean in some windows may be because outputs were rounded, (6,).
 
     Source: Widrow and Kollar, see `fieldcal.effects.quantisation`; the deviation of a
     sine of that amplitude, as any place within a step is as likely.
     """
     off = np.zeros(len(noise))
+    starts = [block[a : min(a + GRAIN, b)] for a, b in windows]
+    some = np.concatenate([p.six for p in starts])
     for c, measured in enumerate(noise):
-        step = lsb_of(np.concatenate([p[:GRAIN, c] for p in pieces]))
+        step = lsb_of(some[:, c])
         if step > measured > 0:
             before = np.sqrt(max(measured**2 - step**2 / 12, 0.0))
             off[c] = bias_of(step, before) / np.sqrt(2)
@@ -104,13 +115,14 @@ def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
 def _steps(piece: Array, m: int, most: int) -> Array:
     """Differences of neighbouring means of m samples; of many, `most` evenly spread."""
     pairs, channels = len(piece) // (2 * m), piece.shape[1]
+    # a product is ten times as fast as a mean over few columns
+    each = np.full(m, 1 / m)
     if pairs > most:
         both = piece[: 2 * m * pairs].reshape(pairs, 2, m, channels)
-        some: Array = np.diff(both[:: pairs // most].mean(axis=2), axis=1)[:, 0]
+        some: Array = np.diff(each @ both[:: pairs // most], axis=1)[:, 0]
         return some
     whole = len(piece) // m * m
-    means = piece[:whole].reshape(-1, m, channels).mean(axis=1)
-    out: Array = np.diff(means, axis=0)
+    out: Array = np.diff(each @ piece[:whole].reshape(-1, m, channels), axis=0)
     return out
 
 

@@ -15,8 +15,7 @@ from fieldcal.diagnosis.dwell import arrivals, beginnings, clamped
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.model import Term
-from fieldcal.diagnosis.noise import white
-from fieldcal.diagnosis.reduce import Source, rate_of, spans
+from fieldcal.diagnosis.reduce import Rows, Source, recounted, spans
 from fieldcal.diagnosis.spectrum import Tone, tones, without
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Line, Scatter, catalogue
@@ -67,31 +66,41 @@ def prepare(block: Block, about: Description) -> Prepared:
 
     """
     _refuse_empty(block, about)
+    _refuse_disorder(about)
     known = known_terms(about.model)
     checked = check(block, about)
-    windows, rate = spans(checked.block, about), rate_of(checked.block)
-    six = np.where(checked.usable, checked.block.six, np.nan)
-    noise = white([six[a:b] for a, b in windows if b > a], rate)
-    rest = arrivals(checked.block, about, noise)
+    rest = arrivals(checked.block, about, checked.noise)
     warmth = Thermometer.of(checked.block)
     source = Source(checked.block, about, checked.usable, rest, warmth, checked.pace)
     rows = rows_of(source)
     found = tuple(tones(source, rows))
     if found:
         source = replace(source, block=without(source.block, source, rows, found))
+        rows = rows_of(source)
         checked = checked_again(checked, source.block, about)
-    source = _counted(source, known)
-    return Prepared(checked, source, bench_of(source), known, found, rest)
+    if not rows.used.any():
+        raise InputError(
+            "nothing in the windows can be used: every output is missing, stuck or"
+            " clipped there; record them again"
+        )
+    bench = bench_of(rows, about)
+    source = _counted(source, bench, known)
+    bench = _from(bench, source.arrived)
+    return Prepared(checked, source, bench, known, found, rest)
 
 
-def bench_of(source: Source) -> Bench:
-    """The rows of a source with the calibration a simulation starts from."""
-    nominal = source.about.nominal
+def bench_of(rows: Rows, about: Description) -> Bench:
+    """Rows with the calibration a simulation starts from."""
+    nominal = about.nominal
     return Bench(
-        rows_of(source),
+        rows,
         np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
         np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
     )
+
+
+def _from(bench: Bench, arrived: Array) -> Bench:
+    return bench.but(rows=recounted(bench.rows, arrived))
 
 
 def _refuse_empty(block: Block, about: Description) -> None:
@@ -103,8 +112,22 @@ def _refuse_empty(block: Block, about: Description) -> None:
             f" samples run from {block.t[0]:g} to {block.t[-1]:g} s of device time:"
             " check start_s and end_s"
         )
-    if not np.isfinite(block.six).any():
+    if not (np.isfinite(block.acc).any() or np.isfinite(block.gyr).any()):
         raise InputError("the samples hold no output of any sensor; record them again")
+
+
+def _refuse_disorder(about: Description) -> None:
+    """Windows are to follow each other, so that turns lie between them."""
+    last = -np.inf
+    for i, window in enumerate(about.windows):
+        if window is not None:
+            if window[0] < last:
+                raise InputError(
+                    f"position {i}: its window starts at {window[0]:g} s, before that"
+                    f" of the position above ends ({last:g} s); put the positions in"
+                    " the order in which they were held, with windows apart"
+                )
+            last = window[1]
 
 
 def known_terms(model: Mapping[str, Mapping[str, Any]]) -> tuple[Term, ...]:
@@ -128,16 +151,23 @@ def known_terms(model: Mapping[str, Mapping[str, Any]]) -> tuple[Term, ...]:
             )
         if isinstance(effect, Chain | Line | Scatter):
             continue
-        start = tuple(float(table.get(p.name, 0.0)) for p in effect.params)
+        start = tuple(_value(name, table, p.name) for p in effect.params)
         missing = [s.name for s in effect.shapes if s.name not in table]
         if missing:
             raise InputError(f"[model.{name}] needs {missing[0]} as well")
-        shape = {s.name: float(table[s.name]) for s in effect.shapes}
+        shape = {s.name: _value(name, table, s.name) for s in effect.shapes}
         out.append(Term(effect, (), shape, start=start))
     return tuple(out)
 
 
-def _counted(source: Source, known: tuple[Term, ...]) -> Source:
+def _value(name: str, table: Mapping[str, Any], key: str) -> float:
+    value = table.get(key, 0.0)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"[model.{name}] {key} = {value!r} is not a number; mend it")
+    return float(value)
+
+
+def _counted(source: Source, bench: Bench, known: tuple[Term, ...]) -> Source:
     """With what settles counted from the instant that fits best.
 
     That is the end of the motion, or a fixed time before each window; any fixed time
@@ -149,18 +179,18 @@ def _counted(source: Source, known: tuple[Term, ...]) -> Source:
     starts = beginnings(source)
     held = np.flatnonzero(np.diff(spans(source.block, source.about), axis=1)[:, 0] > 0)
     first = np.arange(len(starts)) == held[0]
-    best, most = source, _settles(source, known) + BETTER
+    best, most = source.arrived, _settles(bench, known) + BETTER
     for arrived in (source.arrived, starts):
         for tried in (arrived, np.where(first, -np.inf, arrived)):
-            other = replace(source, arrived=tried)
-            if tried is not source.arrived and (gain := _settles(other, known)) > most:
-                best, most = other, gain
-    return best
+            if tried is source.arrived:
+                continue
+            if (gain := _settles(_from(bench, tried), known)) > most:
+                best, most = tried, gain
+    return replace(source, arrived=best)
 
 
-def _settles(source: Source, known: tuple[Term, ...]) -> float:
+def _settles(bench: Bench, known: tuple[Term, ...]) -> float:
     """How much settling raises ln Z, over both triads."""
-    bench = bench_of(source)
     plain, total = bench.fit(known), 0.0
     for hypothesis in hypotheses(bench, False, False):
         if hypothesis.effect.id == "settling":
@@ -176,4 +206,4 @@ def refined(prepared: Prepared, fit: Fit) -> Prepared:
     plain = replace(prepared.source, arrived=rest)
     arrived = clamped(plain, prepared.bench, fit)
     source = replace(prepared.source, arrived=arrived)
-    return replace(prepared, source=source, bench=bench_of(source))
+    return replace(prepared, source=source, bench=_from(prepared.bench, arrived))

@@ -12,6 +12,7 @@ import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.heldout import held_out, rms
 from fieldcal.diagnosis.prepare import Prepared, bench_of
 from fieldcal.diagnosis.reduce import Source
@@ -85,9 +86,11 @@ def raw_bench(block: Block, prepared: Prepared) -> Bench:
     if block is prepared.source.block and not prepared.checked.ids:
         return prepared.bench
     source: Source = replace(
-        prepared.source, block=block, usable=np.isfinite(block.six)
+        prepared.source,
+        block=block,
+        usable=np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)]),
     )
-    return bench_of(source)
+    return bench_of(rows_of(source), source.about)
 
 
 def parted(one: Agreement, other: Agreement) -> int:

@@ -8,14 +8,13 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.noise import rounding, white
+from fieldcal.diagnosis.noise import noise_of, rounding
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
@@ -29,6 +28,12 @@ FEWEST, MOST = 8, 120
 """Rows of one window."""
 
 FIRST_S = 1.0
+
+STEPS = 100_000
+"""Steps between samples that tell the rate; more would only take time."""
+
+SPAN = 50
+"""Samples over which stamps that come in bursts are even."""
 
 LOUDER = 6.0
 """Significance from which a window counts as noisier than the others."""
@@ -45,6 +50,7 @@ class Rows:
     sd : (n, 6) standard deviation of each mean from white noise
     length : (n,) s
     noise : (6,) standard deviation of one sample
+    span : (n, 2) instants of the first and the last sample, s
 
     """
 
@@ -53,6 +59,7 @@ class Rows:
     sd: Array
     length: Array
     noise: Array
+    span: Array
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -62,7 +69,12 @@ class Rows:
 
 def rate_of(block: Block) -> float:
     """Samples a second, from the times."""
-    return float(1 / np.median(np.diff(block.t))) if len(block) > 1 else 1.0
+    if len(block) < 2:
+        return 1.0
+    first = np.arange(0, len(block) - 1, max(len(block) // STEPS, 1))
+    step = float(np.median(block.t[first + 1] - block.t[first]))
+    over = block.t[SPAN::SPAN] - block.t[:-SPAN:SPAN]  # stamps may come in bursts
+    return 1 / max(step, float(np.median(over)) / SPAN if len(over) else 0.0)
 
 
 def spans(block: Block, about: Description) -> NDArray[np.intp]:
@@ -121,25 +133,39 @@ class Source:
     pace: float = 1.0
 
 
+def masked(block: Block, usable: NDArray[np.bool_]) -> Block:
+    """Samples with nan for those that may not be used; the block itself if all may."""
+    new = {}
+    for name, may in (("acc", usable[:, :3]), ("gyr", usable[:, 3:])):
+        triad = getattr(block, name)
+        if (np.isfinite(triad) & ~may).any():
+            new[name] = np.where(may, triad, np.nan)
+    return replace(block, **new) if new else block
+
+
 def reduce(source: Source) -> Rows:
     """Cut the windows into blocks and average them."""
-    block, rate = source.block, rate_of(source.block)
+    block, rate = masked(source.block, source.usable), rate_of(source.block)
     windows = spans(block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
-    six = np.where(source.usable, block.six, np.nan)
-    pieces = [six[a:b] for a, b in windows[held]]
-    noise, levels = levels_of(pieces, rate)
+    noise, levels = levels_of(block, windows[held], rate)
     bounds = [_cut(block.t, a, b, rate, len(held)) for a, b in windows[held]]
     rows = [len(b) for b in bounds]
     level = np.repeat(levels, rows, axis=0)
     out = averaged(source, np.concatenate(bounds), np.repeat(held, rows), level, noise)
-    off = np.tile(rounding(pieces, noise), (len(out.x), 1))
+    off = np.tile(rounding(block, windows[held], noise), (len(out.x), 1))
     # the Earth turns a device of unknown orientation about any of its axes
     free = ~out.x.oriented
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
     same = np.sqrt(np.repeat(rows, rows))[:, None] * off  # all through a window
     return replace(out, sd=np.hypot(out.sd, same))
+
+
+def recounted(rows: Rows, arrived: Array) -> Rows:
+    """Rows with the time since the turn counted from other arrivals, (p,) s."""
+    since = rows.x.t - arrived[rows.x.position]
+    return replace(rows, x=replace(rows.x, since_turn=since))
 
 
 def averaged(
@@ -160,9 +186,13 @@ def averaged(
 
     """
     block, about = source.block, source.about
-    y, count = _means(np.where(source.usable, block.six, np.nan), bound)
-    sd = np.where(count > 0, level / np.sqrt(np.maximum(count, 1)), np.nan)
-    t = (block.t[bound[:, 0]] + block.t[bound[:, 1] - 1]) / 2
+    y, count = _means(masked(block, source.usable), bound)
+    sd = level / np.sqrt(np.maximum(count, 1))
+    sd = np.where(
+        (count > 0) & (sd > 0), sd, np.nan
+    )  # what never changes tells nothing
+    span = np.column_stack([block.t[bound[:, 0]], block.t[bound[:, 1] - 1]])
+    t = span.sum(axis=1) / 2
     warming, heating = source.warmth.at(t)
     x = Experience.at_rest(
         *_angles(about, position),
@@ -182,7 +212,8 @@ def averaged(
         latitude=about.latitude,
     )
     sd[~_force_known(x), :3] = np.nan
-    return Rows(x, y, sd, np.diff(bound, axis=1)[:, 0] / rate_of(block), noise)
+    length = np.diff(bound, axis=1)[:, 0] / rate_of(block)
+    return Rows(x, y, sd, length, noise, span)
 
 
 def _cut(t: Array, first: int, last: int, rate: float, windows: int) -> Array:
@@ -192,42 +223,74 @@ def _cut(t: Array, first: int, last: int, rate: float, windows: int) -> Array:
     return np.column_stack([at[:-1][keep], at[1:][keep]])
 
 
-def _means(six: Array, bound: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """Means between bounds, (n, 6), and how many samples are in each."""
-    some = np.isfinite(six)
-    first = np.argmax(some, axis=0)
-    centre = np.nan_to_num(six[first, np.arange(six.shape[1])])
-    shifted = np.nan_to_num(six - centre)
-    flat = bound.ravel()
-    if flat[-1] == len(six):  # reduceat takes starts only; the end needs no start
-        flat = flat[:-1]
-    total = np.add.reduceat(shifted, flat, axis=0)[::2]
-    count = np.add.reduceat(some.astype(np.intp), flat, axis=0)[::2]
-    mean = total / np.maximum(count, 1) + centre
+def _means(block: Block, bound: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """Means between bounds, (n, 6), and how many samples are in each, (n, 6)."""
+    parts = [_triad_means(triad, bound) for triad in (block.acc, block.gyr)]
+    mean, count = (np.hstack(both) for both in zip(*parts, strict=True))
+    return mean, count
+
+
+def _triad_means(
+    triad: Array, bound: NDArray[np.intp]
+) -> tuple[Array, NDArray[np.intp]]:
+    centre = np.nan_to_num(_middle(triad[bound[0, 0] : bound[0, 1]]))
+    mean, count = np.empty((len(bound), 3)), np.empty((len(bound), 3), dtype=np.intp)
+    # window by window: what is taken at a time stays small
+    gaps = np.flatnonzero(bound[1:, 0] != bound[:-1, 1]) + 1
+    for rows in np.split(np.arange(len(bound)), gaps):
+        first, last = bound[rows[0], 0], bound[rows[-1], 1]
+        shifted = triad[first:last] - centre
+        starts = bound[rows, 0] - first
+        known = np.isfinite(shifted)
+        if known.all():
+            count[rows] = np.diff(bound[rows], axis=1)
+        else:
+            shifted[~known] = 0.0
+            count[rows] = np.add.reduceat(known, starts, axis=0, dtype=np.intp)
+        total = np.add.reduceat(shifted, starts, axis=0)
+        mean[rows] = total / np.maximum(count[rows], 1) + centre
     return np.where(count > 0, mean, np.nan), count
 
 
-def levels_of(pieces: Sequence[Array], rate: float) -> tuple[Array, Array]:
+def _middle(values: Array) -> Array:
+    """Median of each column over what is known, nan where nothing is."""
+    out = np.full(values.shape[1], np.nan)
+    for c, column in enumerate(values.T):
+        known = column[np.isfinite(column)]
+        out[c] = np.median(known) if len(known) else np.nan
+    return out
+
+
+def levels_of(
+    block: Block, windows: NDArray[np.intp], rate: float
+) -> tuple[Array, Array]:
     """Deviation of one sample: usual (6,), and in each window (w, 6).
 
     The usual one is that of the quiet windows. Others have more, and vibration comes on
     top of the noise, whatever the noise's colour.
     """
-    out = np.full((len(pieces), pieces[0].shape[1]), np.nan)
-    for i, piece in enumerate(pieces):
-        steps = np.diff(piece, axis=0) ** 2 / 2
-        count = np.isfinite(steps).sum(axis=0)
-        some = np.where(count > 0, np.nansum(steps, axis=0), np.nan)
-        out[i] = np.sqrt(some / np.maximum(count, 1))
+    out = np.empty((len(windows), 6))
+    for i, (a, b) in enumerate(windows):
+        squares = [_squares(triad[a:b]) for triad in (block.acc, block.gyr)]
+        out[i] = np.sqrt(np.concatenate(squares) / 2)
     low = np.sort(out, axis=0)[(len(out) - 1) // 4]  # nan comes last
-    samples = np.array([[max(len(p), 2)] for p in pieces])
-    margin = LOUDER / np.sqrt(samples)
+    margin = LOUDER / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
     louder = out > low * np.exp(margin)
     quiet = ~louder.any(axis=1)
-    few = [p for p, q in zip(pieces, quiet, strict=True) if q] or list(pieces)
-    noise = white(few, rate)
+    noise = noise_of(block, windows[quiet] if quiet.any() else windows, rate)
     more = np.where(louder, out**2 - low**2, 0.0)
     return noise, np.sqrt(noise**2 + np.maximum(more, 0.0))
+
+
+def _squares(values: Array) -> Array:
+    """Mean square of the steps of each column, nan where there is none."""
+    steps = np.diff(values, axis=0)
+    known = np.isfinite(steps)
+    count = known.sum(axis=0)
+    if not known.all():
+        steps[~known] = 0.0
+    total = np.einsum("nc,nc->c", steps, steps)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from fieldcal.diagnosis.curves import Curve
+    from fieldcal.diagnosis.league import Candidate
 
 Verdict = Literal["consistent", "left_out", "ambiguous", "unexplained"]
 
@@ -176,6 +180,9 @@ class Diagnosis:
     calibration : with the effects; groups that the recording determines
     warnings : what limits the diagnosis
     says : a paragraph for a person
+    candidates : what was tried on the windows, and why it lost
+    curves : residuals over what they follow, before and after
+    next : what to do in the field now
 
     """
 
@@ -188,6 +195,9 @@ class Diagnosis:
     calibration: Mapping[str, Group]
     warnings: tuple[str, ...]
     says: str
+    candidates: tuple[Candidate, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    next: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of diagnosis.json."""
@@ -203,6 +213,9 @@ class Diagnosis:
             "calibration": {n: g.to_json() for n, g in self.calibration.items()},
             "warnings": list(self.warnings),
             "says": self.says,
+            "candidates": [c.to_json() for c in self.candidates],
+            "curves": [c.to_json() for c in self.curves],
+            "next": list(self.next),
         }
 
 

@@ -28,6 +28,9 @@ VARIANCE = 2.0
 UNKNOWN = 6.0
 """What a function costs that no effect makes, ln: known causes come first."""
 
+USUAL = {"walk": (3e-3, 3e-4), "offset": (2e-2, 1e-3)}
+"""Sizes of what wanders that nobody wonders at: m/s^2 (/sqrt(s)), rad/s (/sqrt(s))."""
+
 LONE = 3.0
 """What it costs, ln, that of three axes alike only one should wander."""
 
@@ -157,7 +160,15 @@ def fees(errors: Errors) -> float:
         total += UNKNOWN * sum(p.kind in SMOOTH for p in parts)
         total += UNKNOWN * (sum(p.kind == "offset" for p in parts) == 1)
         total += LONE * (sum(p.kind == "walk" for p in parts) == 1)
+        total += sum(_wonder(p) for p in parts)
     return float(total)
+
+
+def _wonder(part: Part) -> float:
+    """What a size costs that no device wanders by, ln."""
+    if part.kind not in USUAL:
+        return 0.0
+    return 2 * float(np.log1p((part.size / USUAL[part.kind][part.channel // 3]) ** 2))
 
 
 def _of_angles(bench: Bench, fit: Fit) -> Wander:

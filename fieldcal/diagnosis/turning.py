@@ -35,6 +35,9 @@ WIDE = 20.0
 STEP = 1.0
 """Of the differences that the design is made of, in standard deviations."""
 
+SHAPE_STEP = 0.1
+"""And for a time constant at most this part of it."""
+
 PART = 0.1
 """Of what the most affected channel shows, from which another one shows it too."""
 
@@ -264,8 +267,13 @@ class Turntable:
         """
         out = np.zeros((len(turn.x), 6, len(self._fit.names)))
         moved = np.zeros((3, len(self._fit.names)))
-        for j, sigma in enumerate(self._fit.sigma):
+        shapes = {f"{t.effect.id}.{s}" for t in self._fit.terms for s in t.shape}
+        for j, (name, sigma) in enumerate(
+            zip(self._fit.names, self._fit.sigma, strict=True)
+        ):
             step = STEP * max(float(sigma), 1e-9)
+            if name in shapes:  # a time constant stays above zero
+                step = min(step, SHAPE_STEP * abs(float(self._fit.values[j])))
             up, down = (
                 self._there(turn, self._bench.shifted(self._fit, j, sign * step))
                 for sign in (1, -1)

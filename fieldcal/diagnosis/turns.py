@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from fieldcal.diagnosis.attitude import (
     accelerations,
+    astray,
     between,
     blur,
     carry,
@@ -223,6 +224,8 @@ def _turn(
         there = between(attitude, done, *ends)
         earth = np.column_stack([np.interp(t, t[edge], w) for w in there.T])
     if np.arccos(np.clip((np.trace(attitude[-1]) - 1) / 2, -1, 1)) < LEAST:
+        return None
+    if astray(x, pair, attitude[-1]):
         return None
     each_piece = max(1, round(PIECE_S * rate / each), -(-count // PIECES))
     cut = np.append(np.arange(0, count - each_piece // 2, each_piece), count).astype(

@@ -8,14 +8,17 @@ import numpy as np
 
 from fieldcal.description import Description
 from fieldcal.diagnosis import locate, naming
+from fieldcal.diagnosis.advice import advice
 from fieldcal.diagnosis.aliases import Aliases, aliases
-from fieldcal.diagnosis.chain import recording
 from fieldcal.diagnosis.common import common_scale
+from fieldcal.diagnosis.curves import curves
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.league import league
 from fieldcal.diagnosis.naming import Removed
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.diagnosis.quality import UNITS, Agreement, after, before, parted
+from fieldcal.diagnosis.reduce import spans
 from fieldcal.diagnosis.result import (
     Diagnosis,
     Found,
@@ -50,7 +53,11 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
         If nothing in the recording can be used.
 
     """
-    explanation = explain(prepare(block, about))
+    return concluded(block, explain(prepare(block, about)))
+
+
+def concluded(block: Block, explanation: Explanation) -> Diagnosis:
+    """What follows from an explanation of the samples of a block."""
     lost = {t.effect.id: naming.removed(explanation, t) for t in explanation.terms}
     first, then = before(block, explanation), after(explanation)
     unknown = _unknown(explanation, first, then)
@@ -78,6 +85,9 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
         calibration=_calibration(explanation),
         warnings=_warnings(explanation),
         says=words,
+        candidates=league(explanation, effects),
+        curves=tuple(curves(explanation, mismatch, first, then)),
+        next=tuple(advice(explanation, effects, unknown)),
     )
 
 
@@ -132,8 +142,8 @@ def _mismatch(
 ) -> list[Mismatch]:
     prepared = explanation.prepared
     about = prepared.source.about
-    whole = recording(block, np.isfinite(block.six), about)
-    out = list(locate.of_faults(whole, prepared.checked.faults))
+    windows = spans(block, about)
+    out = list(locate.of_faults(block.t, windows, prepared.checked.faults))
     out += locate.of_tones(explanation)
     out += locate.of_effects(explanation, lost)
     out += locate.of_chance(explanation)
@@ -199,8 +209,8 @@ def _warnings(explanation: Explanation) -> tuple[str, ...]:
             spare = _spare(explanation, first)
             if spare <= 1:
                 out.append(
-                    f"{spare} degrees of freedom in the means of the {name}: their"
-                    " residual says nothing about the fit; take more positions"
+                    f"{max(spare, 0)} degrees of freedom in the means of the {name}:"
+                    " their residual says nothing about the fit; take more positions"
                 )
     open_ = [
         n

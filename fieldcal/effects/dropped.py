@@ -1,7 +1,9 @@
 """Samples that are missing from the stream.
 
 Found as gaps in the times against their usual step, or in the device's counter.
-`fraction` is of all samples sent. Source: model of this project.
+`fraction` is of all samples sent. Times that come in bursts, as when a host stamps what
+its buffer held, show none: their gaps are no multiples of a step. Source: model of this
+project.
 
 >>> import numpy as np
 >>> t = np.delete(np.arange(100) * 0.01, [20, 21, 50])
@@ -23,6 +25,12 @@ PAUSE_S = 5.0
 REGULAR = 0.2
 """Spread of the steps, in steps, up to which times can show a loss."""
 
+WHOLE = 0.15
+"""Mean distance of gaps from whole steps, in steps, up to which samples are missing."""
+
+SPAN, BURSTS = 50, 2.0
+"""Samples that take so many times their steps' length come in bursts."""
+
 FEWEST = 2
 
 
@@ -36,6 +44,12 @@ def missing(t: Array) -> NDArray[np.int_]:
         lost = np.zeros(len(step), dtype=int)
         return lost
     lost = np.maximum(np.round(step / usual).astype(int) - 1, 0)
+    over = t[SPAN::SPAN] - t[:-SPAN:SPAN]
+    if len(over) and np.median(over) > BURSTS * SPAN * usual:
+        lost[:] = 0
+    gaps = step[lost > 0] / usual
+    if len(gaps) and np.mean(np.abs(gaps - np.round(gaps))) > WHOLE:
+        lost[:] = 0
     return lost
 
 

@@ -87,11 +87,10 @@ class Mounting(Chain):
         """Axes or unit that are not the declared ones."""
         block, rows = recording.block, recording.windows
         held = [i for i, (a, b) in enumerate(rows) if b > a]
-        six = block.six
-        mean = np.array([six[a:b].mean(axis=0) for a, b in rows[held]])
-        if not np.isfinite(mean[:, :3]).all() or not len(mean):
+        mean = np.array([block.acc[a:b].mean(axis=0) for a, b in rows[held]])
+        if not np.isfinite(mean).all() or not len(mean):
             return []
-        acc = (mean[:, :3] - recording.bias[:3]) / recording.scale[:3]
+        acc = (mean - recording.bias[:3]) / recording.scale[:3]
         unit = self._unit(acc, recording.x.gravity)
         if unit:
             return [self._fault(recording, {"unit": unit}, UNITS[unit], np.eye(3))]

@@ -13,6 +13,9 @@ from fieldcal.samples import Array, Block
 
 Rows = NDArray[np.intp]
 
+ENOUGH = 20_000
+"""Samples that show the grid that values lie on."""
+
 
 @dataclass(frozen=True, slots=True)
 class Recording:
@@ -105,7 +108,10 @@ def lsb_of(values: Array) -> float:
     >>> round(lsb_of(np.array([0.5, 1.25, -0.25, 1.0])), 12)
     0.25
     """
-    some = values[np.isfinite(values)][:20_000]
+    some = values[:ENOUGH]
+    some = some[np.isfinite(some)]
+    if len(some) < min(ENOUGH, len(values)):
+        some = values[np.isfinite(values)][:ENOUGH]
     distinct = np.unique(some)
     gaps = np.diff(distinct)
     gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]

@@ -1,0 +1,75 @@
+"""What to do in the field now."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fieldcal.diagnosis.aliases import decided_by, telling_position
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.result import Found
+from fieldcal.diagnosis.unknown import Unknown
+from fieldcal.effects import Chain, Scatter, catalogue
+from fieldcal.samples import CHANNELS
+
+LESS_THAN = 3
+"""Positions below which nothing can be predicted unseen."""
+
+
+def advice(
+    explanation: Explanation, effects: Sequence[Found], unknown: Sequence[Unknown]
+) -> Iterator[str]:
+    """Sentences, the most urgent first."""
+    for one in effects:
+        if isinstance(catalogue()[one.id], Chain):
+            yield f"{one.id}: {decided_by(one.id)}, then diagnose again."
+    yield from _deciding(explanation, effects)
+    for mystery in unknown:
+        yield _look(mystery)
+    known = [f.id for f in effects if not f.aliases and _deterministic(f)]
+    if known and not unknown:
+        listed = ", ".join(f'"{i}"' for i in known)
+        yield (
+            f"put effects = [{listed}] with the values found into [model] of"
+            " session.toml, or keep the device file that --twin writes."
+        )
+    if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
+        yield "hold more positions, or longer ones: what is random averages out."
+    held = len(np.unique(explanation.prepared.bench.rows.x.position))
+    if held < LESS_THAN:
+        yield f"record more than {held} position{'s' * (held > 1)}: few tell little."
+
+
+def _deciding(explanation: Explanation, effects: Sequence[Found]) -> Iterator[str]:
+    """How to tell an effect from its aliases."""
+    for one in effects:
+        for other in one.aliases:
+            chosen = {h.effect.id for h, _ in explanation.model.chosen}
+            place = (
+                telling_position(explanation, one.id, other)
+                if one.id in chosen
+                else None
+            )
+            if place is None:
+                yield f"to tell {one.id} from {other}: {decided_by(one.id)}."
+            else:
+                yield (
+                    f"to tell {one.id} from {other}: record the position"
+                    f" α = {place[0]:g}°, β = {place[1]:g}° as well."
+                )
+
+
+def _look(unknown: Unknown) -> str:
+    channel = CHANNELS[unknown.channel]
+    places = ", ".join(map(str, unknown.positions))
+    if not np.isfinite(unknown.correlation):
+        return f"take positions {places} again: {channel} is off there by itself."
+    return (
+        f"vary {unknown.kind} on purpose and hold the rest: {channel} follows it, and"
+        " no effect in the catalogue does."
+    )
+
+
+def _deterministic(found: Found) -> bool:
+    return not isinstance(catalogue()[found.id], Scatter | Chain)

@@ -1,0 +1,130 @@
+"""How far replays of a session are from the recording: the figures, and their words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fieldcal.diagnosis.quality import UNITS
+from fieldcal.diagnosis.result import number
+from fieldcal.samples import Array
+from fieldcal.sim_device.profile import Profile
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """How far one device's replay is from the recording.
+
+    Attributes
+    ----------
+    rms : (2,) m/s^2 and rad/s, over parts of all windows
+    chi2_per_dof : of all windows
+    by_position : (p, 2) rms in each window
+    chi2_by_position : (p,) squares a mean of each window, in its white noise
+    lines : (k, 2) rms of what is left of each line, m/s^2 and rad/s
+    turns : rms of the integrals of turns about one joint, rad; nan where there are none
+
+    """
+
+    rms: Array
+    chi2_per_dof: float
+    by_position: Array
+    chi2_by_position: Array
+    lines: Array
+    turns: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        return {
+            **_pair(self.rms),
+            "chi2_per_dof": number(self.chi2_per_dof),
+            "lines": [_pair(line) for line in self.lines],
+            "rms_turns_rad": number(self.turns),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Rerun:
+    """A session replayed.
+
+    Attributes
+    ----------
+    profile : the twin
+    runs : by name in simulation (as session.toml has it), refitted, twin
+    positions : of session.toml that were compared
+    windows : (p, 2) from and to, s
+    random : effects that the replay leaves to chance
+    triad : that gained most: 0 accelerometers, 1 gyroscopes
+    turned : whether something was found in the turns
+
+    """
+
+    profile: Profile
+    runs: Mapping[str, Run]
+    positions: tuple[int, ...]
+    windows: Array
+    random: tuple[str, ...]
+    triad: int
+    turned: bool
+
+    def to_json(self, name: str) -> dict[str, Any]:
+        """Return the object of diagnosis.json; `name` is the device file's."""
+        places = [
+            {
+                "position": p,
+                "from_s": number(w[0]),
+                "to_s": number(w[1]),
+                **{
+                    n: {
+                        **_pair(run.by_position[i]),
+                        "chi2_per_mean": number(run.chi2_by_position[i]),
+                    }
+                    for n, run in self.runs.items()
+                },
+            }
+            for i, (p, w) in enumerate(zip(self.positions, self.windows, strict=True))
+        ]
+        return {
+            "device": name,
+            **{n: run.to_json() for n, run in self.runs.items()},
+            "positions": places,
+            "random": list(self.random),
+        }
+
+    @property
+    def says(self) -> str:
+        """A sentence or two for a person."""
+        old, new = self.runs["refitted"], self.runs["twin"]
+        unit = UNITS[self.triad]
+        out = [
+            "Replayed by the virtual device with its own physics, the twin is"
+            f" {new.rms[self.triad]:.2g} {unit} rms from the recording (χ²"
+            f" {new.chi2_per_dof:.3g} a degree of freedom); without what is left out"
+            f" it is {old.rms[self.triad]:.2g} {unit} (χ² {old.chi2_per_dof:.3g})."
+        ]
+        for before, after in zip(old.lines, new.lines, strict=True):
+            i = int(before[1] / after[1] > before[0] / after[0])
+            out.append(
+                f"Of the line it leaves {after[i]:.2g} of {before[i]:.2g} {UNITS[i]}."
+            )
+        if self.turned and np.isfinite(new.turns):
+            out.append(
+                f"Turns about one joint come out {new.turns:.2g} rad off instead of"
+                f" {old.turns:.2g} rad."
+            )
+        if self.random:
+            out.append(
+                f"{' and '.join(self.random)} is drawn anew in every run of the twin:"
+                " compare its spread, not its numbers."
+            )
+        return " ".join(out)
+
+
+def _pair(values: Array) -> dict[str, float | None]:
+    return {
+        "rms_acceleration": number(float(values[0])),
+        "rms_angular_rate": number(float(values[1])),
+    }

@@ -1,0 +1,244 @@
+"""The virtual twin of a device: everything that a diagnosis found, as a device file.
+
+    truth      bias and scale factor as they come out beside the effects
+    noise      white noise of each axis, as it is in the windows
+    effects    what the simulation had already, and what was found, as fitted
+    climate    the temperature that was recorded
+
+Times of a device file count from when the device is switched on; the session's start
+takes the place of that. What the recording cannot tell stays as the session has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from fieldcal.description import Description
+from fieldcal.diagnosis import Diagnosis
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.model import State
+from fieldcal.diagnosis.reduce import rate_of
+from fieldcal.diagnosis.result import Found
+from fieldcal.diagnosis.spectrum import Tone
+from fieldcal.diagnosis.thermometer import Thermometer
+from fieldcal.effects import Chain, Effect, Scatter, catalogue
+from fieldcal.effects.recording import lsb_of
+from fieldcal.samples import CHANNELS, Array
+from fieldcal.sim_device import vocabulary
+from fieldcal.sim_device.profile import (
+    Climate,
+    FullScale,
+    Identity,
+    Mounting,
+    NoiseFigures,
+    Profile,
+    Sampling,
+    Site,
+    Triad,
+    Truth,
+)
+
+INSTANTS = ("at_s", "from_s", "to_s")
+"""Parameters that are instants of device time."""
+
+WORDS = 32_768
+"""Steps from zero to full scale of a 16-bit word."""
+
+SHOWN_UNITS = ("g", "mg", "deg/s", "mrad/s")
+POINT_S = 20.0
+POINTS = 200
+"""Points of the temperature's course, and how close they may be."""
+
+VIBRATION = "vibration_rectification"
+
+
+def device_of(explanation: Explanation, found: Diagnosis) -> Profile:
+    """The device as a diagnosis knows it, with all that was found in it."""
+    prepared = explanation.prepared
+    start = float(prepared.source.block.t[0])
+    effects = [*settled(explanation.fit.state, start), *of_turns(explanation)]
+    effects += known_chances(prepared.source.about)
+    for tone in prepared.tones:
+        effects += of_tone(tone, start)
+    for one in found.effects:
+        effects += of_samples(explanation, one, start)
+    return device(explanation, explanation.fit.state, _each_once(effects))
+
+
+def device(
+    explanation: Explanation, state: State, effects: list[vocabulary.Effect]
+) -> Profile:
+    """The device with some calibration and some effects."""
+    source = explanation.prepared.source
+    about = source.about
+    bias, loud = state.bias.copy(), 0.0
+    noise = _noise(explanation, effects)
+    for term, values in zip(state.terms, state.values, strict=True):
+        if term.effect.id == VIBRATION:  # the catalogue's variance has the noise in it
+            quiet = explanation.prepared.bench.rows.x.variance.min(axis=0)
+            bias[:3] += term.full(values) * quiet
+            loud = float(vibration(explanation).max(initial=0.0))
+    effects = [_levelled(e, loud) if e.id == VIBRATION else e for e in effects]
+    name, serial = (str(about.device.get(k, "")) for k in ("name", "serial"))
+    return Profile(
+        device=Identity(
+            f"twin of {name or 'a device'}",
+            serial or "SIM-1",
+            "navigation" if about.grade == "navigation" else "tactical",
+        ),
+        sampling=Sampling(float(f"{rate_of(source.block):.9g}")),
+        site=Site(about.latitude_deg, about.height_m, about.gravity),
+        frame=Mounting((about.axes[0], about.axes[1], about.axes[2])),
+        range=FullScale(
+            about.limits.get("acceleration"), about.limits.get("angular_rate")
+        ),
+        truth=Truth(
+            _triad(bias[:3]),
+            _triad(state.scale[:3]),
+            _triad(bias[3:]),
+            _triad(state.scale[3:]),
+        ),
+        noise=noise,
+        temperature=climate(source.warmth, float(source.block.t[0])),
+        effects=tuple(effects),
+    )
+
+
+def settled(state: State, start: float) -> list[vocabulary.Effect]:
+    """Effects of a fit to the windows, with the values that they have there."""
+    out = []
+    for term, values in zip(state.terms, state.values, strict=True):
+        given = _numbers(term.effect, term.full(values))
+        if given or not term.effect.params:
+            given |= _counted(term.shaped(values), start)
+            out.append(vocabulary.effect(term.effect.id, given))
+    return out
+
+
+def of_turns(explanation: Explanation) -> Iterator[vocabulary.Effect]:
+    """Effects that only the turns show."""
+    if (turning := explanation.turning) is None:
+        return
+    for term in turning.terms:
+        values = np.zeros(len(term.effect.params))
+        for j, name in zip(term.columns, term.names, strict=True):
+            at = turning.names.index(f"{term.effect.id}.{name}")
+            if turning.determined[at]:
+                values[j] = turning.values[at]
+        if given := _numbers(term.effect, values):
+            yield vocabulary.effect(term.effect.id, given)
+
+
+def known_chances(about: Description) -> Iterator[vocabulary.Effect]:
+    """Random effects and those on samples that the simulation has already."""
+    for name, given in about.model.items():
+        if isinstance(catalogue()[name], Scatter | Chain):
+            yield vocabulary.effect(name, given)
+
+
+def of_tone(tone: Tone, start: float) -> Iterator[vocabulary.Effect]:
+    """A line, one effect for each of its causes, with its phase at the start.
+
+    Re(c exp(2 pi i hz t)) = |c| sin(2 pi hz (t - start) + phase)
+    """
+    phases = np.angle(tone.causes) + np.pi / 2 + 2 * np.pi * tone.hz * start
+    for j, (size, phase) in enumerate(zip(np.abs(tone.causes), phases, strict=True)):
+        given = {"hz": tone.hz, "phase_deg": float(np.rad2deg(phase) % 360)}
+        if tone.effect.id == "sway":  # about x (East), about z (north)
+            given |= {"amplitude_deg": float(size), "azimuth_deg": 90.0 * j}
+        elif tone.effect.params[j].name not in tone.values:
+            continue
+        else:
+            given[tone.effect.params[j].name] = float(size)
+        yield vocabulary.effect(tone.effect.id, given)
+
+
+def of_samples(
+    explanation: Explanation, found: Found, start: float
+) -> Iterator[vocabulary.Effect]:
+    """What is random, and what happened to samples."""
+    kind = catalogue()[found.id]
+    if not isinstance(kind, Scatter | Chain):
+        return
+    given: dict[str, Any] = {n: q.value for n, q in found.parameters.items()}
+    if given.get("unit", "g") not in SHOWN_UNITS:
+        return
+    if found.id == "decode_fault":
+        channel = CHANNELS.index(str(given["channel"]))
+        block = explanation.prepared.source.block
+        given["full_scale"] = WORDS * lsb_of(block.six[:, channel])
+    yield vocabulary.effect(found.id, _counted(given, start))
+
+
+def climate(warmth: Thermometer, start: float) -> Climate:
+    """The course of the temperature, in as many points as it is known to."""
+    if not np.isfinite(warmth.start_c):
+        return Climate(self_heating_k=0.0)
+    long = np.ptp(warmth.t) > 1.0
+    count = int(np.clip(np.ptp(warmth.t) / POINT_S, 2, POINTS)) if long else 1
+    when = np.linspace(warmth.t[0], warmth.t[-1], count)
+    degrees = warmth.start_c + warmth.at(when)[0]
+    points = zip((when - start).tolist(), degrees.tolist(), strict=True)
+    return Climate(points=tuple(points), self_heating_k=0.0)
+
+
+def vibration(explanation: Explanation) -> Array:
+    """Vibration in each position beyond the quietest window, (p,) m/s^2 rms."""
+    bench = explanation.prepared.bench
+    x, scale = bench.rows.x, explanation.fit.state.scale[:3]
+    more = (x.variance - x.variance.min(axis=0)) / scale**2
+    out = np.zeros(bench.places)
+    out[x.position] = np.sqrt(np.maximum(more, 0.0).mean(axis=1))
+    return out
+
+
+def _noise(explanation: Explanation, effects: list[vocabulary.Effect]) -> NoiseFigures:
+    """White noise before what the signal chain adds to it."""
+    noise = np.nan_to_num(explanation.prepared.bench.rows.noise)
+    for one in effects:
+        if one.id == "quantisation":
+            steps = np.repeat([one["acc"], one["gyr"]], 3)
+            noise = np.sqrt(np.maximum(noise**2 - steps**2 / 12, 0.0))
+        if one.id == "noise_level":
+            noise[CHANNELS.index(one.words["channel"])] /= one["ratio"]
+    still = (0.0, 0.0, 0.0)
+    thermometer = explanation.prepared.source.warmth.noise
+    return NoiseFigures(
+        acc=_triad(noise[:3]),
+        gyr=_triad(noise[3:]),
+        acc_instability=still,
+        gyr_instability=still,
+        temperature=thermometer if np.isfinite(thermometer) else 0.0,
+    )
+
+
+def _numbers(effect: Effect, values: Array) -> dict[str, Any]:
+    """Parameters that are not zero."""
+    names = [p.name for p in effect.params]
+    return {n: float(v) for n, v in zip(names, values, strict=True) if v}
+
+
+def _counted(given: Mapping[str, Any], start: float) -> dict[str, Any]:
+    """With instants counted from the session's start."""
+    return {k: v - start if k in INSTANTS else v for k, v in given.items()}
+
+
+def _levelled(effect: vocabulary.Effect, level: float) -> vocabulary.Effect:
+    return vocabulary.effect(effect.id, {**effect.parameters, "level": level})
+
+
+def _each_once(effects: list[vocabulary.Effect]) -> list[vocabulary.Effect]:
+    """With several of what cannot be there twice put together: the last one counts."""
+    out: dict[object, vocabulary.Effect] = {}
+    for i, one in enumerate(effects):
+        again = vocabulary.CATALOGUE[one.id].repeats and one.id != "earth_rate"
+        out[(one.id, i) if again else one.id] = one
+    return list(out.values())
+
+
+def _triad(values: Array) -> Triad:
+    x, y, z = (float(v) for v in values)
+    return x, y, z

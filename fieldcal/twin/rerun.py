@@ -1,0 +1,225 @@
+"""The session once more, on the virtual device with its own physics.
+
+The device is held where the session's windows held it, at the session's own times, in
+the temperature that was recorded, without noise, and its outputs are compared with the
+recorded ones over the same stretches: rms over parts of windows, and
+
+    chi^2 = sum |L^-1 (y - y_replayed)|^2
+
+with the covariance L L^T that the diagnosis has for them. Three devices are compared:
+the one session.toml describes, the same with bias and scale factor refitted, and the
+twin. What is random is drawn anew in every run of a device, so it is left out of the
+replay and stands in L; what happened to samples has been undone in the recording.
+A line is compared by its amplitude. A turn about a single joint is compared by its
+integral, the gyroscopes' outputs less their bias summed up, whatever its course; the
+course itself was the hand's, and what shows in nothing else is not measured again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.diagnosis import Diagnosis
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.heldout import rms
+from fieldcal.diagnosis.model import State
+from fieldcal.diagnosis.reduce import Rows
+from fieldcal.samples import Array, Block
+from fieldcal.sim_device.profile import Profile
+from fieldcal.sim_device.replay import Window, simulate
+from fieldcal.sim_device.vocabulary import Effect
+from fieldcal.twin import device as twin
+from fieldcal.twin import schedule
+from fieldcal.twin.agreement import Rerun, Run
+
+RANDOM = ("random_walk", "angle_setting")
+SAMPLES = (
+    *("quantisation", "saturation", "stuck", "dropped", "clock_skew", "bump"),
+    *("decode_fault", "noise_level", "mounting"),
+)
+"""Left out of the replay: see above."""
+
+LINES = ("hum", "sway")
+
+SHAKEN = 64
+"""Replays that are averaged where the device vibrates, which is random."""
+
+
+def rerun(explanation: Explanation, found: Diagnosis, raw: Bench) -> Rerun:
+    """Replay a session on the twin and on the devices that it is compared with.
+
+    Parameters
+    ----------
+    explanation, found : of the session
+    raw : rows of the samples as they came
+
+    Raises
+    ------
+    InputError
+        If the session's windows overlap, so that no device could go through them.
+
+    """
+    prepared = explanation.prepared
+    base, always = explanation.base, explanation.always
+    nominal = prepared.source.about.nominal
+    start = float(prepared.source.block.t[0])
+    plain = replace(
+        base.state,
+        bias=np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
+        scale=np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
+    )
+    profile = twin.device_of(explanation, found)
+    refitted = raw.fit(always)
+    devices: dict[str, tuple[Bench, Fit, State, Sequence[Effect]]] = {
+        "simulation": (raw, refitted, plain, twin.settled(plain, start)),
+        "refitted": (raw, refitted, refitted.state, twin.settled(base.state, start)),
+        "twin": (explanation.model.bench, explanation.fit, explanation.fit.state, ()),
+    }
+    runs = {}
+    for name, (bench, fit, state, effects) in devices.items():
+        device = (
+            profile
+            if name == "twin"
+            else twin.device(explanation, state, list(effects))
+        )
+        runs[name] = _run(explanation, _certain(device), bench, fit, state)
+    held = np.unique(raw.rows.x.position)
+    old, new = runs["refitted"].rms ** 2, runs["twin"].rms ** 2
+    gain = np.nan_to_num((old - new) / np.where(new > 0, new, np.inf), nan=-1.0)
+    return Rerun(
+        profile,
+        runs,
+        tuple(int(p) for p in held),
+        np.array([_stretch(raw, p) for p in held]),
+        tuple(e.id for e in profile.effects if e.id in RANDOM),
+        int(np.argmax(gain)),
+        bool(explanation.turning and explanation.turning.terms),
+    )
+
+
+def _certain(profile: Profile) -> Profile:
+    """The device without what is random and what happens to its samples."""
+    kept = (e for e in profile.effects if e.id not in (*RANDOM, *SAMPLES))
+    return replace(profile, effects=tuple(kept))
+
+
+def _run(
+    explanation: Explanation, device: Profile, bench: Bench, fit: Fit, state: State
+) -> Run:
+    """How far a device's replay is from the recording."""
+    source, rows = explanation.prepared.source, bench.rows
+    start = float(source.block.t[0])
+    turns = schedule.gaps(explanation)
+    shaken = bool(device.every(twin.VIBRATION))
+    level = twin.vibration(explanation) * shaken
+    windows = schedule.windows(explanation, state, bench, level)
+    t = schedule.instants(source.block.t, rows.span, schedule.ENOUGH, turns)
+    plain = [e for e in device.effects if e.id not in LINES]
+    blocks = [
+        simulate(
+            replace(device, effects=tuple(plain)), windows, t - start, None, k, False
+        )
+        for k in range(SHAKEN if shaken else 1)
+    ]
+    block = replace(blocks[0], t=t)
+    replayed = np.mean([_means(b, t, rows.span) for b in blocks], axis=0)
+    apart = np.where(rows.used, rows.y - replayed, np.nan)
+    squares = (bench.whiten(rows.y - replayed) ** 2).sum()
+    white = (apart / rows.sd) ** 2
+    places, chi2 = [], []
+    for p in np.unique(rows.x.position):
+        at: NDArray[np.bool_] = rows.x.position == p
+        places.append(_triads(rms(rows, np.where(at[:, None], apart, np.nan))))
+        count = np.isfinite(white[at]).sum()
+        chi2.append(float(np.nansum(white[at]) / count) if count else np.nan)
+    return Run(
+        _triads(rms(rows, apart)),
+        float(squares) / max(fit.dof, 1),
+        np.array(places),
+        np.array(chi2),
+        _lines(explanation, device, windows, rows),
+        _turns(explanation, block, np.array(device.truth.gyr_bias), turns),
+    )
+
+
+def _lines(
+    explanation: Explanation, device: Profile, windows: Sequence[Window], rows: Rows
+) -> Array:
+    """What is left of each line, (k, 2)."""
+    tones, t = explanation.prepared.tones, explanation.prepared.source.block.t
+    if not tones:
+        return np.empty((0, 2))
+    inside = schedule.instants(t, rows.span, len(t), [])
+    block = simulate(device, windows, inside - t[0], noise=False)
+    block = replace(block, t=inside)
+    return np.array([_line(explanation, block, rows, tone.hz) for tone in tones])
+
+
+def _line(explanation: Explanation, replayed: Block, rows: Rows, hz: float) -> Array:
+    """Root mean square of what the replay leaves of a line, (2,)."""
+    checked = explanation.prepared.checked
+    squares, count = np.zeros(6), 0
+    for p in np.unique(rows.x.position):
+        span = rows.span[rows.x.position == p]
+        low, high = span[0, 0], span[-1, 1]
+        cut = slice(
+            *np.searchsorted(checked.block.t, [low, np.nextafter(high, np.inf)])
+        )
+        same = slice(*np.searchsorted(replayed.t, [low, np.nextafter(high, np.inf)]))
+        apart = checked.block[cut].six - replayed[same].six
+        apart = np.where(checked.usable[cut], apart, np.nan)
+        apart = np.nan_to_num(apart - np.nanmean(apart, axis=0))
+        wave = np.exp(-2j * np.pi * hz * checked.block.t[cut])
+        squares += np.abs(2 * (wave @ apart) / len(wave)) ** 2 / 2
+        count += 1
+    return _triads(np.where(rows.used.any(axis=0), np.sqrt(squares / count), np.nan))
+
+
+def _turns(
+    explanation: Explanation, replayed: Block, bias: Array, gaps: list[tuple[int, int]]
+) -> float:
+    """Root mean square of the integrals of turns, recorded less replayed, rad."""
+    block, apart = explanation.prepared.source.block, []
+    known = explanation.fit.state.bias[3:]
+    for a, b in gaps:
+        t = block.t[a:b]
+        first = int(np.searchsorted(replayed.t, t[0]))
+        recorded = trapezoid(block.gyr[a:b] - known, t)
+        again = trapezoid(replayed.gyr[first : first + len(t)] - bias, t)
+        apart.append(recorded - again)
+    return float(np.sqrt(np.mean(np.square(apart)))) if apart else np.nan
+
+
+def trapezoid(values: Array, t: Array) -> Array:
+    """Integral of a course (n, 3) by the trapezoid rule, (3,)."""
+    middle = (values[1:] + values[:-1]) / 2
+    out: Array = np.diff(t) @ middle
+    return out
+
+
+def _means(block: Block, t: Array, span: Array) -> Array:
+    first = np.searchsorted(t, span[:, 0], side="left")
+    last = np.searchsorted(t, span[:, 1], side="right")
+    six = block.six
+    return np.array([six[a:b].mean(axis=0) for a, b in zip(first, last, strict=True)])
+
+
+def _triads(six: Array) -> Array:
+    """Root mean squares of the channels, triad by triad, (2,); nan where unknown."""
+    out = np.full(2, np.nan)
+    for i in (0, 1):
+        known = six[3 * i : 3 * i + 3]
+        known = known[np.isfinite(known)]
+        if len(known):
+            out[i] = np.sqrt(np.mean(known**2))
+    return out
+
+
+def _stretch(bench: Bench, position: int) -> tuple[float, float]:
+    span = bench.rows.span[bench.rows.x.position == position]
+    return float(span[0, 0]), float(span[-1, 1])

@@ -1,0 +1,104 @@
+"""What the virtual device is told, so that it goes through a session again.
+
+It is held where the windows held it, as far as a fit knows that: at the angles of
+session.toml with the turns aside that were found, or, where none are known, at those
+that bring about the force that was felt. Turns end when the device came to rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.fit import Bench
+from fieldcal.diagnosis.model import State
+from fieldcal.diagnosis.reduce import spans
+from fieldcal.frames import angles_of
+from fieldcal.samples import Array
+from fieldcal.sim_device.replay import Window
+
+ENOUGH = 24
+"""Samples of a row that give its mean, where nothing oscillates."""
+
+TURN_S = 4.0
+"""A turn takes at most so long."""
+
+PUT_S = 60.0
+"""The device had stood somewhere for so long before the first window, s."""
+
+HOLES = 3.5
+"""Steps between samples from which some are missing."""
+
+
+def windows(
+    explanation: Explanation, state: State, bench: Bench, shaken: Array
+) -> list[Window]:
+    """The session's windows in time order, from its start, with their turns.
+
+    `state` says where the device was in each, `shaken` (p,) is its vibration there,
+    m/s^2.
+    """
+    source, x = explanation.prepared.source, bench.rows.x
+    start, t = float(source.block.t[0]), source.block.t
+    felt = state.experienced(x)
+    out: list[Window] = []
+    bounds = spans(source.block, source.about)
+    for p in sorted(np.unique(x.position), key=lambda p: int(bounds[p, 0])):
+        row = int(np.argmax(x.position == p))
+        if x.oriented[row]:
+            aside = state.aside[p] if len(state.aside) > p else np.zeros(2)
+            alpha, beta = float(x.alpha[row] + aside[0]), float(x.beta[row] + aside[1])
+        else:
+            alpha, beta = angles_of(x.mounting @ felt.f[row])
+        begin, end = (float(v) - start for v in (t[bounds[p, 0]], t[bounds[p, 1] - 1]))
+        if not out and np.isfinite(source.arrived[p]):  # put there not long before
+            out.append(Window(alpha, beta, begin - PUT_S, begin - PUT_S + 1.0))
+        before = out[-1].end if out else -PUT_S
+        rest = float(np.clip(source.arrived[p] - start, before, begin))
+        moves = max(rest - TURN_S, before)
+        out.append(
+            Window(
+                alpha,
+                beta,
+                begin,
+                end,
+                tuple(x.rate[row].tolist()),
+                (moves, rest) if rest > moves else None,
+                float(shaken[p]) if shaken[p] > 0 else None,
+            )
+        )
+    return out
+
+
+def instants(t: Array, span: Array, most: int, gaps: list[tuple[int, int]]) -> Array:
+    """Sample times: in each row `most` evenly spread at the most, and all of gaps."""
+    first = np.searchsorted(t, span[:, 0], side="left")
+    last = np.searchsorted(t, span[:, 1], side="right")
+    some = [np.arange(a, b) for a, b in gaps]
+    for a, b in zip(first, last, strict=True):
+        every = np.linspace(a, b - 1, min(most, b - a))
+        some.append(np.round(every).astype(np.intp))
+    return t[np.unique(np.concatenate(some))]
+
+
+def gaps(explanation: Explanation) -> list[tuple[int, int]]:
+    """Samples between windows that are a turn about a single joint apart."""
+    rows, source = explanation.prepared.bench.rows, explanation.prepared.source
+    if not rows.used[:, 3:].any(axis=0).all():
+        return []
+    x, bounds = rows.x, spans(source.block, source.about)
+    held = np.unique(x.position)
+    first = [int(np.argmax(x.position == p)) for p in held]
+    out = []
+    for p, q, i, j in zip(held[:-1], held[1:], first[:-1], first[1:], strict=True):
+        moved = [x.alpha[i] != x.alpha[j], x.beta[i] != x.beta[j]]
+        gap = int(bounds[p, 1]), int(bounds[q, 0])
+        known = x.oriented[[i, j]].all() and not x.rate[[i, j]].any()
+        if known and sum(moved) == 1 and gap[1] - gap[0] > 1:
+            steps = np.diff(source.block.t[slice(*gap)])
+            if (
+                steps.max() < HOLES * np.median(steps)
+                and source.usable[slice(*gap)].all()
+            ):
+                out.append(gap)
+    return out

@@ -1,0 +1,232 @@
+"""The virtual twin: what is found goes into a device file, and the replay proves it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from session_folders import SITE, places, recorded, write_session
+
+from fieldcal.cli import main
+from fieldcal.samples import Block
+from fieldcal.sim_device import profile_file
+from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
+from fieldcal.sim_device.vocabulary import parse
+
+QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
+DEVICE = Profile(noise=QUIET)
+
+
+def diagnosed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> tuple[int, dict[str, Any], Profile]:
+    """Exit code, diagnosis.json and twin of a session."""
+    file = folder / "twin.toml"
+    code = main(["diagnose", str(folder), "--twin", str(file), "--json"])
+    out, err = capsys.readouterr()
+    assert "Warning" not in err
+    return code, json.loads(out), profile_file.read(file)
+
+
+def concealing(folder: Path, *effects: str, seed: int = 1, **more: Any) -> Path:
+    """Write a session of a device with effects."""
+    device = replace(DEVICE, effects=tuple(map(parse, effects)), **more)
+    positions = places()
+    return write_session(folder, recorded(device, positions, seed), positions)
+
+
+def later(block: Block, seconds: float) -> Block:
+    return replace(block, t=block.t + seconds)
+
+
+@pytest.mark.parametrize(
+    "concealed",
+    [
+        "base_tilt:about_x_deg=1,about_z_deg=-0.7",
+        "cross_coupling:k12=0.01,k31=-0.008,k32=0.02",
+        "settling:ax=0.05,az=-0.04,tau_s=5",
+        "mounting:axes=+y-x+z",
+        "stuck:channel=gy,from_s=40,to_s=43",
+    ],
+)
+def test_the_replay_with_what_was_found_agrees_with_the_recording(
+    concealed: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, said, twin = diagnosed(concealing(tmp_path / "s", concealed), capsys)
+    assert code == 1
+    replays = said["twin"]
+    assert 0.8 < replays["twin"]["chi2_per_dof"] < 1.2
+    assert replays["twin"]["chi2_per_dof"] < 0.9 * replays["refitted"]["chi2_per_dof"]
+    # two programs' physics, one fit: the windows come out the same
+    assert replays["twin"]["chi2_per_dof"] == pytest.approx(
+        said["fit"]["after"]["chi2_per_dof"], rel=0.02
+    )
+    assert twin.one(concealed.partition(":")[0]) is not None
+    assert "the twin is" in said["says"] and replays["device"].endswith("twin.toml")
+    assert [p["position"] for p in replays["positions"]] == list(range(9))
+
+
+def test_the_device_file_has_the_device_as_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    noise = replace(QUIET, acc=(0.01, 0.02, 0.015), gyr=(1e-3, 1.5e-3, 1.2e-3))
+    folder = concealing(tmp_path / "s", "earth_rate", noise=noise)
+    code, said, twin = diagnosed(folder, capsys)
+    assert (code, said["verdict"]) == (0, "consistent")
+    truth = DEVICE.truth
+    np.testing.assert_allclose(twin.truth.acc_bias, truth.acc_bias, atol=0.02)
+    np.testing.assert_allclose(twin.truth.acc_scale, truth.acc_scale, atol=2e-3)
+    np.testing.assert_allclose(twin.truth.gyr_bias, truth.gyr_bias, atol=2e-4)
+    np.testing.assert_allclose(twin.noise.acc, noise.acc, rtol=0.03)
+    np.testing.assert_allclose(twin.noise.gyr, noise.gyr, rtol=0.03)
+    assert twin.sampling.rate_hz == pytest.approx(100.0)
+    assert twin.temperature.points[-1][1] - twin.temperature.points[0][1] > 0.5
+    assert said["twin"]["simulation"]["chi2_per_dof"] > 100  # nominal: no bias known
+    again, plain = (said["twin"][k]["chi2_per_dof"] for k in ("refitted", "twin"))
+    assert again == pytest.approx(plain, rel=0.02)
+
+
+def test_a_session_may_begin_at_any_time_of_the_device(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    device = replace(DEVICE, effects=(parse("bias_step:ay=0.05,at_s=120"),))
+    positions = places()
+    block = later(recorded(device, positions), 7200.0)
+    for p in positions:
+        p |= {"start_s": p["start_s"] + 7200.0, "end_s": p["end_s"] + 7200.0}
+    _, said, twin = diagnosed(write_session(tmp_path / "s", block, positions), capsys)
+    step = twin.one("bias_step")
+    assert step is not None and step["at_s"] == pytest.approx(120, abs=6)
+    assert said["effects"][0]["parameters"]["at_s"]["value"] > 7200
+    assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
+
+
+@pytest.mark.parametrize(
+    ("concealed", "triad"),
+    [
+        ("hum:ax=0.02,gz=0.002,hz=17.3,phase_deg=40", "rms_acceleration"),
+        ("sway:amplitude_deg=0.05,hz=0.4,azimuth_deg=30", "rms_angular_rate"),
+    ],
+)
+def test_of_a_line_the_replay_leaves_little(
+    concealed: str, triad: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, said, twin = diagnosed(concealing(tmp_path / "s", concealed), capsys)
+    old, new = (said["twin"][run]["lines"][0][triad] for run in ("refitted", "twin"))
+    assert new < 0.2 * old
+    assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
+    assert twin.every(concealed.partition(":")[0])
+    assert "Of the line it leaves" in said["says"]
+
+
+def test_turns_about_one_joint_come_out_with_the_gyroscopes_scale_factor(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = concealing(tmp_path / "s", "gyro_scale:s1=0.01,s3=-0.012")
+    _, said, _ = diagnosed(folder, capsys)
+    runs = said["twin"]
+    assert runs["twin"]["rms_turns_rad"] < 0.2 * runs["refitted"]["rms_turns_rad"]
+    assert "Turns about one joint" in said["says"]
+
+
+def test_what_is_random_gives_spread_and_not_the_same_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The spread of the angles a twin is held at is that of the real one's."""
+    folder = concealing(tmp_path / "s", "angle_setting:sigma_deg=0.3", seed=5)
+    _, said, twin = diagnosed(folder, capsys)
+    setting = twin.one("angle_setting")
+    assert setting is not None and 0.15 < setting["sigma_deg"] < 0.6
+    assert said["twin"]["random"] == ["angle_setting"]
+    assert "compare its spread" in said["says"]
+    positions, apart = places(), []
+    for seed in range(12):
+        block = recorded(twin, positions, seed)
+        level = recorded(replace(twin, effects=()), positions, seed)
+        for p in positions:
+            ours, theirs = (
+                b.between(p["start_s"], p["end_s"]).acc.mean(axis=0)
+                for b in (block, level)
+            )
+            apart.append((ours - theirs)[[0, 2]] / 9.81)
+    # alpha moves ax by g, in the positions with alpha = 0; beta moves az
+    home = np.array(apart).reshape(12, 9, 2)[:, ::3]
+    spread = np.rad2deg(np.sqrt(np.mean(home**2)))
+    assert spread == pytest.approx(setting["sigma_deg"], rel=0.3)
+
+
+def test_positions_without_angles_are_replayed_where_they_were(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    angles = [(0, 0), (90, 0), (-90, 0), (180, 0), (0, 90), (0, -90)]
+    angles += [(45, 30), (-45, 40), (130, -30), (-120, 50), (60, -60), (20, 70)]
+    positions = places([(float(a), float(b)) for a, b in angles])
+    device = replace(DEVICE, effects=(parse("cross_coupling:k12=0.01,k23=-0.015"),))
+    block = recorded(device, positions)
+    unknown = [{k: p[k] for k in ("start_s", "end_s")} for p in positions]
+    _, said, _ = diagnosed(write_session(tmp_path / "s", block, unknown), capsys)
+    assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
+    assert said["twin"]["refitted"]["chi2_per_dof"] > 2
+
+
+def test_the_circle_closes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A device, its session, its twin, the twin's session: the same calibration."""
+    virtual = "--virtual=--base-tilt=1,-1 --acc-bias=0.3,-0.2,0.1 --gravity=9.81"
+    run = ["--headless", "--speed", "max", "--json", "--gravity", "9.81"]
+    run += ["--seconds", "20"]
+    first, second = tmp_path / "real", tmp_path / "twin"
+    assert main(["run", "five_position", virtual, *run, "-o", str(first)]) == 0
+    real = json.loads(capsys.readouterr().out)["parameters"]
+    code, said, _ = diagnosed(first, capsys)
+    assert code == 1 and [e["id"] for e in said["effects"]] == ["base_tilt"]
+    twin = f"--virtual=--profile={first / 'twin.toml'}"
+    assert main(["run", "five_position", twin, *run, "-o", str(second)]) == 0
+    again = json.loads(capsys.readouterr().out)["parameters"]
+    for group in ("acc_bias", "acc_scale", "gyr_bias", "base_tilt"):
+        apart = np.subtract(again[group]["value"], real[group]["value"])
+        sigma = np.hypot(again[group]["sigma"], real[group]["sigma"])
+        assert np.abs(apart / sigma).max() < 4.5, group
+
+
+def test_temperature_and_warm_up_go_into_the_twin(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    course = ((0.0, 20.0), (120.0, 31.0), (250.0, 24.0))
+    climate = Climate(points=course, self_heating_k=0.0)
+    folder = concealing(
+        tmp_path / "s", "temperature_bias:ax=0.01,gx=1e-3", temperature=climate
+    )
+    _, said, twin = diagnosed(folder, capsys)
+    when = [t for t, _ in climate.points]
+    mine = np.interp(when, *np.array(twin.temperature.points).T)
+    np.testing.assert_allclose(mine[1:], [31.0, 24.0], atol=1.0)
+    assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
+
+
+def test_the_console_shows_the_replay_and_where_the_files_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = concealing(tmp_path / "s", "base_tilt:about_x_deg=1")
+    file = tmp_path / "twin.toml"
+    assert main(["diagnose", str(folder), "--twin", str(file)]) == 1
+    out = capsys.readouterr().out
+    assert "Replayed by the virtual device" in out and f"written: {file}" in out
+    assert (
+        tomllib.loads(file.read_text())["site"]["latitude_deg"]
+        == (SITE["latitude_deg"])
+    )
+
+
+def test_a_device_file_that_cannot_be_written_is_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = concealing(tmp_path / "s", "base_tilt:about_x_deg=1")
+    nowhere = tmp_path / "nowhere" / "twin.toml"
+    assert main(["diagnose", str(folder), "--twin", str(nowhere)]) == 2
+    err = capsys.readouterr().err
+    assert str(nowhere) in err and err.count("\n") == 1

@@ -14,6 +14,7 @@ explains twice as well as the position asked for is taken for the slip.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,3 +146,19 @@ def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:
         return f"{slip}: {where}, {asked}"
     off = (a - seen[0], b - seen[1])
     return f"{where}, {asked}: turn it by {off[0]:+.1f}° in α, {off[1]:+.1f}° in β"
+
+
+def standing(
+    positions: Sequence[Position], f: Array, gravity: float, held: Held | None
+) -> int | None:
+    """Which of the positions the device is in: the number of the nearest, or None.
+
+    Parameters as in `judge`; only positions with known angles count.
+    """
+    known = [i for i, p in enumerate(positions) if p.oriented]
+    misses = [_miss(positions[i], f, gravity, held) for i in known]
+    if not misses:
+        return None
+    best = int(np.argmin(misses))
+    there = judge(positions[known[best]], f, gravity, held)
+    return known[best] if there.ok else None

@@ -103,6 +103,24 @@ def _read_arrows(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     return table, _cut_off(path, table) if cut or not ended else ()
 
 
+def whole_batches(path: Path) -> tuple[int, int]:
+    """Bytes to the end of the last whole batch of an .arrows file; number of batches.
+
+    A stream that was closed in order ends behind that, with a marker.
+    """
+    import pyarrow as pa
+
+    end, messages = 0, 0
+    with pa.OSFile(str(path)) as file:
+        try:
+            while True:
+                pa.ipc.read_message(file)
+                end, messages = file.tell(), messages + 1
+        except (pa.ArrowInvalid, EOFError, OSError):
+            pass
+    return end, max(0, messages - 1)
+
+
 def _read_parquet(path: Path) -> pa.Table:
     import pyarrow as pa
     import pyarrow.parquet

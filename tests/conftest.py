@@ -1,5 +1,6 @@
 """What every test needs: property tests that do not depend on the machine's speed."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,17 @@ settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("any machine")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the user's history of devices out of the tests, and the tests out of it."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("history")
+        patch.setenv("FIELDCAL_HISTORY", str(folder / "history.sqlite"))
+        patch.setenv("XDG_DATA_HOME", str(folder))
+        yield
+
 
 SHARED = Path(__file__).parent.parent.parent / "shared"
 

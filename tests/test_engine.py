@@ -21,7 +21,7 @@ from fieldcal.samples import Block
 from fieldcal.session import Session
 from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.in_process import InProcess
-from fieldcal.view import View
+from fieldcal.view import View, Wish
 from fieldcal.windows import Average
 
 ABOUT = description.parse({"site": {"latitude_deg": 50.45, "height_m": 170.0}})
@@ -39,6 +39,7 @@ class Turner:
     late: Position | None = None
     corrects: bool = True
     bumped: list[float] = field(default_factory=list)
+    wishes: list[Wish | None] = field(default_factory=list)
 
     def place(self, hold: Hold) -> None:
         alpha, beta = hold.position.degrees or (0.0, 0.0)
@@ -52,6 +53,9 @@ class Turner:
         if self.late and self.corrects:
             self.driver.place(self.late)
             self.late = None
+
+    def wish(self) -> Wish | None:
+        return self.wishes.pop(0) if self.wishes else None
 
     def show(self, view: View) -> None:
         self.views.append(view)

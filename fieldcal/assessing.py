@@ -133,7 +133,7 @@ def _link(
         samples += len(t)
         if len(t) > 1 and period > 0:
             missing += int(np.maximum(np.rint(np.diff(t) / period) - 1, 0).sum())
-    bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "link")
+    bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "counts")
     return {"samples": samples, "missing": missing, "bad": bad}
 
 
@@ -161,7 +161,7 @@ def _restarts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
     for mark in marks:
         if mark.get("event") == "window":
             taken.append(int(mark["position"]))
-        elif mark.get("event") == "clock" and taken:
+        elif mark.get("event") == "rejoined" and taken:
             said.append(
                 f"the device's clock began anew behind position {taken[-1] + 1}: if it"
                 " lost power there, its bias at the next start may be another"

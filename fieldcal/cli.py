@@ -19,6 +19,7 @@ COMMANDS = {
     "solve": ("calibrate from a recorded session", "solve"),
     "apply": ("take a calibration out of a recording", "apply"),
     "compare": ("say whether two calibrations differ", "compare"),
+    "history": ("show a device's calibrations from run to run", "history"),
     "diagnose": ("say what physics the simulation leaves out", "diagnose"),
     "import": ("make a session of a recording from elsewhere", "import_recording"),
     "sim": ("be a virtual device on a link", "sim"),

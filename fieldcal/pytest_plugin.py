@@ -27,18 +27,21 @@ SIGMAS = 4.5
 LATITUDE = 50.45
 """Where a device stands unless it is told, deg."""
 
-LINKS: dict[str, tuple[list[str], str]] = {
-    "serial": (["--serial", "{format}"], "serial:{port}?format={query}"),
+LINKS: dict[str, tuple[list[str], str, str]] = {
+    "serial": (["--serial", "{format}"], "serial:{port}?format={query}", "max"),
     "can": (
         ["--can", "slcan"],
         "can:{port}?interface=slcan&bitrate=500000&dbc=virtual",
+        "max",
     ),
     "mavlink": (
         ["--mavlink", "tcpin:127.0.0.1:0"],
         "mavlink:{port}?message=HIGHRES_IMU&rate=100",
+        # a socket holds minutes of samples: at full speed it would answer late
+        "20",
     ),
 }
-"""Options of ``fieldcal sim``, and the address to open, by link."""
+"""Options of ``fieldcal sim``, address to open and speed unless given, by link."""
 
 
 class VirtualImu:
@@ -170,7 +173,7 @@ Factory = Callable[..., VirtualImu]
 def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
     """Start virtual devices; they end with the test.
 
-    ``virtual_imu(link="serial", format="witmotion", effects=(), speed="max", seed=1,
+    ``virtual_imu(link="serial", format="witmotion", effects=(), speed=None, seed=1,
     **options)`` starts one on a pseudo-terminal (serial), behind a CAN adapter (can) or
     as an autopilot (mavlink). `effects` are written as for ``fieldcal sim --with``;
     options are those of ``fieldcal sim``, as in ``acc_bias=(0.2, -0.3, 0.1)``.
@@ -181,7 +184,7 @@ def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
         link: str = "serial",
         format: str = "witmotion",
         effects: Sequence[str] = (),
-        speed: str | float = "max",
+        speed: str | float | None = None,
         seed: int = 1,
         **options: Any,
     ) -> VirtualImu:
@@ -189,9 +192,14 @@ def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
 
         if link not in LINKS:
             raise ValueError(f"link {link!r} is none of {', '.join(LINKS)}")
-        arguments, url = LINKS[link]
+        arguments, url, usual = LINKS[link]
         command = [part.format(format=format) for part in arguments]
-        command += ["--speed", str(speed), "--seed", str(seed)]
+        command += [
+            "--speed",
+            str(usual if speed is None else speed),
+            "--seed",
+            str(seed),
+        ]
         for effect in effects:
             command += ["--with", effect]
         options = {"latitude": LATITUDE, **options}

@@ -113,7 +113,7 @@ class Recorder:
             if block.t[0] < last + BREAK:
                 away = away if np.isfinite(away) else BREAK
                 self._shift = last + max(BREAK, away) - float(block.t[0])
-                self.mark("clock", shift_s=self._shift)
+                self.mark("rejoined", shift_s=self._shift)
         if self._shift:
             block = replace(block, t=block.t + self._shift)
         self._last = (float(block.t[-1]), float(block.t_host[-1]))

@@ -118,7 +118,7 @@ class Running:
             health = driver.health
             counted = {name: getattr(health, name) for name in _COUNTED}
             with suppress(SessionError):
-                recorder.mark("link", **counted)
+                recorder.mark("counts", **counted)
 
     def _plan(self) -> Plan[Calibration]:
         task = self._task

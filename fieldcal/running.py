@@ -30,7 +30,7 @@ from fieldcal.observing import rests
 from fieldcal.plan import Plan, note
 from fieldcal.plan_file import WARM_UP, Task
 from fieldcal.recorder import Recorder
-from fieldcal.session import Session
+from fieldcal.session import RESULT, Session
 from fieldcal.view import Operator
 from fieldcal.warmth import Warmth
 from fieldcal.windows import Average, average
@@ -204,7 +204,8 @@ def resumed(folder: Path) -> tuple[Session, dict[str, Any]]:
             f"{folder}: was not recorded by fieldcal run: begin a new one, or solve it"
             " as it stands by fieldcal solve"
         )
-    if any(mark.get("event") == "finished" for mark in session.marks()):
+    finished = any(mark.get("event") == "finished" for mark in session.marks())
+    if finished and (folder / RESULT).exists():
         raise SessionError(
             f"{folder}: is finished, nothing is left to take: see fieldcal solve"
         )

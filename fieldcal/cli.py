@@ -20,6 +20,8 @@ COMMANDS = {
     "apply": ("take a calibration out of a recording", "apply"),
     "compare": ("say whether two calibrations differ", "compare"),
     "history": ("show a device's calibrations from run to run", "history"),
+    "write": ("install a calibration on an autopilot", "write"),
+    "undo": ("give an autopilot back what it had before", "undo"),
     "diagnose": ("say what physics the simulation leaves out", "diagnose"),
     "import": ("make a session of a recording from elsewhere", "import_recording"),
     "sim": ("be a virtual device on a link", "sim"),

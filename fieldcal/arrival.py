@@ -14,7 +14,7 @@ explains twice as well as the position asked for is taken for the slip.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +60,13 @@ class Arrival:
     problem: str = ""
 
 
-def judge(wanted: Position, f: Array, gravity: float, held: Held | None) -> Arrival:
+def judge(
+    wanted: Position,
+    f: Array,
+    gravity: float,
+    held: Held | None,
+    others: Mapping[str, Position] | None = None,
+) -> Arrival:
     """Compare measured force with a position asked for.
 
     Parameters
@@ -69,6 +75,7 @@ def judge(wanted: Position, f: Array, gravity: float, held: Held | None) -> Arri
     f : (3,) measured specific force, procedure axes, m/s^2
     gravity : m/s^2
     held : an earlier position, or None before the first
+    others : further places it might be in instead, by what is then said of it
 
     """
     norm = float(np.linalg.norm(f))
@@ -85,7 +92,7 @@ def judge(wanted: Position, f: Array, gravity: float, held: Held | None) -> Arri
     chord = _chord(wanted, held.position, gravity) if held else 0.0
     limit = NEAR + TILT * chord if held else FIRST
     miss = _miss(wanted, f, gravity, held)
-    slip, slip_miss = _nearest_slip(wanted, f, gravity, held)
+    slip, slip_miss = _nearest_slip(wanted, f, gravity, held, others or {})
     slipped = slip_miss < min(miss / 2, limit) and miss > NEAR
     if miss <= limit and not slipped:
         return Arrival(True, *seen)
@@ -117,7 +124,11 @@ def _miss(wanted: Position, f: Array, gravity: float, held: Held | None) -> floa
 
 
 def _nearest_slip(
-    wanted: Position, f: Array, gravity: float, held: Held | None
+    wanted: Position,
+    f: Array,
+    gravity: float,
+    held: Held | None,
+    others: Mapping[str, Position],
 ) -> tuple[str, float]:
     """The slip that would put the device nearest to where it is, and how near, rad."""
     a, b = wanted.degrees or (0.0, 0.0)
@@ -131,6 +142,7 @@ def _nearest_slip(
         ((a, 0.0), "β is not turned yet"),
         ((0.0, b), "α is not turned yet"),
     ]
+    slips += [(p.degrees, said) for said, p in others.items() if p.degrees]
     if held and held.position.degrees:
         slips.insert(0, (held.position.degrees, "it has not been turned yet"))
     misses = [_miss(Position.deg(*angles), f, gravity, held) for angles, _ in slips]
@@ -146,19 +158,3 @@ def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:
         return f"{slip}: {where}, {asked}"
     off = (a - seen[0], b - seen[1])
     return f"{where}, {asked}: turn it by {off[0]:+.1f}° in α, {off[1]:+.1f}° in β"
-
-
-def standing(
-    positions: Sequence[Position], f: Array, gravity: float, held: Held | None
-) -> int | None:
-    """Which of the positions the device is in: the number of the nearest, or None.
-
-    Parameters as in `judge`; only positions with known angles count.
-    """
-    known = [i for i, p in enumerate(positions) if p.oriented]
-    misses = [_miss(positions[i], f, gravity, held) for i in known]
-    if not misses:
-        return None
-    best = int(np.argmin(misses))
-    there = judge(positions[known[best]], f, gravity, held)
-    return known[best] if there.ok else None

@@ -26,10 +26,10 @@ from fieldcal.view import View, Wish
 FRAMES = 8.0
 """Drawings a second."""
 
-TALL, WIDE = 32, 100
-"""Lines and columns from which the instruction is written larger."""
+TALL = 32
+"""Lines from which there is room around the instruction."""
 
-FIXED = 17
+FIXED = 16
 """Lines of the screen that are not the list of positions."""
 
 
@@ -170,28 +170,32 @@ class ConsoleOperator:
         return Panel(Group(*parts), title=self._title, title_align="left")
 
     def _instruction(self) -> list[Text]:
-        """The one thing to do now: larger where there is room."""
-        words, colour = self._words()
+        """The one thing to do now, in large letters, and what belongs to it."""
+        words, detail, colour = self._words()
         style = f"bold reverse {colour}".strip()
         width = self._console.width - 4
-        if self._console.height < TALL or self._console.width < WIDE:
-            return [Text(f" {words}".ljust(width), style=style)]
-        spaced = "   ".join(" ".join(word) for word in words.split())
-        large = spaced if len(spaced) < width - 2 else words
-        return [Text(text.ljust(width), style=style) for text in ("", f"  {large}", "")]
+        lines = [f"  {words}", f"  {detail}"]
+        if self._console.height >= TALL:
+            lines = ["", *lines, ""]
+        return [Text(line.ljust(width), style=style) for line in lines]
 
-    def _words(self) -> tuple[str, str]:
+    def _words(self) -> tuple[str, str, str]:
+        """What is said large, what small, and its colour."""
         view, hold = self._view, self._hold
         if hold is None:
-            return "WAIT for the device", ""
+            return _large("WAIT"), "for the device", ""
         if view is None or view.hold is not hold or view.phase == "turning":
-            number = f"{hold.index + 1} of {len(self._positions)}"
-            turn = f"TURN to {hold.position.name}, then let go"
-            if view is None or view.hold is not hold or not view.reason:
-                return f"{turn}   ({number})", "cyan"
-            there = view.arrival is not None and view.arrival.ok
-            return (f"WAIT, hands off   ({number})" if there else
-                    f"{turn}   ({number})"), "cyan"  # fmt: skip
+            number = f"position {hold.index + 1} of {len(self._positions)}"
+            now = view if view is not None and view.hold is hold else None
+            if now and now.arrival is not None and now.arrival.ok:
+                return _large("HANDS OFF"), f"{number}: it is in place", "cyan"
+            turn = f"{_large('TURN TO')}   {hold.position.name}"
+            return turn, f"{number}, then let go", "cyan"
         if view.phase == "averaging":
-            return "HOLD STILL: do not touch the device", "green"
-        return "TAKEN", "green"
+            return _large("HOLD STILL"), "do not touch the device", "green"
+        return _large("TAKEN"), "", "green"
+
+
+def _large(words: str) -> str:
+    """Letters set apart: larger than their neighbours on any terminal."""
+    return "   ".join(" ".join(word) for word in words.split())

@@ -184,7 +184,7 @@ class Engine:
                 if not cold:
                     cold = True
                     self._tell(f"{self._warmth.says}: waiting for it, Enter goes on")
-            self._view("turning", hold, placing.arrival, placing.meter, reason=reason)
+            self._view("turning", hold, placing.where, placing.meter, reason=reason)
             if placing.arrived and not waits and wish != "wait":
                 return
             self._complain(hold, placing, quiet=wish == "wait")

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from rich.console import RenderableType
-from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
@@ -18,6 +17,9 @@ from fieldcal.view import View
 
 METER = 20
 """Width of the stillness meter, characters."""
+
+BAR = 30
+"""Width of the bar that fills while averaging, characters."""
 
 SCALE = 31
 """Width of the inclinometer, characters; odd, as the middle is where it should be."""
@@ -83,7 +85,8 @@ def gauges(view: View, told: Sequence[str]) -> Table:
         grid.add_row("waits for", "the turn: see below" if said else view.reason)
     else:
         seconds = view.hold.seconds
-        bar = ProgressBar(seconds, min(view.elapsed, seconds), 30)
+        share = min(1.0, view.elapsed / seconds)
+        bar = Text(f"[{'#' * round(share * BAR):·<{BAR}}] {share:4.0%}")
         left = max(0.0, seconds - view.elapsed)
         grid.add_row("averaging", bar)
         grid.add_row("time left", f"{left:.0f} s of {seconds:.0f} s")

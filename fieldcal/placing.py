@@ -6,11 +6,14 @@ it says.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from fieldcal.arrival import NORM, Arrival, Held, judge, standing
+from fieldcal.arrival import NORM, Arrival, Held, judge
 from fieldcal.description import Description
 from fieldcal.plan import Hold
+from fieldcal.positions import Position
 from fieldcal.samples import Array, Block, concat
 from fieldcal.windows import Stillness
 
@@ -40,7 +43,8 @@ class Placing:
     Attributes
     ----------
     meter : present motion as part of what is allowed; below 1 is rest
-    arrival : where the device is, None while it cannot be told
+    arrival : where the device rests, None while it moves
+    where : where it is, as far as that can be told while it moves
     f : (3,) specific force there, procedure axes, m/s^2; None likewise
     waited : s of device time since it was asked for
 
@@ -50,6 +54,7 @@ class Placing:
         self, hold: Hold, about: Description, held: Held | None, left: bool = False
     ) -> None:
         self._hold, self._about, self._held, self._left = hold, about, held, left
+        self._others = _others(hold, about)
         self._began: float | None = None
         self._start()
         self._last = np.nan
@@ -60,6 +65,7 @@ class Placing:
         self._resting = _Resting()
         self._told = -np.inf
         self.arrival: Arrival | None = None
+        self.where: Arrival | None = None
         self.f: Array | None = None
 
     @property
@@ -83,10 +89,15 @@ class Placing:
         self._resting.add(block, self._stillness.since)
         if self._resting.seconds > 0:
             self.f = force(self._resting.block.acc, self._about)
-            wanted, g = self._hold.position, self._about.gravity
-            self.arrival = judge(wanted, self.f, g, self._held)
+            self.where = self.arrival = self._judged(self.f)
         else:
             self.arrival, self.f, self._told = None, None, -np.inf
+            now = self._judged(force(block.acc, self._about))
+            self.where = replace(now, ok=False)
+
+    def _judged(self, f: Array) -> Arrival:
+        wanted, g = self._hold.position, self._about.gravity
+        return judge(wanted, f, g, self._held, self._others)
 
     @property
     def arrived(self) -> bool:
@@ -117,10 +128,7 @@ class Placing:
         if self.arrival is None or self.arrival.ok or self.f is None:
             return ""
         problem = self.arrival.problem
-        there = standing(self._about.positions, self.f, self._about.gravity, self._held)
         number = self._hold.index + 1
-        if there is not None and there > self._hold.index:
-            problem = f"this is position {there + 1} already: {problem}"
         if self._left:
             problem = f"turned too early, position {number} is not done: {problem}"
         return problem
@@ -133,6 +141,17 @@ class Placing:
         again = np.isfinite(self._told)
         self._told = self._last
         return f"still waiting, {self.waited:.0f} s: {said}" if again else said
+
+
+def _others(hold: Hold, about: Description) -> dict[str, Position]:
+    """The plan's other positions, by what is said if the device is in one of them."""
+    others = {}
+    for i, position in enumerate(about.positions):
+        if position.degrees == hold.position.degrees:
+            continue
+        comes = f", position {hold.index + 1} comes first" if i > hold.index else ""
+        others[f"this is position {i + 1}{comes}"] = position
+    return others
 
 
 def force(acc: Array, about: Description) -> Array:

@@ -101,6 +101,8 @@ def run(args: argparse.Namespace) -> int:
         history = History(args.history or default_path())
         found = _result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
+        if marks.exists():
+            sys.stderr.write(_kept(folder))
         if args.junit and marks.exists():
             said = str(error) or "interrupted"
             known = list(read_marks(marks))
@@ -244,7 +246,6 @@ def _record(
                 found = running.run(driver)
             except (FieldcalError, KeyboardInterrupt) as error:
                 recorder.mark("failed", text=str(error) or "interrupted")
-                sys.stderr.write(_kept(folder))
                 raise
             recorder.mark("finished")
         truth = getattr(mover, "truth", None)

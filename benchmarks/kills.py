@@ -118,16 +118,18 @@ def windows(session: Path) -> dict[int, tuple[float, float]]:
     }
 
 
-def killed(bench: Bench, name: str, rng: np.random.Generator, lasts: float) -> Outcome:
-    """One run that is killed until it gets through."""
+def killed(
+    bench: Bench, name: str, rng: np.random.Generator, lasts: float, most: int = MOST
+) -> Outcome:
+    """One run that is killed, so many times at most, until it gets through."""
     session, outcome = bench.folder / name, Outcome()
     before: dict[int, tuple[float, float]] = {}
-    for attempt in range(MOST + 1):
+    for attempt in range(most + 1):
         process = bench.start(session)
         deadline = monotonic() + rng.uniform(0.0, lasts)
-        while attempt < MOST and process.poll() is None and monotonic() < deadline:
+        while attempt < most and process.poll() is None and monotonic() < deadline:
             sleep(0.005)
-        if attempt < MOST and process.poll() is None:
+        if attempt < most and process.poll() is None:
             process.kill()
             process.communicate()
             outcome.broken += 1
@@ -141,11 +143,13 @@ def killed(bench: Bench, name: str, rng: np.random.Generator, lasts: float) -> O
     raise AssertionError("the last attempt is never killed")
 
 
-def pulled(bench: Bench, name: str, rng: np.random.Generator, lasts: float) -> Outcome:
-    """One run whose cable is pulled at random instants."""
+def pulled(
+    bench: Bench, name: str, rng: np.random.Generator, lasts: float, most: int = 3
+) -> Outcome:
+    """One run whose cable is pulled at random instants, so many times at most."""
     session, outcome = bench.folder / name, Outcome()
     process = bench.start(session)
-    instants = np.sort(rng.uniform(0.0, lasts, rng.integers(1, 4)))
+    instants = np.sort(rng.uniform(0.0, lasts, rng.integers(1, most + 1)))
     began, before = monotonic(), {}
     for instant in instants:
         while process.poll() is None and monotonic() - began < instant:
@@ -179,10 +183,13 @@ def _ended(
     return outcome
 
 
-def series(kind: str, runs: int, seed: int = 1) -> list[Outcome]:
-    """So many runs that are ``killed`` or ``pulled``."""
+def series(
+    kind: str, runs: int, seed: int = 1, most: int | None = None
+) -> list[Outcome]:
+    """So many runs that are ``killed`` or ``pulled``, each `most` times at most."""
     rng, outcomes = np.random.default_rng(seed), []
     one = {"killed": killed, "pulled": pulled}[kind]
+    times = {} if most is None else {"most": most}
     folder = Path(tempfile.mkdtemp(prefix="fieldcal-kills-"))
     try:
         for first in range(0, runs, DEVICES):
@@ -191,7 +198,7 @@ def series(kind: str, runs: int, seed: int = 1) -> list[Outcome]:
             bench.start(folder / f"whole-{first}").communicate()
             lasts = monotonic() - began
             for number in range(first, min(runs, first + DEVICES)):
-                outcomes.append(one(bench, f"run-{number}", rng, 1.1 * lasts))
+                outcomes.append(one(bench, f"run-{number}", rng, 1.1 * lasts, **times))
                 shutil.rmtree(folder / f"run-{number}", ignore_errors=True)
             bench.device.close()
     finally:

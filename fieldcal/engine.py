@@ -180,10 +180,11 @@ class Engine:
             waits = self._warmth is not None and self._warmth.waits
             reason = placing.reason
             if placing.arrived and waits and self._warmth:
-                reason = self._warmth.says + "; waiting, Enter goes on"
-                if not cold:
+                said = self._warmth.says
+                reason = f"{said}; Enter goes on" if said else "settling"
+                if said and not cold:
                     cold = True
-                    self._tell(f"{self._warmth.says}: waiting for it, Enter goes on")
+                    self._tell(f"{said}: waiting for it, Enter goes on")
             self._view("turning", hold, placing.where, placing.meter, reason=reason)
             if placing.arrived and not waits and wish != "wait":
                 return

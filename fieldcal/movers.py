@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Formatter
 from time import monotonic
-from typing import Any, Protocol, Self
+from typing import IO, Any, Protocol, Self
 
 from fieldcal.errors import DeviceError, MoverFailed, PlanError
 from fieldcal.positions import Position
@@ -165,7 +165,7 @@ class Command:
     def __init__(self, template: Sequence[str], timeout: float) -> None:
         self._template, self._timeout = tuple(template), timeout
         self._process: subprocess.Popen[str] | None = None
-        self._said = tempfile.TemporaryFile("w+")  # noqa: SIM115
+        self._said: IO[str] | None = None
         self._began = 0.0
         self._filled(Position.deg(0.0, 0.0), 0)
 
@@ -179,7 +179,7 @@ class Command:
 
         """
         self.close()
-        self._said = tempfile.TemporaryFile("w+")  # noqa: SIM115
+        self._said = tempfile.TemporaryFile("w+")
         command = self._filled(position, number)
         self._began = monotonic()
         try:
@@ -223,7 +223,9 @@ class Command:
             self._process.kill()
             self._process.wait()
             self._process = None
-        self._said.close()
+        if self._said is not None:
+            self._said.close()
+            self._said = None
 
     def __enter__(self) -> Self:
         return self
@@ -232,6 +234,8 @@ class Command:
         self.close()
 
     def _last(self) -> str:
+        if self._said is None:
+            return ""
         self._said.seek(0)
         lines = self._said.read().strip().splitlines()
         return f": {lines[-1]}" if lines else " and said nothing"

@@ -96,7 +96,7 @@ class Warmth:
 
     @property
     def waits(self) -> bool:
-        """Whether a window should not begin yet."""
+        """Whether a window should not begin yet: it changes, or is not known yet."""
         if self.waived or self._until is None or self._last >= self._until:
             return False
-        return bool(self.says)
+        return len(self._seconds) < FEWEST or bool(self.says)

@@ -21,7 +21,7 @@ EXAMPLE = """\
   fieldcal history A1B2 --png bias.png
 """
 
-STRIP = 24
+STRIP = 20
 """Width of the plot beside the numbers, characters."""
 
 
@@ -212,7 +212,7 @@ def lines(points: Sequence[Point]) -> list[str]:
         cells[first : last + 1] = "-" * (last + 1 - first)
         cells[round((p.value - low) / step)] = "o"
         value, sigma = number(p.value, p.sigma)
-        word = "OUT OF FAMILY" if p.odd else "" if p.run.go else "no-go"
+        word = "OUT" if p.odd else "" if p.run.go else "no-go"
         word = "accepted" if p.run.accepted else word
         out.append(
             f"  {p.run.number:3d} {p.run.taken_at[:10]} {_warm(p.run):>8}"

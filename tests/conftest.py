@@ -12,6 +12,10 @@ settings.register_profile(
 settings.load_profile("any machine")
 
 
+collect_ignore = ["example_project"]
+"""A project of its own, which test_pytest_plugin runs."""
+
+
 @pytest.fixture(autouse=True, scope="session")
 def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Keep the user's history of devices out of the tests, and the tests out of it."""

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 from scipy.spatial.transform import Rotation
 
 from fieldcal import description, limits
 from fieldcal.acceptance import Circumstances, Decision, decide, with_decision
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.document import schema
 from fieldcal.error_growth import growth
 from fieldcal.errors import InputError
 from fieldcal.family import expected
@@ -56,6 +58,7 @@ def test_a_sound_calibration_is_go_and_says_what_it_could_not_check() -> None:
     assert unknown == ["change", "verification"]
     document = with_decision(calibration(), made).to_json()
     assert document["verdict"] == "good" and document["decision"]["go"]
+    Draft202012Validator(schema()).validate(document)
     again = Calibration.from_json(document)
     assert again.info["expectation"][1]["seconds"] == 600.0
 

@@ -21,8 +21,9 @@ from fieldcal.calibration import Calibration
 from fieldcal.description import Description
 from fieldcal.positions import Position, forces
 from fieldcal.samples import Array
-from fieldcal.solve.design import Model, Tilt, predict
+from fieldcal.solve.design import Model, predict
 from fieldcal.solve.observations import ACC
+from fieldcal.solve.tilt import Tilt
 from fieldcal.windows import Average
 
 

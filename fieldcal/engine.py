@@ -13,19 +13,19 @@ broke or whose process was killed, is handed back at once and not asked for agai
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
 
 from fieldcal.arrival import Arrival, Held
+from fieldcal.breaks import Again, gap, restarted
 from fieldcal.description import Description
 from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, Skipped, Stopped, WrongPosition
 from fieldcal.placing import GAP, Placing, force
 from fieldcal.plan import Hold, Note, Plan, Step
 from fieldcal.recorder import Recorder
-from fieldcal.samples import Array, Block
+from fieldcal.samples import Array, Block, pieces
 from fieldcal.view import Operator, Phase, View, Wish
 from fieldcal.warmth import Warmth
 from fieldcal.windows import Average, Noise, Window
@@ -34,20 +34,6 @@ R = TypeVar("R")
 
 PIECE = 0.1
 """Longest stretch of samples that is looked at as one, s."""
-
-
-class Again(Exception):
-    """The operator wants a position that was taken once more.
-
-    Attributes
-    ----------
-    index : its number
-
-    """
-
-    def __init__(self, index: int) -> None:
-        super().__init__(index)
-        self.index = index
 
 
 class Engine:
@@ -88,6 +74,8 @@ class Engine:
         self._noise: Noise | None = None
         self._left: int | None = None
         self._before: int | None = None
+        self._silence = 0
+        driver.on_silence = self._silent
         self._stream = self._record(driver)
         self._rate = np.nan
         self._temperature = np.nan
@@ -152,13 +140,25 @@ class Engine:
 
     def _record(self, driver: Driver) -> Iterator[Block]:
         for raw in driver.blocks():
+            self._silence = 0
             block = self._recorder.append(raw)
             if len(block) > 1:
                 self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
             self._temperature = float(block.temperature[-1])
             if self._warmth:
                 self._warmth.add(block)
-            yield from _pieces(block)
+            yield from pieces(block, PIECE)
+
+    def _silent(self) -> None:
+        """Say that nothing comes, before anybody thinks that we are stuck."""
+        self._silence += 1
+        if self._silence == 2:
+            self._tell(
+                f"no samples come from {self._driver.name}: check cable and power; it"
+                " goes on by itself once they do"
+            )
+        if self._operator.wish() == "stop":
+            raise Stopped("stopped by the operator")
 
     def _arrive(self, hold: Hold) -> None:
         """Wait until the device rests where it should."""
@@ -233,9 +233,9 @@ class Engine:
         try:
             for block in self._stream:
                 if block.t[0] - last > GAP:
-                    raise _gap(last, float(block.t[0]))
+                    raise gap(last, float(block.t[0]))
                 if self._driver.health.restarts != restarts:
-                    raise _restarted(float(block.t[0]))
+                    raise restarted(float(block.t[0]))
                 last = float(block.t[-1])
                 window.add(block)
                 if window.moved:
@@ -295,30 +295,3 @@ class Engine:
     ) -> None:
         now = (window.meter, window.elapsed, window.sigma)
         self._view(phase, hold, None, *now)
-
-
-def _pieces(block: Block) -> Iterator[Block]:
-    """Cut a block, so that what the engine does is independent of how samples come."""
-    edges = np.arange(block.t[0] + PIECE, block.t[-1], PIECE)
-    rows = [0, *np.searchsorted(block.t, edges).tolist(), len(block)]
-    for first, last in pairwise(rows):
-        if last > first:
-            yield block[first:last]
-
-
-def _gap(last: float, now: float) -> Moved:
-    return Moved(
-        f"no samples came between {last:.2f} s and {now:.2f} s: the window starts"
-        " again; check the cable if it happens once more",
-        last,
-        "t",
-    )
-
-
-def _restarted(now: float) -> Moved:
-    return Moved(
-        f"the device started anew at {now:.2f} s: the window starts again; check its"
-        " power if it happens once more",
-        now,
-        "t",
-    )

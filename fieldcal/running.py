@@ -14,9 +14,10 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
+from fieldcal.breaks import Again
 from fieldcal.calibration import Calibration
 from fieldcal.driver import Driver
-from fieldcal.engine import Again, Engine
+from fieldcal.engine import Engine
 from fieldcal.errors import (
     DeviceError,
     FieldcalError,
@@ -141,8 +142,9 @@ class Running:
         self._recorder.mark("lost", text=str(lost))
         left = deadline - monotonic()
         if left > 0:
+            said = str(lost).removesuffix(", then start again")
             self._operator.tell(
-                f"{lost}; goes on by itself once it is back, within {left:.0f} s"
+                f"{said}; goes on by itself once it is back, within {left:.0f} s"
             )
         while monotonic() < deadline:
             with suppress(DeviceError):

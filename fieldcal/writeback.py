@@ -23,6 +23,8 @@ from fieldcal.errors import InputError
 WIDEST = {"acc_offset": 3.5, "gyr_offset": 0.5}
 """Largest offsets that are one, m/s^2 and rad/s; more is a broken sensor or a slip."""
 
+UNITS = {"acc_offset": "m/s^2", "acc_scale": "1", "gyr_offset": "rad/s"}
+
 SCALES = (0.8, 1.2)
 """Scales that an accelerometer can have; autopilots refuse others."""
 
@@ -39,6 +41,7 @@ class Change:
     name : of the parameter
     old, new : values
     sigma : standard uncertainty of the new one; 0 where it stays
+    unit : of all three
 
     """
 
@@ -46,6 +49,7 @@ class Change:
     old: float
     new: float
     sigma: float
+    unit: str
 
     @property
     def significance(self) -> float:
@@ -107,7 +111,7 @@ def changes(
     }
     known = names(installed.autopilot, installed.instance)
     return tuple(
-        Change(name, installed.values[name], new[name], float(s))
+        Change(name, installed.values[name], new[name], float(s), UNITS[what])
         for what, sigmas in sigma.items()
         for name, s in zip(known[what], sigmas, strict=True)
     )
@@ -140,9 +144,8 @@ def problems(wanted: tuple[Change, ...], installed: Installed) -> tuple[str, ...
                     f" {SCALES[1]:g}: check the unit of the recording"
                 )
         elif abs(change.new) > WIDEST[what]:
-            unit = "m/s^2" if what == "acc_offset" else "rad/s"
             said.append(
-                f"{change.name} = {change.new:.4g} {unit} is more than"
-                f" {WIDEST[what]:g} {unit}: check mounting and gravity"
+                f"{change.name} = {change.new:.4g} {change.unit} is more than"
+                f" {WIDEST[what]:g} {change.unit}: check mounting and gravity"
             )
     return tuple(said)

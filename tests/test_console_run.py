@@ -23,8 +23,10 @@ SIM += ["--base-tilt=1,-0.5", "--latitude=50.45", "--height=170"]
 
 
 @pytest.fixture
-def device() -> Iterator[VirtualDevice]:
-    with VirtualDevice(SIM, once=False) as made:
+def device(tmp_path: Path) -> Iterator[VirtualDevice]:
+    link = tmp_path / "port"
+    with VirtualDevice([*SIM, "--port-link", str(link)], once=False) as made:
+        made.port = str(link)
         yield made
 
 
@@ -172,6 +174,9 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     console.child.send("r")
     console.wait("[·")
     take(console, 2, 22.5, 0.0)
+    device.ask(fault={"hangup_s": 4.0 * SPEED})
+    console.wait("no samples come from", "goes on by itself")
+    console.wait("the window starts again")
     asked(console, 3)
     console.child.send("r")
     take(console, 2, 22.5, 0.0)

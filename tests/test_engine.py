@@ -12,8 +12,9 @@ import pytest
 
 from fieldcal import description
 from fieldcal.arrival import Held
+from fieldcal.breaks import Again
 from fieldcal.driver import Driver, Health
-from fieldcal.engine import Again, Engine
+from fieldcal.engine import Engine
 from fieldcal.errors import CalibrationFailed, DeviceSilent, Stopped, WrongPosition
 from fieldcal.frames import turn
 from fieldcal.placing import Placing

@@ -17,10 +17,7 @@ from fieldcal.commands.site import add_site, site_tables
 from fieldcal.errors import FieldcalError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from fieldcal.calibration import Calibration
-    from fieldcal.driver import Driver
     from fieldcal.history import History
     from fieldcal.limits import Limits
     from fieldcal.movers import Mover
@@ -33,8 +30,6 @@ EXAMPLE = """\
   fieldcal run plan.toml --headless --json --junit run.xml > result.json
   fieldcal run --resume sessions/2026-03-01T09-30-00-five_position
 """
-
-VIRTUAL_FORMAT = "witmotion"
 
 GIVE_UP, GIVE_UP_UNTURNED = 90.0, 600.0
 """Device time after which a script gives a position up, s: with and without a mover."""
@@ -177,51 +172,16 @@ def _table(name: str, degrees: tuple[float, float] | None) -> dict[str, Any]:
     return {"name": name, "alpha_deg": round(alpha, 9), "beta_deg": round(beta, 9)}
 
 
-@contextlib.contextmanager
-def _device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
-    """What opens the device, and who turns it."""
-    from fieldcal import movers
-    from fieldcal.driver import open_driver
-    from fieldcal.plan_file import TURN
-
-    mover, url = task.mover, str(task.run.get("device", ""))
-    with contextlib.ExitStack() as stack:
-        turns: Mover = movers.Nobody()
-        if mover["kind"] == "virtual" and "control" in mover:
-            turns = stack.enter_context(movers.Controlled(mover["control"]))
-        elif mover["kind"] == "virtual":
-            device = stack.enter_context(movers.VirtualDevice(_virtual(task)))
-            turns, url = device, f"serial:{device.port}?format={VIRTUAL_FORMAT}"
-        elif mover["kind"] == "command":
-            timeout = float(mover.get("timeout_s", TURN))
-            turns = stack.enter_context(movers.Command(mover["command"], timeout))
-        if not url:
-            raise InputError(
-                'name the device: --device "serial:/dev/ttyUSB0?format=witmotion"'
-                " (fieldcal ports lists them), or --virtual to try without one"
-            )
-        yield lambda: open_driver(url), turns
-
-
-def _virtual(task: Task) -> list[str]:
-    site = task.about
-    options = ["--serial", VIRTUAL_FORMAT]
-    options += [f"--latitude={site.latitude_deg}", f"--height={site.height_m}"]
-    options += [f"--mounting={','.join(site.axes)}", f"--grade={site.grade}"]
-    if "gravity" in site.raw.get("site", {}):
-        options.append(f"--gravity={site.gravity}")
-    return options + shlex.split(task.mover.get("options", ""))
-
-
 def _record(
     args: argparse.Namespace, task: Task, folder: Path, bounds: Limits
 ) -> tuple[Calibration, dict[str, Any] | None]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
+    from fieldcal.commands.run_device import device
     from fieldcal.recorder import Recorder
     from fieldcal.running import Running, taken_before
     from fieldcal.session import Session
 
-    with _device(task) as (opened, mover):
+    with device(task) as (opened, mover):
         driver = opened()
         with contextlib.ExitStack() as stack:
             stack.callback(driver.close)

@@ -123,16 +123,16 @@ def _refuse(
 def table(wanted: Sequence[Change]) -> str:
     """Old and new values with uncertainty and significance, a line each."""
     width = max(len(c.name) for c in wanted)
-    lines = [f"{'parameter':{width}}  {'old':>12}    {'new':>12}   ± 1σ       change/σ"]
+    lines = [
+        f"{'parameter':{width}}  {'old':>12}    {'new':>12}   ± 1σ     unit   change/σ"
+    ]
     for c in wanted:
         z = c.significance
         word = "" if not abs(z) > SIGNIFICANT else "  changed"
         told = f"{z:+9.1f}{word}" if z == z else "     kept"
         lines.append(
-            f"{c.name:{width}}  {c.old:12.6f} -> {c.new:12.6f}   {c.sigma:.2g}".ljust(
-                width + 45
-            )
-            + told
+            f"{c.name:{width}}  {c.old:12.6f} -> {c.new:12.6f}   {c.sigma:<8.2g}"
+            f" {c.unit:5}{told}"
         )
     return "\n".join(lines) + "\n"
 
@@ -144,6 +144,7 @@ def _row(change: Change) -> dict[str, Any]:
         "old": change.old,
         "new": change.new,
         "sigma": change.sigma,
+        "unit": change.unit,
         "significance": z if z == z else None,
     }
 

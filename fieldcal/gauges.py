@@ -81,8 +81,9 @@ def gauges(view: View, told: Sequence[str]) -> Table:
     if view.phase == "turning":
         for name, seen, wanted in angles(view):
             grid.add_row(name, inclinometer(seen, wanted))
-        said = any(view.reason in text for text in told) if view.reason else False
-        grid.add_row("waits for", "the turn: see below" if said else view.reason)
+        problem = view.arrival.problem if view.arrival else ""
+        below = bool(told and problem and view.reason.endswith(problem))
+        grid.add_row("waits for", "the turn: see below" if below else view.reason)
     else:
         seconds = view.hold.seconds
         share = min(1.0, view.elapsed / seconds)

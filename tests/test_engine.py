@@ -342,3 +342,21 @@ def _temperatures(seed: int, step: float, rate: float) -> Iterator[Block]:
         if step:
             temperature = step * np.round(temperature / step)
         yield Block.of(t, np.zeros((50, 3)), temperature=temperature)
+
+
+def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
+    """A slow lean of a tenth of a degree, for longer than the window is."""
+    device, turner = bench.turner.driver.device, bench.turner
+
+    class Leaning(Turner):
+        leant = False
+
+        def show(self, view: View) -> None:
+            super().show(view)
+            if view.elapsed > 8.0 and not self.leant:
+                self.leant = True
+                device.bump(push=0.0, tilt=np.deg2rad(0.1), seconds=20.0)
+
+    leaning = Leaning(turner.driver)
+    Engine(turner.driver, leaning, ABOUT, bench.recorder).run(hold_all(TWO[:1], 20.0))
+    assert "hold still, the window starts again" in leaning.told[0]

@@ -166,6 +166,14 @@ def _restarts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
                 f"the device's clock began anew behind position {taken[-1] + 1}: if it"
                 " lost power there, its bias at the next start may be another"
             )
+    counted = sum(
+        int(m.get("restarts", 0)) for m in marks if m.get("event") == "counts"
+    )
+    if counted:
+        said.append(
+            f"the device started anew {counted} times meanwhile: its bias at the next"
+            " start may be another"
+        )
     return said
 
 

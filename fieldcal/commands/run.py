@@ -207,7 +207,7 @@ def _record(
             except (FieldcalError, KeyboardInterrupt) as error:
                 recorder.mark("failed", text=str(error) or "interrupted")
                 raise
-            recorder.mark("finished")
+            recorder.mark("finished", verdict="good" if found.good else "bad")
         truth = getattr(mover, "truth", None)
         return found, dict(truth) if truth else None
 

@@ -28,6 +28,9 @@ KILLED, PULLED = 200, 100
 SECONDS = 8.0
 """Averaging time of a position, s of device time."""
 
+SPEED = "80"
+"""Device time against the clock: at full speed it would run far ahead of a run."""
+
 DEVICES = 20
 """Runs after which another virtual device is taken."""
 
@@ -69,7 +72,7 @@ class Bench:
 
     """
 
-    def __init__(self, folder: Path, seed: int, speed: str = "max") -> None:
+    def __init__(self, folder: Path, seed: int, speed: str = SPEED) -> None:
         self.folder = folder
         port = folder / f"port-{seed}"
         options = ["--serial", "witmotion", "--speed", speed, "--seed", str(seed)]

@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint bench setup clean
+.PHONY: demo test lint bench docs setup clean
 
 demo: $(READY)
 	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
@@ -20,6 +20,10 @@ lint: $(READY)
 bench: .venv/.peers
 	$(BIN)/python -m benchmarks
 
+docs: .venv/.docs
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_site
+	@echo "docs/_site/index.html"
+
 setup: $(READY)
 
 $(READY): pyproject.toml constraints.txt Makefile
@@ -33,5 +37,9 @@ $(READY): pyproject.toml constraints.txt Makefile
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
 	@touch $@
 
+.venv/.docs: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	@touch $@
+
 clean:
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis build *.egg-info
+	rm -rf docs/made docs/_site .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis build *.egg-info

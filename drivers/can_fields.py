@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.drivers.framing import widened
 from fieldcal.samples import Array
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ class Field:
         bits = self.bits(data)
         if self.floating:
             narrow = bits.astype(f"u{self.length // 8}")
-            return narrow.view(_FLOATS[self.length]).astype(float)
+            return widened(narrow.view(_FLOATS[self.length]))
         if not self.signed:
             return bits
         sign = np.uint64(1 << (self.length - 1))

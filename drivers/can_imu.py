@@ -27,7 +27,7 @@ from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Reader
 from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Array, Block, concat
+from fieldcal.samples import Array, Block, Grain, concat
 
 ENOUGH = 10_000
 """Strange frames after which no more identifiers are kept."""
@@ -37,13 +37,7 @@ LIMIT = 1 << 24
 
 
 class Imu(Driver):
-    """A CAN bus, or a log of one, and the samples that are in its frames.
-
-    Attributes
-    ----------
-    skew : the device's clock against the host's
-
-    """
+    """A CAN bus, or a log of one, and the samples that are in its frames."""
 
     def __init__(self, address: str) -> None:
         _check_installed()
@@ -60,7 +54,7 @@ class Imu(Driver):
         self._parts = read_map(options)
         self._samples = Samples(self._parts, self._counts, options)
         self._heard: set[int] = set()
-        self.skew = Skew()
+        self._skew = Skew(self._counts)
         self._log: Log | None = None
         self._reader: Reader | None = None
         if is_log(channel):
@@ -80,6 +74,11 @@ class Imu(Driver):
         """True while the bus is gone and is being tried again."""
         return self._reader is not None and self._reader.reconnecting
 
+    @property
+    def grain(self) -> Grain:
+        """One count of the signals."""
+        return self._samples.grain
+
     def host_time(self) -> float:
         """Now, in s of the clock that stamps `Block.t_host`: for a log, its own."""
         return self._log.now if self._log else super().host_time()
@@ -97,7 +96,7 @@ class Imu(Driver):
                 blocks.append(self._samples.feed(frames, arrived))
             block = concat(block for block in blocks if block is not None)
             if len(block):
-                self.skew.add(block.t, block.t_host)
+                self._skew.add(block.t, block.t_host)
                 return block
             if monotonic() >= deadline:
                 return None

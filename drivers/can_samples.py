@@ -31,7 +31,7 @@ from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
 from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block
+from fieldcal.samples import CHANNELS, Array, Block, Grain
 
 DEEP = 8
 """Newer samples that may have begun before one is given up."""
@@ -80,6 +80,16 @@ class Samples:
         self._groups: Groups = ByTurns(count, health, first, within)
         if self._keyed:
             self._groups = ByKey(count, health, *self._depth(tick))
+
+    @property
+    def grain(self) -> Grain:
+        """One count of the coarsest signal of each sensor; 0 for floating point."""
+        steps = []
+        for names in (CHANNELS[:3], CHANNELS[3:]):
+            some = [c for name in names if (c := self._channel(name))]
+            counts = [c.field.scale * c.scale for c in some if not c.field.floating]
+            steps.append(max(map(abs, counts), default=0.0))
+        return Grain(steps[0], steps[1])
 
     def _channel(self, column: str) -> Channel | None:
         return next(

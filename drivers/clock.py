@@ -31,6 +31,7 @@ class Clock:
         span: float = float("inf"),
     ) -> None:
         rate = options.number("rate", 0.0, 1e-3, 1e6)
+        self._health = health
         self._stamps = Stamps(health, resolution, span)
         self._else = Rate(health, rate) if rate else Arrivals(health)
         self._chosen: Timebase | None = None
@@ -41,6 +42,7 @@ class Clock:
             return stamps
         if self._chosen is None:
             self._chosen = self._else if np.isnan(stamps[0]) else self._stamps
+            self._health.clocked = not isinstance(self._chosen, Arrivals)
         return self._chosen.times(stamps, steps, t_host)
 
     def broken(self) -> None:

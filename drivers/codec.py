@@ -23,7 +23,7 @@ from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.drivers.timebase import Timebase
 from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block, concat
+from fieldcal.samples import Array, Block, Grain, concat
 
 ENOUGH = 3
 """Samples that make a format likely."""
@@ -108,6 +108,11 @@ class Codec(ABC):
             return None
         share = 1 - health.skipped / health.received
         return Likeness(share, query, health.samples)
+
+    @property
+    def grain(self) -> Grain:
+        """What the format rounds to; a format of floating point to nothing."""
+        return Grain()
 
     @abstractmethod
     def scan(self, data: Bytes) -> Candidates:

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.samples import Array
+
 Bytes = NDArray[np.uint8]
 Index = NDArray[np.integer[Any]]
 Mask = NDArray[np.bool_]
@@ -128,3 +130,9 @@ def rows(data: Bytes, starts: Index, size: int) -> Bytes:
         if np.all(np.diff(starts) == size):
             return data[starts[0] : starts[-1] + size].reshape(-1, size)
     return np.lib.stride_tricks.sliding_window_view(data, size)[starts]
+
+
+def widened(numbers: NDArray[Any]) -> Array:
+    """Return numbers of any width as doubles; a signalling nan is a nan like others."""
+    with np.errstate(invalid="ignore"):
+        return numbers.astype(float)

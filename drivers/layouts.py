@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.drivers.framing import Bytes, Found, Index, rows
+from fieldcal.drivers.framing import Bytes, Found, Index, rows, widened
 from fieldcal.samples import Array
 
 
@@ -55,7 +55,7 @@ class Alike:
         first, _ = self.fields[key]
         size = n * np.dtype(kind).itemsize
         field = np.ascontiguousarray(self.frames[:, first : first + size])
-        return field.view(kind).astype(float)
+        return widened(field.view(kind))
 
     def first_of(self, keys: tuple[int, ...]) -> int | None:
         """Return the first of the keys that these frames have."""

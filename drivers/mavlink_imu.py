@@ -28,13 +28,13 @@ from fieldcal.drivers.mavlink_log import Log, is_log
 from fieldcal.drivers.mavlink_talk import Talk, listed
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.reader import Chunk, Reader
+from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, FieldcalError, InputError
-from fieldcal.samples import Block
+from fieldcal.samples import Block, Grain
 
 if TYPE_CHECKING:
     from fieldcal.drivers.mavlink_installed import Installed
     from fieldcal.drivers.mavlink_link import Line
-    from fieldcal.drivers.mavlink_units import Quantisation
 
 GREETING = 6.0
 """Longest time until it is known who is there and what it has installed, s."""
@@ -77,6 +77,7 @@ class Imu(Driver):
         self._decoder = Decoder(options)
         self._asked = options.number("rate", USUAL, 0.0, 1e4)
         self.health: Health = self._decoder.health
+        self._skew = Skew(self.health)
         message = (self._decoder.message, self._decoder.kind.identifier)
         without = options.choice("installed", ("keep", "identity"), "keep")
         self._talk = Talk(
@@ -123,7 +124,8 @@ class Imu(Driver):
         """Sentences for the operator."""
         heard = [f"asked for {self._asked:g} Hz, got {self.rate:.4g} Hz"]
         slow = self._log is None and self._asked > 0 and self.rate > 0
-        return self._talk.says + heard * slow
+        remark = [self.installed.remark] if self.installed else []
+        return [*self._talk.says, *filter(None, remark), *heard * slow]
 
     @property
     def installed(self) -> Installed | None:
@@ -131,9 +133,9 @@ class Imu(Driver):
         return self._talk.installed
 
     @property
-    def quantisation(self) -> Quantisation:
-        """What the rounding of the message adds to each sample."""
-        return self._decoder.quantisation
+    def grain(self) -> Grain:
+        """What the message rounds to, once its unit is known."""
+        return self._decoder.grain
 
     @property
     def rate(self) -> float:
@@ -150,7 +152,6 @@ class Imu(Driver):
             "vehicle": decoder.vehicle,
             "acc_unit": decoder.acc_unit,
             "gyr_unit": decoder.gyr_unit,
-            "quantisation": list(self.quantisation),
             "rate_hz": round(self.rate, 3),
             "installed": installed.as_table() if installed else None,
             "says": self.says,
@@ -227,6 +228,7 @@ class Imu(Driver):
             self._say(self._talk.due(monotonic()))
         if block is not None:
             self._recent.extend(block.t.tolist())
+            self._skew.add(block.t, block.t_host)
         return block
 
     def _listen(self, chunks: list[Chunk]) -> Block | None:

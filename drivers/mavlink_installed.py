@@ -56,6 +56,20 @@ def names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
     return {}
 
 
+def beside(autopilot: int, instance: int) -> tuple[str, ...]:
+    """Parameters of what else is done to the samples: low-pass, temperature.
+
+    Not every program has them; where one is not answered, nothing is concluded.
+    """
+    if autopilot == ARDUPILOT:
+        corrects = f"INS_TCAL{instance + 1}_ENABLE"
+        return ("INS_ACCEL_FILTER", "INS_GYRO_FILTER", corrects)
+    if autopilot == PX4:
+        cutoffs = ("IMU_ACCEL_CUTOFF", "IMU_GYRO_CUTOFF")
+        return (*cutoffs, "TC_A_ENABLE", "TC_G_ENABLE")
+    return ()
+
+
 @dataclass(slots=True)
 class Installed:
     """What an autopilot says of its own calibration.
@@ -79,6 +93,18 @@ class Installed:
         """Parameters that have not come."""
         known = names(self.autopilot, self.instance).values()
         return [name for some in known for name in some if name not in self.values]
+
+    @property
+    def remark(self) -> str:
+        """What the operator should know of it, one sentence; empty if nothing."""
+        on = [n for n, v in self.values.items() if n.endswith("_ENABLE") and v]
+        if not on:
+            return ""
+        return (
+            f"{on[0]} = {self.values[on[0]]:g}: the autopilot corrects for temperature"
+            " before it sends, so what is found holds near the temperature of this"
+            " recording"
+        )
 
     def of(self, what: str) -> Array:
         """Return ``acc_offset``, ``acc_scale`` or ``gyr_offset``, (3,), nan unknown."""
@@ -129,6 +155,8 @@ class Installed:
     def as_table(self) -> dict[str, Any]:
         """What a recording keeps of it."""
         return {
+            "autopilot": self.autopilot,
+            "instance": self.instance,
             "parameters": self.values,
             "missing": self.missing,
             "taken_out": self.taken_out,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, Found
+from fieldcal.drivers.framing import Bytes, Candidates, Found, widened
 from fieldcal.drivers.mavlink_frames import (
     LONGEST,
     Packets,
@@ -24,14 +24,13 @@ from fieldcal.drivers.mavlink_frames import (
 from fieldcal.drivers.mavlink_units import (
     ACCELERATIONS,
     RATES,
-    Quantisation,
     refuse,
     told,
     unbiased,
 )
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.timebase import Stamps
-from fieldcal.samples import Array, Block, concat
+from fieldcal.samples import Array, Block, Grain, concat
 
 Fields = NDArray[np.void]
 
@@ -122,12 +121,11 @@ class Decoder(Codec):
             self._extras[number] = message.crc_extra
 
     @property
-    def quantisation(self) -> Quantisation:
-        """What the rounding of the message adds to each sample."""
+    def grain(self) -> Grain:
+        """What the message rounds to, once its unit is known."""
         if not self.kind.whole or not self.acc_unit:
-            return Quantisation(0.0, 0.0)
-        acc, gyr = ACCELERATIONS[self.acc_unit], RATES[self.gyr_unit]
-        return Quantisation(acc / 12**0.5, gyr / 12**0.5)
+            return Grain()
+        return Grain(ACCELERATIONS[self.acc_unit], RATES[self.gyr_unit], self._cut)
 
     @property
     def vehicle(self) -> tuple[int, int] | None:
@@ -204,7 +202,7 @@ class Decoder(Codec):
         self._waiting.append((fields, t_host))
         fields = np.concatenate([some for some, _ in self._waiting])
         t_host = np.concatenate([some for _, some in self._waiting])
-        acc = fields["acc"].astype(float)
+        acc = widened(fields["acc"])
         for end in range(FEW, min(len(acc), ENOUGH) + 1, FEW):
             if unit := told(acc[end - FEW : end], self.kind.whole):
                 self.acc_unit, self._waiting = unit, []
@@ -216,7 +214,7 @@ class Decoder(Codec):
     def _block(self, fields: Fields, t_host: Array) -> Block | None:
         if not len(fields):
             return None
-        acc, gyr = fields["acc"].astype(float), fields["gyr"].astype(float)
+        acc, gyr = widened(fields["acc"]), widened(fields["gyr"])
         if self.kind.whole and self._cut:
             acc, gyr = unbiased(acc), unbiased(gyr)
         stamps = fields["t"] * self.kind.tick
@@ -237,7 +235,7 @@ class Decoder(Codec):
 
     def _temperature(self, fields: Fields) -> Array:
         """Temperature in deg C; nan where the message has none."""
-        degrees = fields["temperature"].astype(float)
+        degrees = widened(fields["temperature"])
         if self.kind.whole:
             return np.where(degrees == 0, np.nan, degrees / 100)
         said = fields["updated"]

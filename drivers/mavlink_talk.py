@@ -14,7 +14,13 @@ from collections.abc import Callable, Mapping
 from math import inf
 from typing import Any
 
-from fieldcal.drivers.mavlink_installed import PX4, Installed, identity, names
+from fieldcal.drivers.mavlink_installed import (
+    PX4,
+    Installed,
+    beside,
+    identity,
+    names,
+)
 from fieldcal.errors import DeviceError
 
 EVERY = 1.0
@@ -204,11 +210,13 @@ class Talk:
             )
             return b""
         target = self.vehicle or (0, 0)
+        more = beside(self.installed.autopilot, self._instance)
+        unheard = [name for name in more if name not in self.installed.values]
         return b"".join(
             self._packed(
                 self._out.param_request_read_encode(*target, name.encode(), -1)
             )
-            for name in self.installed.missing
+            for name in (*unheard, *self.installed.missing)
         )
 
     def _set(self) -> bytes:
@@ -240,12 +248,16 @@ class Talk:
         if installed is None:
             return
         known = names(installed.autopilot, installed.instance).values()
-        if message.param_id not in {name for some in known for name in some}:
+        more = beside(installed.autopilot, installed.instance)
+        if message.param_id not in {*more, *(name for some in known for name in some)}:
             return
         value = float(message.param_value)
         if installed.autopilot == PX4 and message.param_type == INT32:
             # PX4 sends the bits of a whole number, others its value
             (value,) = struct.unpack("<i", struct.pack("<f", message.param_value))
+        if message.param_id in more:
+            installed.values[message.param_id] = float(value)
+            return
         self._now[message.param_id] = float(value)
         if not self._read:
             installed.values[message.param_id] = float(value)

@@ -16,7 +16,6 @@ Symbols: k field, x what was measured in the unit of the field. Device axes as s
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -38,24 +37,9 @@ CLOSE = 0.2
 """Share of g by which a device may be off that still tells its unit."""
 
 
-class Quantisation(NamedTuple):
-    """Standard deviation of one sample from its rounding, m/s^2 and rad/s; (2).
-
-    Samples whose noise is below their unit share one error: it does not average out.
-    """
-
-    acc: float
-    gyr: float
-
-
 def unbiased(k: Array) -> Array:
     """Return the mean of what was cut toward zero to `k`, (2)."""
     return k + 0.5 * np.sign(k)
-
-
-def variance(k: Array) -> Array:
-    """Return the variance of what was cut toward zero to `k`, (2)."""
-    return np.where(k == 0, 1 / 3, 1 / 12)
 
 
 def told(acc: Array, whole: bool) -> str | None:

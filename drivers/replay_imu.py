@@ -1,26 +1,32 @@
 """A recording as a device: ``replay:SESSION_OR_LOG?speed=1``.
 
 What can be replayed: a session folder, a samples file (.csv, .csv.gz, .parquet,
-.arrows), or the bytes of a serial port kept in a file (also .gz), with their ``format``
-and its options as in `serial_imu`. ``speed`` is device time against the clock, or
-``max``. Units of a samples file are those of its session, m/s^2 and rad/s without one.
+.arrows), the bytes of a serial port kept in a file (also .gz), with their ``format``
+and its options as in `serial_imu`, or a log of a CAN bus (.log, .asc, .blf, .trc) or of
+MAVLink (.tlog), with the options of `can_imu` and `mavlink_imu`, which play it.
+``speed`` is device time against the clock, or ``max``. Units of a samples file are
+those of its session, m/s^2 and rad/s without one.
 """
 
 from __future__ import annotations
 
 import gzip
+from collections.abc import Mapping
 from math import inf
 from pathlib import Path
 from time import monotonic, sleep
+from typing import Any
 
 import numpy as np
 
 from fieldcal.driver import Driver, Health
+from fieldcal.drivers import can_log, mavlink_log
 from fieldcal.drivers.codec import open_codec
 from fieldcal.drivers.options import Options, split
 from fieldcal.errors import DeviceError, InputError
+from fieldcal.observing import grain_of
 from fieldcal.sample_files import ENDINGS, read
-from fieldcal.samples import Block, concat
+from fieldcal.samples import Block, Grain, concat
 from fieldcal.session import Session
 
 PIECE = 0.5
@@ -31,6 +37,55 @@ CUT = 1 << 20
 
 
 class Imu(Driver):
+    """A recording that is played as if the device were there."""
+
+    def __init__(self, address: str) -> None:
+        place, options = split(address, "replay")
+        bytes_of_a_port = bool(options.text("format"))
+        self._player: Driver
+        if can_log.is_log(place) and not bytes_of_a_port:
+            from fieldcal.drivers import can_imu
+
+            self._player = can_imu.Imu(address)
+        elif mavlink_log.is_log(place) and not bytes_of_a_port:
+            from fieldcal.drivers import mavlink_imu
+
+            self._player = mavlink_imu.Imu(address)
+        else:
+            self._player = Samples(address)
+        self.name, self.health = self._player.name, self._player.health
+
+    def receive(self, timeout: float) -> Block | None:
+        """Return what is due, or None if nothing is within `timeout` seconds.
+
+        Raises
+        ------
+        DeviceError
+            At the end of the recording.
+
+        """
+        return self._player.receive(timeout)
+
+    def host_time(self) -> float:
+        """Now, in s of the clock that stamped the arrivals."""
+        return self._player.host_time()
+
+    @property
+    def grain(self) -> Grain:
+        """What the device rounded to."""
+        return self._player.grain
+
+    @property
+    def notes(self) -> Mapping[str, Any]:
+        """What a log says of the device beside its samples."""
+        return self._player.notes
+
+    def close(self) -> None:
+        """Let go of the recording."""
+        self._player.close()
+
+
+class Samples(Driver):
     """Samples of a recording, delivered when they are due."""
 
     def __init__(self, address: str) -> None:
@@ -40,12 +95,33 @@ class Imu(Driver):
             speed = str(options.number("speed", 1.0, 1e-3, 1e6))
         self._speed = inf if speed == "max" else float(speed)
         self.name = place
-        self._block = load(Path(place), options)
+        self._grain = Grain()
+        self._block = self._load(Path(place), options)
         options.finish()
         if not len(self._block):
             raise InputError(f"{place} holds no sample; check format and options")
         self.health = Health()
         self._next, self._began = 0, -1.0
+        self._now = float(self._block.t_host[0])
+
+    def _load(self, place: Path, options: Options) -> Block:
+        if place.is_dir():
+            session = Session.open(place)
+            self._grain = grain_of(session)
+            return session.block
+        if place.is_file() and not place.name.endswith(ENDINGS):
+            block, self._grain = decoded(place, options)
+            return block
+        return load(place)
+
+    @property
+    def grain(self) -> Grain:
+        """What the device rounded to, as far as the recording says it."""
+        return self._grain
+
+    def host_time(self) -> float:
+        """Arrival of the last sample, as far as the recording says it."""
+        return self._now if self._now == self._now else super().host_time()
 
     def receive(self, timeout: float) -> Block | None:
         """Return what is due, or None if nothing is within `timeout` seconds.
@@ -70,6 +146,7 @@ class Imu(Driver):
         until = min(now, t[i] + PIECE)
         end = max(i + 1, int(np.searchsorted(t, until, side="right")))
         self._next = end
+        self._now = float(self._block.t_host[end - 1])
         self.health.samples += end - i
         return self._block[i:end]
 
@@ -78,21 +155,29 @@ class Imu(Driver):
         self._next = len(self._block)
 
 
-def load(place: Path, options: Options) -> Block:
-    """Read all samples of a recording.
+def load(place: Path) -> Block:
+    """Read the samples of a file.
 
     Raises
     ------
     InputError
-        If there is none, or nothing says what it is.
+        If there is none, or it cannot be read.
 
     """
-    if place.is_dir():
-        return Session.open(place).block
     if not place.is_file():
         raise InputError(f"{place}: there is no such session or log")
-    if place.name.endswith(ENDINGS):
-        return read(place)[0]
+    return read(place)[0]
+
+
+def decoded(place: Path, options: Options) -> tuple[Block, Grain]:
+    """Decode the bytes of a port; the samples, and what their format rounds to.
+
+    Raises
+    ------
+    InputError
+        If nothing says what bytes they are.
+
+    """
     name = options.text("format")
     if not name:
         raise InputError(
@@ -104,4 +189,4 @@ def load(place: Path, options: Options) -> Block:
     with opened(place, "rb") as file:
         while data := file.read(CUT):
             blocks.append(codec.feed(data))
-    return concat(block for block in blocks if block is not None)
+    return concat(block for block in blocks if block is not None), codec.grain

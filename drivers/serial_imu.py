@@ -19,7 +19,7 @@ from fieldcal.drivers.options import split
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Block
+from fieldcal.samples import Block, Grain
 
 POLL = 0.1
 """Longest wait for a byte before the reader looks whether it should end, s."""
@@ -76,13 +76,7 @@ class SerialPort:
 
 
 class Imu(Driver):
-    """A serial port and the codec of what comes from it.
-
-    Attributes
-    ----------
-    skew : the device's clock against the host's
-
-    """
+    """A serial port and the codec of what comes from it."""
 
     faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)
 
@@ -94,8 +88,8 @@ class Imu(Driver):
         self._format = options.text("format", "witmotion")
         self._codec = open_codec(self._format, options)
         self._heard: list[Chunk] = []
-        self.skew = Skew()
         self.health = self._codec.health
+        self._skew = Skew(self.health)
         baud = int(options.number("baud", self._codec.bauds[0], 50, 1e8))
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
         options.finish()
@@ -106,6 +100,11 @@ class Imu(Driver):
         """True while the port is gone and is being tried again."""
         return self._reader.reconnecting
 
+    @property
+    def grain(self) -> Grain:
+        """What the wire format rounds to."""
+        return self._codec.grain
+
     def receive(self, timeout: float) -> Block | None:
         """Return what has come, or None if nothing whole came in `timeout` seconds."""
         deadline = monotonic() + timeout
@@ -114,7 +113,7 @@ class Imu(Driver):
             block = self._codec.feed_all(chunks)
             if block is not None:
                 self._heard = []
-                self.skew.add(block.t, block.t_host)
+                self._skew.add(block.t, block.t_host)
                 return block
             self._heard = [*self._heard, *chunks][-HEARD:]
             if monotonic() >= deadline:

@@ -13,10 +13,9 @@ through minima in place of their linear programme. All in s.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from fieldcal.driver import ClockLine, Health
 from fieldcal.samples import Array
 
 STRETCH = 1.0
@@ -29,31 +28,27 @@ LEAST = 10
 """Stretches that a line takes."""
 
 
-class Line(NamedTuple):
-    """The device's clock against the host's.
+class Skew:
+    """Collects device times and arrivals in bounded memory.
 
-    Attributes
+    Parameters
     ----------
-    fast_ppm, sigma_ppm : how fast the device's clock is, and its standard error
-    offset, sigma : host time when the device's is 0, least delay included, s
+    health : told the line whenever a stretch is over; a clock begun anew has a new line
 
     """
 
-    fast_ppm: float
-    sigma_ppm: float
-    offset: float
-    sigma: float
-
-
-class Skew:
-    """Collects device times and arrivals in bounded memory."""
-
-    def __init__(self) -> None:
+    def __init__(self, health: Health) -> None:
+        self._health, self._restarts = health, health.restarts
         self._length = STRETCH
         self._least: dict[int, tuple[float, float, int]] = {}
 
     def add(self, t: Array, t_host: Array) -> None:
         """Take device times and arrivals, (n,) each; arrivals may be unknown."""
+        if not self._health.clocked:
+            return
+        if self._restarts != self._health.restarts:
+            self._restarts, self._least = self._health.restarts, {}
+        before = len(self._least)
         known = ~(np.isnan(t) | np.isnan(t_host))
         t, late = t[known], (t_host - t)[known]
         if not len(t):
@@ -65,8 +60,11 @@ class Skew:
             i = begin + int(np.argmin(late[begin:end]))
             n = end - begin
             self._keep(int(stretch[begin]), float(t[i]), float(late[i]), n)
+        begun = len(self._least) > before
         while len(self._least) > MOST:
             self._coarsen()
+        if begun:
+            self._health.clock = self.line()
 
     def _keep(self, stretch: int, t: float, late: float, n: int) -> None:
         before_t, before, count = self._least.get(stretch, (t, late, 0))
@@ -79,7 +77,7 @@ class Skew:
         for t, late, n in points:
             self._keep(int(np.floor(t / self._length)), t, late, n)
 
-    def line(self) -> Line | None:
+    def line(self) -> ClockLine | None:
         """Fit the line, (1); None before there is enough."""
         if len(self._least) < LEAST:
             return None
@@ -94,9 +92,9 @@ class Skew:
         spread = float(np.sum((t - middle) ** 2))
         rate = 1.0 + float(slope)  # (1)
         sigma_rate = np.sqrt(variance / spread)
-        return Line(
+        return ClockLine(
             fast_ppm=(1 / rate - 1) * 1e6,
             sigma_ppm=float(sigma_rate / rate**2) * 1e6,
-            offset=float(level - slope * middle),
-            sigma=float(np.sqrt(variance / len(t) + (sigma_rate * middle) ** 2)),
+            offset_s=float(level - slope * middle),
+            sigma_s=float(np.sqrt(variance / len(t) + (sigma_rate * middle) ** 2)),
         )

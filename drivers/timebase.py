@@ -13,6 +13,8 @@ hardly any time go by, has begun anew: time goes on from the last sample by what
 host saw.
 
 Rate (`Rate`). t_k = k / rate, k counting also the samples known to be missing.     (2)
+Where a device that has run in real time says nothing for more than `PAUSE`, and what
+comes then is not the samples of that time in a heap, time goes on as the host saw it.
 
 All in s. Symbols: k sample number, T period, q resolution, u phase. `Arrivals` is
 beside this, and `Clock` chooses.
@@ -20,6 +22,7 @@ beside this, and `Clock` chooses.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -35,6 +38,15 @@ LEAP = 60.0
 
 WITNESS = 0.005
 """Least share of a leap that the host must have seen: devices run up to 200 x fast."""
+
+PAUSE = 1.0
+"""Arrivals so far apart are no jitter, s."""
+
+AT_ONCE = 0.05
+"""What waited in a buffer comes within this, s."""
+
+IN_STEP = 0.2
+"""How far a device that runs in real time may be off its declared rate, relative."""
 
 EARLY = 16
 """Intervals from which the period is first told."""
@@ -79,19 +91,43 @@ class Rate:
     def __init__(self, health: Health, rate: float) -> None:
         self._health, self._period = health, 1.0 / rate
         self._base, self._k = 0.0, -1
-        self._host = _NAN
+        self._host = self._host0 = _NAN
         self._broken = False
 
     def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
         """Return times (n,); over a broken link time goes on as the host saw it."""
         if self._broken:
             self._mend(float(t_host[0]))
+        pauses = np.flatnonzero(np.diff(t_host, prepend=self._host) > PAUSE).tolist()
+        edges = [*dict.fromkeys([0, *pauses]), len(steps)]
+        parts = []
+        for begin, end in pairwise(edges):
+            if begin in pauses:
+                self._pause(steps[begin:], t_host[begin:])
+            parts.append(self._count(steps[begin:end], t_host[begin:end]))
+        return np.concatenate(parts)
+
+    def _count(self, steps: Array, t_host: Array) -> Array:
+        if self._k < 0:
+            self._host0 = float(t_host[0])
         k = self._k + np.cumsum(steps)
         self._health.gaps += int(np.sum(steps > 1))
         self._health.missing += int(np.sum(steps - 1))
         self._k, self._host = int(k[-1]), float(t_host[-1])
         t: Array = self._base + k * self._period  # (2)
         return t
+
+    def _pause(self, steps: Array, t_host: Array) -> None:
+        """Tell a device that was silent from samples that only waited for us."""
+        told, seen = self._k * self._period, self._host - self._host0
+        if not (seen > PAUSE and abs(told / seen - 1) < IN_STEP):
+            return  # it does not run in real time: arrivals say nothing of it
+        came = np.sum(steps[t_host < t_host[0] + AT_ONCE]) * self._period
+        waited = max(0.0, float(came) - AT_ONCE)
+        away = float(t_host[0]) - self._host
+        if waited < away / 2:
+            self._health.missing += round((away - waited) / self._period) - 1
+            self._mend(float(t_host[0]))
 
     def broken(self) -> None:
         """Have the next sample begin after a gap."""

@@ -133,7 +133,7 @@ def _link(
         samples += len(t)
         if len(t) > 1 and period > 0:
             missing += int(np.maximum(np.rint(np.diff(t) / period) - 1, 0).sum())
-    bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "counts")
+    bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "link")
     return {"samples": samples, "missing": missing, "bad": bad}
 
 
@@ -166,9 +166,7 @@ def _restarts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
                 f"the device's clock began anew behind position {taken[-1] + 1}: if it"
                 " lost power there, its bias at the next start may be another"
             )
-    counted = sum(
-        int(m.get("restarts", 0)) for m in marks if m.get("event") == "counts"
-    )
+    counted = sum(int(m.get("restarts", 0)) for m in marks if m.get("event") == "link")
     if counted:
         said.append(
             f"the device started anew {counted} times meanwhile: its bias at the next"

@@ -23,6 +23,7 @@ COMMANDS = {
     "write": ("install a calibration on an autopilot", "write"),
     "undo": ("give an autopilot back what it had before", "undo"),
     "diagnose": ("say what physics the simulation leaves out", "diagnose"),
+    "report": ("make a page of a session that opens offline", "report"),
     "import": ("make a session of a recording from elsewhere", "import_recording"),
     "sim": ("be a virtual device on a link", "sim"),
     "ports": ("list the devices that are plugged in", "ports"),

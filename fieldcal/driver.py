@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
 from time import monotonic, time
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
-from fieldcal.samples import Block, concat
+from fieldcal.samples import Block, Grain, concat
 
 LOOK = 0.5
 """How often whoever reads is told of a silence, s of the host's clock."""
@@ -31,6 +31,31 @@ _STARTED = time() - monotonic()
 def host_clock() -> float:
     """Host time in s since 1970 that is never set back; what `Block.t_host` counts."""
     return _STARTED + monotonic()
+
+
+REAL_TIME = 1e5
+"""Difference of the clocks beyond which a device does not run in real time, ppm."""
+
+
+class ClockLine(NamedTuple):
+    """The device's clock against the host's: a straight line through the arrivals.
+
+    Attributes
+    ----------
+    fast_ppm, sigma_ppm : how fast the device's clock is, and its standard error
+    offset_s, sigma_s : host time when the device's is 0, least delay included, s
+
+    """
+
+    fast_ppm: float
+    sigma_ppm: float
+    offset_s: float
+    sigma_s: float
+
+    @property
+    def real_time(self) -> bool:
+        """Whether the device runs beside the host's clock, not many times as fast."""
+        return abs(self.fast_ppm) < REAL_TIME
 
 
 @dataclass(slots=True)
@@ -47,6 +72,8 @@ class Health:
     missing : samples missing in those gaps, as far as the device's clock tells
     repeated : samples dropped because their stamp was an old one
     restarts : times that the device's clock began anew
+    clocked : whether the times are the device's own, and not fitted to the arrivals
+    clock : the device's clock against the host's, None while it is not known
 
     """
 
@@ -58,6 +85,8 @@ class Health:
     missing: int = 0
     repeated: int = 0
     restarts: int = 0
+    clocked: bool = True
+    clock: ClockLine | None = None
 
 
 class Driver(ABC):
@@ -92,6 +121,11 @@ class Driver(ABC):
     def reconnecting(self) -> bool:
         """True while the link is broken and the driver still tries to mend it."""
         return False
+
+    @property
+    def grain(self) -> Grain:
+        """What the device rounds its outputs to, as far as it is known."""
+        return Grain()
 
     @property
     def notes(self) -> Mapping[str, Any]:

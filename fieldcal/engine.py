@@ -22,9 +22,9 @@ from fieldcal.breaks import Again, gap, restarted
 from fieldcal.description import Description
 from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, Skipped, Stopped, WrongPosition
+from fieldcal.link_marks import LinkMarks, Recording
 from fieldcal.placing import GAP, Placing, force
 from fieldcal.plan import Hold, Note, Plan, Step
-from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block, pieces
 from fieldcal.view import Operator, Phase, View, Wish
 from fieldcal.warmth import Warmth
@@ -58,7 +58,7 @@ class Engine:
         driver: Driver,
         operator: Operator,
         about: Description,
-        recorder: Recorder,
+        recorder: Recording,
         give_up: float | None = None,
         taken: dict[int, Average] | None = None,
         warmth: Warmth | None = None,
@@ -74,6 +74,7 @@ class Engine:
         self._noise: Noise | None = None
         self._left: int | None = None
         self._before: int | None = None
+        self._link = LinkMarks(driver, recorder)
         self._silence = 0
         driver.on_silence = self._silent
         self._stream = self._record(driver)
@@ -105,6 +106,8 @@ class Engine:
         except StopIteration as done:
             result: R = done.value
             return result
+        finally:
+            self._link.end()
 
     def _do(self, step: Step) -> object:
         match step:
@@ -142,6 +145,7 @@ class Engine:
         for raw in driver.blocks():
             self._silence = 0
             block = self._recorder.append(raw)
+            self._link.take(block)
             if len(block) > 1:
                 self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
             self._temperature = float(block.temperature[-1])
@@ -228,7 +232,7 @@ class Engine:
 
     def _average(self, hold: Hold) -> Average | None:
         """Average a window; None if the operator wants to begin it again."""
-        window, last = Window(noise=self._noise), np.nan
+        window, last = Window(noise=self._noise, grain=self._driver.grain), np.nan
         restarts = self._driver.health.restarts
         try:
             for block in self._stream:

@@ -138,4 +138,9 @@ def link(view: View) -> Text:
     parts.append(f"{health.gaps} gaps, {health.missing} missing, {health.bad} bad")
     if np.isfinite(view.temperature):
         parts.append(f"{view.temperature:.1f} °C")
+    if health.restarts:
+        parts.append(f"restarts: {health.restarts}")
+    if health.clock and health.clock.real_time:
+        clock = health.clock
+        parts.append(f"clock {clock.fast_ppm:+.0f} ± {clock.sigma_ppm:.1g} ppm")
     return Text("link: " + " · ".join(parts), style="dim")

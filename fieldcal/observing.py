@@ -14,7 +14,7 @@ from fieldcal import __version__
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.description import Description
 from fieldcal.errors import FieldcalError, Moved, SessionError
-from fieldcal.samples import Block
+from fieldcal.samples import Block, Grain
 from fieldcal.session import Session
 from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, Noise, Window, average
@@ -100,9 +100,10 @@ def rests(session: Session) -> Rests:
     block = session.block
     rows, averages, warnings = [], [], list(session.warnings)
     noise: Noise | None = None
+    grain = grain_of(session)
     for i, window in enumerate(session.windows):
         try:
-            found, noise, said = _take(block, window, noise)
+            found, noise, said = _take(block, window, noise, grain)
         except FieldcalError as error:
             warnings.append(f"position {i} is left out: {error}")
             continue
@@ -141,8 +142,20 @@ def with_turns_between(
     return turns.offered(calibration, session.block, still.averages, seen.nominal)
 
 
+def grain_of(session: Session) -> Grain:
+    """What the device said that it rounds to, when it was recorded."""
+    marks = [mark for mark in session.marks() if mark.get("event") == "grain"]
+    if not marks:
+        return Grain()
+    said = marks[-1]
+    return Grain(float(said["acc"]), float(said["gyr"]), bool(said["cut"]))
+
+
 def _take(
-    block: Block, span: tuple[float, float] | None, noise: Noise | None
+    block: Block,
+    span: tuple[float, float] | None,
+    noise: Noise | None,
+    grain: Grain,
 ) -> tuple[Average, Noise | None, str]:
     """Average of a window, what it taught about the noise, and what must be said."""
     if span is None:
@@ -153,19 +166,21 @@ def _take(
             f"no samples lie between {span[0]:g} and {span[1]:g} s; the recording"
             f" spans {block.t[0]:g} to {block.t[-1]:g} s"
         )
-    window = Window(noise=noise)
+    window = Window(noise=noise, grain=grain)
     window.add(part)
     try:
         return window.average(), window.noise and window.noise.spectrum, ""
     except Moved as moved:
-        calm = _calm(part, moved, noise)
+        calm = _calm(part, moved, noise, grain)
         if calm is None:
             raise
         said = f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
         return calm, noise, f"{said} is used"
 
 
-def _calm(block: Block, moved: Moved, noise: Noise | None) -> Average | None:
+def _calm(
+    block: Block, moved: Moved, noise: Noise | None, grain: Grain
+) -> Average | None:
     """Average of the longest calm part, None if there is none worth it."""
     sides = [
         block.between(-float("inf"), moved.at),
@@ -177,12 +192,12 @@ def _calm(block: Block, moved: Moved, noise: Noise | None) -> Average | None:
         if length < SHORTEST or (best and length <= best.end - best.start):
             continue
         try:
-            found: Average | None = average(side, noise=noise)
+            found: Average | None = average(side, noise=noise, grain=grain)
         except Moved as again:
             inside = side.t[0] < again.at < side.t[-1]
             # a disturbance lasts: what follows its first instant is disturbed as well
             shifted = again.at if inside else side.t[0] + 1.0
-            found = _calm(side, Moved(str(again), shifted, again.axis), noise)
+            found = _calm(side, Moved(str(again), shifted, again.axis), noise, grain)
         if found and (best is None or found.end - found.start > best.end - best.start):
             best = found
     return best

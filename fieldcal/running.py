@@ -14,6 +14,7 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
+from fieldcal.beside import First
 from fieldcal.breaks import Again
 from fieldcal.calibration import Calibration
 from fieldcal.driver import Driver
@@ -60,7 +61,7 @@ class Running:
         self,
         task: Task,
         operator: Operator,
-        recorder: Recorder,
+        recorder: Recorder | First,
         opened: Callable[[], Driver],
         limits: Limits,
         patience: float,
@@ -100,6 +101,8 @@ class Running:
         recorder, task = self._recorder, self._task
         if driver.notes:
             recorder.mark("device", **driver.notes)
+            for text in driver.notes.get("says", ()):
+                self._operator.tell(text)
         engine = Engine(
             driver,
             self._operator,
@@ -109,17 +112,11 @@ class Running:
             self._taken,
             self._warmth,
         )
-        try:
-            while True:
-                try:
-                    return engine.run(self._plan())
-                except Again as again:
-                    self._taken.pop(again.index, None)
-        finally:
-            health = driver.health
-            counted = {name: getattr(health, name) for name in _COUNTED}
-            with suppress(SessionError):
-                recorder.mark("counts", **counted)
+        while True:
+            try:
+                return engine.run(self._plan())
+            except Again as again:
+                self._taken.pop(again.index, None)
 
     def _plan(self) -> Plan[Calibration]:
         task = self._task
@@ -155,9 +152,6 @@ class Running:
                 raise Stopped("stopped by the operator")
             sleep(RETRY)
         raise lost
-
-
-_COUNTED = ("samples", "bad", "skipped", "gaps", "missing", "repeated", "restarts")
 
 
 def taken_before(session: Session, task: Task) -> dict[int, Average]:

@@ -80,6 +80,27 @@ class Block:
         return Block(*(getattr(self, f.name)[rows] for f in fields(Block)))
 
 
+@dataclass(frozen=True, slots=True)
+class Grain:
+    """What a device rounds its outputs to, where it says so.
+
+    Attributes
+    ----------
+    acc, gyr : steps of the outputs, m/s^2 and rad/s; 0 where not known
+    cut : whether toward zero, and then put in the middle of what it may have been
+
+    """
+
+    acc: float = 0.0
+    gyr: float = 0.0
+    cut: bool = False
+
+    @property
+    def step(self) -> Array:
+        """Step of each channel, (6,); 0 where not known."""
+        return np.repeat([self.acc, self.gyr], 3)
+
+
 def concat(blocks: Iterable[Block]) -> Block:
     """Join blocks in time order; no block at all gives an empty one."""
     parts = list(blocks)

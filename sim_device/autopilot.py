@@ -45,6 +45,9 @@ OWN = (
 )
 DENIED, UNSUPPORTED = 2, 3
 INT32, REAL32 = 6, 9
+WHOLE = ("SENS_BOARD_ROT", "TC_A_ENABLE", "TC_G_ENABLE")
+"""Parameters of PX4 that are whole numbers."""
+
 COPTER = 2
 SET_INTERVAL = 511
 
@@ -55,14 +58,17 @@ def parameters(kind: str) -> dict[str, float]:
         acc = {f"CAL_ACC{n}_{x}OFF": 0.0 for n in range(3) for x in "XYZ"}
         scale = {f"CAL_ACC{n}_{x}SCALE": 1.0 for n in range(3) for x in "XYZ"}
         gyr = {f"CAL_GYRO{n}_{x}OFF": 0.0 for n in range(3) for x in "XYZ"}
-        return {**acc, **scale, **gyr, "SENS_BOARD_ROT": 0.0}
+        cutoffs = {"IMU_ACCEL_CUTOFF": 30.0, "IMU_GYRO_CUTOFF": 40.0}
+        return {**acc, **scale, **gyr, **cutoffs, **dict.fromkeys(WHOLE, 0.0)}
     table = {}
     for n in ("", "2", "3"):
         for x in "XYZ":
             table[f"INS_ACC{n}OFFS_{x}"] = 0.0
             table[f"INS_ACC{n}SCAL_{x}"] = 1.0
             table[f"INS_GYR{n}OFFS_{x}"] = 0.0
-    return {**table, "AHRS_ORIENTATION": 0.0}
+    filters = {"INS_ACCEL_FILTER": 20.0, "INS_GYRO_FILTER": 20.0}
+    corrects = {f"INS_TCAL{n}_ENABLE": 0.0 for n in (1, 2, 3)}
+    return {**table, **filters, **corrects, "AHRS_ORIENTATION": 0.0}
 
 
 class Autopilot:
@@ -100,16 +106,21 @@ class Autopilot:
         self._mav = dialect.MAVLink(None, system, 1)
         self._mav.robust_parsing = True
         self._target = (system, 1)
-        self._every: dict[int, float] = {}
+        self._unasked: dict[int, float] = {}
         for name in filter(None, given.get("streams", "").split(",")):
             if name not in STREAMS:
                 raise InputError(f"streams={name!r} is none of {', '.join(STREAMS)}")
-            self._every[STREAMS[name]] = 0.0
+            self._unasked[STREAMS[name]] = 0.0
+        self._every = dict(self._unasked)
 
     @property
     def sends(self) -> bool:
         """Whether it was asked for any samples."""
         return bool(self._every)
+
+    def reboot(self) -> None:
+        """Send only what is sent unasked; parameters outlast it."""
+        self._every = dict(self._unasked)
 
     def heartbeat(self) -> bytes:
         """Say that it is there."""
@@ -208,7 +219,7 @@ class Autopilot:
         if self._mute or name not in self.parameters:
             return b""
         value, kind = self.parameters[name], REAL32
-        if self._kind == "px4" and name == "SENS_BOARD_ROT":
+        if self._kind == "px4" and name in WHOLE:
             # PX4 puts the bits of a whole number where a float belongs
             (value,), kind = struct.unpack("<f", struct.pack("<i", int(value))), INT32
         index = list(self.parameters).index(name)

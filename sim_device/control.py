@@ -7,7 +7,10 @@ Requests, one key each:
     {"bump": {}}                                    "push", "tilt_deg", "seconds"
     {"fault": {"silence_s": 2}}                     "hangup_s", "garbage_bytes",
                                                     "flip_bits", "lose_bytes",
-                                                    "double_bytes"
+                                                    "double_bytes", "reboot_s",
+                                                    "jitter_s", "skew_ppm",
+                                                    "duplicate_stamps",
+                                                    "late_stamps"
     {"status": true}
     {"stop": true}
 

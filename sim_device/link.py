@@ -60,6 +60,10 @@ class Link(ABC):
     def come_back(self) -> None:
         """Be there again after `hang_up`; `address` may be another."""
 
+    def reboot(self) -> None:
+        """Forget what the host has asked the device for; most are asked for nothing."""
+        return
+
     @abstractmethod
     def close(self) -> None:
         """Release everything; safe to call twice."""

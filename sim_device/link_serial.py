@@ -21,6 +21,7 @@ from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Block
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
+from fieldcal.sim_device.uart import heard, listens_at
 from fieldcal.sim_device.wire import Wire
 
 HEARD = 4096
@@ -38,6 +39,8 @@ class SerialLink(Link):
     wire : how samples are put into bytes
     faults : what spoils them
     port_link : symbolic link that names the port for as long as it is there
+    baud : bit rate of the device; a host at another hears something else. A pty carries
+        any, which is what None leaves it at
 
     Raises
     ------
@@ -49,9 +52,13 @@ class SerialLink(Link):
     """
 
     def __init__(
-        self, wire: Wire, faults: LineFaults, port_link: Path | None = None
+        self,
+        wire: Wire,
+        faults: LineFaults,
+        port_link: Path | None = None,
+        baud: int | None = None,
     ) -> None:
-        self._wire = wire
+        self._wire, self._baud = wire, baud
         self._faults = faults
         self._port_link = port_link
         self._ours = -1
@@ -81,7 +88,11 @@ class SerialLink(Link):
     def send(self, block: Block) -> None:
         """Queue samples; they are lost while no host is there."""
         if self.attached():
-            self._out += self._faults.spoil(self._wire.encode(block))
+            data = self._faults.spoil(self._wire.encode(block))
+            listens = listens_at(self._ours) if self._baud else None
+            if self._baud and listens and listens != self._baud:
+                data = heard(data, self._baud, listens)
+            self._out += data
 
     @property
     def pending(self) -> int:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fieldcal.errors import InputError
-from fieldcal.sim_device.line_faults import KINDS
+from fieldcal.sim_device.line_faults import KINDS, MOST
 from fieldcal.sim_device.vocabulary import AXES
 
 if TYPE_CHECKING:
@@ -69,17 +69,27 @@ def _bump(stream: Stream, given: dict[str, Any]) -> Reply:
 
 
 def _fault(stream: Stream, given: dict[str, Any]) -> Reply:
-    quiet = _number(given, "silence_s", 0.0)
-    away = _number(given, "hangup_s", 0.0)
-    if min(quiet, away) < 0:
-        raise InputError("silence_s and hangup_s must be 0 or more")
-    _nothing_else("fault", given, ("silence_s", "hangup_s", *KINDS), KINDS)
-    if not (quiet or away or given):
-        raise InputError(f"fault needs one of silence_s, hangup_s, {', '.join(KINDS)}")
+    times = {name: _at_least_0(given, name) for name in ("silence_s", "hangup_s")}
+    times["reboot_s"] = _at_least_0(given, "reboot_s")
+    counts = {name: _count(given, name) for name in ("duplicate_stamps", "late_stamps")}
+    jitter = _at_least_0(given, "jitter_s") if "jitter_s" in given else None
+    ppm = _optional(given, "skew_ppm")
+    takes = (*times, *counts, "jitter_s", "skew_ppm", *KINDS)
+    _nothing_else("fault", given, takes, KINDS)
+    if not (any(times.values()) or any(counts.values()) or given) and (
+        jitter is None and ppm is None
+    ):
+        raise InputError(f"fault needs one of {', '.join(takes)}")
     if given:
         stream.faults.order(given)
-    until = [stream.silence(quiet)] if quiet else []
-    until += [stream.hang_up(away)] if away else []
+    stream.stamps.duplicate(counts["duplicate_stamps"])
+    stream.stamps.swap(counts["late_stamps"])
+    if jitter is not None:
+        stream.delay.mean = jitter
+    if ppm is not None:
+        stream.stamps.drift(stream.device.time, ppm)
+    does = (stream.silence, stream.hang_up, stream.reboot)
+    until = [do(s) for do, s in zip(does, times.values(), strict=True) if s]
     return {"until_s": max(until, default=stream.device.time)}
 
 
@@ -133,6 +143,20 @@ def _number(given: dict[str, Any], name: str, default: float) -> float:
     if not number or not math.isfinite(value):
         raise InputError(f"{name} must be a number, not {value!r}")
     return float(value)
+
+
+def _at_least_0(given: dict[str, Any], name: str) -> float:
+    value = _number(given, name, 0.0)
+    if value < 0:
+        raise InputError(f"{name} must be 0 or more, not {value:g}")
+    return value
+
+
+def _count(given: dict[str, Any], name: str) -> int:
+    value = _at_least_0(given, name)
+    if value != int(value) or value > MOST:
+        raise InputError(f"{name} must be a whole number from 0 to {MOST}")
+    return int(value)
 
 
 def _nothing_else(

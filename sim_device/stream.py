@@ -13,9 +13,11 @@ from collections.abc import Callable
 from time import monotonic
 from typing import Protocol
 
+from fieldcal.sim_device.delay import Delay
 from fieldcal.sim_device.device import VirtualDevice
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
+from fieldcal.sim_device.stamp_faults import StampFaults
 
 TICK_S = 0.01
 """How often samples are sent, and longest sleep in between, s of wall clock."""
@@ -70,6 +72,9 @@ class Stream:
         announce: Callable[[str], None] = lambda address: None,
     ) -> None:
         self.device, self.link, self.faults = device, link, faults
+        self.stamps, self.delay = StampFaults(), Delay(device.seed)
+        # a clock that runs fast puts out more samples in a second of the wall clock
+        self._pace = speed * device.sensing.pace
         self._speed, self._duration, self._announce = speed, duration, announce
         self._once, self._heard = once, False
         self._silent_until = self._away_until = -math.inf
@@ -87,9 +92,18 @@ class Stream:
 
     def hang_up(self, seconds: float) -> float:
         """Break the link for so long; returns the device time until then."""
+        self.delay.forget()
         self.link.hang_up()
         self._away_until = max(self._away_until, self.device.time + seconds)
         return self._away_until
+
+    def reboot(self, seconds: float) -> float:
+        """Begin anew after so long; returns the device time until then."""
+        until = self.silence(seconds)
+        self.stamps.reboot(until)
+        self.link.reboot()
+        self._heard = False  # a host that has to ask anew has not gone
+        return until
 
     def run(self, *listeners: Watched) -> None:
         """Run until the end: the duration, or `stop`.
@@ -100,15 +114,19 @@ class Stream:
             If the link fails for good.
 
         """
-        self._origin = monotonic() - self.device.time / self._speed
+        self._origin = monotonic() - self.device.time / self._pace
         while not self._ends:
             self._sleep(listeners)
             for listener in listeners:
                 listener.serve()
+            for block in self.delay.over():
+                self.link.send(block)
             self.link.pump()
             self._notice()
             if not self._ends:
                 self._go_on()
+        for block in self.delay.over(math.inf):
+            self.link.send(block)
         self.link.linger(LINGER_S)
 
     def _notice(self) -> None:
@@ -139,7 +157,9 @@ class Stream:
             self._heard = False
             self._announce(self.link.address)
         elif not silent and not was_away and self._room():
-            self.link.send(block)
+            self.delay.hold(self.stamps.passes(block))
+            for ready in self.delay.over():
+                self.link.send(ready)
         self.link.pump()
 
     def _room(self) -> bool:
@@ -153,19 +173,19 @@ class Stream:
     def _due(self) -> int:
         """How many samples the device should put out now."""
         if self._speed != 1 and not (self.link.attached() or self._away):
-            self._origin = monotonic() - self.device.time / self._speed
+            self._origin = monotonic() - self.device.time / self._pace
             return 0
-        if self._speed != 1 and self.link.pending:
+        if self._speed != 1 and (self.link.pending or self.delay):
             return 0
         stretch = min(max(CHUNK_S, TICK_S * self._speed), MOST_S)
         chunk = max(1, round(stretch * self.device.rate))
         if math.isinf(self._speed):
             return chunk
-        now = (monotonic() - self._origin) * self._speed
+        now = (monotonic() - self._origin) * self._pace
         due = math.floor((now - self.device.time) * self.device.rate)
         late = due / self.device.rate / self._speed
         if self._speed != 1 and late > BEHIND_S:
-            self._origin = monotonic() - self.device.time / self._speed
+            self._origin = monotonic() - self.device.time / self._pace
         batch = max(1, int(TICK_S * self._speed * self.device.rate))
         return min(due, chunk) if due >= batch else 0
 

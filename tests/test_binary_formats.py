@@ -217,3 +217,11 @@ def test_esf_meas_of_two_sensors_is_put_together(counted: bool) -> None:
 def test_vnimu_takes_no_columns() -> None:
     with pytest.raises(InputError, match="columns is fixed"):
         codec("vnimu", "columns=t,ax,ay,az")
+
+
+def test_a_signalling_nan_is_a_missing_value_and_no_warning() -> None:
+    strange = bytes.fromhex("7fa00000") + struct.pack(">2f", 1.0, 2.0)
+    message = mtdata2((0x1060, struct.pack(">I", 100)), (0x4020, strange))
+    block = open_codec("xsens", Options("serial")).feed(message, 0.0)
+    assert block is not None
+    np.testing.assert_array_equal(block.acc, [[np.nan, 1.0, 2.0]])

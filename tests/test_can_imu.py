@@ -106,27 +106,6 @@ def test_slcan_between_two_processes_loses_nothing_of_a_minute_at_1_khz(
     assert np.abs(block.temperature - truth.temperature).max() < 0.005 + 1e-9
 
 
-def test_the_windows_of_a_calibration_are_those_of_a_serial_device(
-    sims: list[subprocess.Popen[str]],
-) -> None:
-    means = []
-    for option, url in (
-        (("--can", "slcan"), f"can:{{}}?{SLCAN}&reconnect=0"),
-        (("--serial", "xsens"), "serial:{}?format=xsens&reconnect=0"),
-    ):
-        port, control = start(
-            sims, *option, "--speed", "max", "--once", "--duration", "65"
-        )
-        with Remote(control) as remote:
-            remote.ask(turn={"alpha_deg": 45, "beta_deg": 5, "at_s": 30.0})
-            with open_driver(url.format(port)) as imu:
-                block = until_the_end(imu)
-        windows = [block.between(0.0, 29.9), block.between(35.0, 64.9)]
-        assert [len(window) for window in windows] == [2990, 2990]
-        means.append([window.six.mean(axis=0) for window in windows])
-    assert np.abs(np.subtract(means[0], means[1])).max() < 5e-6
-
-
 def test_a_calibration_over_can_finds_the_truth_within_its_uncertainty(
     tmp_path: Path,
 ) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from wires import STREAMS, Stream
 
@@ -64,6 +64,7 @@ def test_samples_are_what_was_sent(name: str) -> None:
 
 @every_format
 @settings(max_examples=25)
+@example(step=1)
 @given(step=st.integers(1, 200))
 def test_any_pieces_give_the_same(name: str, step: int) -> None:
     stream = KNOWN[name]

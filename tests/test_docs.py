@@ -1,19 +1,23 @@
-"""The documentation's examples are run, on a session of a virtual device."""
+"""The documentation: its examples are run, its commands and drawings checked."""
 
+import argparse
 import doctest
+import re
+import sys
+import tomllib
+from importlib import import_module
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet
 import pytest
-import tomlkit
+from bench import five_positions
 
-from fieldcal.positions import FIVE
-from fieldcal.sample_files import to_batch
-from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.replay import simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.cli import COMMANDS
+from fieldcal.effects import catalogue
+from fieldcal.positions import SETS, Position
+from fieldcal.session import Session
+from fieldcal.sim_device.vocabulary import parse
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -22,30 +26,7 @@ DOCS = Path(__file__).parent.parent / "docs"
 def bench_7(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A folder to stand in, with a session of five positions on a tilted base."""
     monkeypatch.chdir(tmp_path)
-    starts = 5.0 + 40.0 * np.arange(len(FIVE))
-    windows = [
-        (p.alpha or 0.0, p.beta or 0.0, float(s), float(s) + 30.0)
-        for p, s in zip(FIVE, starts, strict=True)
-    ]
-    tilt = effect("angle_offset", {"alpha0_deg": 0.8, "beta0_deg": -0.5})
-    earth = effect("earth_rate", {})
-    block = simulate(Profile(effects=(tilt, earth)), windows, seed=1)
-    folder = tmp_path / "bench-7"
-    folder.mkdir()
-    positions = [
-        dict(zip(("alpha_deg", "beta_deg"), p.degrees or (), strict=False))
-        | {"start_s": w[2], "end_s": w[3]}
-        for p, w in zip(FIVE, windows, strict=True)
-    ]
-    about = {
-        "format": 1,
-        "device": {"name": "bench unit 7"},
-        "site": {"latitude_deg": 50.45, "height_m": 170.0},
-        "position": positions,
-    }
-    (folder / "session.toml").write_text(tomlkit.dumps(about))
-    table = pa.Table.from_batches([to_batch(block)])
-    pyarrow.parquet.write_table(table, folder / "samples.parquet")
+    five_positions(tmp_path / "bench-7")
 
 
 @pytest.mark.usefixtures("bench_7")
@@ -54,3 +35,74 @@ def test_examples_of_the_documentation(page: Path) -> None:
     failed, tried = doctest.testfile(str(page), module_relative=False)
     assert failed == 0
     assert tried or ">>>" not in page.read_text()
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the site's drawings are made."""
+    monkeypatch.setattr(sys, "path", [str(DOCS), *sys.path])
+
+
+def options(command: str) -> set[str]:
+    parser = argparse.ArgumentParser()
+    module = import_module(f"fieldcal.commands.{COMMANDS[command][1]}")
+    module.add_arguments(parser)
+    text = parser.format_help()
+    return set(re.findall(r"(?<![\w-])-{1,2}[a-z][\w-]*", text))
+
+
+PAGES = [*DOCS.glob("*.md"), DOCS.parent / "README.md"]
+
+
+@pytest.mark.parametrize("page", sorted(PAGES), ids=lambda p: p.stem)
+def test_every_command_line_that_is_shown_has_options_that_exist(page: Path) -> None:
+    lines = re.findall(r"^fieldcal (\w+)(.*)$", page.read_text(), re.MULTILINE)
+    for command, rest in lines:
+        assert command in COMMANDS
+        # what stands in quotation marks belongs to somebody else
+        bare = re.sub(r'"[^"]*"', "", re.split(r" #| &&", rest)[0])
+        named = set(re.findall(r"(?<!\S)-{1,2}[a-z][\w-]*", bare))
+        assert named <= options(command), (command, rest)
+
+
+def test_the_session_that_is_shown_can_be_read(tmp_path: Path) -> None:
+    page = (DOCS / "files.md").read_text()
+    toml = re.search(r"```toml\n(.*?)```", page, re.DOTALL)
+    assert toml and tomllib.loads(toml[1])["format"] == 1
+    (tmp_path / "session.toml").write_text(toml[1])
+    assert Session.open(tmp_path).positions[0].degrees == (0.0, 0.0)
+
+
+@pytest.mark.usefixtures("drawn")
+def test_drawings_of_positions_turn_the_axes_as_the_frames_say() -> None:
+    positions = import_module("drawn.positions")
+    for positions_of in SETS.values():
+        page = positions.drawings(positions_of)
+        assert len(list(ElementTree.fromstring(page))) == len(positions_of)
+    ends = {}
+    for name, position in (("home", (0, 0)), ("half", (180, 0)), ("up", (0, 90))):
+        page = positions.drawings([Position.deg(*position)])
+        found = re.findall(r'<text x="([\d.-]+)" y="([\d.-]+)"[^>]*>(\w)<', page)
+        ends[name] = {axis: np.array([float(x), float(y)]) for x, y, axis in found}
+    centre = np.array([positions.WIDTH, positions.HEIGHT]) / 2
+    # y is down at home, and up after half a turn about z
+    assert (
+        ends["home"]["y"][1] > centre[1] + 40 and ends["half"]["y"][1] < centre[1] - 40
+    )
+    assert abs(ends["home"]["y"][0] - centre[0]) < 1
+    assert (
+        ends["home"]["x"][0] > centre[0] + 40 and ends["half"]["x"][0] < centre[0] - 40
+    )
+    # f = A (0, -g, 0) has +g along z at beta = 90 deg, so z points up
+    assert ends["up"]["z"][1] < centre[1] - 40
+
+
+@pytest.mark.usefixtures("drawn")
+def test_the_picture_of_each_effect_is_one_the_virtual_device_can_make() -> None:
+    pytest.importorskip("matplotlib")
+    effects = import_module("drawn.effects")
+    for effect in catalogue().values():
+        assert parse(effects.given(effect)).id == effect.id
+    for name in ("cross_coupling", "quantisation", "clock_skew"):
+        svg = effects.picture(catalogue()[name])
+        assert svg.lstrip().startswith("<?xml") and svg.count("<path") > 10

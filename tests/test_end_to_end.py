@@ -64,6 +64,11 @@ def test_progress_is_json_lines_on_standard_error(
     assert events.count("place") >= 5 and events.count("taken") == 5
 
 
+def test_a_run_leaves_its_report(recalibrated: tuple[Path, Any, str]) -> None:
+    page = (recalibrated[0] / "report.html").read_text(encoding="utf-8")
+    assert "The calibration can be used" in page and "base tilt about x" in page
+
+
 def test_solving_the_recorded_session_gives_the_same_numbers(
     recalibrated: tuple[Path, Any, str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -61,8 +61,8 @@ def opened(url: str) -> Imu:
     return imu
 
 
-@pytest.mark.parametrize("place", ["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"])
-def test_same_truth_over_udp_and_tcp(place: str) -> None:
+@pytest.mark.parametrize("place", ["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0", "pty"])
+def test_same_truth_over_udp_tcp_and_a_serial_port(place: str) -> None:
     with autopilot(place, "--speed", "5", "--seed", "3", *CONCEALED) as (where, _):
         for message, within in (("HIGHRES_IMU", 2e-3), ("RAW_IMU", 6e-3)):
             with opened(f"mavlink:{where}?message={message}&rate=100") as imu:
@@ -74,22 +74,6 @@ def test_same_truth_over_udp_and_tcp(place: str) -> None:
             mean = block.acc.mean(axis=0)
             np.testing.assert_allclose(mean, at_home, atol=within + 5e-3)
             assert np.all(np.isfinite(block.temperature))
-
-
-def test_a_minute_at_1_khz_over_tcp_without_a_loss() -> None:
-    options = ("--rate", "1000", "--duration", "60", "--speed", "max")
-    with autopilot("tcpin:127.0.0.1:0", *options) as (where, _):
-        blocks = []
-        url = f"mavlink:{where}?message=HIGHRES_IMU&rate=1000&reconnect=0"
-        with opened(url) as imu:
-            with pytest.raises(DeviceError, match="hung up"):
-                for block in imu.blocks(10.0):
-                    blocks.append(block)
-            health = imu.health
-    got = concat(blocks)
-    assert len(got) == health.samples == 60_000
-    assert health.bad == health.skipped == health.gaps == health.repeated == 0
-    np.testing.assert_allclose(np.diff(got.t), 1e-3, atol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -177,6 +161,24 @@ def test_a_turned_board_is_not_composed() -> None:
         assert imu.installed.values["SENS_BOARD_ROT"] == 2
         with pytest.raises(InputError, match="SENS_BOARD_ROT = 2 turns"):
             imu.installed.next(np.zeros(3), np.ones(3), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("has", "name", "cutoff"),
+    [
+        ("INS_TCAL1_ENABLE=1&INS_GYRO_FILTER=42", "INS_TCAL1_ENABLE", 42.0),
+        ("autopilot=px4&TC_A_ENABLE=1&IMU_GYRO_CUTOFF=42", "TC_A_ENABLE", 42.0),
+    ],
+)
+def test_filters_and_temperature_correction_are_recorded_and_said(
+    has: str, name: str, cutoff: float
+) -> None:
+    with autopilot(f"tcpin:127.0.0.1:0?{has}") as (where, _):
+        with opened(f"mavlink:{where}") as imu:
+            taken(imu, 0.2)
+            assert imu.says[0].startswith(f"{name} = 1: the autopilot corrects for")
+            kept = imu.notes["installed"]["parameters"]
+            assert cutoff in (kept.get("INS_GYRO_FILTER"), kept.get("IMU_GYRO_CUTOFF"))
 
 
 def test_another_unit_is_told_from_gravity() -> None:

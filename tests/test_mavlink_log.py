@@ -18,7 +18,7 @@ from fieldcal.drivers.mavlink_log import split
 from fieldcal.drivers.mavlink_samples import Decoder
 from fieldcal.drivers.options import Options
 from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Array, Block, concat
+from fieldcal.samples import Array, Block, Grain, concat
 
 G = 9.80665
 NAME = "autopilot_12_positions"
@@ -97,7 +97,7 @@ def test_units_are_told_and_counts_agree(log: bytes) -> None:
     assert decoder.sources == {(1, 1)}
     assert decoder.health.gaps == decoder.health.repeated == 0
     assert block.temperature[0] == 25.6
-    assert decoder.quantisation.acc == pytest.approx(1e-3 * G / 12**0.5)
+    assert decoder.grain == Grain(1e-3 * G, 1e-3, cut=True)
 
 
 def test_the_log_plays_as_a_device(log: bytes, tmp_path: Path) -> None:

@@ -1,16 +1,21 @@
 """A recording as a device."""
 
 import gzip
+import json
 import time
 from pathlib import Path
 
+import can
 import numpy as np
 import pytest
 from wires import STREAMS
 
+from fieldcal.cli import main
 from fieldcal.driver import open_driver
 from fieldcal.errors import DeviceError, InputError, SessionError
 from fieldcal.samples import Block, concat
+from fieldcal.sim_device import Profile, VirtualDevice
+from fieldcal.sim_device.can_packing import frames
 
 
 def everything(url: str) -> Block:
@@ -56,7 +61,7 @@ def test_a_samples_file_at_the_speed_asked_for(tmp_path: Path) -> None:
 def test_bytes_of_a_port(tmp_path: Path, name: str, packed: bool) -> None:
     stream = STREAMS[name](300, np.random.default_rng(0))
     data = b"".join(stream.pieces)
-    path = tmp_path / ("port.bin.gz" if packed else "port.bin")
+    path = tmp_path / ("port.log.gz" if packed else "port.bin")
     path.write_bytes(gzip.compress(data) if packed else data)
     query = f"&{stream.query}" if stream.query else ""
     block = everything(f"replay:{path}?format={name}&speed=max{query}")
@@ -80,3 +85,47 @@ def test_what_cannot_be_replayed(tmp_path: Path) -> None:
         open_driver(f"replay:{tmp_path}")
     with pytest.raises(InputError, match="speed"):
         open_driver(f"replay:{tmp_path}/noise.bin?format=mip&speed=0")
+
+
+def test_a_log_of_a_can_bus_plays_through_the_same_code(tmp_path: Path) -> None:
+    path = tmp_path / "drive.log"
+    packed = frames(VirtualDevice(Profile(), seed=2).take(400))
+    with can.Logger(path) as log:
+        for i, frame in enumerate(packed):
+            message = can.Message(
+                timestamp=i / 300, arbitration_id=frame.identifier, data=frame.data
+            )
+            message.is_extended_id = False
+            log(message)
+    block = everything(f"replay:{path}?dbc=virtual&speed=max")
+    assert len(block) == 400
+    np.testing.assert_array_equal(
+        block.six, everything(f"can:{path}?dbc=virtual&speed=max").six
+    )
+
+
+def test_a_log_of_an_autopilot_plays_through_the_same_code(shared: Path) -> None:
+    path = shared / "real" / "autopilot_streams" / "autopilot_12_positions.tlog.gz"
+    url = f"replay:{path}?message=RAW_IMU&speed=max"
+    assert len(everything(url)) == 16917
+    with open_driver(url) as imu:
+        next(imu.blocks())
+        assert imu.grain.cut and imu.notes["acc_unit"] == "mg"
+
+
+def test_a_recorded_session_is_taken_through_a_procedure_again(tmp_path: Path) -> None:
+    """The arrivals in it are of long ago; they are the clock while it plays."""
+    run = ["run", "two_position", "--headless", "--seconds", "5"]
+    virtual = ["--virtual=--can slcan", "--speed", "20", "-o", str(tmp_path / "first")]
+    assert main([*run, *virtual]) == 0
+    url = f"replay:{tmp_path / 'first'}?speed=20"
+    with open_driver(url) as imu:
+        assert imu.grain.acc == pytest.approx(1e-4)
+    assert main([*run, "--device", url, "-o", str(tmp_path / "second")]) == 0
+    first, second = (
+        json.loads((tmp_path / name / "result.json").read_text())["parameters"]
+        for name in ("first", "second")
+    )
+    for group in ("acc_bias", "acc_scale"):
+        off = np.subtract(first[group]["value"], second[group]["value"])
+        assert np.all(np.abs(off) < 4 * np.array(first[group]["sigma"]))

@@ -117,6 +117,39 @@ def test_a_rate_goes_on_over_a_broken_link() -> None:
     assert health.gaps == 1
 
 
+def in_batches(clock: Rate, sent: Array, arrived: Array, most: int) -> Array:
+    """Feed samples as they arrive, several batches at a time."""
+    parts = []
+    for some in np.array_split(np.arange(len(sent)), max(1, len(sent) // most)):
+        ones = np.ones(len(some), dtype=int)
+        parts.append(clock.times(ones * np.nan, ones, arrived[some]))
+    return np.concatenate(parts)
+
+
+@pytest.mark.parametrize("most", [1, 7, 100_000])
+def test_a_silent_device_is_a_gap_and_a_stalled_host_is_none(most: int) -> None:
+    sent = np.arange(1000) / 100
+    silent = sent + 2.5 * (sent >= 5)
+    health = Health()
+    t = in_batches(Rate(health, 100.0), sent, silent + 7, most)
+    assert health.gaps == 1 and abs(health.missing - 250) <= 1
+    np.testing.assert_allclose(np.diff(t)[499], 2.51, atol=0.02)
+    stalled = np.where((sent >= 5) & (sent < 7.5), 7.5, sent)
+    health = Health()
+    t = in_batches(Rate(health, 100.0), sent, stalled + 7, most)
+    if most > 250:  # else what waited is not seen together
+        assert health.gaps == 0
+        np.testing.assert_allclose(t, sent)
+
+
+def test_a_device_that_does_not_run_in_real_time_is_not_judged_by_arrivals() -> None:
+    health = Health()
+    sent = np.arange(1000) / 100
+    t = in_batches(Rate(health, 100.0), sent, sent / 20 + 1.5 * (sent >= 5), 7)
+    assert health.gaps == 0
+    np.testing.assert_allclose(t, sent)
+
+
 def arrive(clock: Arrivals, sent: Array, batch: int, rng: np.random.Generator) -> Array:
     """Feed samples sent at these times in batches, each with a delay of its own."""
     parts = []

@@ -25,7 +25,7 @@ from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, headed, rows
 from fieldcal.drivers.layouts import Raw, in_order
 from fieldcal.drivers.options import Options
-from fieldcal.samples import Array, Block
+from fieldcal.samples import Array, Block, Grain
 
 SYNC = b"\xb5\x62"
 HEAD, TAIL, LONGEST = 6, 2, 4104
@@ -54,8 +54,14 @@ class Codec(Base):
         self._number = MEAS if meas else RAW
         self._tick = 1e-3 if meas else tick
         self._held = np.empty((0, 9))
+        self._usual: Mask | None = None
         span = 2**32 * 1e-3 if meas else 2**TAG_BITS * tick
         self._clock = Clock(self.health, options, span=span)
+
+    @property
+    def grain(self) -> Grain:
+        """One count of 24 bits."""
+        return Grain(float(SCALES[0]), float(SCALES[3]))
 
     @classmethod
     def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
@@ -105,10 +111,25 @@ class Codec(Base):
         joined[sample[row], column] = table[row, column]
         lacks = int(np.isnan(joined[-1, 2:8]).any())
         self._held = joined[len(joined) - lacks :]
-        joined = joined[: len(joined) - lacks]
+        joined = self._like_the_first(joined[: len(joined) - lacks])
         stamps, temperature = joined[:, 0] * self._tick, joined[:, 8]
         which, unknown = np.arange(len(joined)), np.full(len(joined), np.nan)
         return Raw(which, joined[:, 2:8], temperature, stamps, unknown), joined[:, 1]
+
+    def _like_the_first(self, joined: Array) -> Array:
+        """Leave out samples of ESF-RAW that lack what the first one had.
+
+        A message of it holds whole samples: where a sample is in parts, the message is
+        one of the few strange ones that pass the check.
+        """
+        if self._number == MEAS or not len(joined):
+            return joined
+        known = ~np.isnan(joined[:, 2:8])
+        if self._usual is None:
+            self._usual = known[0]
+        alike = (known | ~self._usual).all(axis=1)
+        self.health.bad += int(np.count_nonzero(~alike))
+        return joined[alike]
 
 
 def _samples(which: Index, words: Index, tags: Index) -> Raw:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.protocols.text import Codec as Lines
+from fieldcal.samples import Grain
 
 
 class Codec(Lines):
@@ -25,6 +26,11 @@ class Codec(Lines):
             checksum="xor",
         )
         super().__init__(fixed)
+
+    @property
+    def grain(self) -> Grain:
+        """The last digit of a line."""
+        return Grain(1e-3, 1e-6)
 
     @classmethod
     def likeness(cls, data: bytes, seconds: float) -> Likeness | None:

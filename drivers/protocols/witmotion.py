@@ -29,7 +29,7 @@ from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, rows
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
-from fieldcal.samples import Array, Block
+from fieldcal.samples import Array, Block, Grain
 
 SIZE = 11
 TIME, ACC, GYR = 0x50, 0x51, 0x52
@@ -79,6 +79,11 @@ class Codec(Base):
         self._paired: int | None = None
         self._held = np.empty(0, SAMPLE)
         self._day: int | None = None
+
+    @property
+    def grain(self) -> Grain:
+        """One count of 16 bits."""
+        return Grain(self._acc, self._gyr)
 
     def scan(self, data: Bytes) -> Candidates:
         """Every 0x55 that a kind follows."""

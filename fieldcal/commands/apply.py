@@ -32,10 +32,12 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.calibration import Nominal
     from fieldcal.commands.compare import read
+    from fieldcal.commands.installing import check_same
     from fieldcal.session import Session
 
     session = Session.open(args.session)
     calibration = read(args.calibration or args.session)
+    check_same(calibration, session)
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
     kept = [g for g in ("acc_scale", "gyr_scale") if g not in calibration.groups]
     for group in kept:

@@ -66,7 +66,7 @@ def read(path: Path) -> Calibration:
 
 def table(found: Comparison) -> str:
     """Lines of a comparison, a parameter each."""
-    from fieldcal.commands.table import number
+    from fieldcal.calibration.wording import number
 
     width = max(len(n) for n in found.names)
     lines = [f"{'parameter':{width}}  second - first      ± 1σ       difference/σ"]

@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("session", type=Path, metavar="SESSION", help="session folder")
     add("--json", action="store_true", help="print diagnosis.json instead of the view")
+    add("--report", action="store_true", help="write report.html as well")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -45,4 +46,9 @@ def run(args: argparse.Namespace) -> int:
 
         show(found)
         sys.stdout.write(f"written: {path}\n")
+    if args.report:
+        from fieldcal.commands.report import write
+
+        page = write(args.session)
+        (sys.stderr if args.json else sys.stdout).write(f"written: {page}\n")
     return 0 if found.verdict == "consistent" else 1

@@ -115,7 +115,7 @@ def _fit(diagnosis: Diagnosis) -> object:
 def _calibration(diagnosis: Diagnosis) -> object:
     from rich.table import Table
 
-    from fieldcal.commands.table import TITLES, number
+    from fieldcal.calibration.wording import TITLES, number
 
     table = Table(title="Calibration with it", title_justify="left")
     for name in ("parameter", "value", "± 1σ", "unit", "change"):

@@ -199,7 +199,7 @@ def lines(points: Sequence[Point]) -> list[str]:
     The strip spans all values with twice their uncertainty; ``o`` is the value, ``-``
     its ± 2 sigma.
     """
-    from fieldcal.commands.table import number
+    from fieldcal.calibration.wording import number
 
     low = min(p.value - 2 * p.sigma for p in points)
     high = max(p.value + 2 * p.sigma for p in points)

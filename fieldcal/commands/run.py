@@ -7,16 +7,18 @@ import contextlib
 import json
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.further import Devices
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.errors import FieldcalError, InputError
 
 if TYPE_CHECKING:
+    from fieldcal.beside import Beside
     from fieldcal.calibration import Calibration
     from fieldcal.history import History
     from fieldcal.limits import Limits
@@ -50,8 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--resume", type=Path, metavar="SESSION", help="go on with a run broken off")
     add(
-        "--device", metavar="URL", help='such as "serial:/dev/ttyUSB0?format=witmotion"'
+        "--device",
+        action=Devices,
+        metavar="URL",
+        help='such as "serial:/dev/ttyUSB0?format=witmotion"; again for each further'
+        " device that turns with the first",
     )
+    parser.set_defaults(further=[])
     add(
         "--virtual",
         nargs=argparse.OPTIONAL,
@@ -77,6 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--headless", action="store_true", help="no operator: progress as JSON lines")
     add("--plain", action="store_true", help="lines instead of a screen")
     add("--json", action="store_true", help="print the result as one JSON object")
+    add("--no-report", action="store_true", help="write no report.html")
     add("--junit", type=Path, metavar="FILE", help="write what happened as JUnit XML")
     add_site(parser)
 
@@ -84,6 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal import junit, limits
+    from fieldcal.commands.further import check_heard, results
     from fieldcal.history import History, default_path
     from fieldcal.session import read_marks
 
@@ -92,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
     bounds = limits.read(task.about.grade, Path(file) if file else None)
     marks = folder / "marks.jsonl"
     try:
-        found, truth = _record(args, task, folder, bounds)
+        found, truth, others = _record(args, task, folder, bounds)
         history = History(args.history or default_path())
         found = _result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
@@ -107,8 +116,27 @@ def run(args: argparse.Namespace) -> int:
     if args.junit:
         known = list(read_marks(marks))
         junit.write(args.junit, task.procedure, task.positions, known, result)
-    _show(args, found, folder, truth)
-    return 0 if found.good and result["decision"]["go"] else 1
+    further = results(others)
+    _show(args, found, folder, truth, further)
+    if not args.no_report:
+        for each in (folder, *(folder / name for name in further)):
+            page = _report(each)
+            if page and not args.json:
+                sys.stdout.write(f"report:   {page}\n")
+    check_heard(others)
+    good = all(each.good for each in (found, *further.values()))
+    return 0 if good and result["decision"]["go"] else 1
+
+
+def _report(folder: Path) -> Path | None:
+    """Write the report; the calibration stands without it."""
+    from fieldcal.commands.report import write
+
+    try:
+        return write(folder)
+    except FieldcalError as error:
+        sys.stderr.write(f"fieldcal run: no report: {error}\n")
+        return None
 
 
 def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
@@ -174,8 +202,9 @@ def _table(name: str, degrees: tuple[float, float] | None) -> dict[str, Any]:
 
 def _record(
     args: argparse.Namespace, task: Task, folder: Path, bounds: Limits
-) -> tuple[Calibration, dict[str, Any] | None]:
+) -> tuple[Calibration, dict[str, Any] | None, Sequence[Beside]]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
+    from fieldcal.beside import beside
     from fieldcal.commands.run_device import device
     from fieldcal.recorder import Recorder
     from fieldcal.running import Running, taken_before
@@ -187,8 +216,11 @@ def _record(
             stack.callback(driver.close)
             taken = taken_before(Session.open(folder), task) if args.resume else {}
             tables = None if args.resume else task.tables
-            recorder = stack.enter_context(Recorder(folder, tables))
+            own = stack.enter_context(Recorder(folder, tables))
+            further = [] if args.resume else args.further
+            recorder = stack.enter_context(beside(further, own, task.tables))
             operator = stack.enter_context(_operator(args, task, mover, folder))
+            recorder.tell = operator.tell
             if args.resume:
                 recorder.mark("resumed", taken=sorted(taken))
             patience = PATIENCE_HEADLESS if args.headless else PATIENCE
@@ -209,7 +241,7 @@ def _record(
                 raise
             recorder.mark("finished", verdict="good" if found.good else "bad")
         truth = getattr(mover, "truth", None)
-        return found, dict(truth) if truth else None
+        return found, dict(truth) if truth else None, recorder.others
 
 
 def _kept(folder: Path) -> str:
@@ -235,13 +267,14 @@ def _result(
 ) -> Calibration:
     """Add what the turns say, decide, write it down and keep it."""
     from fieldcal.assessing import assess, remember
+    from fieldcal.commands.installing import with_installed
     from fieldcal.observing import rests, with_provenance, with_turns_between
     from fieldcal.session import RESULT, Session
 
     session = Session.open(folder)
     still = rests(session)
     found = with_turns_between(found, session, still)
-    found = with_provenance(found, session.about)
+    found = with_installed(with_provenance(found, session.about), session)
     found, _ = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
     if said := remember(history, session, found):
@@ -254,17 +287,23 @@ def _show(
     found: Calibration,
     folder: Path,
     truth: dict[str, Any] | None,
+    further: Mapping[str, Calibration],
 ) -> None:
     from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.table import show
     from fieldcal.session import RESULT
 
     if args.json:
-        concealed = {"virtual": truth} if truth else {}
-        sys.stdout.write(json.dumps({**found.to_json(), **concealed}) + "\n")
+        more: dict[str, Any] = {"virtual": truth} if truth else {}
+        if further:
+            more["further"] = {name: each.to_json() for name, each in further.items()}
+        sys.stdout.write(json.dumps({**found.to_json(), **more}) + "\n")
         return
     show(found, truth)
     show_decision(found)
+    for name, each in further.items():
+        sys.stdout.write(f"\n{name}\n")
+        show(each)
     sys.stdout.write(f"recorded: {folder}\nwritten:  {folder / RESULT}\n")
 
 

@@ -21,17 +21,21 @@ VIRTUAL_FORMAT = "witmotion"
 def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
     """Yield what opens the device, and who turns it."""
     from fieldcal import movers
+    from fieldcal.commands.signals import interruptible
+    from fieldcal.commands.virtual import address
     from fieldcal.driver import open_driver
     from fieldcal.plan_file import TURN
 
     mover, url = task.mover, str(task.run.get("device", ""))
     with contextlib.ExitStack() as stack:
+        stack.enter_context(interruptible())
         turns: Mover = movers.Nobody()
         if mover["kind"] == "virtual" and "control" in mover:
             turns = stack.enter_context(movers.Controlled(mover["control"]))
         elif mover["kind"] == "virtual":
-            device = stack.enter_context(movers.VirtualDevice(_virtual(task)))
-            turns, url = device, f"serial:{device.port}?format={VIRTUAL_FORMAT}"
+            options = _virtual(task)
+            made = stack.enter_context(movers.VirtualDevice(options))
+            turns, url = made, address(options, made.port)
         elif mover["kind"] == "command":
             timeout = float(mover.get("timeout_s", TURN))
             turns = stack.enter_context(movers.Command(mover["command"], timeout))

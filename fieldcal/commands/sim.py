@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import json
 import math
-import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,8 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--serial",
         metavar="FORMAT",
         default="witmotion",
-        help="wire format of the pty: witmotion or text, with options as in"
+        help=f"wire format of the pty: {_formats()}; with options as in"
         ' "text?separator=tab&columns=t,ax,ay,az" (default: witmotion)',
+    )
+    add(
+        "--baud",
+        type=int,
+        metavar="BIT/S",
+        help="of the pty: a host at another rate hears garbage (default: at any)",
     )
     add(
         "--can",
@@ -52,8 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--mavlink",
         metavar="URL",
-        help="as an autopilot instead, at udpin:HOST:PORT, udpout:HOST:PORT or"
-        ' tcpin:HOST:PORT, with options as in "tcpin:127.0.0.1:5760?autopilot=px4"',
+        help="as an autopilot instead, at udpin:HOST:PORT, udpout:HOST:PORT,"
+        " tcpin:HOST:PORT or pty, with options as in"
+        ' "tcpin:127.0.0.1:5760?autopilot=px4"',
     )
     add("--port-link", type=Path, metavar="PATH", help="symbolic link to the pty")
     add(
@@ -78,6 +84,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="steps of the arrow keys in alpha and beta, deg (default: 22.5,2.5)",
     )
     _add_device(parser)
+
+
+def _formats() -> str:
+    """Names of the wire formats, without importing any."""
+    from fieldcal.sim_device.wire import formats
+
+    return ", ".join(formats())
 
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
@@ -115,6 +128,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command: run until told to stop, or interrupted."""
+    from fieldcal.commands.signals import interruptible
     from fieldcal.sim_device.control import Control
     from fieldcal.sim_device.device import VirtualDevice
     from fieldcal.sim_device.line_faults import LineFaults
@@ -128,7 +142,7 @@ def run(args: argparse.Namespace) -> int:
         _write(args.truth, device.concealed())
     try:
         with contextlib.ExitStack() as stack:
-            stack.enter_context(_interruptible())
+            stack.enter_context(interruptible())
             faults = LineFaults(args.seed)
             link = _link(args, faults, device.rate)
             stack.callback(link.close)
@@ -157,7 +171,7 @@ def _link(args: argparse.Namespace, faults: LineFaults, rate: float) -> Link:
     from fieldcal.sim_device.link_serial import SerialLink
     from fieldcal.sim_device.wire import open_wire
 
-    return SerialLink(open_wire(args.serial), faults, args.port_link)
+    return SerialLink(open_wire(args.serial), faults, args.port_link, args.baud)
 
 
 def _profile(args: argparse.Namespace) -> Profile:
@@ -255,24 +269,6 @@ def _write(path: Path, concealed: dict[str, Any]) -> None:
 def _say(line: str) -> None:
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
-
-
-@contextlib.contextmanager
-def _interruptible() -> Iterator[None]:
-    """Treat being terminated, or losing the terminal, like an interrupt."""
-
-    def interrupt(number: int, frame: object) -> None:
-        for kind in kinds:
-            signal.signal(kind, signal.SIG_IGN)
-        raise KeyboardInterrupt
-
-    kinds = (signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(kind, interrupt) for kind in kinds]
-    try:
-        yield
-    finally:
-        for kind, handler in zip(kinds, before, strict=True):
-            signal.signal(kind, handler)
 
 
 @contextlib.contextmanager

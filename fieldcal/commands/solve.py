@@ -64,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from fieldcal.commands.decision_view import show_decision
+    from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
     from fieldcal.observing import (
         observations,
@@ -91,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
         found = with_turns_between(found, session, still, args.turns == "yes")
     found = replace(found, warnings=(*still.warnings, *found.warnings))
     found = with_provenance(found, session.about)
+    found = with_installed(found, session)
     found = _decided(args, found, session, still)
     path = session.write_json(RESULT, found.to_json())
     if args.json:

@@ -7,31 +7,8 @@ from collections.abc import Mapping
 from typing import IO, Any
 
 from fieldcal.calibration import Calibration
-
-TITLES = {
-    "acc_bias": "acc bias",
-    "acc_scale": "acc scale factor",
-    "gyr_bias": "gyro bias",
-    "gyr_scale": "gyro scale factor",
-    "cross_coupling": "acc cross-coupling",
-    "gyro_cross_coupling": "gyro cross-coupling",
-    "angle_offset": "joints' offset",
-    "base_tilt": "base tilt",
-}
-
-
-def number(value: float, sigma: float) -> tuple[str, str]:
-    """Value and sigma with as many digits as sigma has two of.
-
-    >>> number(0.12345, 0.00234)
-    ('0.1235', '0.0023')
-    >>> number(123.4, 56.0)
-    ('123', '56')
-    """
-    if not math.isfinite(sigma) or sigma <= 0:
-        return f"{value:.6g}", "?"
-    digits = max(0, 1 - math.floor(math.log10(sigma)))
-    return f"{value:.{digits}f}", f"{sigma:.{digits}f}"
+from fieldcal.calibration.wording import number, title
+from fieldcal.commands.installing import lines
 
 
 def show(
@@ -62,11 +39,10 @@ def show(
     before = ""
     rows = zip(calibration.names, calibration.values, calibration.sigma, strict=True)
     for (name, value, sigma), unit in zip(rows, calibration.units, strict=True):
-        group, _, component = name.partition(".")
+        group = name.partition(".")[0]
         if before and group != before:
             table.add_section()
-        label = component.replace("_deg", "").replace("_", " ")
-        cells = [f"{TITLES.get(group, group)} {label}", *number(value, sigma), unit]
+        cells = [title(name), *number(value, sigma), unit]
         if name in concealed:
             true = concealed[name]
             cells += [number(true, sigma)[0], f"{(value - true) / sigma:+.1f} σ"]
@@ -81,6 +57,8 @@ def _tell(console: Any, calibration: Calibration) -> None:
         console.print(text, markup=False, soft_wrap=True)
 
     line(_fit(calibration))
+    for told in lines(calibration):
+        line(told)
     for warning in calibration.warnings:
         line(f"! {warning}")
     good = "good" if calibration.good else "BAD: do not use these numbers"

@@ -90,8 +90,16 @@ class Verdict:
     quiet: Quiet | None
 
 
-def judge(cells: Table, limits: Limits, before: Quiet | None = None) -> Verdict:
-    """Judge the samples so far by their own noise and that of the windows before."""
+def judge(
+    cells: Table,
+    limits: Limits,
+    before: Quiet | None = None,
+    shows: Array | None = None,
+) -> Verdict:
+    """Judge the samples so far by their own noise and that of the windows before.
+
+    `shows` (6,) are jumps that come of rounding alone, where the device tells them.
+    """
     m = cells.whole
     if m < FEWEST:
         scatter = np.nan_to_num(cells.means[:m]).std(axis=0) if m else np.zeros(6)
@@ -99,7 +107,8 @@ def judge(cells: Table, limits: Limits, before: Quiet | None = None) -> Verdict:
     means = cells.steady[:m]
     noise = quiet(means, before)
     allowed = THRESHOLD * (1 + (EARLY / (CELL * noise.cells)) ** 2)
-    tests = _tests(cells, means, noise, allowed)
+    jumps = cells.rounding if shows is None else np.maximum(cells.rounding, shows)
+    tests = _tests(cells, means, noise, allowed, jumps)
     worst = [_worst(cells, test, allowed) for test in tests] + _stuck(cells)
     worst.append(_beyond_drift(cells, means, noise, limits))
     worst.append(_beyond_noise(cells, noise.spread[0], limits))
@@ -111,9 +120,11 @@ def judge(cells: Table, limits: Limits, before: Quiet | None = None) -> Verdict:
     )
 
 
-def _tests(cells: Table, means: Array, noise: Quiet, allowed: float) -> list[Statistic]:
+def _tests(
+    cells: Table, means: Array, noise: Quiet, allowed: float, jumps: Array
+) -> list[Statistic]:
     m = len(means)
-    least = cells.rounding / allowed
+    least = jumps / allowed
     return [
         *pushes(means, noise, least),
         *steps(means, noise, least),

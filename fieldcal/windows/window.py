@@ -17,10 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.errors import InputError, Moved
-from fieldcal.samples import Array, Block
+from fieldcal.samples import Array, Block, Grain
 from fieldcal.windows.cells import CELL, Cells
+from fieldcal.windows.grain import shows, variance
 from fieldcal.windows.limits import Limits
-from fieldcal.windows.longrun import MeanError, error_of_mean, rounding_variance
+from fieldcal.windows.longrun import MeanError, error_of_mean
 from fieldcal.windows.mean import Average
 from fieldcal.windows.quiet import Quiet
 from fieldcal.windows.verdict import Verdict, judge
@@ -60,7 +61,7 @@ class Window:
 
     Feed it with `add`; every property holds for the samples so far, and none depends
     on how they were cut into blocks. `noise` of a window that was good sharpens the
-    next one of the same device.
+    next one of the same device; `grain` is what the device rounds to, where it says so.
 
     >>> import numpy as np
     >>> rng = np.random.default_rng(0)
@@ -74,10 +75,13 @@ class Window:
     """
 
     def __init__(
-        self, limits: Limits | None = None, noise: Noise | None = None
+        self,
+        limits: Limits | None = None,
+        noise: Noise | None = None,
+        grain: Grain | None = None,
     ) -> None:
         self._limits = limits or Limits()
-        self._before = noise
+        self._before, self._grain = noise, grain or Grain()
         self._sum = Cells()
         self._cells = self._sum.table
         self._error: MeanError | None = None
@@ -196,7 +200,9 @@ class Window:
     def _judged(self) -> Verdict:
         if self._verdict is None:
             before = self._before.quiet if self._before else None
-            self._verdict = judge(self._cells, self._limits, before)
+            sampled = np.nan_to_num(self._cells.noise)
+            jumps = shows(self._grain, self.mean, sampled)
+            self._verdict = judge(self._cells, self._limits, before, jumps)
         return self._verdict
 
     def _mean_error(self) -> MeanError:
@@ -215,10 +221,8 @@ class Window:
         return f / length if length > 0 else f
 
     def _rounding(self) -> Array:
-        resolution = self._cells.resolution
         sampled = np.nan_to_num(self._cells.noise)
-        before = np.sqrt(np.maximum(sampled**2 - resolution**2 / 12, 0.0))
-        return rounding_variance(resolution, before)
+        return variance(self._grain, self.mean, sampled, self._cells.resolution)
 
 
 def _known_along(covariance: Array, n: Array, variance: float) -> Array:
@@ -234,7 +238,10 @@ def _known_along(covariance: Array, n: Array, variance: float) -> Array:
 
 
 def average(
-    block: Block, limits: Limits | None = None, noise: Noise | None = None
+    block: Block,
+    limits: Limits | None = None,
+    noise: Noise | None = None,
+    grain: Grain | None = None,
 ) -> Average:
     """Average a window of samples.
 
@@ -246,6 +253,6 @@ def average(
         If it is too short for its mean to have an error.
 
     """
-    window = Window(limits, noise)
+    window = Window(limits, noise, grain)
     window.add(block)
     return window.average()

@@ -1,0 +1,1 @@
+"""Drawings, pictures and pages that are made from the code."""

@@ -1,0 +1,90 @@
+"""Pages and pictures that are made when the site is built, into docs/made/."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+from drawn.effects import given, picture
+from drawn.positions import drawings
+from fieldcal.effects import Effect, catalogue
+from fieldcal.positions import SETS
+from fieldcal.report.cures import CURES
+
+KINDS = {
+    "motion": ("Place, fixture and motion", "They change what the sensors experience."),
+    "sensor": ("The sensors", "They add to what the sensors put out."),
+    "chain": ("The signal chain", "They happen to the samples."),
+}
+
+
+def make(folder: Path) -> None:
+    """Write all of it; what has not changed is left as it is."""
+    (folder / "effects").mkdir(parents=True, exist_ok=True)
+    for name, positions in SETS.items():
+        _write(folder / f"positions_{name}.html", drawings(positions))
+    for effect in catalogue().values():
+        _write(folder / "effects" / f"{effect.id}.svg", picture(effect))
+    _write(folder / "effects.md", _page())
+
+
+def add_unlisted(app: Any, name: str, source: list[str]) -> None:
+    """List on the front page what it does not name, so that no page gets lost."""
+    if name != "index":
+        return
+    listed = set(re.findall(r"^[\w/-]+$", source[0], re.MULTILINE)) | {"index"}
+    more = sorted(n for n in app.env.found_docs if "/" not in n and n not in listed)
+    if more:
+        lines = "\n".join(more)
+        source[0] += f"\n```{{toctree}}\n:caption: More\n\n{lines}\n```\n"
+
+
+def _write(path: Path, text: str) -> None:
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def _page() -> str:
+    parts = [
+        "# Effects\n",
+        "What a simulation with bias, scale factor and noise can leave out. Each"
+        " picture is made by the virtual device: its outputs with the effect less those"
+        " without, in five positions (shaded) and the turns between them; of effects in"
+        " the signal chain the samples themselves. `fieldcal diagnose` finds them, and"
+        " the report says what to do.\n",
+    ]
+    for kind, (title, lead) in KINDS.items():
+        parts.append(f"## {title}\n\n{lead}\n")
+        found = [e for e in catalogue().values() if e.kind == kind]
+        parts += [_section(effect) for effect in found]
+    return "\n".join(parts)
+
+
+def _section(effect: Effect) -> str:
+    title, equations = _explained(effect)
+    rows = [f"| `{p.name}` | {p.unit} | {p.typical:g} |" for p in effect.params]
+    rows += [f"| `{s.name}` | {s.unit} | |" for s in effect.shapes]
+    table = ["| parameter | unit | up to |", "|---|---|---|", *rows, ""] if rows else []
+    return "\n".join(
+        [
+            f"### {effect.id}\n",
+            f"{title}\n",
+            f"```text\n{equations}\n```\n",
+            f"![what {effect.id} adds](effects/{effect.id}.svg)\n",
+            f"Virtual device: `--with {given(effect)}`\n",
+            *table,
+            f"**Seen through** {effect.covariate}. **Told from others by**"
+            f" {effect.decided_by}.\n",
+            f"**Cure.** {CURES[effect.id]}\n",
+            f"Source: {effect.source}.\n",
+        ]
+    )
+
+
+def _explained(effect: Effect) -> tuple[str, str]:
+    """First sentence and the rest of the module's text, without its examples."""
+    text = inspect.cleandoc(inspect.getmodule(type(effect)).__doc__ or "")
+    title, _, rest = text.partition("\n\n")
+    return " ".join(title.split()), rest.partition(">>>")[0].rstrip()

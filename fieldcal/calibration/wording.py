@@ -1,0 +1,52 @@
+"""Parameters as a person reads them: titles, digits, units."""
+
+from __future__ import annotations
+
+import math
+
+TITLES = {
+    "acc_bias": "acc bias",
+    "acc_scale": "acc scale factor",
+    "gyr_bias": "gyro bias",
+    "gyr_scale": "gyro scale factor",
+    "cross_coupling": "acc cross-coupling",
+    "gyro_cross_coupling": "gyro cross-coupling",
+    "angle_offset": "joints' offset",
+    "base_tilt": "base tilt",
+}
+"""What a group of parameters is called."""
+
+
+def number(value: float, sigma: float) -> tuple[str, str]:
+    """Value and sigma with as many digits as sigma has two of.
+
+    >>> number(0.12345, 0.00234)
+    ('0.1235', '0.0023')
+    >>> number(123.4, 56.0)
+    ('123', '56')
+    """
+    if not math.isfinite(sigma) or sigma <= 0:
+        return f"{value:.6g}", "?"
+    digits = max(0, 1 - math.floor(math.log10(sigma)))
+    return f"{value:.{digits}f}", f"{sigma:.{digits}f}"
+
+
+def title(name: str) -> str:
+    """What a parameter with its component is called.
+
+    >>> title("acc_bias.x"), title("base_tilt.about_x_deg")
+    ('acc bias x', 'base tilt about x')
+    """
+    group, _, component = name.partition(".")
+    label = component.replace("_deg", "").replace("_", " ")
+    return f"{TITLES.get(group, group.replace('_', ' '))} {label}".strip()
+
+
+def pretty(unit: str) -> str:
+    """A unit with raised figures; none for a plain number.
+
+    >>> pretty("m/s^2"), pretty("1/(m/s^2)^2"), pretty("1")
+    ('m/s²', '1/(m/s²)²', '')
+    """
+    raised = unit.replace("^2", "²").replace("^3", "³").replace("sqrt(s)", "√s")
+    return "" if raised == "1" else raised.replace("degC", "°C")

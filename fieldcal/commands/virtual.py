@@ -1,0 +1,43 @@
+"""The address that hears a virtual device, from the options it was started with."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from urllib.parse import parse_qsl, urlencode
+
+USUAL_HZ = 100.0
+"""Rate of a virtual device that was told none."""
+
+WRITTEN = ("digits", "time", "numbers")
+"""Options of a format that only a writer has."""
+
+
+def address(options: Sequence[str], place: str) -> str:
+    """Return the driver's address for what `fieldcal sim` says it listens at.
+
+    >>> address(["--can", "slcan"], "/dev/pts/7")
+    'can:/dev/pts/7?interface=slcan&dbc=virtual'
+    >>> address(["--serial", "vnimu", "--rate", "40"], "/dev/pts/7")
+    'serial:/dev/pts/7?format=vnimu&rate=40'
+    """
+    from fieldcal.commands import sim
+
+    parser = argparse.ArgumentParser()
+    sim.add_arguments(parser)
+    given = parser.parse_args(options)
+    rate = given.rate or USUAL_HZ
+    if given.mavlink:
+        return f"mavlink:{place}?rate={rate:g}"
+    if given.can:
+        interface = given.can.partition(":")[0]
+        return f"can:{place}?interface={interface}&dbc=virtual"
+    name, _, query = given.serial.partition("?")
+    told = dict(parse_qsl(query))
+    timed = name != "vnimu" and told.get("time") != "0"
+    if name == "text" and "columns" in told:
+        timed = "t" in told["columns"].split(",")
+    told = {key: value for key, value in told.items() if key not in WRITTEN}
+    if not timed:
+        told["rate"] = f"{rate:g}"
+    return f"serial:{place}?{urlencode({'format': name, **told}, safe=',/^')}"

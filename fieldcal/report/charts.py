@@ -1,0 +1,158 @@
+"""Charts as data: the page draws them, so that they can be zoomed.
+
+Every chart has a text alternative that says what it shows in words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from fieldcal.samples import Array
+
+DIGITS = 7
+"""Significant digits of a number in the page: more than a screen can show."""
+
+Draw = Literal["points", "line", "both"]
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """An axis; `names` are written at 0, 1, 2, ... instead of numbers."""
+
+    label: str
+    unit: str = ""
+    log: bool = False
+    names: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object the page reads."""
+        return {
+            "label": self.label,
+            "unit": self.unit,
+            "log": self.log,
+            "names": list(self.names),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Points (x, y), each with an interval where `low` and `high` are given.
+
+    `tone` picks one of six colours, each with a marker of its own; `y` is nan where
+    there is no point.
+    """
+
+    name: str
+    x: Array
+    y: Array
+    tone: int
+    draw: Draw = "points"
+    low: Array | None = None
+    high: Array | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object the page reads."""
+        out: dict[str, Any] = {"name": self.name, "tone": self.tone, "draw": self.draw}
+        for name in ("x", "y", "low", "high"):
+            values = getattr(self, name)
+            if values is not None:
+                out[name] = numbers(values)
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A stretch of the x axis with a label: a window."""
+
+    start: float
+    end: float
+    label: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object the page reads."""
+        return {"from": self.start, "to": self.end, "label": self.label}
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """An instant, or a level of the y axis, with a label."""
+
+    at: float
+    label: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object the page reads."""
+        return {"at": self.at, "label": self.label}
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """Points and lines over two axes."""
+
+    id: str
+    title: str
+    alt: str
+    x: Axis
+    y: Axis
+    series: tuple[Series, ...]
+    levels: tuple[Mark, ...] = ()
+    spans: tuple[Span, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object the page reads."""
+        return {
+            "kind": "chart",
+            "id": self.id,
+            "x": self.x.to_json(),
+            "y": self.y.to_json(),
+            "series": [s.to_json() for s in self.series],
+            "levels": [m.to_json() for m in self.levels],
+            "spans": [s.to_json() for s in self.spans],
+            "marks": [],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Channels of a recording over device time, one panel each, zoomed together.
+
+    `means` (spans, panels) are drawn across the spans, nan where there is none.
+    """
+
+    id: str
+    title: str
+    alt: str
+    panels: tuple[tuple[str, str, int], ...]
+    clock: str
+    store: Mapping[str, Any]
+    spans: tuple[Span, ...]
+    means: Array
+    marks: tuple[Mark, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object the page reads."""
+        return {
+            "kind": "record",
+            "id": self.id,
+            "panels": [
+                {"label": label, "unit": unit, "tone": tone}
+                for label, unit, tone in self.panels
+            ],
+            "x": Axis(self.clock, "s").to_json(),
+            "store": self.store,
+            "means": [numbers(row) for row in self.means],
+            "spans": [s.to_json() for s in self.spans],
+            "marks": [m.to_json() for m in self.marks],
+        }
+
+
+def numbers(values: Array | Sequence[float]) -> list[float | None]:
+    """JSON numbers, rounded; null where there is none."""
+    return [
+        float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None
+        for v in np.asarray(values, float).tolist()
+    ]

@@ -1,0 +1,198 @@
+"""What the simulation leaves out, as diagnosis.json says.
+
+Every key may be absent: an older file, or a diagnosis that had nothing to say of it.
+Besides the keys that `fieldcal.diagnosis.result` writes and the twin's replay, three
+are shown where a diagnosis has them:
+
+    candidates   what was tried: id, delta_chi2, delta_bic, held_out_gain, chosen, why
+    curves       residuals: channel, covariate, unit, x, before, after, sigma
+    next         what to do now, a text or a list of texts
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration.wording import TITLES, number, pretty
+from fieldcal.report import evidence
+from fieldcal.report.blocks import (
+    Block,
+    Cell,
+    Facts,
+    Figure,
+    Note,
+    Section,
+    Text,
+    Tone,
+    folded,
+    table,
+)
+from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.gather import Material
+from fieldcal.report.loose import Json, list_at, objects_at, real, shown, table_at
+from fieldcal.samples import CHANNELS
+
+MOST = 10
+"""Rows of the mismatch that are shown; the rest can be opened."""
+
+TONES: dict[str, Tone] = {
+    "consistent": "good",
+    "left_out": "warn",
+    "ambiguous": "warn",
+    "unexplained": "bad",
+}
+
+
+def diagnosis(material: Material) -> Section | None:
+    """Verdict, mismatch, effects, improvement; None where none was made."""
+    found = material.diagnosis
+    if found is None:
+        return None
+    verdict = str(found.get("verdict", "unknown"))
+    said = str(found.get("says", ""))
+    lead = f"{verdict.replace('_', ' ').capitalize()}. {said}"
+    blocks: list[Block] = [Note(lead.strip(), TONES.get(verdict, "warn"))]
+    blocks += [Note(str(w)) for w in list_at(found, "warnings")]
+    blocks += evidence.next_steps(found)
+    mismatch = objects_at(found, "mismatch")
+    if mismatch:
+        blocks += _mismatch(mismatch)
+    blocks += evidence.curves(objects_at(found, "curves"))
+    effects = objects_at(found, "effects")
+    if effects:
+        blocks.append(_effects(effects))
+        blocks += _fit(table_at(found, "fit"))
+        blocks += _calibration(table_at(found, "calibration"))
+    blocks += evidence.replay(table_at(found, "twin"))
+    blocks += evidence.candidates(objects_at(found, "candidates"))
+    return Section("diagnosis", "Diagnosis", tuple(blocks))
+
+
+def _mismatch(rows: Sequence[Json]) -> list[Block]:
+    sigmas = [real(m.get("sigma")) for m in rows]
+    most = max((s for s in sigmas if math.isfinite(s)), default=1.0) or 1.0
+    cells: list[list[str | Cell]] = []
+    for m, sigma in zip(rows, sigmas, strict=True):
+        finite = math.isfinite(sigma)
+        size = Cell(
+            f"{sigma:.0f} σ" if finite else "beyond doubt",
+            bar=math.sqrt(min(sigma, most) / most) if finite else 1.0,
+        )
+        span = f"{real(m.get('from_s')):.1f} – {real(m.get('to_s')):.1f}"
+        cells.append(
+            [
+                str(m.get("channel", "")),
+                str(m.get("kind", "")),
+                ", ".join(str(p) for p in list_at(m, "positions")),
+                span,
+                str(m.get("covariate", "")),
+                f"{real(m.get('rms')):.3g}",
+                size,
+            ]
+        )
+    columns: tuple[str, ...] = (
+        "channel",
+        "kind",
+        "positions",
+        "time, s",
+        "follows",
+        ">rms",
+    )
+    columns += (">significance",)
+    return folded("Where recording and simulation part", columns, cells, MOST)
+
+
+def _effects(effects: Sequence[Json]) -> Block:
+    rows = []
+    for effect in effects:
+        proof = table_at(effect, "evidence")
+        weight = [
+            shown(proof.get("delta_chi2"), "{:.0f}"),
+            shown(-100 * real(proof.get("held_out_gain")), "{:+.0f} %"),
+            ", ".join(str(a) for a in list_at(effect, "aliases")),
+        ]
+        values: list[tuple[str, Any]] = list(table_at(effect, "parameters").items())
+        for i, (name, quantity) in enumerate(values or [("", {})]):
+            lead = str(effect.get("id", "")).replace("_", " ") if i == 0 else ""
+            rest = weight if i == 0 else ["", "", ""]
+            rows.append([lead, str(name), *_quantity(quantity), *rest])
+    columns = ("effect", "parameter", ">value", ">± 1σ", "unit")
+    return table("What is left out", (*columns, ">Δχ²", ">rms unseen", "or else"), rows)
+
+
+def _quantity(quantity: object) -> tuple[str, str, str]:
+    if not isinstance(quantity, Mapping):
+        return "", "", ""
+    value, sigma = quantity.get("value"), real(quantity.get("sigma"))
+    unit = pretty(str(quantity.get("unit", "")))
+    if not isinstance(value, int | float):
+        return str(value if value is not None else ""), "", unit
+    return (*number(float(value), sigma), unit)
+
+
+def _fit(fit: Json) -> list[Block]:
+    before, after = table_at(fit, "before"), table_at(fit, "after")
+    if not before or not after:
+        return []
+    unit = pretty(str(fit.get("unit", "m/s^2")))
+    facts = [
+        (f"rms, {unit}", "rms", "{:.3g}"),
+        ("χ² per degree of freedom", "chi2_per_dof", "{:.2f}"),
+        (f"rms predicted unseen, {unit}", "held_out_rms", "{:.3g}"),
+    ]
+    blocks: list[Block] = [
+        Text("How well the simulation does before and after the effects are added:"),
+        Facts(
+            tuple(
+                (name, f"{shown(before.get(k), f)} → {shown(after.get(k), f)}")
+                for name, k, f in facts
+            )
+        ),
+    ]
+    chart = _by_channel(before, after)
+    if chart is not None:
+        caption = "rms of what was predicted without having been fitted to."
+        blocks.append(Figure(chart, caption))
+    return blocks
+
+
+def _by_channel(before: Json, after: Json) -> Chart | None:
+    first, then = (table_at(q, "held_out_by_channel") for q in (before, after))
+    names = [c for c in CHANNELS if c in first and c in then]
+    if not names:
+        return None
+    x = np.arange(len(names), dtype=float)
+    series = []
+    for tone, (label, values) in ((2, ("before", first)), (1, ("after", then))):
+        y = np.array([real(values[c]) for c in names])
+        series.append(Series(label, x, y, tone))
+    pairs = [f"{c} {real(first[c]):.2g} to {real(then[c]):.2g}" for c in names]
+    return Chart(
+        "diagnosis-channels",
+        "Predicted unseen, before and after",
+        f"From before to after: {', '.join(pairs)} (m/s² and rad/s).",
+        Axis("channel", names=tuple(names)),
+        Axis("rms, m/s² or rad/s", log=True),
+        tuple(series),
+    )
+
+
+def _calibration(groups: Json) -> list[Block]:
+    rows: list[list[str]] = []
+    for name, group in groups.items():
+        if not isinstance(group, Mapping):
+            continue
+        unit = pretty(str(group.get("unit", "")))
+        triads = (list_at(group, k) for k in ("value", "sigma"))
+        for axis, value, sigma in zip("xyz", *triads, strict=False):
+            if isinstance(value, int | float):
+                shown = number(float(value), real(sigma))
+                rows.append([f"{TITLES.get(name, name)} {axis}", *shown, unit])
+    if not rows:
+        return []
+    columns = ("parameter", ">value", ">± 1σ", "unit")
+    return [table("Calibration with the effects", columns, rows)]

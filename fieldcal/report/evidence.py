@@ -1,0 +1,137 @@
+"""How a diagnosis came about: residuals over covariates, what was tried, what next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.calibration.wording import pretty
+from fieldcal.effects import catalogue
+from fieldcal.report.blocks import Block, Cell, Figure, folded, table
+from fieldcal.report.charts import Axis, Chart, Mark, Series
+from fieldcal.report.cures import CURES
+from fieldcal.report.loose import Json, list_at, objects_at, real, shown, table_at
+from fieldcal.samples import Array
+
+MOST_CURVES = 6
+MOST_CANDIDATES = 12
+"""How many are shown; the rest of the candidates can be opened."""
+
+
+def curves(found: Sequence[Json]) -> list[Block]:
+    """Residual against what it follows, before and after."""
+    blocks: list[Block] = []
+    for i, curve in enumerate(found[:MOST_CURVES]):
+        x = np.array([real(v) for v in list_at(curve, "x")])
+        sigma = _column(curve, "sigma", len(x))
+        series = tuple(
+            Series(name, x, y, tone, low=y - sigma, high=y + sigma)
+            for tone, name in ((2, "before"), (1, "after"))
+            if np.isfinite(y := _column(curve, name, len(x))).any()
+        )
+        if not len(x) or not series:
+            continue
+        channel, covariate = (str(curve.get(k, "")) for k in ("channel", "covariate"))
+        sizes = [f"{s.name} {_rms(s):.2g}" for s in series]
+        chart = Chart(
+            f"curve-{i}",
+            f"Residual of {channel} over {covariate}",
+            f"rms of the residual of {channel}: {', '.join(sizes)}.",
+            Axis(covariate, pretty(str(curve.get("unit", "")))),
+            Axis("residual", "m/s²" if channel.startswith("a") else "rad/s"),
+            series,
+        )
+        blocks.append(Figure(chart, "Before and after the effects are added."))
+    return blocks
+
+
+def _column(curve: Json, name: str, n: int) -> Array:
+    """The numbers of a column, (n,); nan where they are missing."""
+    values = np.array([real(v) for v in list_at(curve, name)])
+    return values if len(values) == n else np.full(n, np.nan)
+
+
+def _rms(series: Series) -> float:
+    known = series.y[np.isfinite(series.y)]
+    return float(np.sqrt((known**2).mean())) if known.size else np.nan
+
+
+def replay(twin: Json) -> list[Block]:
+    """The session replayed by the virtual device: by position, without and with."""
+    places = objects_at(twin, "positions")
+    x = np.arange(len(places), dtype=float)
+    series = tuple(
+        Series(label, x, y, tone)
+        for tone, name, label in ((2, "refitted", "before"), (1, "twin", "twin"))
+        if np.isfinite(y := _agreement(places, name)).any()
+    )
+    if not series:
+        return []
+    names = tuple(str(p.get("position", "")) for p in places)
+    worst = [f"{s.name} {np.nanmax(s.y):.3g}" for s in series]
+    chart = Chart(
+        "replay",
+        "Replayed by the virtual device",
+        f"Largest χ² of a mean: {', '.join(worst)}.",
+        Axis("position", names=names),
+        Axis("χ² of a mean", log=True),
+        series,
+        (Mark(1.0, "noise"),),
+    )
+    return [Figure(chart, "How far a simulation with its own physics is off.")]
+
+
+def _agreement(places: Sequence[Json], name: str) -> Array:
+    chi2 = [real(table_at(p, name).get("chi2_per_mean")) for p in places]
+    return np.array([c if c > 0 else np.nan for c in chi2])
+
+
+def candidates(found: Sequence[Json]) -> list[Block]:
+    """The league table: every effect that was tried, and why it lost."""
+    columns = ("effect", ">Δχ²", ">ΔBIC", ">rms unseen", "why")
+    rows: list[list[str | Cell]] = [
+        [
+            str(c.get("id", "")).replace("_", " "),
+            shown(c.get("delta_chi2"), "{:.0f}"),
+            shown(c.get("delta_bic"), "{:.0f}"),
+            shown(-100 * real(c.get("held_out_gain")), "{:+.0f} %"),
+            Cell("chosen", "good")
+            if c.get("chosen") is True
+            else str(c.get("why", "")),
+        ]
+        for c in found
+    ]
+    return folded("What was tried", columns, rows, MOST_CANDIDATES) if rows else []
+
+
+def next_steps(found: Json) -> list[Block]:
+    """What to do in the field now."""
+    said = found.get("next")
+    given = [said] if isinstance(said, str) else list_at(found, "next")
+    rows: list[list[str | Cell]] = [["", str(text)] for text in given if text]
+    rows += _cures(found)
+    rows += [["to tell", text] for text in _decisions(found)] if not given else []
+    return [table("What to do next", ("for", "do"), rows)] if rows else []
+
+
+def _cures(found: Json) -> list[list[str | Cell]]:
+    """What helps against each effect that was found, once each."""
+    ids = dict.fromkeys(str(e.get("id", "")) for e in objects_at(found, "effects"))
+    return [[i.replace("_", " "), CURES[i]] for i in ids if i in CURES]
+
+
+def _decisions(found: Json) -> list[str]:
+    """What would tell the effects apart that this recording cannot."""
+    known = catalogue()
+    texts = []
+    for effect in objects_at(found, "effects"):
+        name = str(effect.get("id", ""))
+        others = [str(a) for a in list_at(effect, "aliases")]
+        if name in known and others:
+            listed = " or ".join(o.replace("_", " ") for o in others)
+            texts.append(
+                f"{name.replace('_', ' ')} from {listed}: record"
+                f" {known[name].decided_by}."
+            )
+    return texts

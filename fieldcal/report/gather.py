@@ -1,0 +1,149 @@
+"""What a report is made from: the session's files, read once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration import Calibration
+from fieldcal.errors import FieldcalError, InputError, SessionError
+from fieldcal.observing import Rests, rests
+from fieldcal.samples import Block
+from fieldcal.session import RESULT, Session
+
+DIAGNOSIS = "diagnosis.json"
+
+FAR = 1e6
+"""Device time from which on its digits hide what happens in a chart, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """A calibration of the same device from another day.
+
+    Attributes
+    ----------
+    label : when or where, as the reader is to see it
+    calibration : what was found then
+
+    """
+
+    label: str
+    calibration: Calibration
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """A session with what was derived from it.
+
+    Attributes
+    ----------
+    session : the folder
+    block : its samples, SI
+    still : averages of its windows; None where it has none that can be used
+    trouble : why there are none, empty otherwise
+    calibration : of result.json, None where it has not been solved
+    diagnosis : of diagnosis.json, None where there is none
+    marks : what happened, in order
+    earlier : calibrations of the same device, oldest first
+
+    """
+
+    session: Session
+    block: Block
+    still: Rests | None
+    trouble: str
+    calibration: Calibration | None
+    diagnosis: Mapping[str, Any] | None
+    marks: tuple[Mapping[str, Any], ...]
+    earlier: tuple[Earlier, ...] = ()
+
+    @property
+    def epoch(self) -> float:
+        """What is taken off device times in charts: all but 0 for a clock of dates."""
+        start = float(self.block.t[0])
+        return float(np.floor(start)) if abs(start) > FAR else 0.0
+
+    @property
+    def clock(self) -> str:
+        """What the time axis of a chart is called."""
+        return f"device time − {self.epoch:.0f}" if self.epoch else "device time"
+
+    def position_name(self, row: int) -> str:
+        """Name of a position with its number."""
+        return f"{row} · {self.session.positions[row].name}"
+
+
+def gather(folder: Path | str, earlier: Iterable[Earlier] = ()) -> Material:
+    """Read a session for its report.
+
+    Raises
+    ------
+    SessionError
+        If the folder is no session or one of its files cannot be read.
+
+    """
+    session = Session.open(folder)
+    block = session.block
+    still, trouble = None, ""
+    try:
+        still = rests(session)
+    except FieldcalError as error:
+        trouble = str(error)
+    result = _read(session.folder / RESULT)
+    return Material(
+        session=session,
+        block=block,
+        still=still,
+        trouble=trouble,
+        calibration=None if result is None else _calibration(session, result),
+        diagnosis=_read(session.folder / DIAGNOSIS),
+        marks=tuple(session.marks()),
+        earlier=tuple(earlier),
+    )
+
+
+def earlier_result(path: Path) -> Earlier:
+    """A calibration from a session folder or a result.json.
+
+    Raises
+    ------
+    SessionError
+        If there is none.
+
+    """
+    file = path / RESULT if path.is_dir() else path
+    document = _read(file)
+    if document is None:
+        raise SessionError(f"{file}: no result there; run fieldcal solve first")
+    name = file.parent.name if file.name == RESULT else file.stem
+    try:
+        return Earlier(name, Calibration.from_json(document))
+    except InputError as error:
+        raise SessionError(f"{file}: {error}") from error
+
+
+def _calibration(session: Session, document: Mapping[str, Any]) -> Calibration:
+    try:
+        return Calibration.from_json(document)
+    except InputError as error:
+        raise SessionError(
+            f"{session.folder / RESULT}: {error}; run fieldcal solve again"
+        ) from error
+
+
+def _read(path: Path) -> Mapping[str, Any] | None:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise SessionError(f"{path}: cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise SessionError(f"{path}: holds no JSON object; make it again")
+    return content

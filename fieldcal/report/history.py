@@ -1,0 +1,72 @@
+"""The device over the days: its parameters in earlier calibrations and now."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.calibration import COMPONENTS, Calibration, compare
+from fieldcal.calibration.wording import TITLES, pretty, title
+from fieldcal.errors import InputError
+from fieldcal.report.blocks import Block, Cell, Figure, Section, table
+from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.gather import Earlier, Material
+
+
+def history(material: Material) -> Section | None:
+    """Each group over the calibrations; None where there is no earlier one."""
+    now = material.calibration
+    if now is None or not material.earlier:
+        return None
+    every = (*material.earlier, Earlier("now", now))
+    blocks: list[Block] = []
+    for group in COMPONENTS:
+        if any(group in e.calibration.groups for e in every):
+            blocks.append(
+                Figure(_chart(group, every), "Change since the first; bars are ± 1σ.")
+            )
+    rows = _changes(material.earlier[-1], now)
+    if rows:
+        caption = f"Change since {material.earlier[-1].label}"
+        blocks.append(table(caption, ("parameter", ">change", "unit", ">in σ"), rows))
+    return Section("history", "History of the device", tuple(blocks))
+
+
+def _chart(group: str, every: tuple[Earlier, ...]) -> Chart:
+    x = np.arange(len(every), dtype=float)
+    series = []
+    for i, axis in enumerate(COMPONENTS[group][0]):
+        name = f"{group}.{axis}"
+        value = np.array([e.calibration.value(name) for e in every])
+        sigma = np.array([e.calibration.uncertainty(name) for e in every])
+        known = value[np.isfinite(value)]
+        if known.size:
+            y = value - known[0]
+            at = x + 0.1 * (i - 1)
+            series.append(Series(axis, at, y, i + 1, "both", y - sigma, y + sigma))
+    drift = max(float(np.nanmax(np.abs(s.y))) for s in series)
+    unit = pretty(COMPONENTS[group][1])
+    return Chart(
+        f"history-{group}",
+        TITLES[group],
+        f"{len(every)} calibrations; the largest change is {drift:.2g} {unit}.",
+        Axis("calibration", names=tuple(e.label for e in every)),
+        Axis("change", unit),
+        tuple(series),
+    )
+
+
+def _changes(before: Earlier, now: Calibration) -> list[list[str | Cell]]:
+    try:
+        found = compare(now, before.calibration)
+    except InputError:
+        return []
+    units = dict(zip(now.names, now.units, strict=True))
+    return [
+        [
+            title(name),
+            f"{d:+.2g}",
+            pretty(units[name]),
+            Cell(f"{z:+.1f}", "warn" if name in found.changed else ""),
+        ]
+        for name, d, z in zip(found.names, found.difference, found.z, strict=True)
+    ]

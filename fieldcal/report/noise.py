@@ -1,0 +1,116 @@
+"""What averaging can reach: the Allan deviation of the longest stretch at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.errors import InputError
+from fieldcal.report.blocks import Block as Part
+from fieldcal.report.blocks import Figure, Section, Table, Text, table
+from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.gather import Material
+from fieldcal.samples import CHANNELS
+from fieldcal.windows.allan import SHORTEST, AllanDeviation, allan_deviation
+from fieldcal.windows.stretches import still_stretches
+
+MOST = 1_000_000
+"""Samples that are looked at: more cost seconds and tell little."""
+
+
+def noise(material: Material) -> Section:
+    """Allan deviation of accelerometers and gyroscopes, or why there is none."""
+    span = _longest(material)
+    parts: tuple[Part, ...]
+    if span[1] - span[0] < SHORTEST:
+        parts = (
+            Text(
+                f"The longest stretch at rest lasts {span[1] - span[0]:.0f} s. Record"
+                f" {SHORTEST:.0f} s or more at rest to see how far averaging helps."
+            ),
+        )
+        return Section("noise", "Noise", parts)
+    block = material.block.between(*span)[:MOST]
+    try:
+        found = allan_deviation(block)
+        levels = _table(found)
+    except InputError as error:
+        parts = (Text(f"No Allan deviation: {error}."),)
+    else:
+        where = f"From {block.t[0]:.0f} to {block.t[-1]:.0f} s of device time."
+        parts = (*_figures(found, where), levels)
+    return Section("noise", "Noise", parts)
+
+
+def _longest(material: Material) -> tuple[float, float]:
+    """The longest stretch at rest: a window, or what can be found."""
+    still = material.still
+    spans = [(a.start, a.end) for a in still.averages] if still is not None else []
+    best = max(spans, key=_length, default=(0.0, 0.0))
+    whole = float(material.block.t[-1] - material.block.t[0])
+    if _length(best) < SHORTEST <= whole:
+        return max(still_stretches(material.block), key=_length, default=best)
+    return best
+
+
+def _length(span: tuple[float, float]) -> float:
+    return span[1] - span[0]
+
+
+def _figures(found: AllanDeviation, where: str) -> list[Part]:
+    out: list[Part] = []
+    for first, what, unit in (
+        (0, "accelerometers", "m/s²"),
+        (3, "gyroscopes", "rad/s"),
+    ):
+        series = tuple(
+            Series(
+                CHANNELS[i],
+                found.tau,
+                found.deviation[:, i],
+                i % 3 + 1,
+                "both",
+                found.low[:, i],
+                found.high[:, i],
+            )
+            for i in range(first, first + 3)
+            if np.isfinite(found.deviation[:, i]).any()
+        )
+        if series:
+            out.append(Figure(_chart(series, what, unit, found), where))
+    return out
+
+
+def _chart(
+    series: tuple[Series, ...], what: str, unit: str, found: AllanDeviation
+) -> Chart:
+    least = [f"{s.name} {np.nanmin(s.y):.2g} {unit}" for s in series]
+    return Chart(
+        f"allan-{what}",
+        f"Allan deviation, {what}",
+        f"Over {found.tau[0]:.2g} to {found.tau[-1]:.3g} s; least: {', '.join(least)}.",
+        Axis("averaging time τ", "s", log=True),
+        Axis("Allan deviation", unit, log=True),
+        series,
+    )
+
+
+def _table(found: AllanDeviation) -> Table:
+    rows = []
+    one = found.sigma_of_mean(1.0)
+    for i, name in enumerate(CHANNELS):
+        if not np.isfinite(found.deviation[:, i]).any():
+            continue
+        unit = "m/s²" if i < 3 else "rad/s"
+        k = int(np.nanargmin(found.deviation[:, i]))
+        least = found.deviation[k, i]
+        width = (found.high[k, i] - found.low[k, i]) / 2
+        rows.append(
+            [
+                name,
+                f"{one[i]:.2g} {unit}",
+                f"{least:.2g} ± {width:.1g} {unit}",
+                f"{found.tau[k]:.0f} s",
+            ]
+        )
+    columns = ("channel", ">error of a mean over 1 s", ">least error", ">averaged over")
+    return table("How far averaging helps", columns, rows)

@@ -1,0 +1,167 @@
+"""The head of the page and the table of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.wording import number, pretty, title
+from fieldcal.report.blocks import (
+    Block,
+    Cell,
+    Facts,
+    Note,
+    Section,
+    Table,
+    Text,
+    Tone,
+    table,
+)
+from fieldcal.report.gather import Material
+from fieldcal.report.loose import list_at, objects_at, table_at
+from fieldcal.samples import Array
+
+WIDEST = 30.0
+"""Change in standard uncertainties that fills its bar."""
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What stands on top of the page."""
+
+    name: str
+    under: str
+    verdict: str
+    tone: Tone
+    says: str
+    facts: Facts
+
+
+def head(material: Material) -> Head:
+    """Name of the device, verdict and the facts one looks for first."""
+    about, found = material.session.about, material.calibration
+    name = str(about.device.get("name") or material.session.folder.resolve().name)
+    serial = about.device.get("serial")
+    under = [material.session.folder.resolve().name]
+    under += [f"serial {serial}"] if serial else []
+    verdict, tone, says = _verdict(found)
+    return Head(name, " · ".join(under), verdict, tone, says, _facts(material))
+
+
+def _verdict(found: Calibration | None) -> tuple[str, Tone, str]:
+    """Verdict, its tone and a sentence; a decision by limits goes before."""
+    if found is None:
+        return "not solved", "warn", "fieldcal solve has not been run yet."
+    decision = table_at(found.info, "decision")
+    reasons = " ".join(str(r) for r in list_at(decision, "reasons"))
+    if decision.get("go") is False:
+        return "no-go", "bad", reasons or "A limit is not kept."
+    if not found.good:
+        return "bad", "bad", "Do not use these numbers."
+    says = "The calibration can be used within its uncertainties."
+    return "go" if decision.get("go") is True else "good", "good", says
+
+
+def _facts(material: Material) -> Facts:
+    block, found = material.block, material.calibration
+    span = float(block.t[-1] - block.t[0])
+    facts = [
+        ("recorded", f"{_duration(span)}, {len(block):,} samples"),
+        ("rate", _rate(block.t)),
+    ]
+    if material.still is not None:
+        taken, of = len(material.still.rows), len(material.session.positions)
+        facts.append(("positions", f"{taken} of {of}" if taken < of else f"{of}"))
+    warm = block.temperature[np.isfinite(block.temperature)]
+    if warm.size:
+        facts.append(("temperature", f"{warm.min():.1f} to {warm.max():.1f} °C"))
+    if found is not None:
+        facts.append(("method", found.method.replace("_", " ")))
+    if found is not None and np.isfinite(found.chi2) and found.dof > 0:
+        facts.append(("χ² / degrees of freedom", f"{found.chi2:.1f} / {found.dof}"))
+    if found is not None and np.isfinite(found.rms):
+        facts.append(("rms residual", f"{found.rms:.2g} m/s²"))
+    if material.diagnosis is not None:
+        said = str(material.diagnosis.get("verdict", "")).replace("_", " ")
+        facts.append(("diagnosis", said))
+    return Facts(tuple(facts))
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{seconds:.1f} s"
+
+
+def _rate(t: Array) -> str:
+    if len(t) < 2:
+        return "a single sample"
+    steps = np.diff(t)
+    gaps = int((steps > 5 * np.median(steps)).sum())
+    holes = f", {gaps} gap{'s' * (gaps > 1)}" if gaps else ", no gap"
+    return f"{1 / float(np.median(steps)):.4g} Hz{holes}"
+
+
+def calibration(material: Material) -> Section | None:
+    """The parameters with their uncertainties, and what the reader must know."""
+    found = material.calibration
+    if found is None:
+        return None
+    blocks: list[Block] = [_parameters(found, material.session.about.nominal)]
+    if found.warnings:
+        blocks += [Note(w) for w in found.warnings]
+    blocks += _checks(found)
+    left = _without(found)
+    if left:
+        blocks.append(Text(left))
+    return Section("calibration", "Calibration", tuple(blocks))
+
+
+def _parameters(found: Calibration, nominal: Mapping[str, Array]) -> Table:
+    rows: list[list[str | Cell]] = []
+    for name, value, sigma, unit in zip(
+        found.names, found.values, found.sigma, found.units, strict=True
+    ):
+        group, _, axis = name.partition(".")
+        change: str | Cell = ""
+        if group in nominal and sigma > 0:
+            z = (value - nominal[group]["xyz".index(axis)]) / sigma
+            change = Cell(f"{z:+.1f} σ", bar=float(min(1.0, abs(z) / WIDEST)))
+        rows.append([title(name), *number(value, sigma), pretty(unit), change])
+    columns: tuple[str, ...] = ("parameter", ">value", ">± 1σ", "unit")
+    caption = "Device axes; ± is one standard uncertainty"
+    if any(row[-1] for row in rows):
+        columns += (">change from nominal",)
+    else:
+        rows = [row[:-1] for row in rows]
+    return table(caption, columns, rows)
+
+
+def _checks(found: Calibration) -> list[Block]:
+    """What a decision by limits looked at; none where there was no decision."""
+    marks: dict[object, Cell] = {
+        True: Cell("kept", "good"),
+        False: Cell("not kept", "bad"),
+    }
+    checks = objects_at(table_at(found.info, "decision"), "checks")
+    rows: list[list[str | Cell]] = [
+        [
+            str(c.get("name", "")).replace("_", " "),
+            marks.get(c.get("ok"), Cell("not checked", "warn")),
+            str(c.get("says", "")),
+        ]
+        for c in checks
+        if not isinstance(c.get("ok"), list | dict)
+    ]
+    return [table("Limits", ("limit", "", "found"), rows)] if rows else []
+
+
+def _without(found: Calibration) -> str:
+    """What the reader gets instead of numbers that are not there."""
+    missing = [g for g in ("acc_scale", "gyr_scale") if g not in found.groups]
+    if not missing:
+        return ""
+    names = " and ".join(title(g) for g in missing)
+    return f"Not determined by this recording, and not filled in: {names}."

@@ -1,0 +1,76 @@
+"""Where the numbers come from: versions, place, events, and the files with hashes."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from fieldcal import __version__
+from fieldcal.report.blocks import Block, Code, Facts, Fold, Note, Section, table
+from fieldcal.report.gather import Material
+from fieldcal.session import DESCRIPTION
+
+OWN = ("report.html", "report.png", "report.pdf")
+"""Files that the report itself makes."""
+
+MOST_EVENTS = 500
+"""Events that are listed; the first ones of more."""
+
+
+def provenance(material: Material, made: datetime) -> Section:
+    """Versions, configuration, what happened, and SHA-256 of every file."""
+    session, found = material.session, material.calibration
+    about = session.about
+    by = str(found.info.get("software", "")) if found is not None else ""
+    facts = [
+        ("report made", made.astimezone(UTC).strftime("%Y-%m-%d %H:%M UTC")),
+        ("software", f"fieldcal {__version__}"),
+        *([("calibrated by", by)] if by else []),
+        ("libraries", _libraries()),
+        ("latitude, height", f"{about.latitude_deg:g}°, {about.height_m:g} m"),
+        ("gravity", f"{about.gravity:.5f} m/s²"),
+        ("mounting", ", ".join(about.axes)),
+        ("grade", about.grade),
+    ]
+    blocks: list[Block] = [Note(w) for w in session.warnings]
+    blocks += [Facts(tuple(facts)), _files(session.folder)]
+    if material.marks:
+        blocks.append(Fold("What happened", (_events(material.marks),)))
+    text = (session.folder / DESCRIPTION).read_text(encoding="utf-8")
+    blocks.append(Fold(DESCRIPTION, (Code(text),)))
+    return Section("provenance", "Provenance", tuple(blocks))
+
+
+def _libraries() -> str:
+    names = ", ".join(f"{n} {version(n)}" for n in ("numpy", "scipy", "pyarrow"))
+    return f"{names}, Python {platform.python_version()}"
+
+
+def _files(folder: Path) -> Block:
+    rows = []
+    for path in sorted(folder.iterdir()):
+        if path.is_file() and path.name not in OWN and not path.name.startswith("."):
+            with path.open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+            rows.append([path.name, f"{path.stat().st_size:,}", digest])
+    return table("Files of the session", ("file", ">bytes", "SHA-256"), rows)
+
+
+def _events(marks: tuple[Mapping[str, Any], ...]) -> Block:
+    rows = []
+    for mark in marks[:MOST_EVENTS]:
+        rest = {k: v for k, v in mark.items() if k not in ("event", "host_s")}
+        said = ", ".join(f"{k} {v}" for k, v in rest.items())
+        rows.append([_clock(mark.get("host_s")), str(mark.get("event", "")), said])
+    return table("Events by the host's clock, UTC", ("time", "event", "details"), rows)
+
+
+def _clock(host: object) -> str:
+    if not isinstance(host, int | float) or not 0 <= host < 1e11:
+        return ""
+    return datetime.fromtimestamp(host, UTC).strftime("%H:%M:%S")

@@ -1,0 +1,156 @@
+"""The raw recording, zoomable, and the averages that were taken from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.calibration.wording import number
+from fieldcal.observing import Rests
+from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
+from fieldcal.report.charts import Mark, Record, Span
+from fieldcal.report.gather import Material
+from fieldcal.report.loose import Json, objects_at, real
+from fieldcal.report.packing import Columns, around, pack
+from fieldcal.samples import CHANNELS, Array
+
+CLOSE = 3.0
+"""Stretch about each edge of a window that is packed sample by sample, s."""
+
+BRIEF = 5.0
+"""A mismatch shorter than this is marked where it begins, s."""
+
+MOST_MARKS = 30
+
+EVENTS = {
+    "rejected": "window rejected",
+    "wrong": "wrong place",
+    "failed": "failed",
+    "interrupted": "interrupted",
+}
+
+
+def recording(material: Material) -> Section:
+    """Every channel over device time, with the windows, and their averages."""
+    chart = _chart(material)
+    blocks: list[Block] = [
+        Figure(
+            chart,
+            "Shaded: the windows that were averaged, with a line at the average. Drag"
+            " to zoom in on a stretch; each panel then fits what is seen.",
+        )
+    ]
+    if material.still is not None:
+        blocks += averages(material, material.still)
+    if material.trouble:
+        blocks.append(Text(f"No window could be averaged: {material.trouble}."))
+    return Section("recording", "Recording", tuple(blocks))
+
+
+def windows(material: Material) -> tuple[Span, ...]:
+    """The windows that were averaged, with the number of their position."""
+    if material.still is None:
+        return ()
+    pairs = zip(material.still.rows, material.still.averages, strict=True)
+    off = material.epoch
+    return tuple(Span(a.start - off, a.end - off, str(row)) for row, a in pairs)
+
+
+def _chart(material: Material) -> Record:
+    block = material.block
+    six = block.six
+    panels = [
+        (name, "m/s²" if i < 3 else "rad/s", i % 3 + 1)
+        for i, name in enumerate(CHANNELS)
+        if np.isfinite(six[:, i]).any()
+    ]
+    used = [i for i in range(6) if np.isfinite(six[:, i]).any()]
+    values = six[:, used]
+    if np.isfinite(block.temperature).any():
+        panels.append(("temperature", "°C", 4))
+        values = np.column_stack([values, block.temperature])
+    spans, marks = windows(material), _marks(material)
+    edges = [m.at for m in marks] + [e for s in spans for e in (s.start, s.end)]
+    return Record(
+        "record",
+        "Samples over device time",
+        _alt(panels, values, float(block.t[-1] - block.t[0]), spans),
+        tuple(panels),
+        material.clock,
+        pack(Columns(block.t - material.epoch, values), around(edges, CLOSE)),
+        spans,
+        _means(material, used, values.shape[1]),
+        marks,
+    )
+
+
+def _means(material: Material, used: Sequence[int], panels: int) -> Array:
+    """Averages of the windows, (windows, panels)."""
+    averages = material.still.averages if material.still is not None else ()
+    rows = [[*(a.mean[i] for i in used), a.temperature] for a in averages]
+    return np.array(rows, dtype=float).reshape(len(rows), len(used) + 1)[:, :panels]
+
+
+def _marks(material: Material) -> tuple[Mark, ...]:
+    """Events with a device time of their own, and what a diagnosis found in samples."""
+    marks = [
+        Mark(float(m["at_s"]) - material.epoch, EVENTS[m["event"]])
+        for m in material.marks
+        if m.get("event") in EVENTS and isinstance(m.get("at_s"), int | float)
+    ]
+    return (*marks, *_transients(material.diagnosis or {}, material.epoch))
+
+
+def _transients(diagnosis: Json, epoch: float) -> list[Mark]:
+    found: dict[float, list[str]] = {}
+    for m in objects_at(diagnosis, "mismatch"):
+        at = real(m.get("from_s"))
+        brief = real(m.get("to_s")) - at < BRIEF
+        if m.get("kind") in ("samples", "transient") and brief:
+            found.setdefault(round(at - epoch, 1), []).append(str(m.get("channel", "")))
+    return [Mark(at, ", ".join(names)) for at, names in found.items()][:MOST_MARKS]
+
+
+def _alt(
+    panels: Sequence[tuple[str, str, int]],
+    values: Array,
+    seconds: float,
+    spans: Sequence[Span],
+) -> str:
+    ranges = [
+        f"{name} from {np.nanmin(v):.4g} to {np.nanmax(v):.4g} {unit}"
+        for (name, unit, _), v in zip(panels, values.T, strict=True)
+    ]
+    return f"{seconds:.0f} s of samples, {len(spans)} windows: {'; '.join(ranges)}."
+
+
+def averages(material: Material, still: Rests) -> list[Table]:
+    """The mean of each window with its standard error, a table a sensor."""
+    out = []
+    for first, sensor, unit in (
+        (0, "accelerometers", "m/s²"),
+        (3, "gyroscopes", "rad/s"),
+    ):
+        channels = [
+            i
+            for i in range(first, first + 3)
+            if any(np.isfinite(a.mean[i]) for a in still.averages)
+        ]
+        if not channels:
+            continue
+        columns = ["position", *(f">{CHANNELS[i]}, {unit}" for i in channels)]
+        columns += [">from – to, s", ">samples", ">°C"]
+        rows = [
+            [
+                material.position_name(row),
+                *(" ± ".join(number(a.mean[i], a.sigma[i])) for i in channels),
+                f"{a.start:.1f} – {a.end:.1f}",
+                f"{a.n:,}",
+                f"{a.temperature:.2f}" if np.isfinite(a.temperature) else "–",
+            ]
+            for row, a in zip(still.rows, still.averages, strict=True)
+        ]
+        caption = f"Averages of the {sensor}, with standard errors"
+        out.append(table(caption, columns, rows))
+    return out

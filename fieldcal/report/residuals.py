@@ -1,0 +1,183 @@
+"""What the calibration leaves of the averages, and where the device was.
+
+    r = <U> - (b + M f' + what else was estimated)                           device axes
+
+f' is the specific force at the angles asked for, with the tilt that was estimated. Of a
+position whose angles are not known only the norm says something: r = |M^-1 (<U> - b)| -
+g. Gyroscopes of tactical grade: r = <W> - b - A w, w the Earth's rate with its level
+part as these windows show it, because north is not known. m/s^2 and rad/s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.calibration import COMPONENTS, Calibration, Nominal
+from fieldcal.effects import NO_SHAPE, Experience, Motion, Sensor, catalogue
+from fieldcal.frames import EARTH_RATE, angles_of, earth_rate_home, turn
+from fieldcal.observing import observations
+from fieldcal.report.gather import Material
+from fieldcal.samples import Array, Block
+from fieldcal.solve.observations import Observations
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """Residuals of the windows.
+
+    Attributes
+    ----------
+    rows : (n,) number of each window's position
+    channel : (n, 6) m/s^2 and rad/s, nan where unknown or not measured
+    norm : (n,) m/s^2, of the norm of the specific force where angles are not known
+    sigma : (n, 6) standard error of the averages
+    temperature : (n,) deg C, nan where unknown
+
+    """
+
+    rows: tuple[int, ...]
+    channel: Array
+    norm: Array
+    sigma: Array
+    temperature: Array
+
+
+def residuals(material: Material) -> Residuals | None:
+    """Residuals of the windows; None without windows or a calibration."""
+    found, still = material.calibration, material.still
+    if found is None or still is None:
+        return None
+    seen = observations(material.session.about, still.averages, still.rows)
+    channel = seen.mean - predicted(found, seen)
+    true = found.apply(Block.of(seen.time, *_sensors(seen)), seen.nominal)
+    norm = np.where(
+        seen.oriented, np.nan, np.linalg.norm(true.acc, axis=1) - seen.gravity
+    )
+    sigma = np.sqrt(np.einsum("nii->ni", seen.covariance))
+    return Residuals(still.rows, channel, norm, sigma, seen.temperature)
+
+
+def predicted(found: Calibration, seen: Observations) -> Array:
+    """Outputs that the calibration predicts, (n, 6); nan where angles are unknown."""
+    x = Experience.at_rest(
+        *seen.angles, seen.gravity, mounting=seen.mounting, rate=_table_rates(seen)
+    )
+    if seen.grade == "navigation" and seen.latitude is not None:
+        x = x.turned(base_rate=earth_rate_home(seen.latitude))
+    effects = catalogue()
+    extra = [g for g in found.groups if g not in COMPONENTS and g in effects]
+    for group in extra:
+        effect = effects[group]
+        if isinstance(effect, Motion):
+            x = effect.change(x, _full(found, group, effect))
+    bias, scale = _base(found, seen.nominal)
+    out: Array = bias + scale * np.hstack([x.f, x.w])
+    for group in extra:
+        effect = effects[group]
+        if isinstance(effect, Sensor):
+            out = out + effect.design(x, NO_SHAPE) @ _full(found, group, effect)
+    if seen.grade != "navigation":
+        out[:, 3:] += _earth(seen, seen.mean[:, 3:] - out[:, 3:])
+    return out
+
+
+def _base(found: Calibration, nominal: Nominal) -> tuple[Array, Array]:
+    (acc_bias, acc), (gyr_bias, gyr) = (
+        found.accelerometers(nominal),
+        found.gyroscopes(nominal),
+    )
+    scale = np.concatenate([np.diag(acc), np.diag(gyr)])
+    return np.concatenate([acc_bias, gyr_bias]), scale
+
+
+def _full(found: Calibration, group: str, effect: Motion | Sensor) -> Array:
+    """Values of an effect's parameters, 0 where not determined."""
+    values = [found.value(f"{group}.{p.name}") for p in effect.params]
+    known: Array = np.nan_to_num(np.array(values))
+    return known
+
+
+def _table_rates(seen: Observations) -> Array:
+    rates: Array = np.array([p.rate or (0.0, 0.0, 0.0) for p in seen.positions])
+    return rates
+
+
+def _earth(seen: Observations, left: Array) -> Array:
+    """The Earth's rate in the windows, (n, 3) rad/s, as far as it can be known."""
+    known = seen.oriented & np.isfinite(left).all(axis=1)
+    if seen.latitude is None or not known.any():
+        return np.zeros((len(seen), 3))
+    away = np.zeros((len(seen), 3, 3))
+    alpha, beta = seen.angles
+    away[known] = seen.mounting.T @ turn(alpha[known], beta[known])
+    down = away[..., 1] * earth_rate_home(seen.latitude)[1]
+    level = away[known][..., [0, 2]].reshape(-1, 2)
+    # a prior of the size it can have keeps few windows from explaining anything with it
+    size = EARTH_RATE * np.cos(seen.latitude)
+    noise = np.sqrt(np.einsum("nii->ni", seen.covariance)[known][:, 3:]).ravel()
+    rows = np.vstack([level / noise[:, None], np.eye(2) / size])
+    target = np.concatenate([(left - down)[known].ravel() / noise, np.zeros(2)])
+    fitted = np.linalg.lstsq(rows, target, rcond=None)[0]
+    earth: Array = down + away[..., [0, 2]] @ fitted
+    return earth
+
+
+def _sensors(seen: Observations) -> tuple[Array, Array]:
+    return seen.mean[:, :3], seen.mean[:, 3:]
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """Angles the calibrated accelerometers show.
+
+    Attributes
+    ----------
+    rows : (n,) number of each window's position
+    asked : (n, 2) alpha and beta, deg; nan where not known
+    shown : (n, 2) deg
+    sigma : (n, 2) deg, of noise and calibration
+
+    """
+
+    rows: tuple[int, ...]
+    asked: Array
+    shown: Array
+    sigma: Array
+
+
+def reached(material: Material) -> Reached | None:
+    """Where the device was in each window; None without windows.
+
+    Without a calibration the nominal one serves.
+    """
+    still = material.still
+    if still is None:
+        return None
+    seen = observations(material.session.about, still.averages, still.rows)
+    if not seen.has_acc:
+        return None
+    block = Block.of(seen.time, *_sensors(seen))
+    spread = np.sqrt(np.einsum("nii->ni", seen.covariance))[:, :3]
+    found = material.calibration
+    if found is None:
+        acc = (block.acc - seen.nominal.acc_bias) / np.array(seen.nominal.acc_scale)
+    else:
+        acc = found.apply(block, seen.nominal).acc
+        spread = np.hypot(spread, found.uncertainty_of(block, seen.nominal)[:, :3])
+    force, spread = acc @ seen.mounting.T, spread @ np.abs(seen.mounting.T)
+    shown = np.rad2deg([angles_of(f) for f in force])
+    asked = np.rad2deg(np.column_stack(seen.angles))
+    return Reached(still.rows, asked, shown, _sigma(force, spread, shown))
+
+
+def _sigma(force: Array, spread: Array, shown: Array) -> Array:
+    """Uncertainty of the angles by that of each component of the force, (n, 2) deg."""
+    variance = np.zeros_like(shown)
+    for axis in range(3):
+        moved = force.copy()
+        moved[:, axis] += spread[:, axis]
+        change = np.rad2deg([angles_of(f) for f in moved]) - shown
+        variance += ((change + 180) % 360 - 180) ** 2
+    return np.sqrt(variance)

@@ -1,0 +1,94 @@
+"""How still the device was: in each window, and all the way through.
+
+    r = max over channels of sd(y over 1 s) / quietest tenth of that channel
+
+y are means over 0.1 s. At rest r is about 1; a turn takes it to hundreds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.observing import Rests
+from fieldcal.report import blocks
+from fieldcal.report.blocks import Cell, Figure, Section, Tone, table
+from fieldcal.report.charts import Axis, Chart, Mark, Series
+from fieldcal.report.gather import Material
+from fieldcal.report.recording import windows
+from fieldcal.samples import CHANNELS, Array, Block
+from fieldcal.windows import Limits
+from fieldcal.windows.cells import CELL, Cells, Table
+from fieldcal.windows.verdict import judge
+
+SPAN = 10
+"""Cells whose spread is looked at: 1 s."""
+
+POINTS = 4000
+"""Most points of the line; the greatest of each group is kept."""
+
+NEAR = 0.8
+"""Part of what is allowed from which a window is marked as close to it."""
+
+
+def stillness(material: Material) -> Section | None:
+    """Restlessness over time, and how near each window came to be rejected."""
+    cells = _cells(material.block)
+    if len(cells) < 2 * SPAN:
+        return None
+    t, r = restlessness(cells)
+    chart = Chart(
+        "stillness",
+        "Restlessness over device time",
+        f"Restlessness from {r.min():.2g} to {r.max():.2g} times that of rest.",
+        Axis(material.clock, "s"),
+        Axis("spread over 1 s, times that of rest", log=True),
+        (Series("restlessness", *_thinned(t - material.epoch, r), 1, "line"),),
+        (Mark(1.0, "rest"),),
+        windows(material),
+    )
+    caption = (
+        "Spread of means over 0.1 s within 1 s, against the quietest tenth of the"
+        " recording. Shaded: the windows."
+    )
+    parts: list[blocks.Block] = [Figure(chart, caption)]
+    if material.still is not None:
+        parts.append(_windows(material, material.still))
+    return Section("stillness", "Stillness", tuple(parts))
+
+
+def restlessness(cells: Table) -> tuple[Array, Array]:
+    """Middle of each second, s, and r of it, (m,) each."""
+    means = cells.steady
+    view = np.lib.stride_tricks.sliding_window_view(means, SPAN, axis=0)
+    spread = view.std(axis=-1)
+    quiet = np.quantile(spread, 0.1, axis=0)
+    ratio = spread / np.where(quiet > 0, quiet, np.inf)
+    return cells.times[: len(ratio)] + SPAN * CELL / 2, ratio.max(axis=1)
+
+
+def _thinned(t: Array, r: Array) -> tuple[Array, Array]:
+    group = -(-len(t) // POINTS)
+    first = np.arange(0, len(t), group)
+    return t[first], np.maximum(np.maximum.reduceat(r, first), 1e-3)
+
+
+def _cells(block: Block) -> Table:
+    cells = Cells()
+    cells.add(block)
+    return cells.table
+
+
+def _windows(material: Material, still: Rests) -> blocks.Table:
+    rows: list[list[str | Cell]] = []
+    for row, average in zip(still.rows, still.averages, strict=True):
+        end = float(np.nextafter(average.end, np.inf))
+        worst = judge(
+            _cells(material.block.between(average.start, end)), Limits()
+        ).worst
+        tone: Tone = "bad" if worst.ratio > 1 else "warn" if worst.ratio > NEAR else ""
+        share = Cell(f"{100 * worst.ratio:.0f} %", tone, min(1.0, worst.ratio))
+        what = f"{worst.kind} on {CHANNELS[worst.channel]}"
+        at = f"{worst.at - average.start:.1f}"
+        rows.append([material.position_name(row), share, what, at])
+    columns = ("position", ">of what is allowed", "nearest to", ">at, s into it")
+    return table("What came nearest to disturbing each window", columns, rows)

@@ -1,0 +1,71 @@
+"""A pseudo-terminal that packets go through, for a link that does its own packing."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import tty
+from collections import deque
+from contextlib import suppress
+
+from fieldcal.errors import DeviceError
+
+HEARD = 1 << 16
+
+
+class PtyPort:
+    """Our side of a pty; the host's is not held open, so the kernel tells who is there.
+
+    Raises
+    ------
+    DeviceError
+        If there is no pty to be had.
+
+    """
+
+    def __init__(self) -> None:
+        try:
+            self._ours, theirs = pty.openpty()
+        except OSError as error:
+            raise DeviceError(f"no pty to be had: {error.strerror}") from error
+        tty.setraw(theirs)
+        self.address = os.ttyname(theirs)
+        self.place = (self.address, 0)
+        os.close(theirs)
+        os.set_blocking(self._ours, False)
+
+    def fileno(self) -> int:
+        """Return our side."""
+        return self._ours
+
+    def listens(self) -> bool:
+        """Whether a host has the port open."""
+        poll = select.poll()
+        poll.register(self._ours, select.POLLIN)
+        return not any(event & select.POLLHUP for _, event in poll.poll(0))
+
+    def read(self) -> bytes:
+        """Return what the host said."""
+        with suppress(OSError):  # nothing, or nobody
+            return os.read(self._ours, HEARD)
+        return b""
+
+    def write(self, parts: deque[bytes]) -> None:
+        """Send what the pty takes; what nobody is there for is lost."""
+        if not self.listens():
+            parts.clear()
+            return
+        with suppress(BlockingIOError):
+            while parts:
+                sent = os.write(self._ours, parts[0])
+                rest = parts.popleft()[sent:]
+                if rest:
+                    parts.appendleft(rest)
+
+    def finish(self) -> None:
+        """Do nothing: a line has no end but a hang-up."""
+
+    def close(self) -> None:
+        """Hang up."""
+        os.close(self._ours)

@@ -1,0 +1,104 @@
+"""Several devices at once on one table: a session and a result for each."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal.beside import Times, folders
+from fieldcal.commands.virtual import address
+from fieldcal.movers import VirtualDevice
+from fieldcal.positions import Position
+from fieldcal.samples import Block
+from fieldcal.session import Session
+
+LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
+BIASES = ["0.2,-0.3,0.1", "-0.1,0.4,0.2", "0.3,0.1,-0.2"]
+
+
+def led(
+    devices: Sequence[VirtualDevice], urls: Sequence[str], *options: str
+) -> tuple[int, Any, str]:
+    """A run of two positions in which somebody turns all devices when told to."""
+    run = [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+    run += ["--seconds", "10", "--json", "--latitude", "50.45", *options]
+    for url in urls:
+        run += ["--device", url]
+    said = []
+    with subprocess.Popen(
+        run, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr and process.stdout
+        for line in process.stderr:
+            said.append(line.strip())
+            told = json.loads(line) if line.startswith("{") else {}
+            if told.get("event") == "place":
+                angles = [(0.0, 0.0), (45.0, 5.0)][told["position"]]
+                for device in devices:
+                    device.turn(Position.deg(*angles))
+        out = process.stdout.read()
+    return process.returncode, json.loads(out or "null"), said[-1]
+
+
+def started(stack: ExitStack, speed: str) -> tuple[list[VirtualDevice], list[str]]:
+    devices, urls = [], []
+    for link, bias in zip(LINKS, BIASES, strict=True):
+        options = [*link.split(), "--speed", speed, f"--acc-bias={bias}"]
+        options += ["--latitude=50.45", "--height=0"]
+        devices.append(stack.enter_context(VirtualDevice(options)))
+        urls.append(address(options, devices[-1].port))
+    return devices, urls
+
+
+def test_three_devices_on_three_links_have_a_session_and_a_result_each(
+    tmp_path: Path,
+) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20")
+        code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
+        truths = [device.truth for device in devices]
+    assert code == 0, said
+    sessions = [tmp_path / "s", *folders(tmp_path / "s")]
+    assert [path.name for path in sessions] == ["s", "device-2", "device-3"]
+    for folder, truth, url in zip(sessions, truths, urls, strict=True):
+        written = json.loads((folder / "result.json").read_text())
+        for group in ("acc_bias", "acc_scale", "gyr_bias"):
+            found = written["parameters"][group]
+            off = np.subtract(found["value"], truth[group])
+            assert np.abs(off / np.array(found["sigma"])).max() < 4.5, (folder, group)
+        session = Session.open(folder)
+        assert not session.warnings and (np.diff(session.block.t) > 0).all()
+        if folder != sessions[0]:
+            assert session.about.device["address"] == url
+            key = result["further"][folder.name]["parameters"]
+            assert key == written["parameters"]
+
+
+def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20")
+        urls[1] += "&reconnect=0"
+        devices[1].ask(fault={"silence_s": 1e6})
+        code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
+    assert code == 3
+    assert said.startswith("fieldcal run: device-2: ")
+    assert said.endswith("; the other devices have their results")
+    assert result["verdict"] == "good" and set(result["further"]) == {"device-3"}
+    marks = list(Session.open(tmp_path / "s" / "device-2").marks())
+    assert marks[-1]["event"] == "failed"
+
+
+def test_times_go_over_the_hosts_clock() -> None:
+    times = Times()
+    assert np.isnan(times.device(0.0))
+    for t in (10.0, 10.5, 11.0):
+        times.add(Block.of(np.array([t]), np.zeros((1, 3))))
+    assert (
+        times.device(times.host(10.7)) == 10.7
+        or abs(times.device(times.host(10.7)) - 10.7) < 1e-6
+    )

@@ -1,0 +1,132 @@
+"""A recalibration on top of the one an autopilot has: composed, shown, given back."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("fastcrc")
+pytest.importorskip("pymavlink")
+
+from fieldcal.cli import main
+from fieldcal.driver import open_driver
+from fieldcal.drivers.mavlink_imu import Imu
+
+HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
+
+
+def recalibrated(folder: Path, has: str) -> tuple[int, Any]:
+    virtual = f"--virtual=--mavlink tcpin:127.0.0.1:0?{has} --rate 200"
+    run = [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+    run += ["--seconds", "10", "--speed", "20", "--json", "-o", str(folder), virtual]
+    done = subprocess.run(run, capture_output=True, text=True, check=False, timeout=60)
+    return done.returncode, json.loads(done.stdout)
+
+
+ARDUPILOT = ("INS_ACCOFFS_{}", "INS_ACCSCAL_{}", "INS_GYROFFS_{}")
+PX4 = ("CAL_ACC0_{}OFF", "CAL_ACC0_{}SCALE", "CAL_GYRO0_{}OFF")
+
+
+@pytest.mark.parametrize(
+    ("has", "names"),
+    [
+        (HAS, ARDUPILOT),
+        ("autopilot=px4&CAL_ACC0_XOFF=0.5&CAL_ACC0_YSCALE=1.02", PX4),
+    ],
+)
+def test_what_to_install_is_the_truth_whatever_was_installed(
+    has: str,
+    names: tuple[str, ...],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code, result = recalibrated(tmp_path / "s", has)
+    assert code == 0
+    truth = result["virtual"]
+    wanted = (truth["acc_bias"], 1 / np.array(truth["acc_scale"]), truth["gyr_bias"])
+    for name, right in zip(names, wanted, strict=True):
+        for axis, value in zip("XYZ", right, strict=True):
+            said = result["install"][name.format(axis)]
+            assert abs(said["value"] - value) < 4.5 * said["sigma"], name
+    assert main(["solve", str(tmp_path / "s")]) == 0
+    assert f"install {names[0].format('X')} = " in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("installed") / "session"
+    assert recalibrated(folder, HAS)[0] == 0
+    return folder
+
+
+def as_if(session: Path, folder: Path, name: str, value: float) -> str:
+    """The same recording, had another parameter been installed."""
+    shutil.copytree(session, folder)
+    lines = (folder / "marks.jsonl").read_text().splitlines()
+    mark = json.loads(lines[0])
+    mark["installed"]["parameters"][name] = value
+    (folder / "marks.jsonl").write_text("\n".join([json.dumps(mark), *lines[1:]]))
+    assert main(["solve", str(folder)]) == 0
+    return str(folder)
+
+
+def test_a_calibration_is_applied_only_on_top_of_what_it_was_found_on(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = as_if(session, tmp_path / "other", "INS_ACCOFFS_X", 0.4)
+    out = str(tmp_path / "out.csv")
+    assert main(["apply", str(session), out]) == 0
+    assert main(["apply", str(session), out, "--calibration", other]) == 2
+    said = capsys.readouterr().err
+    assert "was recorded with INS_ACCOFFS_X = 0.5 in the autopilot" in said
+
+
+def test_a_turned_board_says_why_there_is_nothing_to_install(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    as_if(session, tmp_path / "turned", "AHRS_ORIENTATION", 4.0)
+    said = capsys.readouterr().out
+    assert "nothing to install in the autopilot: AHRS_ORIENTATION = 4 turns" in said
+    assert "install INS" not in said
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_that_is_told_to_end_gives_the_calibration_back(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    options = ["--mavlink", f"tcpin:127.0.0.1:0?{HAS}", "--speed", "5"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "fieldcal", "sim", *options],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as sim:
+        assert sim.stdout
+        place = sim.stdout.readline().strip()
+        run = subprocess.Popen(
+            [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+            + ["--device", f"mavlink:{place}?installed=identity"]
+            + ["-o", str(tmp_path / "s")],
+            stderr=subprocess.DEVNULL,
+        )
+        file, deadline = tmp_path / "s" / "samples.arrows", monotonic() + 30
+        while not (file.exists() and file.stat().st_size > 10_000):
+            assert monotonic() < deadline and run.poll() is None
+            sleep(0.02)
+        marks = (tmp_path / "s" / "marks.jsonl").read_text().splitlines()
+        kept = json.loads(marks[0])["installed"]  # what to set by hand after a kill -9
+        assert kept["taken_out"] and kept["parameters"]["INS_ACCOFFS_X"] == 0.5
+        run.send_signal(number)
+        run.send_signal(number)
+        assert run.wait(20) == 130
+        with open_driver(f"mavlink:{place}") as imu:
+            assert isinstance(imu, Imu) and imu.installed is not None
+            np.testing.assert_allclose(imu.installed.of("acc_offset"), [0.5, 0, 0])
+            assert imu.installed.values["INS_GYROFFS_Z"] == pytest.approx(0.01)
+        sim.terminate()

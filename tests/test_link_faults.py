@@ -1,0 +1,173 @@
+"""What a link survives and what it does not, through the command, on every link."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fieldcal.commands.virtual import address
+from fieldcal.movers import VirtualDevice
+from fieldcal.session import Session
+from fieldcal.sim_device.remote import Remote
+
+LINKS = {
+    "serial": "--serial xsens --port-link {0}/port",
+    "text": "--serial text?checksum=xor --port-link {0}/port",
+    "can": "--can slcan --port-link {0}/port",
+    "mavlink": "--mavlink tcpin:127.0.0.1:0",
+}
+every_link = pytest.mark.parametrize("link", LINKS)
+
+SURVIVED: tuple[dict[str, float], ...] = (
+    {"flip_bits": 5},
+    {"lose_bytes": 5},
+    {"double_bytes": 5},
+    {"garbage_bytes": 200},
+    {"duplicate_stamps": 3},
+    {"late_stamps": 3},
+    {"jitter_s": 0.02},
+    {"jitter_s": 0},
+    {"skew_ppm": 200},
+    {"silence_s": 3},
+    {"reboot_s": 2},
+    {"hangup_s": 4},
+)
+
+
+class Run:
+    """A calibration of a virtual device in other processes, and what came of it."""
+
+    def __init__(self, folder: Path, link: str, *more: str, speed: str = "20") -> None:
+        self.folder, self._control = folder / "session", folder / "control"
+        name, _, conceals = link.partition(" ")
+        virtual = f"{LINKS[name].format(folder)} {conceals} --control {self._control}"
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+            + ["--seconds", "10", "--json", "--speed", speed, *more]
+            + [f"--virtual={virtual}", "-o", str(self.folder)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.wait_for_samples()
+
+    def wait_for_samples(self) -> None:
+        file, deadline = self.folder / "samples.arrows", monotonic() + 30
+        while not (file.exists() and file.stat().st_size > 20_000):
+            assert monotonic() < deadline and self._process.poll() is None
+            sleep(0.02)
+
+    def fault(self, *faults: dict[str, float]) -> None:
+        with Remote(self._control) as remote:
+            for fault in faults:
+                over = remote.ask(fault=fault)["until_s"] + 0.5
+                while over < 1e5 and remote.ask(status={})["time_s"] < over:
+                    sleep(0.01)
+
+    def end(self) -> tuple[int, Any, str]:
+        """Exit code, the result, and the last line of standard error."""
+        out, said = self._process.communicate(timeout=60)
+        lines = said.strip().splitlines()
+        return self._process.returncode, json.loads(out or "null"), lines[-1]
+
+    def marks(self, event: str) -> list[dict[str, Any]]:
+        return [m for m in Session.open(self.folder).marks() if m["event"] == event]
+
+
+@every_link
+def test_a_link_that_stumbles_costs_nothing_but_time(link: str, tmp_path: Path) -> None:
+    run = Run(tmp_path, link)
+    run.fault(*SURVIVED)
+    code, result, said = run.end()
+    assert code == 0, said
+    for group in ("acc_bias", "acc_scale", "gyr_bias"):
+        found, truth = result["parameters"][group], result["virtual"][group]
+        pull = np.subtract(found["value"], truth) / np.array(found["sigma"])
+        assert np.abs(pull).max() < 4.5, group
+    block = Session.open(run.folder).block
+    assert (np.diff(block.t) > 0).all()
+    marks = run.marks("link")
+    counts = {
+        name: sum(mark.get(name, 0) for mark in marks)
+        for name in ("gaps", "missing", "repeated", "restarts", "bad")
+    }
+    assert counts["gaps"] >= 3 and counts["restarts"] >= 1 and counts["missing"] > 500
+    assert counts["repeated"] >= 3
+    # each long gap in the samples is marked where it is
+    for at in np.flatnonzero(np.diff(block.t) > 1.5):
+        gap = [m for m in marks if abs(m.get("from_s", -9) - block.t[at]) < 1e-3]
+        assert len(gap) == 1 and abs(gap[0]["to_s"] - block.t[at + 1]) < 1e-3
+
+
+def test_a_link_that_loses_all_the_time_is_marked_now_and_then(tmp_path: Path) -> None:
+    run = Run(tmp_path, "serial --with dropped:fraction=0.05")
+    code, _, said = run.end()
+    assert code == 0, said
+    marks, block = run.marks("link"), Session.open(run.folder).block
+    lost = sum(mark["missing"] for mark in marks)
+    share = lost / (lost + len(block))
+    assert 0.03 < share < 0.07
+    seconds = marks[-1]["host_s"] - marks[0]["host_s"]
+    assert 1 <= len(marks) <= seconds + 2
+
+
+def failed(
+    device: VirtualDevice, url: str, folder: Path, *faults: dict[str, float]
+) -> tuple[int, str]:
+    """Exit code and last line of a run in whose midst faults happen."""
+    run = subprocess.Popen(
+        [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+        + ["--device", url, "-o", str(folder)],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    samples, deadline = folder / "samples.arrows", monotonic() + 30
+    while not (samples.exists() and samples.stat().st_size > 20_000):
+        assert monotonic() < deadline and run.poll() is None
+        sleep(0.02)
+    for fault in faults:
+        device.ask(fault=fault)
+    _, said = run.communicate(timeout=60)
+    return run.returncode, said.strip().splitlines()[-1]
+
+
+def kept(folder: Path, said: str) -> None:
+    """What came before is in the session, and so is what was said."""
+    session = Session.open(folder)
+    assert len(session.block) > 50
+    (mark,) = [m for m in session.marks() if m["event"] == "failed"]
+    assert said.endswith(mark["text"]) and ". " not in mark["text"]
+
+
+SILENT = "went silent for 3 s: not a byte came; check"
+GONE = "hung up: check cable and power, then start again"
+
+
+@pytest.mark.parametrize(
+    ("link", "fault", "says"),
+    [
+        ("serial", "silence_s", SILENT),
+        ("can", "silence_s", "went silent for 3 s: not a frame came; check"),
+        ("mavlink", "silence_s", "went silent for 3 s: an autopilot is there, but"),
+        ("mavlink", "reboot_s", "went silent for 3 s: an autopilot is there, but"),
+        ("serial", "hangup_s", GONE),
+        ("can", "hangup_s", GONE),
+        ("mavlink", "hangup_s", GONE),
+    ],
+)
+def test_what_ends_a_run_is_one_sentence(
+    link: str, fault: str, says: str, tmp_path: Path
+) -> None:
+    options = [*LINKS[link].format(tmp_path).split(), "--speed", "20"]
+    with VirtualDevice(options) as device:
+        url = address(options, device.port) + "&reconnect=0"
+        code, said = failed(device, url, tmp_path / "s", {fault: 1e6})
+    assert code == 3 and says in said, said
+    kept(tmp_path / "s", said)

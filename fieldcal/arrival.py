@@ -14,6 +14,7 @@ explains twice as well as the position asked for is taken for the slip.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +60,13 @@ class Arrival:
     problem: str = ""
 
 
-def judge(wanted: Position, f: Array, gravity: float, held: Held | None) -> Arrival:
+def judge(
+    wanted: Position,
+    f: Array,
+    gravity: float,
+    held: Held | None,
+    others: Mapping[str, Position] | None = None,
+) -> Arrival:
     """Compare measured force with a position asked for.
 
     Parameters
@@ -68,6 +75,7 @@ def judge(wanted: Position, f: Array, gravity: float, held: Held | None) -> Arri
     f : (3,) measured specific force, procedure axes, m/s^2
     gravity : m/s^2
     held : an earlier position, or None before the first
+    others : further places it might be in instead, by what is then said of it
 
     """
     norm = float(np.linalg.norm(f))
@@ -84,7 +92,7 @@ def judge(wanted: Position, f: Array, gravity: float, held: Held | None) -> Arri
     chord = _chord(wanted, held.position, gravity) if held else 0.0
     limit = NEAR + TILT * chord if held else FIRST
     miss = _miss(wanted, f, gravity, held)
-    slip, slip_miss = _nearest_slip(wanted, f, gravity, held)
+    slip, slip_miss = _nearest_slip(wanted, f, gravity, held, others or {})
     slipped = slip_miss < min(miss / 2, limit) and miss > NEAR
     if miss <= limit and not slipped:
         return Arrival(True, *seen)
@@ -116,7 +124,11 @@ def _miss(wanted: Position, f: Array, gravity: float, held: Held | None) -> floa
 
 
 def _nearest_slip(
-    wanted: Position, f: Array, gravity: float, held: Held | None
+    wanted: Position,
+    f: Array,
+    gravity: float,
+    held: Held | None,
+    others: Mapping[str, Position],
 ) -> tuple[str, float]:
     """The slip that would put the device nearest to where it is, and how near, rad."""
     a, b = wanted.degrees or (0.0, 0.0)
@@ -130,6 +142,7 @@ def _nearest_slip(
         ((a, 0.0), "β is not turned yet"),
         ((0.0, b), "α is not turned yet"),
     ]
+    slips += [(p.degrees, said) for said, p in others.items() if p.degrees]
     if held and held.position.degrees:
         slips.insert(0, (held.position.degrees, "it has not been turned yet"))
     misses = [_miss(Position.deg(*angles), f, gravity, held) for angles, _ in slips]

@@ -25,7 +25,7 @@ import numpy as np
 
 from fieldcal.driver import Driver, open_driver
 from fieldcal.errors import FieldcalError
-from fieldcal.link_marks import LinkMarks, Recording
+from fieldcal.link_marks import LinkMarks
 from fieldcal.recorder import Recorder
 from fieldcal.samples import Block
 
@@ -131,7 +131,7 @@ class First:
 
     """
 
-    def __init__(self, recorder: Recording, others: Sequence[Beside]) -> None:
+    def __init__(self, recorder: Recorder, others: Sequence[Beside]) -> None:
         self._recorder, self.others = recorder, others
         self._times = Times()
         self._told: set[Path] = set()
@@ -146,6 +146,10 @@ class First:
                 self._told.add(other.folder)
                 self.tell(f"{other.folder.name}: {other.failed}")
         return recorded
+
+    def rejoin(self) -> None:
+        """Take note that the link of the first device was opened anew."""
+        self._recorder.rejoin()
 
     def mark(self, event: str, **what: Any) -> None:
         """Append a mark, and a window to all sessions."""

@@ -12,7 +12,7 @@ shows in the times and in `Health`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
@@ -21,6 +21,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.samples import Block, Grain, concat
+
+LOOK = 0.5
+"""How often whoever reads is told of a silence, s of the host's clock."""
 
 _STARTED = time() - monotonic()
 
@@ -90,12 +93,14 @@ class Driver(ABC):
     """A link to one IMU: a context manager that yields blocks.
 
     Exceptions listed in `faults` become `DeviceError` with `name` in the text.
+    `on_silence`, if set, is called every `LOOK` s in which `blocks` has no sample.
     """
 
     faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)
 
     name: str
     health: Health
+    on_silence: Callable[[], None] | None = None
 
     @abstractmethod
     def __init__(self, address: str) -> None: ...
@@ -142,11 +147,15 @@ class Driver(ABC):
         """
         deadline, before = monotonic() + timeout, replace(self.health)
         while True:
-            block = self._receive(max(0.0, deadline - monotonic()))
+            left = max(0.0, deadline - monotonic())
+            block = self._receive(min(left, LOOK) if self.on_silence else left)
             if block is not None and len(block):
                 deadline, before = monotonic() + timeout, replace(self.health)
                 yield block
-            elif self.reconnecting:
+                continue
+            if self.on_silence:
+                self.on_silence()
+            if self.reconnecting:
                 deadline = monotonic() + timeout
             elif monotonic() >= deadline:
                 raise DeviceSilent(self._silence(timeout, before))

@@ -6,40 +6,34 @@ device time, so a virtual device may run faster than the wall clock and nothing 
 A hold goes through three phases. *Turning*: until the device has come to rest where it
 was asked to be; a wrong place is said, and nothing is averaged there. *Averaging*:
 until the window is long enough; a disturbance rejects it. *Taken*: the window is marked
-and its average goes back to the plan.
+and its average goes back to the plan. What was taken before, by an engine whose link
+broke or whose process was killed, is handed back at once and not asked for again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
 
-from fieldcal.arrival import Arrival, Held, judge
+from fieldcal.arrival import Arrival, Held
+from fieldcal.breaks import Again, gap, restarted
 from fieldcal.description import Description
 from fieldcal.driver import Driver
-from fieldcal.errors import FieldcalError, Moved, WrongPosition
+from fieldcal.errors import FieldcalError, Moved, Skipped, Stopped, WrongPosition
 from fieldcal.link_marks import LinkMarks, Recording
+from fieldcal.placing import GAP, Placing, force
 from fieldcal.plan import Hold, Note, Plan, Step
-from fieldcal.samples import Array, Block, concat
-from fieldcal.view import Operator, Phase, View
-from fieldcal.windows import Average, Noise, Stillness, Window
+from fieldcal.samples import Array, Block, pieces
+from fieldcal.view import Operator, Phase, View, Wish
+from fieldcal.warmth import Warmth
+from fieldcal.windows import Average, Noise, Window
 
 R = TypeVar("R")
 
-SETTLE = 1.5
-"""Rest before a window begins, s: a joint that was just let go of still creeps."""
-
-PATIENCE = 3.0
-"""Rest at a wrong place before that is said, s: a person stops in between."""
-
 PIECE = 0.1
 """Longest stretch of samples that is looked at as one, s."""
-
-GAP = 0.5
-"""Longest time without samples inside a window, s."""
 
 
 class Engine:
@@ -52,8 +46,10 @@ class Engine:
     about : the session's description; site, mounting and nominal calibration serve to
         judge where the device is
     recorder : the session folder being written
-    give_up : s of device time at a wrong place after which the hold is given up; None
-        waits for ever, as for a person
+    give_up : s of device time away from where it should be after which the hold is
+        given up; None waits for ever, as for a person
+    taken : averages of positions taken before, by number; what is taken is added
+    warmth : judges whether the device is still warming up; None does not ask
 
     """
 
@@ -64,23 +60,38 @@ class Engine:
         about: Description,
         recorder: Recording,
         give_up: float | None = None,
+        taken: dict[int, Average] | None = None,
+        warmth: Warmth | None = None,
     ) -> None:
         self._driver = driver
         self._operator = operator
         self._about = about
         self._recorder = recorder
         self._give_up = give_up
+        self._taken = {} if taken is None else taken
+        self._warmth = warmth
         self._held: Held | None = None
         self._noise: Noise | None = None
+        self._left: int | None = None
+        self._before: int | None = None
         self._link = LinkMarks(driver, recorder)
+        self._silence = 0
+        driver.on_silence = self._silent
         self._stream = self._record(driver)
         self._rate = np.nan
+        self._temperature = np.nan
 
     def run(self, plan: Plan[R]) -> R:
         """Carry out a plan and return its result.
 
         An error of ours while doing a step is thrown into the plan at that step, which
         may catch it and go on; anything else ends the run.
+
+        Raises
+        ------
+        Again
+            If the operator wants a position that was taken already once more.
+
         """
         reply: object = None
         error: FieldcalError | None = None
@@ -90,7 +101,7 @@ class Engine:
                 reply, error = None, None
                 try:
                     reply = self._do(step)
-                except (Moved, WrongPosition) as failed:
+                except (Moved, WrongPosition, Skipped) as failed:
                     error = failed
         except StopIteration as done:
             result: R = done.value
@@ -101,188 +112,190 @@ class Engine:
     def _do(self, step: Step) -> object:
         match step:
             case Hold():
-                self._recorder.mark(
-                    "asked", position=step.index, name=step.position.name
-                )
-                self._operator.place(step)
-                f = self._arrive(step)
-                average = self._average(step)
+                average = self._taken.get(step.index)
+                if average is None:
+                    average = self._hold(step)
+                    self._taken[step.index] = average
+                else:
+                    self._view("taken", step, reason="taken before")
                 if step.position.oriented:
+                    f = force(average.mean[None, :3], self._about)
                     self._held = Held(step.position, f)
+                self._before = step.index
                 return average
             case Note(text):
-                self._recorder.mark("told", text=text)
-                self._operator.tell(text)
+                self._tell(text)
                 return None
 
+    def _hold(self, hold: Hold) -> Average:
+        while True:
+            name = hold.position.name
+            self._recorder.mark("asked", position=hold.index, name=name)
+            self._operator.place(hold)
+            self._arrive(hold)
+            average = self._average(hold)
+            if average is not None:
+                return average
+
+    def _tell(self, text: str) -> None:
+        self._recorder.mark("told", text=text)
+        self._operator.tell(text)
+
     def _record(self, driver: Driver) -> Iterator[Block]:
-        for block in driver.blocks():
-            self._recorder.append(block)
+        for raw in driver.blocks():
+            self._silence = 0
+            block = self._recorder.append(raw)
             self._link.take(block)
             if len(block) > 1:
                 self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
-            yield from _pieces(block)
+            self._temperature = float(block.temperature[-1])
+            if self._warmth:
+                self._warmth.add(block)
+            yield from pieces(block, PIECE)
 
-    def _force(self, block: Block) -> Array:
-        """Mean specific force in procedure axes by the nominal calibration, (3,)."""
-        nominal = self._about.nominal
-        f = (np.nanmean(block.acc, axis=0) - nominal["acc_bias"]) / nominal["acc_scale"]
-        force: Array = self._about.mounting @ f
-        return force
+    def _silent(self) -> None:
+        """Say that nothing comes, before anybody thinks that we are stuck."""
+        self._silence += 1
+        if self._silence == 2:
+            self._tell(
+                f"no samples come from {self._driver.name}: check cable and power; it"
+                " goes on by itself once they do"
+            )
+        if self._operator.wish() == "stop":
+            raise Stopped("stopped by the operator")
 
-    def _arrive(self, hold: Hold) -> Array:
-        """Wait until the device rests where it should; specific force there, (3,)."""
-        stillness, resting = Stillness(), _Resting()
-        began: float | None = None
-        told = False
+    def _arrive(self, hold: Hold) -> None:
+        """Wait until the device rests where it should."""
+        placing = Placing(hold, self._about, self._held, self._left == hold.index)
         asked = self._driver.host_time()
+        insisted = cold = False
         for block in self._stream:
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before
-            began = block.t[0] if began is None else began
-            stillness.add(block)
-            resting.add(block, stillness.since)
-            arrival, f = None, None
-            if resting.seconds > 0:
-                f = self._force(resting.block)
-                arrival = judge(hold.position, f, self._about.gravity, self._held)
-            reason = _reason(stillness.since, arrival, resting.seconds)
-            self._show("turning", hold, block, arrival, stillness.meter, reason)
-            if arrival is None or f is None:
-                told = False
-                continue
-            if arrival.ok and resting.seconds >= SETTLE:
-                return f
-            if not arrival.ok and resting.seconds >= PATIENCE and not told:
-                self._complain(hold, arrival)
-                told = True
-            waited = float(block.t[-1] - began)
-            if not arrival.ok and self._give_up and waited > self._give_up:
-                raise WrongPosition(f"{hold.position.name}: {arrival.problem}")
+            placing.add(block)
+            wish = self._wish(hold, averaging=False)
+            if wish == "confirm" and self._warmth and self._warmth.waits:
+                self._warmth.waived = True
+            elif wish == "confirm" and not placing.arrived:
+                if insisted and placing.usable:
+                    self._insist(hold, placing)
+                    return
+                insisted = self._ask_back(placing)
+            waits = self._warmth is not None and self._warmth.waits
+            reason = placing.reason
+            if placing.arrived and waits and self._warmth:
+                said = self._warmth.says
+                reason = f"{said}; Enter goes on" if said else "settling"
+                if said and not cold:
+                    cold = True
+                    self._tell(f"{said}: waiting for it, Enter goes on")
+            self._view("turning", hold, placing.where, placing.meter, reason=reason)
+            if placing.arrived and not waits and wish != "wait":
+                return
+            self._complain(hold, placing, quiet=wish == "wait")
         raise AssertionError("blocks() ends in an exception only")
 
-    def _complain(self, hold: Hold, arrival: Arrival) -> None:
-        """Say that it rests at a wrong place: once for each rest."""
-        self._recorder.mark("wrong", position=hold.index, text=arrival.problem)
-        self._operator.tell(arrival.problem)
+    def _complain(self, hold: Hold, placing: Placing, quiet: bool) -> None:
+        """Say that it rests at a wrong place, and give up in the end."""
+        if not quiet and (said := placing.complaint()):
+            self._recorder.mark("wrong", position=hold.index, text=said)
+            self._operator.tell(said)
+        if self._give_up and placing.waited > self._give_up and not placing.arrived:
+            what = placing.problem or f"it has not come to rest in {self._give_up:g} s"
+            raise WrongPosition(f"{hold.position.name}: {what}")
 
-    def _average(self, hold: Hold) -> Average:
-        window = Window(noise=self._noise, grain=self._driver.grain)
-        last = np.nan
+    def _ask_back(self, placing: Placing) -> bool:
+        """Answer an operator who wants to go on at a wrong place."""
+        if placing.usable and placing.problem:
+            self._tell(f"{placing.problem}; press Enter once more to take it like this")
+            return True
+        self._tell(f"not yet: {placing.problem or placing.reason}")
+        return False
+
+    def _insist(self, hold: Hold, placing: Placing) -> None:
+        self._recorder.mark("insisted", position=hold.index, text=placing.problem)
+
+    def _wish(self, hold: Hold, averaging: bool) -> Wish | None:
+        """What the operator wants; what ends the step is carried out at once."""
+        wish = self._operator.wish()
+        if wish == "stop":
+            raise Stopped("stopped by the operator")
+        if wish == "skip":
+            self._recorder.mark("skipped", position=hold.index)
+            raise Skipped(f"{hold.position.name} was left out by the operator")
+        if wish == "repeat" and not averaging:
+            if self._before is not None:
+                self._recorder.mark("repeated", position=self._before)
+                raise Again(self._before)
+            self._operator.tell("nothing was taken yet that could be repeated")
+        return wish
+
+    def _average(self, hold: Hold) -> Average | None:
+        """Average a window; None if the operator wants to begin it again."""
+        window, last = Window(noise=self._noise, grain=self._driver.grain), np.nan
+        restarts = self._driver.health.restarts
         try:
             for block in self._stream:
                 if block.t[0] - last > GAP:
-                    raise _gap(last, float(block.t[0]))
+                    raise gap(last, float(block.t[0]))
+                if self._driver.health.restarts != restarts:
+                    raise restarted(float(block.t[0]))
                 last = float(block.t[-1])
                 window.add(block)
                 if window.moved:
                     raise window.moved
-                self._show_window(hold, block, window)
+                if self._wish(hold, averaging=True) == "repeat":
+                    self._recorder.mark("repeated", position=hold.index)
+                    return None
+                self._show_window(hold, window)
                 if window.elapsed >= hold.seconds or window.done(hold.sigma):
                     break
             average = window.average()
         except Moved as moved:
-            self._recorder.mark(
-                "rejected",
-                position=hold.index,
-                at_s=moved.at,
-                axis=moved.axis,
-                text=str(moved),
-            )
+            self._left = hold.index
+            what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
+            self._recorder.mark("rejected", position=hold.index, **what)
             raise
-        self._recorder.mark(
-            "window",
-            position=hold.index,
-            start_s=average.start,
-            end_s=float(np.nextafter(average.end, np.inf)),
-        )
+        end = float(np.nextafter(average.end, np.inf))
+        where = {"start_s": average.start, "end_s": end}
+        self._recorder.mark("window", position=hold.index, **where)
         self._noise = window.noise and window.noise.spectrum
-        self._show_window(hold, block, window, "taken")
+        self._show_window(hold, window, "taken")
+        self._say_if_cold()
         return average
 
-    def _show(
+    def _say_if_cold(self) -> None:
+        if self._warmth and (said := self._warmth.says):
+            self._tell(said)
+
+    def _view(
         self,
         phase: Phase,
         hold: Hold,
-        block: Block,
-        arrival: Arrival | None,
-        stillness: float,
-        reason: str,
+        arrival: Arrival | None = None,
+        stillness: float = np.nan,
+        elapsed: float = 0.0,
+        sigma: Array | None = None,
+        reason: str = "",
     ) -> None:
+        if phase == "taken" and sigma is None:
+            sigma = self._taken[hold.index].sigma
         view = View(
             phase,
             hold,
             arrival,
             stillness,
-            0.0,
-            np.full(6, np.nan),
+            elapsed,
+            np.full(6, np.nan) if sigma is None else sigma,
             reason,
             self._rate,
-            float(block.temperature[-1]),
+            self._temperature,
             self._driver.health,
         )
         self._operator.show(view)
 
     def _show_window(
-        self, hold: Hold, block: Block, window: Window, phase: Phase = "averaging"
+        self, hold: Hold, window: Window, phase: Phase = "averaging"
     ) -> None:
-        view = View(
-            phase,
-            hold,
-            None,
-            window.meter,
-            window.elapsed,
-            window.sigma,
-            "",
-            self._rate,
-            float(block.temperature[-1]),
-            self._driver.health,
-        )
-        self._operator.show(view)
-
-
-def _pieces(block: Block) -> Iterator[Block]:
-    """Cut a block, so that what the engine does is independent of how samples come."""
-    edges = np.arange(block.t[0] + PIECE, block.t[-1], PIECE)
-    rows = [0, *np.searchsorted(block.t, edges).tolist(), len(block)]
-    for first, last in pairwise(rows):
-        if last > first:
-            yield block[first:last]
-
-
-class _Resting:
-    """The last second of samples since the device came to rest."""
-
-    def __init__(self) -> None:
-        self._blocks: list[Block] = []
-        self.seconds = 0.0
-
-    def add(self, block: Block, still_since: float | None) -> None:
-        if still_since is None:
-            self._blocks, self.seconds = [], 0.0
-            return
-        self.seconds = float(block.t[-1] - still_since)
-        self._blocks.append(block)
-        while len(self._blocks) > 1 and block.t[-1] - self._blocks[1].t[0] > 1.0:
-            self._blocks.pop(0)
-
-    @property
-    def block(self) -> Block:
-        return concat(self._blocks)
-
-
-def _reason(still_since: float | None, arrival: Arrival | None, resting: float) -> str:
-    if still_since is None:
-        return "moving: waiting for it to rest"
-    if arrival is not None and not arrival.ok:
-        return arrival.problem if resting >= PATIENCE else "waiting for the turn"
-    return "settling"
-
-
-def _gap(last: float, now: float) -> Moved:
-    return Moved(
-        f"no samples came between {last:.2f} s and {now:.2f} s: the window starts"
-        " again; check the cable if it happens once more",
-        last,
-        "t",
-    )
+        now = (window.meter, window.elapsed, window.sigma)
+        self._view(phase, hold, None, *now)

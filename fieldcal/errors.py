@@ -7,9 +7,12 @@ FieldcalError                2
 |    +-- NotObservable       2  the positions cannot determine what was asked for
 +-- DeviceError              3  the link to the device failed
 |    +-- DeviceSilent        3  no sample came in time
+|    +-- MoverFailed         3  what turns the device did not do so
 +-- Moved                    1  the device was not still during a window
 +-- WrongPosition            1  the device is not where the procedure needs it
 +-- CalibrationFailed        1  the procedure could not reach a result
++-- Skipped                  1  the operator leaves a position out
++-- Stopped                130  the operator ends the run
 
 Texts are for the operator: what happened, where, what to do now. One sentence.
 """
@@ -51,6 +54,10 @@ class DeviceSilent(DeviceError):
     """No sample came in time."""
 
 
+class MoverFailed(DeviceError):
+    """What turns the device did not do so."""
+
+
 class Moved(FieldcalError):
     """The device was not still during a window.
 
@@ -79,3 +86,15 @@ class CalibrationFailed(FieldcalError):
     """The procedure could not reach a result."""
 
     exit_code = 1
+
+
+class Skipped(FieldcalError):
+    """The operator leaves a position out."""
+
+    exit_code = 1
+
+
+class Stopped(FieldcalError):
+    """The operator ends the run."""
+
+    exit_code = 130

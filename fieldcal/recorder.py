@@ -108,7 +108,8 @@ class Recorder:
                 self._begin(about)
         except FileExistsError as error:
             raise SessionError(
-                f"{folder}: holds a session already; name another folder"
+                f"{folder}: holds a session already; name another folder, or go on"
+                " with it by --resume"
             ) from error
         except OSError as error:
             raise SessionError(f"{folder}: cannot be written: {error}") from error

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -108,3 +109,12 @@ def concat(blocks: Iterable[Block]) -> Block:
     return Block(
         *(np.concatenate([getattr(b, f.name) for b in parts]) for f in fields(Block))
     )
+
+
+def pieces(block: Block, seconds: float) -> Iterator[Block]:
+    """Cut a block, so that what is done with it does not depend on how samples come."""
+    edges = np.arange(block.t[0] + seconds, block.t[-1], seconds)
+    rows = [0, *np.searchsorted(block.t, edges).tolist(), len(block)]
+    for first, last in pairwise(rows):
+        if last > first:
+            yield block[first:last]

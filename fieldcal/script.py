@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.movers import Mover
 from fieldcal.plan import Hold
-from fieldcal.view import View
+from fieldcal.view import View, Wish
 
 EVERY = 5.0
 """Time between two lines of progress, s of device time."""
@@ -29,20 +29,25 @@ class ScriptOperator:
     def __init__(self, mover: Mover, out: IO[str] | None = None) -> None:
         self._mover = mover
         self._out = out or sys.stderr
-        self._shown: tuple[str, int, int] = ("", -1, -1)
+        self._shown: tuple[str, int, int, str] = ("", -1, -1, "")
 
     def place(self, hold: Hold) -> None:
         """Begin to turn."""
         self._say("place", position=hold.index, name=hold.position.name)
-        self._mover.turn(hold.position)
+        self._mover.turn(hold.position, hold.index)
 
     def tell(self, text: str) -> None:
         """Report a sentence."""
         self._say("tell", text=text)
 
+    def wish(self) -> Wish | None:
+        """Wait for a mover that is still at work."""
+        return "wait" if self._mover.busy() else None
+
     def show(self, view: View) -> None:
         """Report progress: each change of phase, and now and then within one."""
-        now = (view.phase, view.hold.index, int(view.elapsed // EVERY))
+        waits = view.reason.partition(":")[0]
+        now = (view.phase, view.hold.index, int(view.elapsed // EVERY), waits)
         if now == self._shown:
             return
         self._shown = now

@@ -141,6 +141,8 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
         i = mark.get("position")
         if mark.get("event") == "window" and isinstance(i, int) and i < len(windows):
             windows[i] = (float(mark["start_s"]), float(mark["end_s"]))
+        elif mark.get("event") == "repeated" and isinstance(i, int):
+            windows[i : i + 1] = [None]
     return replace(about, windows=tuple(windows))
 
 

@@ -13,6 +13,9 @@ from fieldcal.samples import Array
 Phase = Literal["turning", "averaging", "taken"]
 """What the engine waits for: to be in place, for the window, for the next step."""
 
+Wish = Literal["confirm", "repeat", "skip", "stop", "wait"]
+"""What an operator may want: a key, or a mover that is still at work (wait)."""
+
 
 @dataclass(frozen=True, slots=True)
 class View:
@@ -56,3 +59,6 @@ class Operator(Protocol):
 
     def show(self, view: View) -> None:
         """Show the state; called for every block, must not take long."""
+
+    def wish(self) -> Wish | None:
+        """What was asked for since the last call; called for every block."""

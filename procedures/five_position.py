@@ -11,7 +11,7 @@ from fieldcal.description import Description
 from fieldcal.observing import observations
 from fieldcal.plan import Plan
 from fieldcal.positions import FIVE, Position
-from fieldcal.procedures.holding import hold_all
+from fieldcal.procedures.holding import hold_each, with_left_out
 from fieldcal.solve import solve
 
 POSITIONS: tuple[Position, ...] = FIVE
@@ -21,5 +21,6 @@ def plan(
     about: Description, seconds: float = 30.0, sigma: float | None = None
 ) -> Plan[Calibration]:
     """Hold the positions of `about` for `seconds` each and solve."""
-    averages = yield from hold_all(about.positions, seconds, sigma)
-    return solve(observations(about, averages))
+    held = yield from hold_each(about.positions, seconds, sigma)
+    seen = observations(about, list(held.values()), list(held))
+    return with_left_out(solve(seen), about.positions, held)

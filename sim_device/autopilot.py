@@ -4,7 +4,9 @@ It has a calibration of its own among its parameters, and applies it, axis by ax
 U = (r - o) k. Options follow the place as a query: ``autopilot`` (ardupilot, px4),
 ``system``, ``instance``, ``streams`` (messages that it sends unasked, joined by
 commas), ``deny=1`` (no SET_MESSAGE_INTERVAL), ``acc_unit`` (mg, mm/s^2), ``mute=1`` (no
-parameter is answered), and any parameter by its name.
+parameter is answered), and any parameter by its name. ``drop`` names parameters, joined
+by commas, that it does not take; ``alter`` some that it answers rightly and keeps
+wrongly; ``glitch`` the same, but the first time only.
 """
 
 from __future__ import annotations
@@ -36,7 +38,11 @@ RAW_SENSORS = (RAW, *SCALED[1:])
 """What the old request for the raw sensor stream begins."""
 
 KINDS = {"ardupilot": 3, "px4": 12}
-OWN = ("autopilot", "system", "instance", "streams", "deny", "acc_unit", "mute")
+FAULTS = ("drop", "alter", "glitch")
+OWN = (
+    *("autopilot", "system", "instance", "streams", "deny", "acc_unit", "mute"),
+    *FAULTS,
+)
 DENIED, UNSUPPORTED = 2, 3
 INT32, REAL32 = 6, 9
 WHOLE = ("SENS_BOARD_ROT", "TC_A_ENABLE", "TC_G_ENABLE")
@@ -94,6 +100,7 @@ class Autopilot:
                 f"acc_unit={self._unit!r} is none of {', '.join(ACC_UNITS)}"
             )
         self.parameters = {**parameters(self._kind), **_parameters(given, self._kind)}
+        self._wrong = {f: given.get(f, "").split(",") for f in FAULTS}
         self._dialect = dialect
         system = int(_number(given, "system", 1, 255))
         self._mav = dialect.MAVLink(None, system, 1)
@@ -177,10 +184,20 @@ class Autopilot:
         elif kind == "PARAM_REQUEST_READ" and self._is_target(message):
             return self._value(message.param_id)
         elif kind == "PARAM_SET" and self._is_target(message):
-            if message.param_id in self.parameters:
-                self.parameters[message.param_id] = float(message.param_value)
-            return self._value(message.param_id)
+            return self._set(message.param_id, float(message.param_value))
         return b""
+
+    def _set(self, name: str, value: float) -> bytes:
+        """Set a parameter, or do something else with it, and answer."""
+        wrong = self._wrong
+        if name not in self.parameters or name in wrong["drop"]:
+            return self._value(name)
+        self.parameters[name] = value
+        answer = self._value(name)
+        if name in (*wrong["alter"], *wrong["glitch"]):
+            self.parameters[name] = 1.01 * value + 0.01
+        wrong["glitch"] = [n for n in wrong["glitch"] if n != name]
+        return answer
 
     def _is_target(self, message: Any) -> bool:
         system, component = message.target_system, message.target_component

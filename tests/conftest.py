@@ -1,6 +1,7 @@
 """What every test needs: property tests that do not depend on the machine's speed."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,21 @@ settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("any machine")
+
+
+collect_ignore = ["example_project"]
+"""A project of its own, which test_pytest_plugin runs."""
+
+
+@pytest.fixture(autouse=True, scope="session")
+def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the user's history of devices out of the tests, and the tests out of it."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("history")
+        patch.setenv("FIELDCAL_HISTORY", str(folder / "history.sqlite"))
+        patch.setenv("XDG_DATA_HOME", str(folder))
+        yield
+
 
 SHARED = Path(__file__).parent.parent.parent / "shared"
 

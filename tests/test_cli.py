@@ -101,8 +101,11 @@ def test_a_session_that_cannot_be_solved_is_said_so_in_one_sentence(
     [
         ("[[position]]\nalpha_deg = 0.0\nbeta_deg = 0.0\n" * 2, "are the same"),
         ("[[position]]\nalpha_deg = 0.0\nbeta_deg = 0.0\n", "are not enough"),
-        ("[run]\nseconds = -1\n", "seconds = -1 must be a number above 0"),
-        ("[run]\nprocedure = 'magic'\n", "'magic' is none of"),
+        ("[run]\nseconds = -1\n", "[run] seconds = -1 cannot be: give the averaging"),
+        (
+            "[run]\nprocedure = 'magic'\n",
+            '[run] procedure = "magic" cannot be: write two',
+        ),
         ("run = 3\n", "write [run]"),
         ("x = [", "is no plan file"),
         (ZERO_G, "gravity = 0"),

@@ -56,7 +56,7 @@ def test_turning_says_where_to_where_it_is_and_what_it_waits_for(
 ) -> None:
     operator.show(view("turning"))
     said = screen(operator)
-    assert "TURN to α = 22.5°, β = 0°" in said
+    assert "T U R N   T O   α = 22.5°, β = 0°" in said
     assert "+3.0°" in said and "turn +19.5°" in said
     assert "100 Hz" in said and "24.5 °C" in said
 
@@ -66,7 +66,7 @@ def test_averaging_says_hold_still_time_left_and_what_is_reached(
 ) -> None:
     operator.show(view("averaging", 12.0))
     said = screen(operator)
-    assert "HOLD STILL" in said and "18 s" in said and "3.00 mm/s²" in said
+    assert "H O L D   S T I L L" in said and "18 s" in said and "3.00 mm/s²" in said
 
 
 def test_a_position_taken_is_ticked_off_with_its_sigma(

@@ -175,6 +175,7 @@ def device_error(
 ) -> tuple[int, str]:
     code = main(
         ["run", "two_position", "--headless", "--device", f"serial:{port}"]
+        + ["--patience", "1"]
         + ["-o", str(folder)]
     )
     lines = capsys.readouterr().err.strip().splitlines()

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fieldcal import description
+from fieldcal.arrival import Held
+from fieldcal.breaks import Again
 from fieldcal.driver import Driver, Health
 from fieldcal.engine import Engine
-from fieldcal.errors import CalibrationFailed, DeviceSilent, WrongPosition
-from fieldcal.plan import Hold, hold
-from fieldcal.positions import TWO, Position
-from fieldcal.procedures.holding import hold_all
+from fieldcal.errors import CalibrationFailed, DeviceSilent, Stopped, WrongPosition
+from fieldcal.frames import turn
+from fieldcal.placing import Placing
+from fieldcal.plan import Hold, Plan, hold
+from fieldcal.positions import FIVE, TWO, Position
+from fieldcal.procedures.holding import hold_all, hold_each
 from fieldcal.recorder import Recorder
-from fieldcal.samples import Block
+from fieldcal.samples import Array, Block
 from fieldcal.session import Session
 from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.in_process import InProcess
-from fieldcal.view import View
+from fieldcal.sim_device.profile import Climate, Profile
+from fieldcal.view import View, Wish
+from fieldcal.warmth import Warmth
 from fieldcal.windows import Average
 
 ABOUT = description.parse({"site": {"latitude_deg": 50.45, "height_m": 170.0}})
@@ -39,6 +46,7 @@ class Turner:
     late: Position | None = None
     corrects: bool = True
     bumped: list[float] = field(default_factory=list)
+    wishes: list[Wish | None] = field(default_factory=list)
 
     def place(self, hold: Hold) -> None:
         alpha, beta = hold.position.degrees or (0.0, 0.0)
@@ -52,6 +60,9 @@ class Turner:
         if self.late and self.corrects:
             self.driver.place(self.late)
             self.late = None
+
+    def wish(self) -> Wish | None:
+        return self.wishes.pop(0) if self.wishes else None
 
     def show(self, view: View) -> None:
         self.views.append(view)
@@ -195,3 +206,157 @@ def test_the_operator_sees_where_the_device_is_and_how_far_the_average_is(
     taken = [v for v in bench.turner.views if v.phase == "taken"]
     assert len(taken) == 2 and np.isfinite(taken[0].sigma).all()
     assert taken[0].rate_hz == pytest.approx(100, rel=0.01)
+
+
+def test_what_was_taken_before_is_not_asked_for_again(bench: Bench) -> None:
+    first, second = bench.engine.run(hold_all(TWO, 10.0))
+    again = Engine(
+        bench.turner.driver, bench.turner, ABOUT, bench.recorder, 60.0, {0: first}
+    )
+    averages = again.run(hold_all(TWO, 10.0))
+    assert averages[0] is first and averages[1].start > second.end
+    assert events(bench).count("asked") == 3
+
+
+def test_a_position_left_out_is_told_to_the_procedure(bench: Bench) -> None:
+    bench.turner.wishes = [*[None] * 30, "skip"]
+    held = bench.engine.run(hold_each(FIVE[:2], 10.0))
+    assert list(held) == [1]
+    assert "was left out by the operator" in bench.turner.told[0]
+
+
+def test_a_taken_position_is_wanted_again(bench: Bench) -> None:
+    taken: dict[int, Average] = {}
+    turner = bench.turner
+    engine = Engine(turner.driver, turner, ABOUT, bench.recorder, 60.0, taken)
+    with pytest.raises(Again) as again:
+        engine.run(_then_repeat(turner))
+    assert again.value.index == 0 and list(taken) == [0]
+
+
+def _then_repeat(turner: Turner) -> Plan[None]:
+    yield from hold_all(TWO[:1], 5.0)
+    turner.wishes = ["repeat"]
+    yield from hold(1, TWO[1], 5.0)
+
+
+def test_an_operator_may_stop(bench: Bench) -> None:
+    bench.turner.wishes = ["stop"]
+    with pytest.raises(Stopped):
+        bench.engine.run(hold_all(TWO, 10.0))
+
+
+def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
+    """Every pair of the five, on bases tilted by up to a degree and a half."""
+    rng = np.random.default_rng(6)
+    for _ in range(5):
+        tilt = turn(*np.deg2rad(rng.uniform(-1.5, 1.5, 2)))
+        f = {i: _force(p, tilt) for i, p in enumerate(FIVE)}
+        for wanted, there in itertools.permutations(range(5), 2):
+            known = Held(FIVE[wanted - 1], f[wanted - 1]) if wanted else None
+            placing = Placing(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
+            placing.add(_resting(f[there]))
+            assert not placing.arrived, (wanted, there)
+            placing = Placing(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
+            placing.add(_resting(f[wanted]))
+            assert placing.arrived, (wanted, placing.problem)
+
+
+FIVE_ABOUT = description.parse(
+    {
+        "site": {"gravity": 9.81},
+        "position": [
+            dict(zip(("alpha_deg", "beta_deg"), p.degrees or (), strict=False))
+            for p in FIVE
+        ],
+    }
+)
+
+
+def _force(position: Position, tilt: Array) -> Array:
+    f: Array = turn(position.alpha or 0.0, position.beta or 0.0) @ tilt @ [0, -9.81, 0]
+    return f
+
+
+def _resting(f: Array) -> Block:
+    t = np.arange(400) / 100
+    noise = np.random.default_rng(1).standard_normal((400, 6))
+    return Block.of(t, f + 0.005 * noise[:, :3], 0.001 * noise[:, 3:])
+
+
+def test_nothing_is_known_of_a_time_without_samples() -> None:
+    placing = Placing(Hold(0, FIVE[0], 10.0), FIVE_ABOUT, None)
+    block = _resting(np.array([0.0, -9.81, 0.0]))
+    placing.add(block[:150])
+    assert placing.seconds > 1.0
+    placing.add(block[300:])
+    assert placing.seconds < 1.5 and not placing.arrived
+
+
+def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
+    warming = replace(Climate(), self_heating_k=20.0, warm_up_s=60.0)
+    driver = InProcess(VirtualDevice(replace(Profile(), temperature=warming), seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner = Turner(driver)
+        warmth = Warmth(0.5, 40.0)
+        engine = Engine(driver, turner, ABOUT, recorder, warmth=warmth)
+        engine.run(hold_all(TWO[:1], 10.0))
+    assert "still warming up" in turner.told[0] and "Enter goes on" in turner.told[0]
+    waits = [v.reason for v in turner.views if "Enter goes" in v.reason]
+    assert waits and "K/min" in waits[0]
+    window = [m for m in Session.open(tmp_path / "s").marks() if m["event"] == "window"]
+    assert 39.0 < window[0]["start_s"] < 43.0, "but not for ever"
+    assert "still warming up" in turner.told[-1]
+
+
+@pytest.mark.parametrize(("step", "rate"), [(0.0, 0.0), (1.0, 0.0), (0.01, 0.3)])
+def test_a_steady_temperature_is_no_warming_up(step: float, rate: float) -> None:
+    for seed in range(20):
+        warmth = Warmth(0.5, 600.0)
+        for block in _temperatures(seed, step, rate):
+            warmth.add(block)
+            assert not warmth.says
+
+
+@pytest.mark.parametrize(("step", "within"), [(0.0, 15.0), (1.0, 70.0)])
+def test_warming_up_is_noticed_also_in_whole_degrees(
+    step: float, within: float
+) -> None:
+    warmth, said = Warmth(0.5, 600.0), np.inf
+    for block in _temperatures(1, step, 4.0):
+        warmth.add(block)
+        if warmth.says:
+            said = min(said, float(block.t[-1]))
+    assert said < within
+    rate, sigma = warmth.rate
+    assert abs(rate - 4.0) < 4 * sigma + 0.05
+
+
+def _temperatures(seed: int, step: float, rate: float) -> Iterator[Block]:
+    """Two minutes of a device whose temperature changes by `rate` K/min."""
+    rng = np.random.default_rng(seed)
+    for start in np.arange(0.0, 120.0, 0.5):
+        t = start + np.arange(50) / 100
+        temperature = 20.0 + rate * t / 60
+        temperature = temperature + 0.05 * rng.standard_normal(50)
+        if step:
+            temperature = step * np.round(temperature / step)
+        yield Block.of(t, np.zeros((50, 3)), temperature=temperature)
+
+
+def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
+    """A slow lean of a tenth of a degree, for longer than the window is."""
+    device, turner = bench.turner.driver.device, bench.turner
+
+    class Leaning(Turner):
+        leant = False
+
+        def show(self, view: View) -> None:
+            super().show(view)
+            if view.elapsed > 8.0 and not self.leant:
+                self.leant = True
+                device.bump(push=0.0, tilt=np.deg2rad(0.1), seconds=20.0)
+
+    leaning = Leaning(turner.driver)
+    Engine(turner.driver, leaning, ABOUT, bench.recorder).run(hold_all(TWO[:1], 20.0))
+    assert "hold still, the window starts again" in leaning.told[0]

@@ -108,7 +108,7 @@ def test_the_command_writes_a_plan_that_run_takes(
     assert len(said["positions"]) == 4 and said["sigma"]["acc_bias.x"] > 0
     parser = argparse.ArgumentParser()
     run.add_arguments(parser)
-    task = run.make_task(parser.parse_args([str(path)]))
+    task, _ = run.make_task(parser.parse_args([str(path)]))
     assert len(task.about.positions) == 4 and task.seconds == said["seconds"]
     assert main(["plan", "-o", str(path)]) == 2
     assert main(["plan", "--minutes", "0.5"]) == 2

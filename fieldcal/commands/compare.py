@@ -32,9 +32,9 @@ def run(args: argparse.Namespace) -> int:
 
     found = compare(read(args.first), read(args.second))
     if args.json:
-        sys.stdout.write(json.dumps(_document(found)) + "\n")
+        sys.stdout.write(json.dumps(document(found)) + "\n")
     else:
-        sys.stdout.write(_table(found))
+        sys.stdout.write(table(found))
     return 0
 
 
@@ -64,7 +64,8 @@ def read(path: Path) -> Calibration:
         raise InputError(f"{file}: {error}") from None
 
 
-def _table(found: Comparison) -> str:
+def table(found: Comparison) -> str:
+    """Lines of a comparison, a parameter each."""
     from fieldcal.calibration.wording import number
 
     width = max(len(n) for n in found.names)
@@ -85,7 +86,8 @@ def _table(found: Comparison) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _document(found: Comparison) -> dict[str, object]:
+def document(found: Comparison) -> dict[str, object]:
+    """A comparison as one JSON object."""
     return {
         "names": list(found.names),
         "difference": [-float(d) for d in found.difference],

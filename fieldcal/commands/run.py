@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
@@ -15,41 +15,29 @@ from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.further import Devices
 from fieldcal.commands.site import add_site, site_tables
-from fieldcal.errors import FieldcalError, InputError, PlanError
+from fieldcal.errors import FieldcalError, InputError
 
 if TYPE_CHECKING:
     from fieldcal.beside import Beside
     from fieldcal.calibration import Calibration
-    from fieldcal.description import Description
-    from fieldcal.driver import Driver
+    from fieldcal.history import History
+    from fieldcal.limits import Limits
     from fieldcal.movers import Mover
+    from fieldcal.plan_file import Task
     from fieldcal.view import Operator
-
-PROCEDURES = ("two_position", "five_position", "positions")
 
 EXAMPLE = """\
   fieldcal run five_position --device "serial:/dev/ttyUSB0?format=witmotion"
   fieldcal run five_position --virtual --speed 20
-  fieldcal run plan.toml --headless --json > result.json
+  fieldcal run plan.toml --headless --json --junit run.xml > result.json
+  fieldcal run --resume sessions/2026-03-01T09-30-00-five_position
 """
 
-VIRTUAL_FORMAT = "witmotion"
+GIVE_UP, GIVE_UP_UNTURNED = 90.0, 600.0
+"""Device time after which a script gives a position up, s: with and without a mover."""
 
-GIVE_UP = 90.0
-"""Device time after which a script gives a position up, s."""
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """What is to be done: the tables of a session.toml, and how to carry them out."""
-
-    procedure: str
-    tables: Mapping[str, Any]
-    about: Description
-    seconds: float
-    sigma: float | None
-    device: str | None
-    folder: Path
+PATIENCE, PATIENCE_HEADLESS = 120.0, 20.0
+"""How long a device that is gone is waited for, s."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,10 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
         "procedure",
+        nargs=argparse.OPTIONAL,
         metavar="PROCEDURE",
-        help=f"{', '.join(PROCEDURES)}, or a plan file (a session.toml with positions,"
-        " and a table [run] of procedure, seconds, sigma, device)",
+        help="two_position, five_position, positions, or a plan file (a session.toml"
+        " with positions, and a table [run])",
     )
+    add("--resume", type=Path, metavar="SESSION", help="go on with a run broken off")
     add(
         "--device",
         action=Devices,
@@ -80,50 +70,62 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seed", default="1", metavar="N", help="of the virtual device's noise")
     add("--seconds", type=float, metavar="S", help="averaging time (default: 30)")
     add("--sigma", type=float, metavar="M/S^2", help="stop averaging at this ± instead")
+    add("--verify", action="store_true", help="one more position, which is not fitted")
+    add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
+    add("--history", type=Path, metavar="FILE", help="instead of the usual history")
+    add(
+        "--patience",
+        type=float,
+        metavar="S",
+        help="how long to wait for a device that is gone"
+        f" (default: {PATIENCE:g}, headless {PATIENCE_HEADLESS:g})",
+    )
     add("-o", "--output", type=Path, metavar="FOLDER", help="where to record")
     add("--headless", action="store_true", help="no operator: progress as JSON lines")
     add("--plain", action="store_true", help="lines instead of a screen")
     add("--json", action="store_true", help="print the result as one JSON object")
     add("--no-report", action="store_true", help="write no report.html")
+    add("--junit", type=Path, metavar="FILE", help="write what happened as JUnit XML")
     add_site(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal import junit, limits
     from fieldcal.commands.further import check_heard, results
-    from fieldcal.commands.installing import with_installed
-    from fieldcal.commands.table import show
-    from fieldcal.observing import rests, with_turns_between
-    from fieldcal.session import RESULT, Session
+    from fieldcal.history import History, default_path
+    from fieldcal.session import read_marks
 
-    task = make_task(args)
-    _check(task)
-    with _link(args, task) as (driver, mover):
-        found, others = _record(args, task, driver, mover)
-        truth = getattr(mover, "truth", None)
-    session = Session.open(task.folder)
-    found = with_turns_between(found, session, rests(session))
-    found = with_installed(found, session)
-    written = session.write_json(RESULT, found.to_json())
+    task, folder = make_task(args)
+    file = args.limits or task.run.get("limits")
+    bounds = limits.read(task.about.grade, Path(file) if file else None)
+    marks = folder / "marks.jsonl"
+    try:
+        found, truth, others = _record(args, task, folder, bounds)
+        history = History(args.history or default_path())
+        found = _result(found, folder, bounds, history)
+    except (FieldcalError, KeyboardInterrupt) as error:
+        if marks.exists():
+            sys.stderr.write(_kept(folder))
+        if args.junit and marks.exists():
+            said = str(error) or "interrupted"
+            known = list(read_marks(marks))
+            junit.write(args.junit, task.procedure, task.positions, known, None, said)
+        raise
+    result = found.to_json()
+    if args.junit:
+        known = list(read_marks(marks))
+        junit.write(args.junit, task.procedure, task.positions, known, result)
     further = results(others)
-    if args.json:
-        more: dict[str, Any] = {"virtual": truth} if truth else {}
-        if further:
-            more["further"] = {name: each.to_json() for name, each in further.items()}
-        sys.stdout.write(json.dumps({**found.to_json(), **more}) + "\n")
-    else:
-        show(found, truth)
-        for name, each in further.items():
-            sys.stdout.write(f"\n{name}\n")
-            show(each)
-        sys.stdout.write(f"recorded: {task.folder}\nwritten:  {written}\n")
+    _show(args, found, folder, truth, further)
     if not args.no_report:
-        for folder in (task.folder, *(task.folder / name for name in further)):
-            page = _report(folder)
+        for each in (folder, *(folder / name for name in further)):
+            page = _report(each)
             if page and not args.json:
                 sys.stdout.write(f"report:   {page}\n")
     check_heard(others)
-    return 0 if all(each.good for each in (found, *further.values())) else 1
+    good = all(each.good for each in (found, *further.values()))
+    return 0 if good and result["decision"]["go"] else 1
 
 
 def _report(folder: Path) -> Path | None:
@@ -137,8 +139,8 @@ def _report(folder: Path) -> Path | None:
         return None
 
 
-def make_task(args: argparse.Namespace) -> Task:
-    """What is to be done, from the options or a plan file.
+def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
+    """What is to be done, and where, from the options, a plan file or a session.
 
     Raises
     ------
@@ -146,31 +148,51 @@ def make_task(args: argparse.Namespace) -> Task:
         Naming what is wrong with the plan.
 
     """
-    from fieldcal import description
+    from fieldcal import description, plan_file
 
-    options: Mapping[str, Any]
-    if args.procedure in PROCEDURES:
-        module = import_module(f"fieldcal.procedures.{args.procedure}")
+    if args.resume:
+        if args.procedure or args.output:
+            raise InputError("--resume goes on with what it finds: give it alone")
+        from fieldcal.running import resumed
+
+        session, tables = resumed(args.resume)
+        tables["run"] = {**tables["run"], **_given(args)}
+        return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder
+    if not args.procedure:
+        raise InputError(
+            f"name a procedure ({', '.join(plan_file.PROCEDURES)}) or a plan file"
+        )
+    name = args.procedure
+    if name in plan_file.PROCEDURES:
+        module = import_module(f"fieldcal.procedures.{name}")
         tables = {"format": description.FORMAT, **site_tables(args, "device")}
         tables["position"] = [_table(p.name, p.degrees) for p in module.POSITIONS]
-        options = {"procedure": args.procedure}
+        tables["run"] = {"procedure": name, **_given(args)}
+        name = "the options"
     else:
-        tables, options = _plan_file(Path(args.procedure))
-    name = str(options.get("procedure", "positions"))
-    if name not in PROCEDURES:
-        raise PlanError(
-            f"{args.procedure}: procedure {name!r} is none of: {', '.join(PROCEDURES)}"
-        )
+        tables = plan_file.read(Path(name))
+        if not isinstance(tables.get("run", {}), dict):
+            raise InputError(f"{name}: run must be a table: write [run]")
+        tables["run"] = {**tables.get("run", {}), **_given(args)}
+    task = plan_file.task(tables, name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
-    return Task(
-        procedure=name,
-        tables=tables,
-        about=description.parse(tables),
-        seconds=args.seconds or _option(args.procedure, options, "seconds") or 30.0,
-        sigma=args.sigma or _option(args.procedure, options, "sigma"),
-        device=args.device or options.get("device"),
-        folder=args.output or Path("sessions") / f"{stamp}-{name}",
-    )
+    return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
+
+
+def _given(args: argparse.Namespace) -> dict[str, Any]:
+    """The table [run] as far as options say it."""
+    given: dict[str, Any] = {
+        "device": args.device,
+        "seconds": args.seconds,
+        "sigma": args.sigma,
+        "verify": args.verify or None,
+        "limits": str(args.limits.absolute()) if args.limits else None,
+    }
+    if args.virtual is not None:
+        speed = ["--speed", args.speed, "--seed", args.seed]
+        options = f"{shlex.join(speed)} {args.virtual}".strip()
+        given["mover"] = {"kind": "virtual", "options": options}
+    return {key: value for key, value in given.items() if value is not None}
 
 
 def _table(name: str, degrees: tuple[float, float] | None) -> dict[str, Any]:
@@ -178,127 +200,117 @@ def _table(name: str, degrees: tuple[float, float] | None) -> dict[str, Any]:
     return {"name": name, "alpha_deg": round(alpha, 9), "beta_deg": round(beta, 9)}
 
 
-def _plan_file(path: Path) -> tuple[dict[str, Any], Mapping[str, Any]]:
-    import tomllib
-
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(
-            f"{path}: is neither a procedure ({', '.join(PROCEDURES)}) nor a plan file"
-        ) from error
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: is no plan file: {error}") from error
-    options = tables.pop("run", {})
-    if not isinstance(options, dict):
-        raise PlanError(f"{path}: run must be a table: write [run]")
-    return tables, options
-
-
-def _option(plan: str, options: Mapping[str, Any], key: str) -> float | None:
-    value = options.get(key)
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
-        raise PlanError(f"{plan}: [run] {key} = {value!r} must be a number above 0")
-    return float(value)
-
-
-def _check(task: Task) -> None:
-    """Refuse a plan that cannot end well, before anything moves."""
-    import numpy as np
-
-    from fieldcal.positions import forces
-
-    if task.seconds <= 0:
-        raise PlanError(f"averaging for {task.seconds:g} s: give a time above 0 s")
-    positions = task.about.positions
-    if len(positions) < 2 or not all(p.oriented for p in positions):
-        raise PlanError(
-            f"{len(positions)} positions with known angles are not enough: a plan needs"
-            " two or more, each with alpha_deg and beta_deg"
-        )
-    f = forces(positions, 1.0)
-    if np.linalg.norm(f - f[0], axis=1).max() < np.deg2rad(0.5):
-        raise PlanError(
-            f"all {len(positions)} positions are the same ({positions[0].name}): no"
-            " scale factor can be determined; turn the device between them"
-        )
-
-
-@contextlib.contextmanager
-def _link(args: argparse.Namespace, task: Task) -> Iterator[tuple[Driver, Mover]]:
-    """Open the device, and whoever turns it."""
-    from fieldcal.commands.signals import interruptible
-    from fieldcal.commands.virtual import address
-    from fieldcal.driver import open_driver
-    from fieldcal.movers import Nobody, VirtualDevice
-
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(interruptible())
-        if args.virtual is not None:
-            options = _virtual(args, task)
-            device = stack.enter_context(VirtualDevice(options))
-            url = address(options, device.port)
-            yield stack.enter_context(open_driver(url)), device
-        elif task.device:
-            yield stack.enter_context(open_driver(task.device)), Nobody()
-        else:
-            raise InputError(
-                'name the device: --device "serial:/dev/ttyUSB0?format=witmotion"'
-                " (fieldcal ports lists them), or --virtual to try without one"
-            )
-
-
-def _virtual(args: argparse.Namespace, task: Task) -> list[str]:
-    import shlex
-
-    site = task.about
-    options = ["--serial", VIRTUAL_FORMAT, "--speed", args.speed, "--seed", args.seed]
-    options += [f"--latitude={site.latitude_deg}", f"--height={site.height_m}"]
-    options += [f"--mounting={','.join(site.axes)}", f"--grade={site.grade}"]
-    if "gravity" in site.raw.get("site", {}):
-        options.append(f"--gravity={site.gravity}")
-    return options + shlex.split(args.virtual)
-
-
 def _record(
-    args: argparse.Namespace, task: Task, driver: Driver, mover: Mover
-) -> tuple[Calibration, Sequence[Beside]]:
+    args: argparse.Namespace, task: Task, folder: Path, bounds: Limits
+) -> tuple[Calibration, dict[str, Any] | None, Sequence[Beside]]:
+    """Hold the positions, record and solve; and what a virtual device conceals."""
     from fieldcal.beside import beside
-    from fieldcal.engine import Engine
-    from fieldcal.observing import with_provenance
+    from fieldcal.commands.run_device import device
     from fieldcal.recorder import Recorder
+    from fieldcal.running import Running, taken_before
+    from fieldcal.session import Session
 
-    plan = import_module(f"fieldcal.procedures.{task.procedure}").plan
-    with (
-        Recorder(task.folder, task.tables) as own,
-        beside(args.further, own, task.tables) as recorder,
-    ):
-        with _operator(args, task, mover) as operator:
+    with device(task) as (opened, mover):
+        driver = opened()
+        with contextlib.ExitStack() as stack:
+            stack.callback(driver.close)
+            taken = taken_before(Session.open(folder), task) if args.resume else {}
+            tables = None if args.resume else task.tables
+            own = stack.enter_context(Recorder(folder, tables))
+            further = [] if args.resume else args.further
+            recorder = stack.enter_context(beside(further, own, task.tables))
+            operator = stack.enter_context(_operator(args, task, mover, folder))
             recorder.tell = operator.tell
-            give_up = GIVE_UP if args.headless or args.virtual is not None else None
-            engine = Engine(driver, operator, task.about, recorder, give_up)
-            if driver.notes:
-                recorder.mark("device", **driver.notes)
-                for text in driver.notes.get("says", ()):
-                    operator.tell(text)
+            if args.resume:
+                recorder.mark("resumed", taken=sorted(taken))
+            patience = PATIENCE_HEADLESS if args.headless else PATIENCE
+            running = Running(
+                task,
+                operator,
+                recorder,
+                opened,
+                bounds,
+                patience if args.patience is None else args.patience,
+                _give_up(args, task),
+                taken,
+            )
             try:
-                found = engine.run(plan(task.about, task.seconds, task.sigma))
-            except FieldcalError as error:
-                recorder.mark("failed", text=str(error))
-                sys.stderr.write(f"what was recorded is kept in {task.folder}\n")
+                found = running.run(driver)
+            except (FieldcalError, KeyboardInterrupt) as error:
+                recorder.mark("failed", text=str(error) or "interrupted")
                 raise
-            except KeyboardInterrupt:
-                recorder.mark("interrupted")
-                sys.stderr.write(f"what was recorded is kept in {task.folder}\n")
-                raise
-        recorder.mark("finished", verdict="good" if found.good else "bad")
-    return with_provenance(found, task.about), recorder.others
+            recorder.mark("finished", verdict="good" if found.good else "bad")
+        truth = getattr(mover, "truth", None)
+        return found, dict(truth) if truth else None, recorder.others
+
+
+def _kept(folder: Path) -> str:
+    return (
+        f"what was recorded is kept in {folder}; to go on:"
+        f" fieldcal run --resume {shlex.quote(str(folder))}\n"
+    )
+
+
+def _give_up(args: argparse.Namespace, task: Task) -> float | None:
+    """How long a position is waited for; for a person, for ever."""
+    given = task.run.get("give_up_s")
+    unturned = task.mover["kind"] == "nothing"
+    if given is not None:
+        return float(given)
+    if unturned:
+        return GIVE_UP_UNTURNED if args.headless else None
+    return GIVE_UP
+
+
+def _result(
+    found: Calibration, folder: Path, bounds: Limits, history: History
+) -> Calibration:
+    """Add what the turns say, decide, write it down and keep it."""
+    from fieldcal.assessing import assess, remember
+    from fieldcal.commands.installing import with_installed
+    from fieldcal.observing import rests, with_provenance, with_turns_between
+    from fieldcal.session import RESULT, Session
+
+    session = Session.open(folder)
+    still = rests(session)
+    found = with_turns_between(found, session, still)
+    found = with_installed(with_provenance(found, session.about), session)
+    found, _ = assess(found, session, still, bounds, history)
+    session.write_json(RESULT, found.to_json())
+    if said := remember(history, session, found):
+        sys.stderr.write(f"fieldcal run: {said}\n")
+    return found
+
+
+def _show(
+    args: argparse.Namespace,
+    found: Calibration,
+    folder: Path,
+    truth: dict[str, Any] | None,
+    further: Mapping[str, Calibration],
+) -> None:
+    from fieldcal.commands.decision_view import show_decision
+    from fieldcal.commands.table import show
+    from fieldcal.session import RESULT
+
+    if args.json:
+        more: dict[str, Any] = {"virtual": truth} if truth else {}
+        if further:
+            more["further"] = {name: each.to_json() for name, each in further.items()}
+        sys.stdout.write(json.dumps({**found.to_json(), **more}) + "\n")
+        return
+    show(found, truth)
+    show_decision(found)
+    for name, each in further.items():
+        sys.stdout.write(f"\n{name}\n")
+        show(each)
+    sys.stdout.write(f"recorded: {folder}\nwritten:  {folder / RESULT}\n")
 
 
 @contextlib.contextmanager
-def _operator(args: argparse.Namespace, task: Task, mover: Mover) -> Iterator[Operator]:
+def _operator(
+    args: argparse.Namespace, task: Task, mover: Mover, folder: Path
+) -> Iterator[Operator]:
     if args.headless:
         from fieldcal.script import ScriptOperator
 
@@ -307,10 +319,15 @@ def _operator(args: argparse.Namespace, task: Task, mover: Mover) -> Iterator[Op
     from rich.console import Console
 
     from fieldcal.console import ConsoleOperator
+    from fieldcal.keyboard import Keyboard
 
-    title = f"fieldcal · {task.procedure} · {task.folder}"
-    console = Console(stderr=args.json)
     with ConsoleOperator(
-        title, task.about.positions, mover, console, args.plain
+        f"fieldcal · {task.procedure} · {folder}",
+        task.positions,
+        mover,
+        Console(stderr=args.json),
+        args.plain,
+        Keyboard(),
+        len(task.about.positions) if task.verification else None,
     ) as operator:
         yield operator

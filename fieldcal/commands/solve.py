@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    pass
+    from fieldcal.calibration import Calibration
+    from fieldcal.observing import Rests
+    from fieldcal.session import Session
 
 EXAMPLE = """\
   fieldcal solve bench-7/2026-03-01
@@ -48,6 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--heading", "how well z points north, 1σ; for the gyroscopes"),
     ):
         add(option, type=float, metavar="DEG", help=what)
+    add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
+    add("--history", type=Path, metavar="FILE", help="instead of the usual history")
     add(
         "--as-printed",
         action="store_true",
@@ -59,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from dataclasses import replace
 
+    from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
     from fieldcal.observing import (
@@ -86,7 +91,9 @@ def run(args: argparse.Namespace) -> int:
     if args.turns != "no" and not args.as_printed:
         found = with_turns_between(found, session, still, args.turns == "yes")
     found = replace(found, warnings=(*still.warnings, *found.warnings))
-    found = with_installed(with_provenance(found, session.about), session)
+    found = with_provenance(found, session.about)
+    found = with_installed(found, session)
+    found = _decided(args, found, session, still)
     path = session.write_json(RESULT, found.to_json())
     if args.json:
         for warning in found.warnings:
@@ -94,5 +101,22 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(json.dumps(found.to_json()) + "\n")
     else:
         show(found)
+        show_decision(found)
         sys.stdout.write(f"written: {path}\n")
-    return 0 if found.good else 1
+    go = found.info.get("decision", {}).get("go", True)
+    return 0 if found.good and go else 1
+
+
+def _decided(
+    args: argparse.Namespace, found: Calibration, session: Session, still: Rests
+) -> Calibration:
+    """GO or NO-GO, where the session was a recalibration or limits are given."""
+    from fieldcal import limits
+    from fieldcal.assessing import assess, limits_path
+    from fieldcal.history import History, default_path
+
+    if args.limits is None and "run" not in session.about.raw:
+        return found
+    bounds = limits.read(session.grade, limits_path(session, args.limits))
+    history = History(args.history or default_path())
+    return assess(found, session, still, bounds, history)[0]

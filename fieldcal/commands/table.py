@@ -35,7 +35,7 @@ def show(
     for column in columns:
         right = column in ("value", "± 1σ", "concealed", "off by")
         table.add_column(column, justify="right" if right else "left", no_wrap=True)
-    concealed = _flat(truth or {})
+    concealed = concealed_values(truth or {})
     before = ""
     rows = zip(calibration.names, calibration.values, calibration.sigma, strict=True)
     for (name, value, sigma), unit in zip(rows, calibration.units, strict=True):
@@ -65,7 +65,7 @@ def _tell(console: Any, calibration: Calibration) -> None:
     line(f"verdict: {good}")
 
 
-def _flat(truth: Mapping[str, Any]) -> dict[str, float]:
+def concealed_values(truth: Mapping[str, Any]) -> dict[str, float]:
     """Concealed values by the full names of a calibration."""
     flat = {
         f"{group}.{axis}": float(value)

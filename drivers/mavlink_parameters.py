@@ -1,0 +1,238 @@
+"""Parameters of an autopilot, read and set over any MAVLink link, and not believed.
+
+PARAM_REQUEST_READ asks for one, PARAM_SET sets one, PARAM_VALUE answers both. An answer
+to PARAM_SET says what was understood, not what is kept, so whoever writes reads again.
+Questions are put `TRIES` times, since links lose packets.
+
+A parameter travels as a float of 32 bits; whole numbers of PX4 as their bits in one.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Mapping
+from time import monotonic
+from typing import Any, Self
+
+import numpy as np
+
+from fieldcal.drivers.mavlink_installed import PX4
+from fieldcal.drivers.mavlink_link import Line, opener
+from fieldcal.drivers.mavlink_talk import INT32, NO_AUTOPILOT, REAL32, STATION, listed
+from fieldcal.drivers.options import split
+from fieldcal.errors import DeviceError, InputError
+
+BEAT, PATIENCE = 1.0, 0.7
+"""Between two heartbeats, and until a question is put again, s."""
+
+TRIES = 4
+"""How often a question is put."""
+
+HEARTBEAT = 5.0
+"""How long a first heartbeat may take, s."""
+
+ARMED = 128
+"""In a heartbeat's mode: motors may turn."""
+
+
+class Parameters:
+    """The parameters of the one autopilot on a link; a context manager.
+
+    Parameters
+    ----------
+    address : as of the driver, ``mavlink:`` left out; only ``baud``, ``system`` and
+        ``component`` matter here
+
+    Attributes
+    ----------
+    autopilot : number of its program in the heartbeat
+    armed : whether its motors may turn
+
+    Raises
+    ------
+    DeviceError
+        If the link cannot be opened, or no autopilot is heard.
+    InputError
+        If there are several, and none is named.
+
+    """
+
+    def __init__(self, address: str) -> None:
+        from pymavlink.dialects.v20 import all as dialect
+
+        endpoint, options = split(address, "mavlink")
+        baud = int(options.number("baud", 57600, 50, 1e8))
+        wanted = {
+            name: int(options.number(name, 0, 0, 255))
+            for name in ("system", "component")
+        }
+        self.name, self._wanted = endpoint, wanted
+        self._out = dialect.MAVLink(None, *STATION)
+        self._in = dialect.MAVLink(None)
+        self._in.robust_parsing = True
+        self._heard: dict[str, float] = {}
+        self._vehicles: dict[tuple[int, int], Any] = {}
+        self._beat = -np.inf
+        self.autopilot, self.armed = 0, False
+        self._target = (0, 0)
+        self._line: Line = opener(endpoint, baud)()
+        try:
+            self._greet()
+        except BaseException:
+            self.close()
+            raise
+
+    def read(self, names: Iterable[str]) -> dict[str, float]:
+        """Values of parameters, as the autopilot keeps them now.
+
+        Raises
+        ------
+        DeviceError
+            If it does not answer for one of them.
+
+        """
+        wanted = list(names)
+        for name in wanted:
+            self._heard.pop(name, None)
+
+        def ask() -> None:
+            for name in wanted:
+                if name not in self._heard:
+                    self._send(
+                        self._out.param_request_read_encode(
+                            *self._target, name.encode(), -1
+                        )
+                    )
+
+        self._until(lambda: all(n in self._heard for n in wanted), ask)
+        lacking = [name for name in wanted if name not in self._heard]
+        if lacking:
+            raise DeviceError(
+                f"{self.name}: the autopilot does not answer for"
+                f" {', '.join(lacking)}; check the link, then try again"
+            )
+        return {name: self._heard[name] for name in wanted}
+
+    def write(self, values: Mapping[str, float]) -> None:
+        """Set parameters, and read each back from what is kept.
+
+        Raises
+        ------
+        DeviceError
+            If one is not kept as it was set.
+
+        """
+        for name in values:
+            self._heard.pop(name, None)
+
+        def ask() -> None:
+            for name, value in values.items():
+                if not same(self._heard.get(name), value):
+                    self._send(
+                        self._out.param_set_encode(
+                            *self._target, name.encode(), value, REAL32
+                        )
+                    )
+
+        self._until(lambda: all(same(self._heard.get(n), v) for n, v in values.items()),
+                    ask)  # fmt: skip
+        kept = self.read(values)
+        wrong = {n: kept[n] for n, v in values.items() if not same(kept[n], v)}
+        if wrong:
+            raise DeviceError(
+                f"{self.name}: the autopilot did not take what was set: it keeps"
+                f" {listed(wrong)}"
+            )
+
+    def close(self) -> None:
+        """Release the link; safe to call twice."""
+        self._line.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def _until(self, done: Callable[[], bool], ask: Callable[[], None]) -> None:
+        """Ask until it is done, or was asked often enough."""
+        for _ in range(TRIES):
+            ask()
+            deadline = monotonic() + PATIENCE
+            while monotonic() < deadline:
+                self._listen()
+                if done():
+                    return
+
+    def _greet(self) -> None:
+        deadline = monotonic() + HEARTBEAT
+        while not self._vehicles and monotonic() < deadline:
+            self._listen()
+        if not self._vehicles:
+            raise DeviceError(
+                f"{self.name}: no heartbeat of an autopilot came in {HEARTBEAT:g} s;"
+                " check link, port and baud rate"
+            )
+        named = all(self._wanted.values())
+        settle = monotonic() + (0.0 if named else BEAT)
+        while monotonic() < settle:
+            self._listen()  # others on the same link say so within a second
+        if len(self._vehicles) > 1:
+            several = ", ".join(
+                f"system={s}&component={c}" for s, c in sorted(self._vehicles)
+            )
+            raise InputError(
+                f"{self.name} carries several vehicles: name one, {several}"
+            )
+        ((self._target, heartbeat),) = self._vehicles.items()
+        self.autopilot = int(heartbeat.autopilot)
+        self.armed = bool(heartbeat.base_mode & ARMED)
+
+    def _listen(self) -> None:
+        """Say that we are there, and take in what comes within a moment."""
+        if monotonic() - self._beat >= BEAT:
+            self._beat = monotonic()
+            self._send(self._out.heartbeat_encode(6, NO_AUTOPILOT, 0, 0, 4))
+        try:
+            data = self._line.read()
+        except OSError as fault:
+            raise DeviceError(
+                f"{self.name} hung up: {fault}; check the link"
+            ) from fault
+        for message in self._in.parse_buffer(data) or []:
+            self._take(message)
+
+    def _take(self, message: Any) -> None:
+        source = (message.get_srcSystem(), message.get_srcComponent())
+        kind = message.get_type()
+        if kind == "HEARTBEAT" and message.autopilot != NO_AUTOPILOT:
+            wanted = (self._wanted["system"], self._wanted["component"])
+            if all(w in (0, s) for w, s in zip(wanted, source, strict=True)):
+                self._vehicles[source] = message
+        elif kind == "PARAM_VALUE" and source == self._target:
+            value = float(message.param_value)
+            if self.autopilot == PX4 and message.param_type == INT32:
+                bits = struct.pack("<f", message.param_value)
+                value = float(struct.unpack("<i", bits)[0])
+            self._heard[message.param_id] = value
+
+    def _send(self, message: Any) -> None:
+        packed = message.pack(self._out)
+        self._out.seq = (self._out.seq + 1) % 256
+        try:
+            self._line.write(packed)
+        except OSError as fault:
+            raise DeviceError(
+                f"{self.name} hung up: {fault}; check the link"
+            ) from fault
+
+
+def same(kept: float | None, wanted: float) -> bool:
+    """Whether a value that was kept is the one wanted, as floats of 32 bits are.
+
+    >>> same(0.1, 0.1 + 1e-10), same(0.1, 0.1001), same(None, 0.1)
+    (True, False, False)
+    """
+    if kept is None or not np.isfinite(kept):
+        return False
+    return bool(np.float32(kept) == np.float32(wanted))

@@ -1,0 +1,221 @@
+"""`fieldcal history`: the calibrations of a device from run to run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fieldcal.history import History, Run
+    from fieldcal.limits import Limits
+    from fieldcal.trend import Point
+
+EXAMPLE = """\
+  fieldcal history
+  fieldcal history A1B2 --parameter gyr_bias.x
+  fieldcal history A1B2 --compare 3 7
+  fieldcal history A1B2 --png bias.png
+"""
+
+STRIP = 20
+"""Width of the plot beside the numbers, characters."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add(
+        "serial",
+        nargs=argparse.OPTIONAL,
+        metavar="SERIAL",
+        help="serial number of the device; without it all devices are listed",
+    )
+    add(
+        "--parameter",
+        action="append",
+        metavar="NAME",
+        help="as in acc_bias.x; may be given several times (default: all biases)",
+    )
+    add(
+        "--compare",
+        nargs=2,
+        type=int,
+        metavar="N",
+        help="whether two calibrations differ, by their numbers",
+    )
+    add(
+        "--accept",
+        type=int,
+        metavar="N",
+        help="let a calibration begin a new family, as after a repair",
+    )
+    add("--png", type=Path, metavar="FILE", help="plot into a picture")
+    add("--limits", type=Path, metavar="FILE", help="limits for what is out of family")
+    add("--history", type=Path, metavar="FILE", help="instead of the usual history")
+    add("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    from fieldcal.errors import InputError
+    from fieldcal.history import History, default_path
+
+    history = History(args.history or default_path())
+    if args.serial is None:
+        return _devices(args, history)
+    if args.accept is not None:
+        history.accept(args.serial, args.accept)
+    runs = history.runs(args.serial)
+    if not runs:
+        known = ", ".join(s for s, _, _ in history.serials()) or "none yet"
+        raise InputError(
+            f"{history.path} has no calibration of {args.serial}; it has {known}"
+        )
+    if args.compare:
+        return _compare(args, runs)
+    return _trends(args, runs)
+
+
+def _devices(args: argparse.Namespace, history: History) -> int:
+    devices = history.serials()
+    if args.json:
+        keys = ("serial", "calibrations", "last")
+        rows = [dict(zip(keys, device, strict=True)) for device in devices]
+        sys.stdout.write(json.dumps({"devices": rows}) + "\n")
+        return 0
+    if not devices:
+        sys.stdout.write(
+            f"{history.path}: no calibration yet; fieldcal run --serial keeps them\n"
+        )
+    for serial, count, last in devices:
+        sys.stdout.write(f"{serial}: {count} calibrations, the last {last}\n")
+    return 0
+
+
+def _compare(args: argparse.Namespace, runs: Sequence[Run]) -> int:
+    from fieldcal.calibration import compare
+    from fieldcal.commands.compare import document, table
+    from fieldcal.errors import InputError
+
+    known = {run.number: run for run in runs}
+    missing = [n for n in args.compare if n not in known]
+    if missing:
+        raise InputError(
+            f"{args.serial} has no calibration number {missing[0]}; it has"
+            f" {', '.join(map(str, known))}"
+        )
+    first, second = (known[n] for n in args.compare)
+    found = compare(first.calibration, second.calibration)
+    if args.json:
+        sys.stdout.write(json.dumps(document(found)) + "\n")
+        return 0
+    for run_ in (first, second):
+        sys.stdout.write(f"{run_.number}: {run_.taken_at}, {_warm(run_)}\n")
+    sys.stdout.write(table(found))
+    return 0
+
+
+def _trends(args: argparse.Namespace, runs: Sequence[Run]) -> int:
+    from fieldcal import limits
+    from fieldcal.trend import names, trend
+
+    grade = runs[-1].calibration.info.get("conditions", {}).get("grade", "tactical")
+    bounds = limits.read(str(grade), args.limits)
+    wanted = _wanted(args.parameter, names(runs))
+    trends = {name: trend(runs, name, bounds) for name in wanted}
+    if args.png:
+        from fieldcal.commands.history_plot import plot
+
+        plot(args.png, args.serial, trends)
+        sys.stderr.write(f"written: {args.png}\n")
+    if args.json:
+        document = {
+            "serial": args.serial,
+            "runs": [_run(r) for r in runs],
+            "parameters": {n: [p.to_json() for p in t] for n, t in trends.items()},
+        }
+        sys.stdout.write(json.dumps(document) + "\n")
+        return 0
+    _show(args.serial, runs, trends, bounds)
+    return 0
+
+
+def _wanted(asked: Sequence[str] | None, known: Sequence[str]) -> list[str]:
+    from fieldcal.errors import InputError
+
+    if not asked:
+        biases = [n for n in known if n.startswith(("acc_bias.", "gyr_bias."))]
+        return biases or list(known)
+    odd = [name for name in asked if name not in known]
+    if odd:
+        raise InputError(f"no calibration has {odd[0]}; there are {', '.join(known)}")
+    return list(asked)
+
+
+def _run(run: Run) -> dict[str, Any]:
+    return {
+        "number": run.number,
+        "taken_at": run.taken_at,
+        "session": run.session,
+        "go": run.go,
+        "accepted": run.accepted,
+        "temperature_c": run.temperature,
+        "latitude_deg": run.latitude_deg,
+        "height_m": run.height_m,
+        "software": run.software,
+    }
+
+
+def _warm(run: Run) -> str:
+    return "? °C" if run.temperature is None else f"{run.temperature:.1f} °C"
+
+
+def _show(
+    serial: str,
+    runs: Sequence[Run],
+    trends: dict[str, list[Point]],
+    bounds: Limits,
+) -> None:
+    say = sys.stdout.write
+    say(f"{serial}: {len(runs)} calibrations\n")
+    for name, points in trends.items():
+        unit = points[-1].unit if points else ""
+        say(f"\n{name}, {unit}\n")
+        for line in lines(points):
+            say(line + "\n")
+        odd = [str(p.run.number) for p in points if p.odd]
+        spread = points[-1].spread
+        say(f"  spread from run to run ± {spread:.2g} {unit}")
+        say(f"; out of family: {', '.join(odd)}\n" if odd else "; all in family\n")
+
+
+def lines(points: Sequence[Point]) -> list[str]:
+    """A line for each calibration: number, date, value, and where that lies.
+
+    The strip spans all values with twice their uncertainty; ``o`` is the value, ``-``
+    its ± 2 sigma.
+    """
+    from fieldcal.calibration.wording import number
+
+    low = min(p.value - 2 * p.sigma for p in points)
+    high = max(p.value + 2 * p.sigma for p in points)
+    step = (high - low) / (STRIP - 1) or 1.0
+    out = []
+    for p in points:
+        cells = [" "] * STRIP
+        ends = (p.value - 2 * p.sigma, p.value + 2 * p.sigma)
+        first, last = (round((end - low) / step) for end in ends)
+        cells[first : last + 1] = "-" * (last + 1 - first)
+        cells[round((p.value - low) / step)] = "o"
+        value, sigma = number(p.value, p.sigma)
+        word = "OUT" if p.odd else "" if p.run.go else "no-go"
+        word = "accepted" if p.run.accepted else word
+        out.append(
+            f"  {p.run.number:3d} {p.run.taken_at[:10]} {_warm(p.run):>8}"
+            f" {value:>10} ± {sigma:<8} |{''.join(cells)}| {word}".rstrip()
+        )
+    return out

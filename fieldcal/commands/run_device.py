@@ -1,0 +1,57 @@
+"""The device of a run, and who turns it, from its plan."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from fieldcal.errors import InputError
+
+if TYPE_CHECKING:
+    from fieldcal.driver import Driver
+    from fieldcal.movers import Mover
+    from fieldcal.plan_file import Task
+
+VIRTUAL_FORMAT = "witmotion"
+
+
+@contextlib.contextmanager
+def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
+    """Yield what opens the device, and who turns it."""
+    from fieldcal import movers
+    from fieldcal.commands.signals import interruptible
+    from fieldcal.commands.virtual import address
+    from fieldcal.driver import open_driver
+    from fieldcal.plan_file import TURN
+
+    mover, url = task.mover, str(task.run.get("device", ""))
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(interruptible())
+        turns: Mover = movers.Nobody()
+        if mover["kind"] == "virtual" and "control" in mover:
+            turns = stack.enter_context(movers.Controlled(mover["control"]))
+        elif mover["kind"] == "virtual":
+            options = _virtual(task)
+            made = stack.enter_context(movers.VirtualDevice(options))
+            turns, url = made, address(options, made.port)
+        elif mover["kind"] == "command":
+            timeout = float(mover.get("timeout_s", TURN))
+            turns = stack.enter_context(movers.Command(mover["command"], timeout))
+        if not url:
+            raise InputError(
+                'name the device: --device "serial:/dev/ttyUSB0?format=witmotion"'
+                " (fieldcal ports lists them), or --virtual to try without one"
+            )
+        yield lambda: open_driver(url), turns
+
+
+def _virtual(task: Task) -> list[str]:
+    site = task.about
+    options = ["--serial", VIRTUAL_FORMAT]
+    options += [f"--latitude={site.latitude_deg}", f"--height={site.height_m}"]
+    options += [f"--mounting={','.join(site.axes)}", f"--grade={site.grade}"]
+    if "gravity" in site.raw.get("site", {}):
+        options.append(f"--gravity={site.gravity}")
+    return options + shlex.split(task.mover.get("options", ""))

@@ -1,0 +1,48 @@
+"""`fieldcal undo`: give an autopilot back what it had before `fieldcal write`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+EXAMPLE = """\
+  fieldcal undo bench-7/2026-03-01
+  fieldcal undo bench-7/2026-03-01 --device mavlink:udp:0.0.0.0:14550 --yes
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add(
+        "session",
+        type=Path,
+        metavar="SESSION",
+        help="session that was written, or its installed-before file",
+    )
+    add("--device", metavar="URL", help="by default the one that was written to")
+    add("--yes", action="store_true", help="do not ask")
+    add("--force", action="store_true", help="although somebody changed it since")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    from fieldcal.commands.write import ask, check_ready, opened
+    from fieldcal.installing import check_unchanged, install, note_done, saved
+
+    path, known = saved(args.session)
+    old, new = known["old"], known["new"]
+    device = args.device or known["device"]
+    with opened(device) as link:
+        check_ready(link, link.autopilot)
+        if not args.force:
+            check_unchanged(link, new, "when it was written", old)
+        now = link.read(old)
+        for name, value in old.items():
+            sys.stdout.write(f"{name}: {now[name]:.9g} -> {value:.9g}\n")
+        ask(f"give these {len(old)} parameters back to {device}", args.yes)
+        install(link, now, old)
+    note_done(path, undone=True)
+    sys.stderr.write(f"given back and read back: {len(old)} parameters\n")
+    return 0

@@ -1,0 +1,268 @@
+"""`fieldcal write`: install a calibration on an autopilot, so that it can be undone."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldcal.errors import FieldcalError, InputError
+
+if TYPE_CHECKING:
+    from fieldcal.calibration import Calibration
+    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.session import Session
+    from fieldcal.writeback import Change
+
+EXAMPLE = """\
+  fieldcal write bench-7/2026-03-01 --device mavlink:/dev/ttyACM0
+  fieldcal write bench-7/2026-03-01 -o bench-7.param
+  fieldcal undo bench-7/2026-03-01 --device mavlink:/dev/ttyACM0
+"""
+
+SIGNIFICANT = 3.0
+"""Standard uncertainties from which a change counts as one."""
+
+
+class Refused(FieldcalError):
+    """The calibration is not to be installed."""
+
+    exit_code = 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add("session", type=Path, metavar="SESSION", help="session of an autopilot, solved")
+    add("--device", metavar="URL", help="such as mavlink:udp:0.0.0.0:14550")
+    add(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="write a parameter file instead: .param (Mission Planner), .params"
+        " (QGroundControl)",
+    )
+    add("--yes", action="store_true", help="do not ask")
+    add("--force", action="store_true", help="although it is NO-GO")
+    add("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    from fieldcal.commands.compare import read
+    from fieldcal.session import Session
+
+    if (args.device is None) == (args.output is None):
+        raise InputError("say where to: --device URL, or -o FILE; one of them")
+    session = Session.open(args.session)
+    found = read(args.session)
+    wanted, installed, says = prepared(session, found)
+    _refuse(found, wanted, installed, args.force)
+    out = sys.stderr if args.json else sys.stdout
+    out.write(table(wanted))
+    for sentence in says:
+        out.write(f"! {sentence}\n")
+    if args.output:
+        _to_file(args.output, wanted)
+    else:
+        _to_device(args, session, wanted, installed)
+    if args.json:
+        rows = [_row(change) for change in wanted]
+        where = str(args.output or args.device)
+        sys.stdout.write(json.dumps({"written": where, "parameters": rows}) + "\n")
+    return 0
+
+
+def prepared(
+    session: Session, found: Calibration
+) -> tuple[tuple[Change, ...], Installed, tuple[str, ...]]:
+    """What is to be written, what was installed, and what must be known of it.
+
+    Raises
+    ------
+    InputError
+        If the session does not say what was installed.
+
+    """
+    from fieldcal.calibration import Nominal
+    from fieldcal.writeback import changes, installed_from, left_out
+
+    notes: dict[str, Any] = {}
+    for mark in session.marks():
+        if mark.get("event") == "device":
+            notes = mark
+    installed = installed_from(notes)
+    nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
+    return changes(found, nominal, installed), installed, left_out(found)
+
+
+def _refuse(
+    found: Calibration,
+    wanted: Sequence[Change],
+    installed: Installed,
+    force: bool,
+) -> None:
+    from fieldcal.writeback import problems
+
+    decision = found.info.get("decision")
+    reasons = list(decision["reasons"]) if decision else ["nobody decided about it"]
+    if decision and decision["go"] and found.good:
+        reasons = []
+    reasons += problems(tuple(wanted), installed)
+    if reasons and not force:
+        raise Refused(
+            f"NO-GO, nothing is written: {'; '.join(reasons)}; mend that and record"
+            " again, or --force it"
+        )
+
+
+def table(wanted: Sequence[Change]) -> str:
+    """Old and new values with uncertainty and significance, a line each."""
+    width = max(len(c.name) for c in wanted)
+    lines = [
+        f"{'parameter':{width}}  {'old':>12}    {'new':>12}   ± 1σ     unit   change/σ"
+    ]
+    for c in wanted:
+        z = c.significance
+        word = "" if not abs(z) > SIGNIFICANT else "  changed"
+        told = f"{z:+9.1f}{word}" if z == z else "     kept"
+        lines.append(
+            f"{c.name:{width}}  {c.old:12.6f} -> {c.new:12.6f}   {c.sigma:<8.2g}"
+            f" {c.unit:5}{told}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _row(change: Change) -> dict[str, Any]:
+    z = change.significance
+    return {
+        "name": change.name,
+        "old": change.old,
+        "new": change.new,
+        "sigma": change.sigma,
+        "unit": change.unit,
+        "significance": z if z == z else None,
+    }
+
+
+def _to_file(path: Path, wanted: Sequence[Change]) -> None:
+    """Write a parameter file of the kind that its ending says.
+
+    Raises
+    ------
+    InputError
+        If it has another ending.
+
+    """
+    from fieldcal.session import write_whole
+
+    if path.suffix in (".param", ".parm"):
+        lines = [f"{c.name},{c.new:.9g}" for c in wanted]
+    elif path.suffix == ".params":
+        lines = ["# Vehicle-Id Component-Id Name Value Type"]
+        lines += [f"1\t1\t{c.name}\t{c.new:.9g}\t9" for c in wanted]
+    else:
+        raise InputError(f"{path}: end it in .param (Mission Planner) or .params (QGC)")
+    write_whole(path, "\n".join(lines) + "\n")
+    sys.stderr.write(f"written: {path}\n")
+
+
+def _to_device(
+    args: argparse.Namespace,
+    session: Session,
+    wanted: Sequence[Change],
+    installed: Installed,
+) -> None:
+    from fieldcal.installing import (
+        Undone,
+        check_unchanged,
+        install,
+        note_done,
+        save,
+    )
+
+    old = {c.name: c.old for c in wanted}
+    new = {c.name: c.new for c in wanted}
+    with opened(args.device) as link:
+        check_ready(link, installed.autopilot)
+        check_unchanged(link, old, "while it was recorded")
+        ask(f"write these {len(new)} parameters to {args.device}", args.yes)
+        path = save(session.folder, args.device, old, new)
+        try:
+            install(link, old, new)
+        except Undone:
+            note_done(path, undone=True)
+            raise
+        note_done(path, done=True)
+    undo = f"fieldcal undo {args.session} --device {args.device}"
+    sys.stderr.write(
+        f"written and read back: {len(new)} parameters; the old ones are in {path}\n"
+        f"to take it back: {undo}\n"
+    )
+
+
+def opened(url: str) -> Any:
+    """Open the parameters of an autopilot.
+
+    Raises
+    ------
+    InputError
+        If it is no MAVLink address, or pymavlink is not installed.
+
+    """
+    from importlib.util import find_spec
+
+    scheme, _, address = url.partition(":")
+    if scheme != "mavlink":
+        raise InputError(
+            f"{url}: parameters are written over mavlink:, such as"
+            " mavlink:udp:0.0.0.0:14550; for other devices fieldcal export"
+        )
+    if not find_spec("pymavlink"):
+        raise InputError("MAVLink needs pymavlink: pip install 'fieldcal[mavlink]'")
+    from fieldcal.drivers.mavlink_parameters import Parameters
+
+    return Parameters(address)
+
+
+def check_ready(link: Any, autopilot: int) -> None:
+    """Refuse an autopilot of another program, or one that may fly.
+
+    Raises
+    ------
+    InputError
+        If it is.
+
+    """
+    if link.armed:
+        raise InputError(f"{link.name}: the vehicle is armed: disarm it, then write")
+    if link.autopilot != autopilot:
+        raise InputError(
+            f"{link.name}: this autopilot runs another program than the one that was"
+            " recorded: name the right one"
+        )
+
+
+def ask(what: str, yes: bool) -> None:
+    """Ask a person; without one, it must have been said beforehand.
+
+    Raises
+    ------
+    InputError
+        If nobody is there to ask.
+    Refused
+        If the answer is no.
+
+    """
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise InputError(f"nobody is there to be asked: give --yes to {what}")
+    sys.stderr.write(f"{what}? [y/N] ")
+    sys.stderr.flush()
+    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+        raise Refused("nothing was written, as you wished")

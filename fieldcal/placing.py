@@ -1,0 +1,186 @@
+"""Waiting for the device to rest where it was asked to be, block by block.
+
+Nothing here reads a device or talks to anybody: the engine feeds it and passes on what
+it says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.arrival import NORM, Arrival, Held, judge
+from fieldcal.description import Description
+from fieldcal.plan import Hold
+from fieldcal.positions import Position
+from fieldcal.samples import Array, Block, concat
+from fieldcal.windows import Stillness
+
+SETTLE = 1.5
+"""Rest before a window begins, s: a joint that was just let go of still creeps."""
+
+PATIENCE = 3.0
+"""Rest at a wrong place before that is said, s: a person stops in between."""
+
+REMIND = 60.0
+"""Time at the same wrong place after which it is said again, s."""
+
+GAP = 0.5
+"""Longest time without samples that a rest may have, s."""
+
+
+class Placing:
+    """The way of the device to one position.
+
+    Parameters
+    ----------
+    hold : what was asked for
+    about : site, mounting and nominal calibration
+    held : a position that was accepted before, if any
+    left : whether a window here was broken off by a movement just before
+
+    Attributes
+    ----------
+    meter : present motion as part of what is allowed; below 1 is rest
+    arrival : where the device rests, None while it moves
+    where : where it is, as far as that can be told while it moves
+    f : (3,) specific force there, procedure axes, m/s^2; None likewise
+    waited : s of device time since it was asked for
+
+    """
+
+    def __init__(
+        self, hold: Hold, about: Description, held: Held | None, left: bool = False
+    ) -> None:
+        self._hold, self._about, self._held, self._left = hold, about, held, left
+        self._others = _others(hold, about)
+        self._began: float | None = None
+        self._start()
+        self._last = np.nan
+        self.waited = 0.0
+
+    def _start(self) -> None:
+        self._stillness = Stillness()
+        self._resting = _Resting()
+        self._told = -np.inf
+        self.arrival: Arrival | None = None
+        self.where: Arrival | None = None
+        self.f: Array | None = None
+
+    @property
+    def meter(self) -> float:
+        """Present motion as part of what is allowed."""
+        return self._stillness.meter
+
+    @property
+    def seconds(self) -> float:
+        """Rest so far, s."""
+        return self._resting.seconds
+
+    def add(self, block: Block) -> None:
+        """Take in the block that follows; nothing is known of a time without any."""
+        if block.t[0] - self._last > GAP:
+            self._start()
+        self._last = float(block.t[-1])
+        self._began = float(block.t[0]) if self._began is None else self._began
+        self.waited = self._last - self._began
+        self._stillness.add(block)
+        self._resting.add(block, self._stillness.since)
+        if self._resting.seconds > 0:
+            self.f = force(self._resting.block.acc, self._about)
+            self.where = self.arrival = self._judged(self.f)
+        else:
+            self.arrival, self.f, self._told = None, None, -np.inf
+            now = self._judged(force(block.acc, self._about))
+            self.where = replace(now, ok=False)
+
+    def _judged(self, f: Array) -> Arrival:
+        wanted, g = self._hold.position, self._about.gravity
+        return judge(wanted, f, g, self._held, self._others)
+
+    @property
+    def arrived(self) -> bool:
+        """Whether it rests where it should."""
+        there = self.arrival is not None and self.arrival.ok
+        return there and self.seconds >= SETTLE
+
+    @property
+    def usable(self) -> bool:
+        """Whether it rests, and reads about gravity: a place one may insist on."""
+        if self.f is None or self.seconds < SETTLE:
+            return False
+        off = abs(float(np.linalg.norm(self.f)) - self._about.gravity)
+        return off <= NORM * self._about.gravity
+
+    @property
+    def reason(self) -> str:
+        """What it waits for, for the operator."""
+        if self._stillness.since is None:
+            return "moving: waiting for it to rest"
+        if self.arrival is not None and not self.arrival.ok:
+            return self.problem if self.seconds >= PATIENCE else "waiting for the turn"
+        return "settling"
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with the place, in one sentence; empty if nothing is."""
+        if self.arrival is None or self.arrival.ok or self.f is None:
+            return ""
+        problem = self.arrival.problem
+        number = self._hold.index + 1
+        if self._left:
+            problem = f"turned too early, position {number} is not done: {problem}"
+        return problem
+
+    def complaint(self) -> str:
+        """What is to be said aloud now: once for a rest, and again every minute."""
+        since = self._last - self._told
+        if self.seconds < PATIENCE or since < REMIND or not (said := self.problem):
+            return ""
+        again = np.isfinite(self._told)
+        self._told = self._last
+        return f"still waiting, {self.waited:.0f} s: {said}" if again else said
+
+
+def _others(hold: Hold, about: Description) -> dict[str, Position]:
+    """The plan's other positions, by what is said if the device is in one of them."""
+    others = {}
+    for i, position in enumerate(about.positions):
+        if position.degrees == hold.position.degrees:
+            continue
+        comes = f", position {hold.index + 1} comes first" if i > hold.index else ""
+        others[f"this is position {i + 1}{comes}"] = position
+    return others
+
+
+def force(acc: Array, about: Description) -> Array:
+    """Mean specific force in procedure axes by the nominal calibration, (3,).
+
+    `acc` is (n, 3) m/s^2, device axes.
+    """
+    nominal = about.nominal
+    f = (np.nanmean(acc, axis=0) - nominal["acc_bias"]) / nominal["acc_scale"]
+    turned: Array = about.mounting @ f
+    return turned
+
+
+class _Resting:
+    """The last second of samples since the device came to rest."""
+
+    def __init__(self) -> None:
+        self._blocks: list[Block] = []
+        self.seconds = 0.0
+
+    def add(self, block: Block, still_since: float | None) -> None:
+        if still_since is None:
+            self._blocks, self.seconds = [], 0.0
+            return
+        self.seconds = float(block.t[-1] - still_since)
+        self._blocks.append(block)
+        while len(self._blocks) > 1 and block.t[-1] - self._blocks[1].t[0] > 1.0:
+            self._blocks.pop(0)
+
+    @property
+    def block(self) -> Block:
+        return concat(self._blocks)

@@ -1,0 +1,221 @@
+"""Fixtures for tests of your own procedure or driver: a virtual device on a link.
+
+    def test_ours(virtual_imu):
+        device = virtual_imu("serial", effects=["base_tilt:about_x_deg=1"])
+        device.assert_calibration(our_procedure(device.url))
+
+pytest finds them by themselves once fieldcal is installed. Nothing else is loaded until
+a test asks for a device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from fieldcal.calibration import Calibration
+    from fieldcal.driver import Driver
+    from fieldcal.movers import VirtualDevice
+
+SIGMAS = 4.5
+"""Standard uncertainties within which a value must agree with the truth."""
+
+LATITUDE = 50.45
+"""Where a device stands unless it is told, deg."""
+
+LINKS: dict[str, tuple[list[str], str, str]] = {
+    "serial": (["--serial", "{format}"], "serial:{port}?format={query}", "max"),
+    "can": (
+        ["--can", "slcan"],
+        "can:{port}?interface=slcan&bitrate=500000&dbc=virtual",
+        "max",
+    ),
+    "mavlink": (
+        ["--mavlink", "tcpin:127.0.0.1:0"],
+        "mavlink:{port}?message=HIGHRES_IMU&rate=100",
+        # a socket holds minutes of samples: at full speed it would answer late
+        "20",
+    ),
+}
+"""Options of ``fieldcal sim``, address to open and speed unless given, by link."""
+
+
+class VirtualImu:
+    """A virtual device that runs, and what it conceals.
+
+    Attributes
+    ----------
+    url : what a driver opens
+    port : pseudo-terminal, or endpoint
+    control : path of the control socket
+
+    """
+
+    def __init__(
+        self, device: VirtualDevice, url: str, folder: Path, latitude: float
+    ) -> None:
+        self._latitude = latitude
+        self._device, self._folder = device, folder
+        self.url, self.port, self.control = url, device.port, device.control
+        self._runs = 0
+
+    @property
+    def truth(self) -> Mapping[str, Any]:
+        """What it conceals, as ``fieldcal sim --truth`` writes it."""
+        return self._device.truth
+
+    def open(self) -> Driver:
+        """Open it with the driver of its link."""
+        from fieldcal.driver import open_driver
+
+        return open_driver(self.url)
+
+    def turn(self, alpha_deg: float, beta_deg: float) -> float:
+        """Turn it; returns the device time at which it is there, s."""
+        reply = self.ask(turn={"alpha_deg": alpha_deg, "beta_deg": beta_deg})
+        return float(reply["until_s"])
+
+    def bump(self, **how: float) -> None:
+        """Knock it: ``push`` m/s^2, ``tilt_deg``, ``seconds``."""
+        self.ask(bump=how)
+
+    def fault(self, **what: float) -> None:
+        """Spoil its link: ``silence_s``, ``hangup_s``, ``flip_bits`` and others."""
+        self.ask(fault=what)
+
+    def ask(self, **request: Any) -> dict[str, Any]:
+        """Send any order of the control socket and return the reply."""
+        return self._device.ask(**request)
+
+    def recalibrate(
+        self,
+        procedure: str = "five_position",
+        seconds: float = 30.0,
+        tables: Mapping[str, Any] | None = None,
+    ) -> Calibration:
+        """Take it through a procedure, turning it by itself.
+
+        Parameters
+        ----------
+        procedure : name of a module in ``fieldcal.procedures``
+        seconds : averaging time
+        tables : of session.toml, over what the device itself says
+
+        """
+        from fieldcal.pytest_run import recalibrate
+
+        self._runs += 1
+        folder = self._folder / f"session-{self._runs}"
+        with self.open() as driver:
+            return recalibrate(
+                driver,
+                self._device,
+                folder,
+                procedure,
+                seconds,
+                self._latitude,
+                tables or {},
+            )
+
+    def assert_calibration(
+        self,
+        found: Calibration | Mapping[str, Any],
+        sigmas: float = SIGMAS,
+        within: Mapping[str, float] | None = None,
+    ) -> None:
+        """Fail unless a calibration agrees with what the device conceals.
+
+        Parameters
+        ----------
+        found : a `Calibration`, or the object of result.json
+        sigmas : how many standard uncertainties a value may be off
+        within : largest standard uncertainty by group, as in ``{"acc_bias": 0.02}``
+
+        """
+        __tracebackhide__ = True
+        from fieldcal.calibration import Calibration
+        from fieldcal.commands.table import concealed_values
+
+        if not isinstance(found, Calibration):
+            found = Calibration.from_json(dict(found))
+        truth = concealed_values(self.truth)
+        wrong, compared = [], 0
+        for name, value, sigma in zip(
+            found.names, found.values, found.sigma, strict=True
+        ):
+            limit = (within or {}).get(name.partition(".")[0], float("inf"))
+            if sigma > limit:
+                wrong.append(f"{name} is known to ± {sigma:.3g}, wanted {limit:.3g}")
+            if name in truth:
+                compared += 1
+                if not abs(value - truth[name]) <= sigmas * sigma:
+                    off = (value - truth[name]) / sigma
+                    wrong.append(
+                        f"{name} = {value:.6g} ± {sigma:.2g}, concealed is"
+                        f" {truth[name]:.6g}: {off:+.1f} σ"
+                    )
+        if not compared:
+            wrong.append("it has no parameter that the device conceals")
+        lacking = set(within or {}) - set(found.groups)
+        wrong += [f"{group} was not determined" for group in sorted(lacking)]
+        if wrong:
+            pytest.fail("the calibration is wrong: " + "; ".join(wrong))
+
+
+Factory = Callable[..., VirtualImu]
+
+
+@pytest.fixture
+def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
+    """Start virtual devices; they end with the test.
+
+    ``virtual_imu(link="serial", format="witmotion", effects=(), speed=None, seed=1,
+    **options)`` starts one on a pseudo-terminal (serial), behind a CAN adapter (can) or
+    as an autopilot (mavlink). `effects` are written as for ``fieldcal sim --with``;
+    options are those of ``fieldcal sim``, as in ``acc_bias=(0.2, -0.3, 0.1)``.
+    """
+    devices: list[VirtualDevice] = []
+
+    def start(
+        link: str = "serial",
+        format: str = "witmotion",
+        effects: Sequence[str] = (),
+        speed: str | float | None = None,
+        seed: int = 1,
+        **options: Any,
+    ) -> VirtualImu:
+        from fieldcal.movers import VirtualDevice
+
+        if link not in LINKS:
+            raise ValueError(f"link {link!r} is none of {', '.join(LINKS)}")
+        arguments, url, usual = LINKS[link]
+        command = [part.format(format=format) for part in arguments]
+        command += [
+            "--speed",
+            str(usual if speed is None else speed),
+            "--seed",
+            str(seed),
+        ]
+        for effect in effects:
+            command += ["--with", effect]
+        options = {"latitude": LATITUDE, **options}
+        command += [_option(name, value) for name, value in options.items()]
+        device = VirtualDevice(command, once=False)
+        devices.append(device)
+        query = format.replace("?", "&")
+        address = url.format(port=device.port, query=query)
+        return VirtualImu(device, address, tmp_path, float(options["latitude"]))
+
+    yield start
+    for device in devices:
+        device.close()
+
+
+def _option(name: str, value: Any) -> str:
+    several = not isinstance(value, str) and isinstance(value, Sequence)
+    text = ",".join(map(str, value)) if several else str(value)
+    return f"--{name.replace('_', '-')}={text}"

@@ -1,0 +1,71 @@
+"""A run without an operator, for tests: a driver, a mover, a folder."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from fieldcal import description, limits, plan_file
+from fieldcal.calibration import Calibration
+from fieldcal.driver import Driver
+from fieldcal.movers import VirtualDevice
+from fieldcal.observing import rests, with_turns_between
+from fieldcal.recorder import Recorder
+from fieldcal.running import Running
+from fieldcal.script import ScriptOperator
+from fieldcal.session import Session
+
+GIVE_UP = 90.0
+"""Device time after which a position is given up, s."""
+
+
+def recalibrate(
+    driver: Driver,
+    device: VirtualDevice,
+    folder: Path,
+    procedure: str,
+    seconds: float,
+    latitude_deg: float,
+    tables: Mapping[str, Any],
+) -> Calibration:
+    """Take a virtual device through a procedure and solve.
+
+    Raises
+    ------
+    FieldcalError
+        As a run without an operator ends; what was recorded is in `folder`.
+
+    """
+    truth = device.truth
+    module = import_module(f"fieldcal.procedures.{procedure}")
+    known = {
+        "device": {"name": "virtual device", "grade": truth["grade"]},
+        "site": {"latitude_deg": latitude_deg, "gravity": truth["gravity"]},
+        "frame": {"mounting": truth["mounting"]},
+    }
+    positions = [
+        dict(zip(("alpha_deg", "beta_deg"), p.degrees or (0.0, 0.0), strict=True))
+        for p in module.POSITIONS
+    ]
+    whole = {
+        "format": description.FORMAT,
+        **known,
+        "position": positions,
+        "run": {"procedure": procedure, "seconds": seconds},
+        **tables,
+    }
+    task = plan_file.task(whole, procedure)
+
+    def once() -> Driver:
+        return driver
+
+    with Recorder(folder, whole) as recorder:
+        operator = ScriptOperator(device, io.StringIO())
+        bounds = limits.read(task.about.grade)
+        running = Running(task, operator, recorder, once, bounds, 0.0, GIVE_UP)
+        found = running.run(driver)
+    session = Session.open(folder)
+    return with_turns_between(found, session, rests(session))

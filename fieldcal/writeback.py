@@ -9,16 +9,15 @@ was not determined is as nominal. Units m/s^2, rad/s; device axes.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
-from fieldcal.errors import InputError
+from fieldcal.calibration.diagonal import diagonal
+from fieldcal.drivers.mavlink_installed import Installed, names
+from fieldcal.session import Session
 
 WIDEST = {"acc_offset": 3.5, "gyr_offset": 0.5}
 """Largest offsets that are one, m/s^2 and rad/s; more is a broken sensor or a slip."""
@@ -57,34 +56,18 @@ class Change:
         return (self.new - self.old) / self.sigma if self.sigma > 0 else np.nan
 
 
-def installed_from(notes: Mapping[str, Any]) -> Installed:
-    """What a session says was installed while it was recorded.
-
-    Parameters
-    ----------
-    notes : what the driver noted of the device, as in the mark ``device``
+def installed_in(session: Session) -> Installed | None:
+    """What an autopilot had installed while a session was recorded; None if nothing.
 
     Raises
     ------
     InputError
-        If the session does not say it.
+        If the session's marks do not tell it whole.
 
     """
-    table = notes.get("installed")
-    values = table.get("parameters") if isinstance(table, Mapping) else None
-    if not isinstance(values, Mapping) or not values or table is None:
-        raise InputError(
-            "the session was not recorded from an autopilot that told its parameters:"
-            " record it over mavlink:, or write a file by fieldcal export"
-        )
-    for name in values:
-        if found := re.match(r"INS_ACC(\d?)OFFS_|CAL_ACC(\d)_", str(name)):
-            ardu, px4 = found.groups()
-            autopilot = ARDUPILOT if px4 is None else PX4
-            instance = int(px4) if px4 is not None else int(ardu or 1) - 1
-            numbers = {str(k): float(v) for k, v in values.items()}
-            return Installed(autopilot, instance, numbers, bool(table.get("taken_out")))
-    raise InputError("the session names no accelerometer parameter of the autopilot")
+    marks = [mark for mark in session.marks() if mark.get("event") == "device"]
+    told = [mark["installed"] for mark in marks if mark.get("installed")]
+    return Installed.from_table(told[-1]) if told else None
 
 
 def changes(
@@ -98,15 +81,12 @@ def changes(
         If what was installed is not known whole, or the board is mounted turned.
 
     """
-    (bias, scale), (gyr, _) = (
-        found.accelerometers(nominal),
-        found.gyroscopes(nominal),
-    )
-    new = installed.next(bias, np.diag(scale), gyr)  # (1)
+    acc, gyr = (diagonal(found, sensor, nominal) for sensor in ("acc", "gyr"))
+    new = installed.next(acc.bias, acc.scale, gyr.bias)  # (1)
     k = np.ones(3) if installed.taken_out else installed.of("acc_scale")
     sigma = {
         "acc_offset": _sigma(found, "acc_bias") / np.abs(k),  # (2)
-        "acc_scale": np.abs(k) * _sigma(found, "acc_scale") / np.diag(scale) ** 2,
+        "acc_scale": np.abs(k) * _sigma(found, "acc_scale") / acc.scale**2,
         "gyr_offset": _sigma(found, "gyr_bias"),
     }
     known = names(installed.autopilot, installed.instance)

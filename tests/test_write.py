@@ -20,10 +20,13 @@ pytest.importorskip("pymavlink")
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
+from fieldcal.commands.write import prepared
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
 from fieldcal.drivers.mavlink_parameters import Parameters
 from fieldcal.errors import InputError
-from fieldcal.writeback import changes, installed_from, problems
+from fieldcal.recorder import Recorder
+from fieldcal.session import Session
+from fieldcal.writeback import changes, problems
 
 BIAS, SCALE = (0.2, -0.3, 0.1), (1.006, 0.992, 1.008)
 GYR = (0.011, -0.02, 0.006)
@@ -242,6 +245,9 @@ def test_values_that_no_sensor_has_are_named() -> None:
     assert "INS_ACCSCAL_X = 0.5" in said[1]
 
 
-def test_a_session_of_no_autopilot_is_refused() -> None:
+def test_a_session_of_no_autopilot_is_refused(tmp_path: Path) -> None:
+    about = {"format": 1, "device": {"name": "bench"}, "sampling": {"rate_hz": 100.0}}
+    with Recorder(tmp_path / "s", about) as recorder:
+        recorder.mark("device", serial="7")
     with pytest.raises(InputError, match="not recorded from an autopilot"):
-        installed_from({})
+        prepared(Session.open(tmp_path / "s"), calibration())

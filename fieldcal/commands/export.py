@@ -5,11 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from fieldcal.drivers.mavlink_installed import Installed
-    from fieldcal.session import Session
 
 EXAMPLE = """\
   fieldcal export bench-7/today --format ardupilot
@@ -47,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.errors import InputError
     from fieldcal.exporters import Source, exporter
     from fieldcal.session import Session
+    from fieldcal.writeback import installed_in
 
     session = Session.open(args.session)
     module = exporter(args.format)
@@ -59,19 +55,10 @@ def run(args: argparse.Namespace) -> int:
         read(args.calibration or args.session),
         nominal,
         session,
-        _installed(session),
+        installed_in(session),
         args.instance,
     )
     for sentence in module.write(source, path):
         sys.stderr.write(f"fieldcal export: {sentence}\n")
     sys.stdout.write(f"{path}\n")
     return 0
-
-
-def _installed(session: Session) -> Installed | None:
-    """What the device had taken out of the samples, as the recording tells."""
-    from fieldcal.drivers.mavlink_installed import Installed
-
-    tables = [m.get("installed") for m in session.marks() if m["event"] == "device"]
-    told = [table for table in tables if table]
-    return Installed.from_table(told[-1]) if told else None

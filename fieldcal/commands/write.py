@@ -89,13 +89,14 @@ def prepared(
 
     """
     from fieldcal.calibration import Nominal
-    from fieldcal.writeback import changes, installed_from, left_out
+    from fieldcal.writeback import changes, installed_in, left_out
 
-    notes: dict[str, Any] = {}
-    for mark in session.marks():
-        if mark.get("event") == "device":
-            notes = mark
-    installed = installed_from(notes)
+    installed = installed_in(session)
+    if installed is None:
+        raise InputError(
+            "the session was not recorded from an autopilot that told its parameters:"
+            " record it over mavlink:, or write a file by fieldcal export"
+        )
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
     return changes(found, nominal, installed), installed, left_out(found)
 

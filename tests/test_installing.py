@@ -18,6 +18,7 @@ pytest.importorskip("pymavlink")
 from fieldcal.cli import main
 from fieldcal.driver import open_driver
 from fieldcal.drivers.mavlink_imu import Imu
+from fieldcal.session import mark_line
 
 HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
 
@@ -72,7 +73,9 @@ def as_if(session: Path, folder: Path, name: str, value: float) -> str:
     lines = (folder / "marks.jsonl").read_text().splitlines()
     mark = json.loads(lines[0])
     mark["installed"]["parameters"][name] = value
-    (folder / "marks.jsonl").write_text("\n".join([json.dumps(mark), *lines[1:]]))
+    mark.pop("crc32")
+    changed = mark_line(mark).rstrip("\n")
+    (folder / "marks.jsonl").write_text("\n".join([changed, *lines[1:]]) + "\n")
     assert main(["solve", str(folder)]) == 0
     return str(folder)
 

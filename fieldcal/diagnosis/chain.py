@@ -6,6 +6,7 @@ clipped, bumped), and the rest is remembered (lost samples, the clock, coarse st
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,7 +71,8 @@ def check(block: Block, about: Description) -> Checked:
                 seen = recording(block, usable, about)
     for name in MASKING:
         before = len(faults)
-        for fault in _find(name, seen):
+        found = _find(name, seen)
+        for fault in _off_rails(found, seen) if name == "stuck" else found:
             if name == "saturation" and _is_stuck(fault, faults):
                 continue
             faults.append((name, fault))
@@ -120,6 +122,21 @@ def _mask(
             inside = (fault.rows >= first) & (fault.rows < last)
             if inside.sum() > CLIPPED * (last - first):
                 usable[first:last, c] = False
+
+
+def _off_rails(found: list[Fault], seen: Recording) -> list[Fault]:
+    """Runs of equal values less those at a rail that a channel returns to.
+
+    What stands still does so once and anywhere; what is clipped always stops there.
+    """
+    rails = {f.channel: f.rows for f in _find("saturation", seen)}
+    clipped = [bool(np.isin(f.rows, rails.get(f.channel, ())).all()) for f in found]
+    often = Counter(f.channel for f, c in zip(found, clipped, strict=True) if c)
+    return [
+        f
+        for f, c in zip(found, clipped, strict=True)
+        if not (c and often[f.channel] > 1)
+    ]
 
 
 def _is_stuck(fault: Fault, faults: list[tuple[str, Fault]]) -> bool:

@@ -35,7 +35,8 @@ def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
     """
     out = []
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    if low < 0 and abs(high + low) < 1e-3 * high and not np.isfinite(limit):
+    alike = low < 0 and abs(high + low) < 1e-3 * high
+    if alike and not coarse and not np.isfinite(limit):
         limit = high  # as far down as up: full scale, if it is taken again and again
     for edge in (low, high):
         at = np.flatnonzero(values == edge)
@@ -70,11 +71,13 @@ class Saturation(Chain):
         out = []
         for first in (0, 3):
             limit, found = float(recording.limits[first // 3]), {}
+            # a channel at its rail all the time shows no noise of its own
+            noise = float(np.nanmax(recording.noise[first : first + 3], initial=0.0))
             for _ in range(2):
                 for c in range(first, first + 3):
                     values = recording.channel(c)
                     if c not in found and np.isfinite(values).any():
-                        coarse = lsb_of(values) > recording.noise[c]
+                        coarse = lsb_of(values) > noise
                         if at := rails(values, limit, coarse):
                             found[c] = np.sort(np.concatenate(at))
                 if not found:

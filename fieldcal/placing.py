@@ -46,7 +46,7 @@ class Placing:
     arrival : where the device rests, None while it moves
     where : where it is, as far as that can be told while it moves
     f : (3,) specific force there, procedure axes, m/s^2; None likewise
-    waited : s of device time since it was asked for
+    waited : s of samples since it was asked for
 
     """
 
@@ -79,9 +79,11 @@ class Placing:
         return self._resting.seconds
 
     def add(self, block: Block) -> None:
-        """Take in the block that follows; nothing is known of a time without any."""
-        if block.t[0] - self._last > GAP:
+        """Take in the block that follows; a time without any is no waiting."""
+        away = float(block.t[0]) - self._last
+        if away > GAP:
             self._start()
+            self._began = None if self._began is None else self._began + away
         self._last = float(block.t[-1])
         self._began = float(block.t[0]) if self._began is None else self._began
         self.waited = self._last - self._began

@@ -76,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
 
         page = write(args.session)
         (sys.stderr if args.json else sys.stdout).write(f"written: {page}\n")
-        if args.twin:
-            sys.stdout.write(f"written: {args.twin}\n")
+    if args.twin and not args.json:
+        sys.stdout.write(f"written: {args.twin}\n")
     return 0 if found.verdict == "consistent" else 1
 
 

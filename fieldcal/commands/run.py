@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import os
 import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -105,9 +106,10 @@ def run(args: argparse.Namespace) -> int:
         history = History(args.history or default_path())
         found = _result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
-        if marks.exists():
+        begun = os.path.exists(marks)  # where nobody may look, nothing was begun
+        if begun:
             sys.stderr.write(_kept(folder))
-        if args.junit and marks.exists():
+        if args.junit and begun:
             said = str(error) or "interrupted"
             known = list(read_marks(marks))
             junit.write(args.junit, task.procedure, task.positions, known, None, said)

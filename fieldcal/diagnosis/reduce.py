@@ -154,8 +154,9 @@ def reduce(source: Source) -> Rows:
     level = np.repeat(levels, rows, axis=0)
     out = averaged(source, np.concatenate(bounds), np.repeat(held, rows), level, noise)
     off = np.tile(rounding(block, windows[held], noise), (len(out.x), 1))
-    # the Earth turns a device of unknown orientation about any of its axes
-    free = ~out.x.oriented
+    # the Earth turns a device of unknown orientation about any of its axes; one that
+    # was never turned has it in its bias
+    free = ~out.x.oriented & (len(held) > 1)
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
     same = np.sqrt(np.repeat(rows, rows))[:, None] * off  # all through a window

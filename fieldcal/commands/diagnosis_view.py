@@ -6,7 +6,7 @@ from typing import IO, TYPE_CHECKING
 
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.quality import UNITS
-from fieldcal.diagnosis.result import Found, Mismatch, Quantity
+from fieldcal.diagnosis.result import Found, Mismatch
 from fieldcal.diagnosis.words import said
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ STYLES = {
     "unexplained": "bold red",
 }
 
-WIDEST = 24
+WIDEST = 8
 """Cells of the bar that shows how significant a mismatch is."""
 
 
@@ -36,8 +36,9 @@ def show(
     console.print(diagnosis.says, markup=False)
     if diagnosis.mismatch:
         console.print(_mismatch(diagnosis.mismatch))
-    if diagnosis.effects:
-        console.print(_effects(diagnosis.effects))
+    for found in diagnosis.effects:
+        console.print(_heading(found), markup=False)
+        console.print(_effect(found))
     console.print(_fit(diagnosis))
     console.print(_calibration(diagnosis))
     if again is not None:
@@ -45,25 +46,25 @@ def show(
 
 
 def _mismatch(mismatch: tuple[Mismatch, ...]) -> object:
+    from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    table = Table(title="Where the two part", title_justify="left")
-    for name in ("channel", "kind", "positions", "time s", "follows"):
-        table.add_column(name)
-    table.add_column("rms", justify="right")
-    table.add_column("significance")
+    table = Table(title="Where the two part", title_justify="left", box=SIMPLE_HEAD)
+    for name in ("channel", "follows", "positions", "time s"):
+        table.add_column(name, no_wrap=name in ("channel", "time s"), min_width=7)
+    table.add_column("rms", justify="right", no_wrap=True)
+    table.add_column("σ", no_wrap=True)
     most = max((m.sigma for m in mismatch if m.sigma < float("inf")), default=1.0)
     for m in mismatch:
         finite = m.sigma < float("inf")
         bar = "█" * max(1, round(WIDEST * (min(m.sigma, most) / most) ** 0.5))
         table.add_row(
             m.channel,
-            m.kind,
+            m.kind if m.covariate in (m.kind, "") else f"{m.kind}: {m.covariate}",
             ranges(m.positions),
-            f"{m.from_s:.1f} – {m.to_s:.1f}",
-            m.covariate,
+            f"{m.from_s:.0f}–{m.to_s:.0f}",
             f"{m.rms:.3g}",
-            f"{bar} {m.sigma:.0f} σ" if finite else bar,
+            f"{bar} {m.sigma:.0f}" if finite else bar,
         )
     return table
 
@@ -83,27 +84,29 @@ def ranges(numbers: tuple[int, ...]) -> str:
     return ", ".join(f"{a}–{b}" if b > a else f"{a}" for a, b in parts)
 
 
-def _effects(effects: tuple[Found, ...]) -> object:
+def _heading(found: Found) -> str:
+    """An effect and what speaks for it."""
+    gain = found.evidence.get("held_out_gain", float("nan"))
+    squares = found.evidence.get("delta_chi2", float("nan"))
+    about = [f"Left out: {found.id}"]
+    if abs(squares) < float("inf"):
+        about.append(f"Δχ² {squares:.0f}")
+    if gain == gain:
+        about.append(f"rms unseen {-100 * gain:+.0f} %")
+    if found.aliases:
+        about.append(f"or else {', '.join(found.aliases)}")
+    return "; ".join(about)
+
+
+def _effect(found: Found) -> object:
+    from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    table = Table(title="What is left out", title_justify="left")
-    for name in ("effect", "parameter", "value ± 1σ", "Δχ²", "unseen rms"):
-        right = name in ("Δχ²", "unseen rms")
-        table.add_column(name, justify="right" if right else "left")
-    table.add_column("or else")
-    for found in effects:
-        gain = found.evidence.get("held_out_gain", float("nan"))
-        squares = found.evidence.get("delta_chi2", float("nan"))
-        first = [
-            f"{squares:.0f}" if abs(squares) < float("inf") else "",
-            f"{-100 * gain:+.0f} %" if gain == gain else "",
-            ", ".join(found.aliases),
-        ]
-        rows: list[tuple[str, Quantity | None]] = [*found.parameters.items()]
-        for i, (name, quantity) in enumerate(rows or [("", None)]):
-            lead = found.id if not i else ""
-            value = said(quantity) if quantity is not None else ""
-            table.add_row(lead, name, value, *(first if not i else ["", "", ""]))
+    table = Table(box=SIMPLE_HEAD)
+    table.add_column("parameter")
+    table.add_column("value ± 1σ")
+    for name, quantity in found.parameters.items():
+        table.add_row(name, said(quantity))
     return table
 
 

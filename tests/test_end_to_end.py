@@ -108,7 +108,7 @@ def test_killed_at_any_moment_the_session_holds_all_but_the_last_quarter_second(
             stderr=subprocess.DEVNULL,
         )
         _wait_for(folder / "samples.arrows")
-        sleep(rng.uniform(0.5, 3.0))
+        late = _slept(rng.uniform(0.5, 3.0))
         killed = time()
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -116,10 +116,20 @@ def test_killed_at_any_moment_the_session_holds_all_but_the_last_quarter_second(
         block = session.block
         assert "cut off" in session.warnings[0]
         assert (np.diff(block.t) > 0).all()
-        # what waited in the reader at the kill had not reached the recorder yet
-        assert killed - block.t_host[-1] < 0.5
+        # what waited in the reader at the kill had not reached the recorder yet, and
+        # on a busy machine each of device, reader and recorder waits for its turn
+        assert killed - block.t_host[-1] < 0.5 + 4 * late
         code = main(["solve", str(folder)])
         assert code in (0, 1, 2)
+
+
+def _slept(seconds: float) -> float:
+    """Sleep, and tell by how much the machine was late with it at worst, s."""
+    end, late = monotonic() + seconds, 0.0
+    while (now := monotonic()) < end:
+        sleep(0.02)
+        late = max(late, monotonic() - now - 0.02)
+    return late
 
 
 def _wait_for(path: Path, seconds: float = 30.0) -> None:

@@ -131,8 +131,7 @@ def of_chance(
             tuple(aliases.get("angle_setting", ())),
             _rise(explanation, "setting"),
         )
-    walks = [p for p in bench.errors.parts if p.kind == "walk"]
-    walks += wandering(explanation)
+    walks = wandering(explanation)
     names = [n for n in model.random if n.startswith(("walk", "offset"))]
     rise = _rise(explanation, *names) if walks else {}
     if walks and rise["delta_chi2"] > MATERIAL:

@@ -17,6 +17,7 @@ from fieldcal.assessing import assess, remember
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.commands.history import lines
+from fieldcal.commands.report import write
 from fieldcal.errors import InputError
 from fieldcal.history import History, default_path, family
 from fieldcal.observing import observe, rests
@@ -212,3 +213,13 @@ def test_the_command_lists_plots_compares_and_accepts(
     assert document["parameters"]["acc_bias.x"][2]["out_of_family"]
     for wrong in (["B2"], ["A1", "--parameter", "x"], ["A1", "--compare", "1", "9"]):
         assert main(["history", *wrong, *own]) == 2
+
+
+def test_the_report_shows_what_the_history_of_the_device_has(tmp_path: Path) -> None:
+    session = bench(tmp_path / "s")
+    assert main(["solve", str(session.folder)]) in (0, 1)
+    history = filled(tmp_path / "h.sqlite", 0.2, 0.21)
+    page = write(session.folder, history=history.path).read_text()
+    assert "2026-03-01" in page and "2026-03-02" in page
+    alone = write(session.folder, history=tmp_path / "none.sqlite").read_text()
+    assert "2026-03-01" not in alone

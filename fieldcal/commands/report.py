@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from fieldcal.report import Earlier
+
 EXAMPLE = """\
   fieldcal report bench-7/2026-03-01
   fieldcal report bench-7/2026-03-01 --earlier bench-7/2026-02-01 --pdf
@@ -33,7 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="RESULT",
-        help="earlier sessions or result.json of the same device, oldest first",
+        help="earlier sessions or result.json of the same device, oldest first"
+        " (default: what its history has)",
     )
     add("--pdf", action="store_true", help="beside it a .pdf, by Chromium")
     add("--png", action="store_true", help="beside it a .png, by Chromium")
@@ -60,9 +63,19 @@ def run(args: argparse.Namespace) -> int:
 
 
 def write(
-    session: Path, output: Path | None = None, earlier: Sequence[Path] = ()
+    session: Path,
+    output: Path | None = None,
+    earlier: Sequence[Path] = (),
+    history: Path | None = None,
 ) -> Path:
     """Write the report of a session and return where it is.
+
+    Parameters
+    ----------
+    session : its folder
+    output : the page; in the session's folder if not given
+    earlier : results to compare with; those of the device's history if none are given
+    history : another file than the user's
 
     Raises
     ------
@@ -75,5 +88,22 @@ def write(
     from fieldcal.report.page import REPORT
     from fieldcal.session import write_whole
 
-    material = gather(session, [earlier_result(path) for path in earlier])
-    return write_whole(output or session / REPORT, render(material))
+    before = [earlier_result(path) for path in earlier] or _before(session, history)
+    return write_whole(output or session / REPORT, render(gather(session, before)))
+
+
+def _before(folder: Path, history: Path | None) -> list[Earlier]:
+    """What the history knows of the device, without this session."""
+    from fieldcal.history import History, default_path
+    from fieldcal.report import Earlier
+    from fieldcal.session import Session
+
+    path = history or default_path()
+    serial = Session.open(folder).about.device.get("serial")
+    if not serial or not path.exists():
+        return []
+    return [
+        Earlier(run.taken_at[:10], run.calibration)
+        for run in History(path).runs(str(serial))
+        if Path(run.session).resolve() != folder.resolve()
+    ]

@@ -122,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
     _show(args, found, folder, truth, further)
     if not args.no_report:
         for each in (folder, *(folder / name for name in further)):
-            page = _report(each)
+            page = _report(each, history.path)
             if page and not args.json:
                 sys.stdout.write(f"report:   {page}\n")
     check_heard(others)
@@ -130,12 +130,12 @@ def run(args: argparse.Namespace) -> int:
     return 0 if good and result["decision"]["go"] else 1
 
 
-def _report(folder: Path) -> Path | None:
+def _report(folder: Path, history: Path) -> Path | None:
     """Write the report; the calibration stands without it."""
     from fieldcal.commands.report import write
 
     try:
-        return write(folder)
+        return write(folder, history=history)
     except FieldcalError as error:
         sys.stderr.write(f"fieldcal run: no report: {error}\n")
         return None

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from time import monotonic, sleep
 
 import numpy as np
 import pytest
 
+from benchmarks.kills import Bench, windows
 from fieldcal import description, plan_file
 from fieldcal.errors import SessionError
 from fieldcal.recorder import SAMPLES, Recorder
@@ -138,3 +141,28 @@ def test_runs_that_are_broken_end_with_right_numbers(kind: str, runs: int) -> No
     for _, lost, pulls, says in outcomes:
         assert lost == 0 and says == ""
         assert len(pulls) >= 11 and np.abs(pulls).max() < 4.5
+
+
+def test_a_laptop_that_fell_asleep_goes_on_with_right_numbers(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, 3, speed="20")
+    try:
+        run = bench.start(tmp_path / "s")
+        samples, deadline = tmp_path / "s" / SAMPLES, monotonic() + 30
+        while not (samples.exists() and samples.stat().st_size > 40_000):
+            assert monotonic() < deadline and run.poll() is None
+            sleep(0.02)
+        run.send_signal(signal.SIGSTOP)
+        sleep(1.5)  # half a minute of the device's time
+        run.send_signal(signal.SIGCONT)
+        _, said = run.communicate(timeout=60)
+        assert run.returncode in (0, 1), said
+        pulls = bench.pulls(tmp_path / "s")
+        taken = windows(tmp_path / "s")
+    finally:
+        bench.device.close()
+    assert sorted(taken) == [0, 1, 2, 3, 4]
+    block = Session.open(tmp_path / "s").block
+    for start, end in taken.values():
+        inside = block.between(start, end)
+        assert np.diff(inside.t).max() < 0.5
+    assert len(pulls) >= 11 and np.abs(pulls).max() < 4.5

@@ -406,5 +406,14 @@ def test_mutated_files_are_read_or_refused_in_words(
     assert changes or small.knows(found)
 
 
+def test_a_log_whose_format_calls_a_number_a_text_is_refused(tmp_path: Path) -> None:
+    small = Small("dataflash", tmp_path / "file")
+    content = bytearray(small.content)
+    content[189] = ord("n")
+    small.path.write_bytes(content)
+    with pytest.raises(InputError, match="fit"):
+        whole(small.path, small.wanted, small.name, repair=False)
+
+
 def test_every_format_is_tried() -> None:
     assert set(SMALL) | {"wire"} == set(recordings.formats())

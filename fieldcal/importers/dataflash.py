@@ -190,6 +190,10 @@ class File(Recording):
         there = set(form.layout.names or ())
         needed = {"PARM": {"Name", "Value"}, **dict.fromkeys(INSTANCES, SIX)}
         fits = form.layout.itemsize == size and there >= needed.get(name, set())
+        fits = fits and all(
+            form.layout[n].kind in ("S" if n == "Name" else "iuf")
+            for n in there & {*NUMBERS, *needed.get(name, ())}
+        )
         if name in INSTANCES:
             fits = fits and bool(there & {"TimeUS", "TimeMS"})
         if name in needed and not fits:
@@ -203,6 +207,9 @@ def _numpy(code: str) -> str:
     """Return numpy's name of a field of `struct`."""
     return f"S{code[:-1]}" if code.endswith("s") else f"<{_CODES[code]}"
 
+
+NUMBERS = ("TimeUS", "TimeMS", "T", "Temp", "I")
+"""Columns that are read besides those that are needed."""
 
 _CODES = {
     "b": "i1", "B": "u1", "h": "i2", "H": "u2", "i": "i4", "I": "u4", "q": "i8",

@@ -44,7 +44,7 @@ def test_the_wrong_baud_rate(
         said = failed(url, tmp_path / "s", capsys)
     assert "no format that is known; check the baud rate" in said
     with VirtualDevice(["--serial", "mip", "--baud", "921600"]) as device:
-        assert main(["ports", "--probe", "--seconds", "0.4", device.port]) == 0
+        assert main(["ports", "--probe", "--seconds", "2", device.port]) == 0
     assert "?format=mip&baud=921600" in capsys.readouterr().out
 
 

@@ -42,8 +42,6 @@ ACCEPTED, IN_PROGRESS = 0, 5
 RAW_SENSORS = 1
 INT32, REAL32 = 6, 9
 
-PROGRAMS = {3: "ArduPilot", 12: "PX4"}
-
 
 class Talk:
     """A conversation with one autopilot.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.frames import earth_rate, force
+from fieldcal.frames import force
 from fieldcal.samples import Array
 
 
@@ -61,11 +61,6 @@ def angles(positions: Sequence[Position]) -> tuple[Array, Array]:
 def forces(positions: Sequence[Position], gravity: float) -> Array:
     """Specific force at rest in procedure axes, (n, 3) m/s^2, nan where unknown."""
     return force(*angles(positions), gravity)
-
-
-def earth_rates(positions: Sequence[Position], latitude: float) -> Array:
-    """Earth's rate in procedure axes, (n, 3) rad/s, nan where unknown."""
-    return earth_rate(*angles(positions), latitude)
 
 
 def _set(*pairs: tuple[float, float]) -> tuple[Position, ...]:

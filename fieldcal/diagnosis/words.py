@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -150,8 +150,3 @@ def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
     if left:
         out.append(f"The positions leave open: {', '.join(left)}.")
     return out
-
-
-def count_said(effects: Mapping[str, int]) -> str:
-    """Ids with how often each was found."""
-    return ", ".join(f"{n} {i}" if n > 1 else i for i, n in effects.items())

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.diagnosis.explain import CLOSE, Explanation, preferred
+from fieldcal.diagnosis.contender import Model, foretells
+from fieldcal.diagnosis.explain import CLOSE, Explanation, allowed, preferred
 from fieldcal.diagnosis.scatter import wanders
-from fieldcal.diagnosis.select import MARGIN, TIE, Model, foretells
+from fieldcal.diagnosis.select import MARGIN, TIE
 from fieldcal.effects import Experience, catalogue
 from fieldcal.frames import turn
 
@@ -51,7 +52,8 @@ def aliases(explanation: Explanation) -> Aliases:
     cost = preferred(explanation.model)
     mine = _causes(explanation.model)
     for rival in explanation.rivals:
-        if not _foretells(explanation.model, rival):
+        slack = allowed(explanation.search, explanation.model, rival)
+        if not _foretells(explanation.model, rival, slack):
             continue
         theirs = _causes(rival)
         for name in sorted(mine - theirs):
@@ -95,9 +97,9 @@ def _chances(explanation: Explanation) -> Iterator[tuple[str, str]]:
                             yield id_, newest.effect.id
 
 
-def _foretells(best: Model, other: Model) -> bool:
+def _foretells(best: Model, other: Model, slack: float = 0.0) -> bool:
     """Whether another model predicts positions left out about as well."""
-    return foretells(other) > foretells(best) - MARGIN
+    return foretells(other) > foretells(best) - MARGIN - slack
 
 
 def telling_position(

@@ -8,14 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.diagnosis.candidates import Hypothesis, hypotheses
+from fieldcal.diagnosis.contender import Model
 from fieldcal.diagnosis.estimate import RELAX, estimate
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.prepare import Prepared, refined
 from fieldcal.diagnosis.reduce import rate_of
-from fieldcal.diagnosis.select import Model, Search
-from fieldcal.diagnosis.turning import CANDIDATES, Turning, Turntable
+from fieldcal.diagnosis.select import Search
+from fieldcal.diagnosis.together import together
+from fieldcal.diagnosis.turning import Turning, Turntable
 from fieldcal.diagnosis.turns import NOTHING, Turn, turns
+from fieldcal.diagnosis.whiten import Errors, Part
 from fieldcal.frames import EARTH_RATE
 
 CLOSE = 4.6
@@ -26,6 +29,18 @@ NEARBY, RIVALS = 15.0, 4
 
 SEES_EARTH = 20.0
 """Earth rate over the noise of one window from which tactical gyroscopes see it."""
+
+
+THERMAL = {*("temperature_bias", "temperature_scale"), "thermal_hysteresis", "warm_up"}
+
+LAG = 0.03
+"""Part of its course by which the sensors' temperature is not the thermometer's."""
+
+TOGETHER = 5.0
+"""How much likelier one course has to be than one for each axis, ln."""
+
+PASSES = 12
+"""Of fits to the turns at most, each beginning where the last one came to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +61,7 @@ class Explanation:
     made : the turns
     table, turning : what the turns say; None where there are none
     earth : by how much the Earth's rate raises ln Z; 0 where it is not in the model
+    in_step : first channels of the triads whose axes seem to wander, in one course
 
     """
 
@@ -62,6 +78,7 @@ class Explanation:
     table: Turntable | None
     turning: Turning | None
     earth: float
+    in_step: frozenset[int]
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -92,7 +109,7 @@ def explain(prepared: Prepared) -> Explanation:
         search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
         model = search.model(model.chosen, bench, None, model.random, model.shaped)
     wide, fit, left = _estimated(search, model)
-    made, table, turning = _turned(prepared, model, fit, search.price)
+    made, table, turning = _turned(prepared, wide, fit, search.price)
     base = prepared.bench.fit(always)
     return Explanation(
         prepared,
@@ -108,12 +125,43 @@ def explain(prepared: Prepared) -> Explanation:
         table,
         turning,
         _earth(search, model),
+        _in_step(prepared, model, fit),
     )
+
+
+def bare(prepared: Prepared, model: Model, fit: Fit) -> tuple[Bench, Fit]:
+    """The effects that were found, without anything random but the angles' setting."""
+    errors = Errors(setting=model.bench.errors.setting)
+    bench = prepared.bench.but(errors=errors, relax=RELAX)
+    return bench, bench.fit(fit.terms, fit)
+
+
+def _in_step(prepared: Prepared, model: Model, fit: Fit) -> frozenset[int]:
+    """Triads of which the axes seem to wander, but follow one course.
+
+    Biases wander each for itself.
+    """
+    out = set()
+    for first in (0, 3):
+        axes = sorted({p.channel for p in wandering(model.bench.errors, first)})
+        if len(axes) > 1:
+            if together(*bare(prepared, model, fit), axes) > TOGETHER:
+                out.add(first)
+    return frozenset(out)
+
+
+def wandering(errors: Errors, first: int) -> list[Part]:
+    """Walks and offsets of the triad that begins with a channel."""
+    return [
+        p
+        for p in errors.parts
+        if p.kind in ("walk", "offset") and first <= p.channel < first + 3
+    ]
 
 
 def _estimated(search: Search, model: Model) -> tuple[Bench, Fit, tuple[str, ...]]:
     whole = [replace(t, columns=h.variants[0].columns) for h, t in model.chosen]
-    terms = [*search.always, *merged(whole)]
+    terms = [*search.rules.always, *merged(whole)]
     return estimate(model.bench, terms, model.fit)
 
 
@@ -121,33 +169,65 @@ def _with_turns(
     prepared: Prepared, search: Search, best: Model
 ) -> tuple[Model, tuple[Model, ...]]:
     """The best model of windows and turns, and the rivals that come close to it."""
-    close = [m for m in search.rivals(best) if m.objective > best.objective - NEARBY]
+    level = worth(best) - NEARBY
+    close = [
+        m for m in search.rivals(best) if worth(m) + allowed(search, best, m) > level
+    ]
     close = [best, *sorted(close, key=lambda m: -m.objective)[:RIVALS]]
     if len(close) == 1:
         return best, ()
     gains = []
     for model in close:
-        _, fit, _ = _estimated(search, model)
-        made = turns(prepared.source, model.bench.rows, fit)
+        wide, fit, _ = _estimated(search, model)
+        made = turns(prepared.source, wide.rows, fit)
         if made:
             interval = 1 / rate_of(prepared.source.block)
-            table = Turntable(model.bench, fit, made, interval)
+            table = Turntable(wide, fit, made, interval)
             found = table.better((), search.price, closures=False)
-            worth = found.score - search.price * len(found.terms)
+            score = found.score - search.price * len(found.terms)
             # turns that nothing explains well do not tell much about the rest
-            gains.append(worth / max(1.0, found.chi2 / max(found.dof, 1)))
+            gains.append(score / max(1.0, found.chi2 / max(found.dof, 1)))
         else:
             gains.append(0.0)
     totals = [m.objective + g for m, g in zip(close, gains, strict=True)]
     first = int(np.argmax(totals))
-    level = totals[first] + preferred(close[first]) - CLOSE
-    rivals = [m for m, t in zip(close, totals, strict=True) if t + preferred(m) > level]
-    return close[first], tuple(m for m in rivals if m is not close[first])
+    chosen, others = close[first], []
+    for model, gain in zip(close, gains, strict=True):
+        less = worth(chosen) + gains[first] - worth(model) - gain
+        if model is not chosen and less < CLOSE + allowed(search, chosen, model):
+            others.append(model)
+    return chosen, tuple(others)
+
+
+def worth(model: Model) -> float:
+    """Evidence of a model, ln, whatever the choice of its effects' variants cost.
+
+    That is paid for believing an effect, not for whether it would explain the same.
+    """
+    return model.objective + sum(model.shaped)
 
 
 def preferred(model: Model) -> float:
     """What a model paid for effects that are second choice by their nature, ln."""
     return sum(h.cost for h, _ in model.chosen)
+
+
+def allowed(search: Search, best: Model, other: Model) -> float:
+    """What another model may fall short by for the thermometer alone, ln.
+
+    The sensors are not where the thermometer is: their temperature is known to a part
+    of its course only. Of what an effect of it explains, the square of that part says
+    nothing about which effect it is.
+    """
+    mine, theirs = (
+        {h.effect.id for h, _ in m.chosen if not h.known} for m in (best, other)
+    )
+    if not mine ^ theirs <= THERMAL or not mine - theirs:
+        return 0.0
+    less = best
+    for cause in mine - theirs:
+        less = search.without(less, cause)
+    return LAG**2 * (best.fit.score - less.fit.score)
 
 
 def _pool(prepared: Prepared, bench: Bench) -> list[Hypothesis]:
@@ -176,42 +256,46 @@ def merged(terms: Sequence[Term]) -> list[Term]:
 
 
 def _turned(
-    prepared: Prepared, model: Model, fit: Fit, price: float
+    prepared: Prepared, bench: Bench, fit: Fit, price: float
 ) -> tuple[tuple[Turn, ...], Turntable | None, Turning | None]:
     """What the turns show beyond the windows."""
     if any(t.effect.kind == "motion" for t in prepared.tones):
         return (), None, None  # a base that rocks turns the device as well
-    made, table, found = _unwound(prepared, model, fit, price, closures=False)
+    made, table, found = _unwound(prepared, bench, fit, price, closures=False)
     if found is not None and not found.steady:
-        made, table, found = _unwound(prepared, model, fit, price, closures=True)
+        made, table, found = _unwound(prepared, bench, fit, price, closures=True)
     return made, table, found
 
 
 def _unwound(
-    prepared: Prepared, model: Model, fit: Fit, price: float, closures: bool
+    prepared: Prepared, bench: Bench, fit: Fit, price: float, closures: bool
 ) -> tuple[tuple[Turn, ...], Turntable | None, Turning | None]:
     """One effect after the other, as long as one more is worth it.
 
-    What is fitted is to first order in the errors of the gyroscopes, so those found are
-    taken out before the turns are integrated again.
+    What is fitted is to first order in the errors of the gyroscopes and in what the
+    turns change of the windows' model, so those found are taken out, and the model is
+    put where windows and turns agree, before the turns are integrated again.
     """
-    rows, interval = model.bench.rows, 1 / rate_of(prepared.source.block)
-    made = tuple(turns(prepared.source, rows, fit))
+    interval = 1 / rate_of(prepared.source.block)
+    made = tuple(turns(prepared.source, bench.rows, fit))
     table: Turntable | None = None
     found: Turning | None = None
-    undo = NOTHING
+    undo, bent = NOTHING, True
     terms: tuple[Term, ...] = ()
-    while made and len(terms) <= len(CANDIDATES):
-        table = Turntable(model.bench, fit, made, interval)
-        chosen = table.better(terms, price, closures)
-        more = table.fit(chosen.terms, chosen.rows, RELAX)
+    for _ in range(PASSES if made else 0):
+        table = Turntable(bench, fit, made, interval, undo)
+        more = table.fit(terms, table.seen(closures), RELAX)
+        moved = bench.at(fit, fit.values + more.values[: len(fit.values)])
+        bent = bench.bends(fit, moved)
+        chosen = terms if bent else table.better(terms, price, closures).terms
+        more = table.fit(chosen, table.seen(closures), RELAX)
         there = np.array([undo.of(name) for name in more.names])
         found = replace(more, values=more.values + there)
-        undo, settled = table.undo(found), chosen.terms == terms
-        if settled:
+        if chosen == terms and not bent:
             break
-        terms = chosen.terms
-        again = tuple(turns(prepared.source, rows, fit, undo))
+        fit = moved if bent else fit
+        undo, terms = table.undo(found), chosen
+        again = tuple(turns(prepared.source, bench.rows, fit, undo))
         if len(again) != len(made):
             break
         made = again

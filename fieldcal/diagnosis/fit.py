@@ -44,6 +44,10 @@ DETERMINED = 0.1
 """A parameter is determined when its variance is less than this part of the prior's."""
 
 
+BENT = 1.0
+"""By how much squares may part from their linear prediction."""
+
+
 @dataclass(frozen=True, slots=True)
 class Fit:
     """A model at its optimum.
@@ -139,10 +143,7 @@ class Bench:
         `near` is a fit to start from: of whatever terms the two have in common.
         """
         state = self._start(tuple(terms), near)
-        names = self._names(state)
-        prior = self._prior(state)
-        centre = self._pack(self._start(tuple(terms), None))
-        shape = np.array([n in _shape_names(terms) for n in names], dtype=bool)
+        names, prior, centre, shape = self._about(state)
         p = self._pack(state)
         for _ in range(ITERATIONS):
             prediction, columns = self._linearise(state)
@@ -199,6 +200,44 @@ class Bench:
             dof,
             score,
         )
+
+    def at(self, fit: Fit, values: Array) -> Fit:
+        """The same model where its columns have other values, (k,)."""
+        state = self._unpack(fit.state, values)
+        names, prior, centre, shape = self._about(state)
+        return self._result(state, names, prior, centre, shape)
+
+    def ahead(self, fit: Fit) -> Array:
+        """Newton's step from where a model stands to its optimum, (k,)."""
+        _, prior, centre, shape = self._about(fit.state)
+        flat = fit.jacobian.reshape(-1, len(fit.names))
+        pull = np.where(shape, 0.0, (fit.values - centre) / prior**2)
+        step: Array = fit.covariance @ (flat.T @ fit.white.ravel() - pull)
+        return step
+
+    def bends(self, fit: Fit, moved: Fit) -> bool:
+        """Whether rows part from what is linear at `fit`, at `moved`."""
+        off = moved.values - fit.values - self.ahead(fit)
+        curvature = np.linalg.inv(fit.covariance)
+        ahead = self.ahead(fit)
+        linear = off @ curvature @ off - ahead @ curvature @ ahead
+        change = self._squares(moved) - self._squares(fit)
+        return bool(abs(change - linear) > BENT)
+
+    def _squares(self, fit: Fit) -> float:
+        """S of a model where it stands."""
+        _, prior, centre, shape = self._about(fit.state)
+        pull = np.where(shape, 0.0, (fit.values - centre) / prior)
+        return float((fit.white**2).sum() + (pull**2).sum())
+
+    def _about(
+        self, state: State
+    ) -> tuple[tuple[str, ...], Array, Array, NDArray[np.bool_]]:
+        """Names of the columns, their priors, and which are shapes."""
+        names, terms = self._names(state), state.terms
+        centre = self._pack(self._start(terms, None))
+        shape = np.array([n in _shape_names(terms) for n in names], dtype=bool)
+        return names, self._prior(state), centre, shape
 
     def shifted(self, fit: Fit, column: int, step: float) -> State:
         """Where a fit would stand with one column changed."""

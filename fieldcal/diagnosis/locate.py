@@ -17,7 +17,7 @@ from fieldcal.diagnosis.heldout import cells
 from fieldcal.diagnosis.naming import Removed
 from fieldcal.diagnosis.reduce import spans
 from fieldcal.diagnosis.result import Kind, Mismatch
-from fieldcal.diagnosis.unknown import Unknown, wandering
+from fieldcal.diagnosis.unknown import Unknown, walking
 from fieldcal.effects import Fault, catalogue
 from fieldcal.samples import CHANNELS, Array
 
@@ -88,7 +88,7 @@ def of_chance(explanation: Explanation) -> Iterator[Mismatch]:
         squares = (fit.white**2).sum(axis=0) - (explanation.fit.white**2).sum(axis=0)
         covariate = catalogue()["angle_setting"].covariate
         yield from _of_residual(explanation, fit, squares, "position", covariate)
-    walks = [p.channel for p in wandering(explanation) if p.kind == "walk"]
+    walks = [p.channel for p in walking(explanation) if p.kind == "walk"]
     if walks:
         plain = explanation.prepared.bench
         fit = plain.fit(explanation.fit.terms, explanation.fit)

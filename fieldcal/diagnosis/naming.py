@@ -16,7 +16,7 @@ from fieldcal.diagnosis.quality import Agreement
 from fieldcal.diagnosis.result import Found, Quantity
 from fieldcal.diagnosis.scatter import dropped, size_sigma, wanders
 from fieldcal.diagnosis.steps import jump_instant
-from fieldcal.diagnosis.unknown import wandering
+from fieldcal.diagnosis.unknown import walking
 from fieldcal.effects import Fault, catalogue
 from fieldcal.samples import CHANNELS, Array
 
@@ -131,7 +131,7 @@ def of_chance(
             tuple(aliases.get("angle_setting", ())),
             _rise(explanation, "setting"),
         )
-    walks = wandering(explanation)
+    walks = walking(explanation)
     names = [n for n in model.random if n.startswith(("walk", "offset"))]
     rise = _rise(explanation, *names) if walks else {}
     if walks and rise["delta_chi2"] > MATERIAL:

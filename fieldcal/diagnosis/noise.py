@@ -8,7 +8,8 @@ is the variance of one sample for white noise, whatever m. What is wanted is the
 that a mean over a second obeys; shorter m are pooled in as long as they agree with it,
 so that filtered or otherwise coloured outputs are not taken for quieter ones. The mean
 of squares leaves out the largest tenth, so that a few disturbed spots do not count.
-Source: IEEE Std 952, annex C.
+Biases that walk by q sqrt(t) add q^2 dt m^2 / 3, and where the levels rise like that,
+white noise is what they rise from. Source: IEEE Std 952, annex C.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def white(pieces: Sequence[Array], rate_hz: float) -> Array:
     levels, spreads = zip(*(_level(pieces, m) for m in lengths), strict=True)
     out = np.full(channels, np.nan)
     for c in range(channels):
-        out[c] = _pooled([v[c] for v in levels], [s[c] for s in spreads])
+        out[c] = _pooled(lengths, [v[c] for v in levels], [s[c] for s in spreads])
     # outputs coarser than their noise may not change at all while the device is held
     noise: Array = np.maximum(out, _grain(pieces) / np.sqrt(12))
     return noise
@@ -126,16 +127,42 @@ def _steps(piece: Array, m: int, most: int) -> Array:
     return out
 
 
-def _pooled(levels: Sequence[float], spreads: Sequence[float]) -> float:
+def _pooled(
+    lengths: Sequence[int], levels: Sequence[float], spreads: Sequence[float]
+) -> float:
     """Level at the shortest m that all longer ones agree with."""
+    under = _under_a_walk(lengths, levels, spreads)
+    if under is not None:
+        return under
     best, spread = levels[0], spreads[0]
     for level, finer in zip(levels[1:], spreads[1:], strict=True):
         if not np.isfinite(best):
             best, spread = level, finer
-        elif not abs(level - best) <= AGREE * np.hypot(spread, finer) * max(
-            level, best
-        ):
+        elif not _agree(level, best, spread, finer):
             break
         else:
             best, spread = level, finer
     return float(np.sqrt(best))
+
+
+def _under_a_walk(
+    lengths: Sequence[int], levels: Sequence[float], spreads: Sequence[float]
+) -> float | None:
+    """White noise a of s^2(m) = a + b m^2, if that is what the levels obey."""
+    if len(levels) < 3 or not np.isfinite(levels).all():
+        return None
+    square = np.square(lengths, dtype=float)
+    slope = (levels[0] - levels[1]) / (square[0] - square[1])
+    least = levels[1] - slope * square[1]
+    if slope <= 0 or least <= 0 or _agree(levels[1], levels[0], *spreads[:2]):
+        return None
+    rest = zip(square[2:], levels[2:], spreads[2:], strict=True)
+    if all(_agree(v, least + slope * m, spreads[1], s) for m, v, s in rest):
+        return float(np.sqrt(least))
+    return None
+
+
+def _agree(one: float, other: float, spread: float, finer: float) -> bool:
+    """Whether two levels are the same but for their relative errors."""
+    error = np.hypot(spread, finer) * max(one, other)
+    return bool(abs(one - other) <= AGREE * error)

@@ -17,17 +17,15 @@ positions left out better is taken.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.diagnosis.candidates import Hypothesis, instants
+from fieldcal.diagnosis.candidates import Hypothesis
+from fieldcal.diagnosis.contender import Choice, Model, Rules, foretells
 from fieldcal.diagnosis.fit import Bench, Fit
-from fieldcal.diagnosis.heldout import foretold
 from fieldcal.diagnosis.model import Term
-from fieldcal.diagnosis.narrow import narrower
-from fieldcal.diagnosis.scatter import Wander, dropped, fees, wanders
-from fieldcal.diagnosis.steps import step_gains
+from fieldcal.diagnosis.scatter import Wander, dropped, wanders
+from fieldcal.diagnosis.variants import with_one
 
 EXTRA = 6.9
 """Of ln 1000."""
@@ -45,56 +43,8 @@ BEAM = 3
 RIVAL = 0.3
 """Beginnings followed up have at least this part of the best one's gain."""
 
-AGAIN = 3.0
-"""What the second triad costs of an effect that the first has already, ln."""
-
 MOST = 6
 """Hypotheses in one model."""
-
-STEPS = 3
-LEAVES = 4.0
-"""Standard deviations of chi^2 from which a fit leaves something to explain."""
-
-Choice = tuple[Hypothesis, Term]
-
-
-@dataclass(frozen=True, slots=True)
-class Model:
-    """Hypotheses with their fit.
-
-    Attributes
-    ----------
-    chosen : hypotheses, each with the variant that fits best
-    bench : rows with the errors of this model
-    fit : at the optimum
-    objective : ln Z less what the hypotheses cost
-    random : names of the random parts that were let in
-    shaped : what the choice of variants cost, ln
-
-    """
-
-    chosen: tuple[Choice, ...]
-    bench: Bench
-    fit: Fit
-    objective: float
-    random: tuple[str, ...] = ()
-    shaped: tuple[float, ...] = ()
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Names of the hypotheses in it."""
-        return frozenset(h.name for h, _ in self.chosen)
-
-    @property
-    def parts(self) -> frozenset[str]:
-        """Names of everything in it, causes and random parts."""
-        return self.names | {*self.random}
-
-    @property
-    def leaves_nothing(self) -> bool:
-        """Whether its rows are no further off than white noise."""
-        spread = np.sqrt(2 * max(self.fit.dof, 1))
-        return self.fit.chi2 < self.fit.dof + LEAVES * float(spread)
 
 
 class Search:
@@ -111,8 +61,9 @@ class Search:
     def __init__(
         self, bench: Bench, pool: Sequence[Hypothesis], always: Sequence[Term] = ()
     ) -> None:
-        self.bench, self.pool, self.always = bench, list(pool), tuple(always)
+        self.bench, self.pool = bench, list(pool)
         self.price = float(np.log(len(self.pool) + OTHERS)) + EXTRA
+        self.rules = Rules(tuple(always), self.price)
         self._grown: dict[tuple[frozenset[str], tuple[str, ...]], list[Model]] = {}
 
     def run(self) -> Model:
@@ -138,12 +89,7 @@ class Search:
         shaped: tuple[float, ...] = (),
     ) -> Model:
         """Fit some hypotheses."""
-        fit = bench.fit([*self.always, *(t for _, t in chosen)], near)
-        new = {h.effect.id for h, _ in chosen if not h.known}
-        again = sum(not h.known for h, _ in chosen) - len(new)
-        cost = self.price * (len(new) + len(random)) + AGAIN * again + sum(shaped)
-        cost += fees(bench.errors)
-        return Model(chosen, bench, fit, fit.score - cost, random, shaped)
+        return self.rules.model(chosen, bench, near, random, shaped)
 
     def _grow(self, model: Model) -> Model | None:
         """The model with something more in it, if that is better."""
@@ -220,48 +166,8 @@ class Search:
         return self._grown[key]
 
     def with_one(self, model: Model, hypothesis: Hypothesis) -> Model:
-        """The model and the variant of a hypothesis that fits best with it.
-
-        Several variants are one hypothesis: their mean likelihood counts.
-        """
-        variants, cost = hypothesis.variants, hypothesis.cost
-        there = [t for h, t in model.chosen if h.effect is hypothesis.effect]
-        if there and there[0].shape:
-            variants = (replace(variants[0], shape=there[0].shape),)
-        if "at_s" in variants[0].shape and not there:
-            variants, more = self._jumps(model, hypothesis)
-            cost += more
-        tried = [
-            narrowed(
-                self.model(
-                    (*model.chosen, (hypothesis, term)),
-                    model.bench,
-                    model.fit,
-                    model.random,
-                    (*model.shaped, cost),
-                )
-            )
-            for term in variants
-        ]
-        best = max(tried, key=lambda m: m.objective)
-        if "at_s" in variants[0].shape or len(tried) == 1:
-            return best
-        relative = np.array([m.objective for m in tried]) - best.objective
-        more = -float(np.log(np.mean(np.exp(relative))))
-        shaped = (*model.shaped, best.shaped[-1] + more)
-        return replace(best, objective=best.objective - more, shaped=shaped)
-
-    def _jumps(
-        self, model: Model, hypothesis: Hypothesis
-    ) -> tuple[tuple[Term, ...], float]:
-        """The likeliest instants of a jump, and what choosing among all costs."""
-        term = hypothesis.variants[0]
-        channels = term.columns
-        gains = step_gains(model.bench, model.fit, channels, term.prior)
-        best = np.argsort(gains)[::-1][:STEPS]
-        cost = -float(np.log(np.mean(np.exp(gains - gains.max()))))
-        at = instants(model.bench)
-        return tuple(replace(term, shape={"at_s": float(at[i])}) for i in best), cost
+        """The model and the variant of a hypothesis that fits best with it."""
+        return with_one(self.rules, model, hypothesis)
 
     def with_random(self, model: Model, chance: Wander) -> Model:
         """The model with something random let in."""
@@ -333,21 +239,3 @@ class Search:
             bench = model.bench.but(errors=dropped(model.bench.errors, name))
             out.append(self.model(model.chosen, bench, model.fit, kept, model.shaped))
         return out
-
-
-def foretells(model: Model) -> float:
-    """How well a model predicts positions left out, ln."""
-    return foretold(model.bench, model.fit.terms, model.fit)
-
-
-def narrowed(model: Model) -> Model:
-    """With the newest term on the axes, and of the size, that serve it best."""
-    hypothesis, term = model.chosen[-1]
-    columns, tight, more, cost = narrower(model.bench, model.fit, term)
-    new = replace(term, columns=columns, tight=tight)
-    return replace(
-        model,
-        chosen=(*model.chosen[:-1], (hypothesis, new)),
-        objective=model.objective + more - cost,
-        shaped=(*model.shaped[:-1], model.shaped[-1] + cost),
-    )

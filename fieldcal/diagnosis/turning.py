@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from fieldcal.diagnosis.attitude import geometry
 from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
 from fieldcal.diagnosis.model import State, Term
-from fieldcal.diagnosis.turns import Turn, Undo
+from fieldcal.diagnosis.turns import NOTHING, Turn, Undo
 from fieldcal.effects import Motion, Sensor, catalogue, columns
 from fieldcal.samples import CHANNELS, Array
 
@@ -93,9 +93,10 @@ class Turntable:
 
     Parameters
     ----------
-    bench, fit : the windows' rows and their fit
+    bench, fit : the windows' rows, and a model of them near its optimum
     made : the turns
     interval : s between samples
+    undo : what the turns were rid of
 
     Attributes
     ----------
@@ -105,12 +106,18 @@ class Turntable:
     """
 
     def __init__(
-        self, bench: Bench, fit: Fit, made: Sequence[Turn], interval: float
+        self,
+        bench: Bench,
+        fit: Fit,
+        made: Sequence[Turn],
+        interval: float,
+        undo: Undo = NOTHING,
     ) -> None:
         self._bench, self._fit, self._made = bench, fit, list(made)
         self._density = bench.rows.noise[3:] * np.sqrt(interval)
         self.pool = tuple(self._pool())
-        self._kept = list(range(len(fit.names)))
+        self._undone = undo
+        self._ahead = bench.ahead(fit)
         blocks = [self._block(t) for t in made]
         self._z = np.concatenate([z for z, _, _ in blocks])
         self._a = np.vstack([a for _, a, _ in blocks])
@@ -124,12 +131,16 @@ class Turntable:
                 effect = catalogue()[name]
                 yield Term(effect, tuple(range(len(effect.params))))
 
+    def seen(self, closures: bool) -> NDArray[np.bool_]:
+        """The rows that are used: the closures alone, or all."""
+        return self.closing if closures else np.ones(len(self._z), dtype=bool)
+
     def better(self, terms: tuple[Term, ...], price: float, closures: bool) -> Turning:
         """The fit with the terms, or with the one more that is worth its price.
 
         `closures` leaves out what the accelerometers see on the way.
         """
-        rows = self.closing if closures else np.ones(len(self._z), dtype=bool)
+        rows = self.seen(closures)
         best = self.fit(terms, rows)
         objective = best.score
         for term in self.pool:
@@ -144,29 +155,31 @@ class Turntable:
         self, terms: Sequence[Term], rows: NDArray[np.bool_], relax: float = 1.0
     ) -> Turning:
         """Fit some of the pool's effects to some of the rows."""
-        width, columns = len(self._kept), self._columns(terms)
-        names = [self._fit.names[j] for j in self._kept]
+        width, columns = len(self._ahead), self._columns(terms)
+        names = list(self._fit.names)
         sizes: list[float] = []
         for term in (t for t in self.pool if t in terms):
             names += [f"{term.effect.id}.{n}" for n in term.names]
             sizes += list(relax * term.prior)
-        a = self._a[rows][:, columns]
+        a, z = self._a[rows][:, columns], self._z[rows] - self._kept_out(terms, rows)
         precision = np.zeros((len(columns), len(columns)))
-        known = self._fit.covariance[np.ix_(self._kept, self._kept)]
-        precision[:width, :width] = np.linalg.inv(known)
+        precision[:width, :width] = np.linalg.inv(self._fit.covariance)
         precision[range(width, len(columns)), range(width, len(columns))] = (
             1 / np.array(sizes) ** 2
         )
         normal = a.T @ a + precision
-        values = np.linalg.solve(normal, a.T @ self._z[rows])
-        white = self._z[rows] - a @ values
+        undone = [-self._undone.of(n) for n in names[width:]]
+        centre = np.concatenate([self._ahead, undone])
+        values = np.linalg.solve(normal, a.T @ z + precision @ centre)
+        off = values - centre
+        white = z - a @ values
         covariance = np.linalg.inv(normal)
         prior = np.concatenate([np.full(width, np.inf), sizes])
         determined = np.diag(covariance) < DETERMINED * prior**2
         chi2 = float(white @ white)
         missing = int(self.closing[rows].sum()) - self._rank
         dof = int(rows.sum()) - missing - int(determined[width:].sum())
-        score = -0.5 * (chi2 + float(values @ precision @ values))
+        score = -0.5 * (chi2 + float(off @ precision @ off))
         score -= 0.5 * float(
             np.linalg.slogdet(normal)[1] - np.linalg.slogdet(precision)[1]
         )
@@ -183,19 +196,32 @@ class Turntable:
             rest, here = rows & (self.turn != i), rows & (self.turn == i)
             seen = self.fit(terms, rest, WIDE)
             if rest.any():
-                off = self._z[here] - self._a[here][:, columns] @ seen.values
+                off = self._z[here] - self._kept_out(terms, here)
+                off = off - self._a[here][:, columns] @ seen.values
                 squares, count = squares + float(off @ off), count + len(off)
         return float(np.sqrt(squares / max(count, 1)))
 
     def _columns(self, terms: Sequence[Term]) -> list[int]:
         """Columns of the windows' parameters and of some of the pool's effects."""
-        at = len(self._kept)
+        at = len(self._ahead)
         out = list(range(at))
         for term in self.pool:
             if term in terms:
                 out += range(at, at + len(term.columns))
             at += len(term.columns)
         return out
+
+    def _kept_out(self, terms: Sequence[Term], rows: NDArray[np.bool_]) -> Array:
+        """What the turns were rid of that is not in the model, put back again."""
+        at, total = len(self._ahead), np.zeros(int(rows.sum()))
+        for term in self.pool:
+            width = len(term.columns)
+            if term not in terms:
+                names = [f"{term.effect.id}.{n}" for n in term.names]
+                back = np.array([-self._undone.of(n) for n in names])
+                total = total + self._a[rows][:, at : at + width] @ back
+            at += width
+        return total
 
     def shown(
         self, term: Term, found: Turning, some: NDArray[np.intp]

@@ -52,6 +52,9 @@ LONGEST_S = 60.0
 CLEARLY = 30.0
 """How far motion has to stand out for its ends to be seen; else the gap is taken."""
 
+AWAY = 5.0
+"""Standard deviations of the angle turned from which the device is on its way."""
+
 LEAST = np.deg2rad(1.0)
 
 
@@ -164,7 +167,7 @@ def turns(source: Source, rows: Rows, fit: Fit, undo: Undo = NOTHING) -> list[Tu
     for p, q in zip(held[:-1].tolist(), held[1:].tolist(), strict=True):
         if x.rate[np.isin(x.position, (p, q))].any():
             continue
-        stretch = _moving(source, rows, q, int(windows[p, 1]), int(windows[q, 0]))
+        stretch = _moving(source, rows, (p, q), int(windows[p, 1]), int(windows[q, 0]))
         made = _turn(source, rows, fit, x, undo, (p, q), *stretch) if stretch else None
         if made is not None:
             found.append(made)
@@ -172,7 +175,7 @@ def turns(source: Source, rows: Rows, fit: Fit, undo: Undo = NOTHING) -> list[Tu
 
 
 def _moving(
-    source: Source, rows: Rows, q: int, first: int, last: int
+    source: Source, rows: Rows, pair: tuple[int, int], first: int, last: int
 ) -> tuple[int, int] | None:
     """Samples of the gap, or of the motion in a long one, if none is missing."""
     block, rate = source.block, rate_of(source.block)
@@ -181,18 +184,23 @@ def _moving(
         return None
     if np.diff(block.t[gap]).max() > 3.5 / rate:
         return None
-    rest = np.nanmean(rows.y[rows.x.position == q, 3:], axis=0)
-    off = block.gyr[gap] - rest
-    total = np.vstack([np.zeros(3), np.cumsum(off, axis=0)])
+    rest = [np.nanmean(rows.y[rows.x.position == p, 3:], axis=0) for p in pair]
+    total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])
     level = np.abs(total[m:] - total[:-m]) / m
     limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
-    at = np.flatnonzero((level > limit).any(axis=1))
-    if not level.max() > CLEARLY * limit.min():
-        return (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
-    margin = round(MARGIN_S * rate)
-    start = max(first, first + int(at[0]) - margin)
-    end = min(last, first + int(at[-1]) + m + margin)
+    start, end = first, last
+    if level.max() > CLEARLY * limit.min():
+        margin, noise = round(MARGIN_S * rate), rows.noise[3:]
+        start += max(_still(block.gyr[gap] - rest[0], noise) - margin, 0)
+        end -= max(_still(block.gyr[gap][::-1] - rest[1], noise) - margin, 0)
     return (start, end) if block.t[end - 1] - block.t[start] < LONGEST_S else None
+
+
+def _still(off: Array, noise: Array) -> int:
+    """Samples until the angle turned stands out of the noise; a last touch does too."""
+    angle = np.abs(np.cumsum(off, axis=0))
+    spread = noise * np.sqrt(np.arange(1, len(off) + 1))[:, None]
+    return int(np.argmax((angle > AWAY * spread).any(axis=1)))
 
 
 def _turn(

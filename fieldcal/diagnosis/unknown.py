@@ -13,22 +13,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.explain import Explanation, bare, wandering
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.heldout import cells
-from fieldcal.diagnosis.whiten import SMOOTH, Errors, Part, factor
+from fieldcal.diagnosis.whiten import SMOOTH, Part, factor
 from fieldcal.effects import Experience
 from fieldcal.samples import Array
 
 STANDS = 3.5
 ALIKE = 2
 """Axes of a triad that scatter together when biases wander."""
-
-FREE = 2 / 3
-"""Part of the changes from position to position that tells something new."""
-
-TOGETHER = 1e-4
-"""Probability below which axes are said to follow one course."""
 
 SMALL = 0.05
 """Part of what effects explain that is too little to be called unexplained."""
@@ -69,71 +63,32 @@ def unknowns(explanation: Explanation) -> list[Unknown]:
     out = [p for p in parts if p.kind in SMOOTH]
     for first in (0, 3):
         scatter = _scatter(explanation, first)
-        if in_step(explanation, first):
+        if first in explanation.in_step:
             out += [replace(p, kind="time") if p.kind == "walk" else p for p in scatter]
         elif sum(p.kind == "offset" for p in scatter) < ALIKE:
             out += [p for p in scatter if p.kind == "offset"]
     return [_of(explanation, part) for part in out]
 
 
-def wandering(explanation: Explanation) -> list[Part]:
+def walking(explanation: Explanation) -> list[Part]:
     """What is random in time: walks, and scatter that is as good as walks."""
     out = []
     for first in (0, 3):
         scatter = _scatter(explanation, first)
         offsets = [p for p in scatter if p.kind == "offset"]
-        if not in_step(explanation, first):
+        if first not in explanation.in_step:
             out += [p for p in scatter if p.kind == "walk"]
             out += offsets if len(offsets) >= ALIKE else []
     return out
 
 
 def _scatter(explanation: Explanation, first: int) -> list[Part]:
-    """Walks and offsets of the triad that begins with channel `first`."""
-    return [
-        p
-        for p in explanation.model.bench.errors.parts
-        if p.kind in ("walk", "offset") and first <= p.channel < first + 3
-    ]
-
-
-def in_step(explanation: Explanation, first: int) -> bool:
-    """Whether axes of a triad that seem to wander follow one course.
-
-    Biases wander each for itself. The changes from position to position of p axes are
-    independent with Bartlett's statistic -(n - 1 - (2 p + 5) / 6) ln det R ~ chi^2,
-    p (p - 1) / 2 degrees of freedom, R their correlations; changes, as two walks are
-    alike by chance and their changes are not. Source: Bartlett 1950.
-    """
-    from scipy.special import chdtrc
-
-    axes = sorted({p.channel for p in _scatter(explanation, first)})
-    if len(axes) < ALIKE:
-        return False
-    fit = _bare(explanation)
-    mean, _, position = cells(explanation.prepared.bench.rows, fit.residual)
-    held = [mean[position == p][:, axes].mean(axis=0) for p in np.unique(position)]
-    changes = np.diff(held, axis=0)
-    changes = changes[np.isfinite(changes).all(axis=1)]
-    # means that scatter each for itself have changes half as many are free of
-    count = FREE * len(changes) - 1 - (2 * len(axes) + 5) / 6
-    if count <= 0:
-        return False
-    _, determinant = np.linalg.slogdet(np.corrcoef(changes.T))
-    chance = chdtrc(len(axes) * (len(axes) - 1) / 2, -count * determinant)
-    return bool(chance < TOGETHER)
-
-
-def _bare(explanation: Explanation) -> Fit:
-    """The effects that were found, without anything random but the angles' setting."""
-    setting = explanation.model.bench.errors.setting
-    bench = explanation.prepared.bench.but(errors=Errors(setting=setting), relax=20.0)
-    return bench.fit(explanation.fit.terms, explanation.fit)
+    return wandering(explanation.model.bench.errors, first)
 
 
 def _of(explanation: Explanation, part: Part) -> Unknown:
     bench, c = explanation.prepared.bench, part.channel
-    fit = _bare(explanation)
+    _, fit = bare(explanation.prepared, explanation.model, explanation.fit)
     mean, sd, position = cells(bench.rows, fit.residual)
     z = np.nan_to_num(mean[:, c] / sd[:, c])
     squares = float((fit.white[:, c] ** 2).sum())

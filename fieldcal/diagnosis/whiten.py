@@ -4,7 +4,7 @@
 
 Each part belongs to one channel. F of
 
-- "walk": a random walk through the rows, per sqrt(s), its increments on KNOTS spans;
+- "walk": a random walk through the rows, per sqrt(s);
 - "offset": one value for each window;
 - "time", "faster time", "fast time", "alpha", "beta", "joints", "force", "force and
   time", "temperature", "since turn": a smooth function of that, nothing more being
@@ -22,7 +22,10 @@ from fieldcal.diagnosis.reduce import Rows
 from fieldcal.effects import Experience
 from fieldcal.samples import Array
 
-KNOTS = 40
+KNOTS = 120
+EXACT = 500
+"""Rows up to which a walk is taken as it is, not on KNOTS spans."""
+
 HARMONICS = 4
 SLOW = 5
 FASTER, FAST = 8.0, 20.0
@@ -120,7 +123,20 @@ def factor(kind: str, x: Experience, channel: int) -> Array:
 
 
 def _walk(x: Experience, channel: int) -> Array:
-    t = x.t
+    """Means over rows of length L have cov min(t, t') - L/6 on the diagonal."""
+    if len(x) > EXACT:
+        return _coarse_walk(x.t)
+    length = np.gradient(x.t) if len(x) > 1 else np.ones(1)
+    for p in np.unique(x.position):
+        inside = x.position == p
+        if inside.sum() > 1:
+            length[inside] = np.gradient(x.t[inside])
+    t = x.t - x.t[0] + length[0] / 2
+    return np.linalg.cholesky(np.minimum.outer(t, t) - np.diag(length / 6))
+
+
+def _coarse_walk(t: Array) -> Array:
+    """Increments on KNOTS spans, straight between them."""
     knots = np.linspace(0, len(t) - 1, KNOTS + 1)
     at = np.interp(knots, np.arange(len(t)), t)
     gaps = np.diff(at)

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.reduce import levels_of, masked, rate_of, spans, table_rate
+from fieldcal.diagnosis.noise import quick_of
+from fieldcal.diagnosis.reduce import masked, rate_of, spans, table_rate
+from fieldcal.diagnosis.vibration import usual_noise
 from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
 from fieldcal.frames import earth_rate_home, force_home
 from fieldcal.positions import angles
@@ -161,7 +163,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
     """What the checks look at."""
     windows, rate = spans(block, about), rate_of(block)
     block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
-    noise = levels_of(block, held, rate)[0] if len(held) else np.full(6, np.nan)
+    noise = usual_noise(block, held, rate) if len(held) else np.full(6, np.nan)
     if about.positions:
         alpha, beta = angles(about.positions)
     else:
@@ -184,6 +186,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
         scale=np.concatenate([about.nominal["acc_scale"], about.nominal["gyr_scale"]]),
         bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
         noise=noise,
+        quick=quick_of(block, held) if len(held) else noise,
         limits=np.array(limits),
         rate_hz=about.rate_hz or np.nan,
     )

@@ -109,7 +109,8 @@ def _dwelling(source: Source, noise: Array) -> Rows | None:
     if not bounds:
         return None
     level = np.broadcast_to(noise, (len(bounds), 6))
-    return averaged(source, np.array(bounds), np.array(position), level, noise)
+    shaken = level[:, :3] ** 2
+    return averaged(source, np.array(bounds), np.array(position), level, noise, shaken)
 
 
 def _squares(bench: Bench, fit: Fit, still: Rows, arrived: Array) -> float:

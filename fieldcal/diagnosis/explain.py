@@ -17,7 +17,8 @@ from fieldcal.diagnosis.reduce import rate_of
 from fieldcal.diagnosis.select import Search
 from fieldcal.diagnosis.together import together
 from fieldcal.diagnosis.turning import Turning, Turntable
-from fieldcal.diagnosis.turns import NOTHING, Turn, turns
+from fieldcal.diagnosis.turns import Turn, turns
+from fieldcal.diagnosis.unwind import turned
 from fieldcal.diagnosis.whiten import Errors, Part
 from fieldcal.frames import EARTH_RATE
 
@@ -38,9 +39,6 @@ LAG = 0.03
 
 TOGETHER = 5.0
 """How much likelier one course has to be than one for each axis, ln."""
-
-PASSES = 12
-"""Of fits to the turns at most, each beginning where the last one came to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +96,20 @@ class Explanation:
 
 
 def explain(prepared: Prepared) -> Explanation:
-    """Find what explains a recording."""
-    always = prepared.known
+    """Find what explains a recording.
+
+    What turns say of the gyroscopes shows in the Earth's rate as well, where they see
+    that; the windows are searched again with it then.
+    """
+    found = _explained(prepared, ())
+    if prepared.navigation and (rates := _of_rates(found)):
+        return _explained(prepared, rates)
+    return found
+
+
+def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
+    """What explains windows, and then turns; `told` is known of the windows' rates."""
+    always = (*prepared.known, *told)
     search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
     model, rivals = _with_turns(prepared, search, search.run())
     if any(h.effect.id == "settling" for h, _ in model.chosen):
@@ -109,15 +119,14 @@ def explain(prepared: Prepared) -> Explanation:
         search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
         model = search.model(model.chosen, bench, None, model.random, model.shaped)
     wide, fit, left = _estimated(search, model)
-    made, table, turning = _turned(prepared, wide, fit, search.price)
-    base = prepared.bench.fit(always)
+    made, table, turning = turned(prepared, wide, untold(fit, told), search.price)
     return Explanation(
         prepared,
-        always,
+        prepared.known,
         search,
         model,
         rivals,
-        base,
+        prepared.bench.fit(prepared.known),
         wide,
         fit,
         left,
@@ -127,6 +136,30 @@ def explain(prepared: Prepared) -> Explanation:
         _earth(search, model),
         _in_step(prepared, model, fit),
     )
+
+
+def _of_rates(found: Explanation) -> tuple[Term, ...]:
+    """What the turns showed of the gyroscopes, with its values."""
+    if (turning := found.turning) is None:
+        return ()
+    values = dict(zip(turning.names, turning.values.tolist(), strict=True))
+    return tuple(
+        replace(
+            term,
+            columns=(),
+            start=tuple(values[f"{term.effect.id}.{n}"] for n in term.names),
+        )
+        for term in turning.terms
+        if term.effect.id.startswith("gyro")
+    )
+
+
+def untold(fit: Fit, told: tuple[Term, ...]) -> Fit:
+    """A fit without terms that are known: the turns are to find them themselves."""
+    pairs = zip(fit.state.terms, fit.state.values, strict=True)
+    kept = [(t, v) for t, v in pairs if t not in told]
+    terms, values = tuple(t for t, _ in kept), tuple(v for _, v in kept)
+    return replace(fit, state=replace(fit.state, terms=terms, values=values))
 
 
 def bare(prepared: Prepared, model: Model, fit: Fit) -> tuple[Bench, Fit]:
@@ -143,9 +176,16 @@ def _in_step(prepared: Prepared, model: Model, fit: Fit) -> frozenset[int]:
     """
     out = set()
     for first in (0, 3):
-        axes = sorted({p.channel for p in wandering(model.bench.errors, first)})
+        errors = model.bench.errors
+        axes = {p.channel for p in wandering(errors, first)}
+        if axes:  # one that is smooth may be of the same course
+            axes |= {
+                p.channel
+                for p in errors.parts
+                if p.kind.endswith("time") and p.channel // 3 == first // 3
+            }
         if len(axes) > 1:
-            if together(*bare(prepared, model, fit), axes) > TOGETHER:
+            if together(*bare(prepared, model, fit), sorted(axes)) > TOGETHER:
                 out.add(first)
     return frozenset(out)
 
@@ -253,50 +293,3 @@ def merged(terms: Sequence[Term]) -> list[Term]:
         columns = tuple(sorted({*(old.columns if old else ()), *term.columns}))
         out[term.effect.id] = replace(old or term, columns=columns)
     return list(out.values())
-
-
-def _turned(
-    prepared: Prepared, bench: Bench, fit: Fit, price: float
-) -> tuple[tuple[Turn, ...], Turntable | None, Turning | None]:
-    """What the turns show beyond the windows."""
-    if any(t.effect.kind == "motion" for t in prepared.tones):
-        return (), None, None  # a base that rocks turns the device as well
-    made, table, found = _unwound(prepared, bench, fit, price, closures=False)
-    if found is not None and not found.steady:
-        made, table, found = _unwound(prepared, bench, fit, price, closures=True)
-    return made, table, found
-
-
-def _unwound(
-    prepared: Prepared, bench: Bench, fit: Fit, price: float, closures: bool
-) -> tuple[tuple[Turn, ...], Turntable | None, Turning | None]:
-    """One effect after the other, as long as one more is worth it.
-
-    What is fitted is to first order in the errors of the gyroscopes and in what the
-    turns change of the windows' model, so those found are taken out, and the model is
-    put where windows and turns agree, before the turns are integrated again.
-    """
-    interval = 1 / rate_of(prepared.source.block)
-    made = tuple(turns(prepared.source, bench.rows, fit))
-    table: Turntable | None = None
-    found: Turning | None = None
-    undo, bent = NOTHING, True
-    terms: tuple[Term, ...] = ()
-    for _ in range(PASSES if made else 0):
-        table = Turntable(bench, fit, made, interval, undo)
-        more = table.fit(terms, table.seen(closures), RELAX)
-        moved = bench.at(fit, fit.values + more.values[: len(fit.values)])
-        bent = bench.bends(fit, moved)
-        chosen = terms if bent else table.better(terms, price, closures).terms
-        more = table.fit(chosen, table.seen(closures), RELAX)
-        there = np.array([undo.of(name) for name in more.names])
-        found = replace(more, values=more.values + there)
-        if chosen == terms and not bent:
-            break
-        fit = moved if bent else fit
-        undo, terms = table.undo(found), chosen
-        again = tuple(turns(prepared.source, bench.rows, fit, undo))
-        if len(again) != len(made):
-            break
-        made = again
-    return made, table, found

@@ -37,7 +37,8 @@ def rows_of(source: Source) -> Rows:
         for p in held
     ]
     bound = spans(source.block, source.about)[held]
-    one = averaged(source, bound, held, np.array(level), rows.noise)
+    shaken = [rows.x.variance[rows.x.position == p].mean(axis=0) for p in held]
+    one = averaged(source, bound, held, np.array(level), rows.noise, np.array(shaken))
     unsteady = np.sqrt(2.0) * angle / one.length
     one.sd[:, 3:] = np.hypot(one.sd[:, 3:], unsteady[:, None])
     return one

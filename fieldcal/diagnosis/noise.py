@@ -1,14 +1,15 @@
-"""White noise of the samples, from short-lag differences inside windows.
+"""White noise of the samples, from what bends at short lags inside windows.
 
-With means over m consecutive samples, the Allan variance times m,
+With means over m consecutive samples, the Hadamard variance times m,
 
-    s^2(m) = m <(mean_{k+1} - mean_k)^2> / 2
+    s^2(m) = m <(mean_{k+2} - 2 mean_{k+1} + mean_k)^2> / 6
 
-is the variance of one sample for white noise, whatever m. What is wanted is the level
-that a mean over a second obeys; shorter m are pooled in as long as they agree with it,
-so that filtered or otherwise coloured outputs are not taken for quieter ones. The mean
-of squares leaves out the largest tenth, so that a few disturbed spots do not count.
-Biases that walk by q sqrt(t) add q^2 dt m^2 / 3, and where the levels rise like that,
+is the variance of one sample for white noise, whatever m and however the mean drifts.
+What is wanted is the level that a mean over a second obeys; shorter m are pooled in as
+long as they agree with it, so that filtered or otherwise coloured outputs are not taken
+for quieter ones. The mean of squares leaves out the largest tenth, so that a few
+disturbed spots do not count.
+Biases that walk by q sqrt(t) add a term in m^2, and where the levels rise like that,
 white noise is what they rise from. Source: IEEE Std 952, annex C.
 """
 
@@ -70,6 +71,17 @@ def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Array:
     )
 
 
+def quick_of(block: Block, windows: NDArray[np.intp]) -> Array:
+    """The same from one sample to the next alone, whatever is slower, (6,)."""
+    held = [slice(a, b) for a, b in windows if b > a]
+    out = []
+    for triad in (block.acc, block.gyr):
+        pieces = [triad[w] for w in held]
+        level = _level(pieces, 1)[0] if pieces else np.full(3, np.nan)
+        out.append(np.maximum(np.sqrt(level), _grain(pieces) / np.sqrt(12)))
+    return np.concatenate(out)
+
+
 def _grain(pieces: Sequence[Array]) -> Array:
     """Smallest change of each channel from one sample to the next, (c,)."""
     steps = [np.abs(np.diff(p[:GRAIN], axis=0)) for p in pieces]
@@ -99,31 +111,31 @@ def rounding(block: Block, windows: NDArray[np.intp], noise: Array) -> Array:
 def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
     """s^2(m) of each channel and its relative standard error."""
     most = max(MOST // len(pieces), 1)
-    steps = [_steps(p, m, most) for p in pieces if len(p) >= 2 * m]
+    steps = [_steps(p, m, most) for p in pieces if len(p) >= 3 * m]
     if not steps:
         nothing = np.full(pieces[0].shape[1], np.nan)
         return nothing, nothing
-    squares = m * np.concatenate(steps) ** 2 / 2
+    squares = m * np.concatenate(steps) ** 2 / 6
     count = np.isfinite(squares).sum(axis=0)
     level = np.full(squares.shape[1], np.nan)
     for c in np.flatnonzero(count >= 4):
         column = squares[np.isfinite(squares[:, c]), c]
         kept = int(np.ceil(KEEP * len(column)))
         level[c] = np.partition(column, kept - 1)[:kept].mean() / KEPT
-    return level, np.sqrt(4.5 / np.maximum(count, 1))
+    return level, np.sqrt(6.0 / np.maximum(count, 1))
 
 
 def _steps(piece: Array, m: int, most: int) -> Array:
-    """Differences of neighbouring means of m samples; of many, `most` evenly spread."""
-    pairs, channels = len(piece) // (2 * m), piece.shape[1]
+    """Bends over means of m samples in turn; of many, `most` evenly spread."""
+    triples, channels = len(piece) // (3 * m), piece.shape[1]
     # a product is ten times as fast as a mean over few columns
     each = np.full(m, 1 / m)
-    if pairs > most:
-        both = piece[: 2 * m * pairs].reshape(pairs, 2, m, channels)
-        some: Array = np.diff(each @ both[:: pairs // most], axis=1)[:, 0]
+    if triples > most:
+        three = piece[: 3 * m * triples].reshape(triples, 3, m, channels)
+        some: Array = np.diff(each @ three[:: triples // most], 2, axis=1)[:, 0]
         return some
     whole = len(piece) // m * m
-    out: Array = np.diff(each @ piece[:whole].reshape(-1, m, channels), axis=0)
+    out: Array = np.diff(each @ piece[:whole].reshape(-1, m, channels), 2, axis=0)
     return out
 
 

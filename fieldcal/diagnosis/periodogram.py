@@ -30,6 +30,12 @@ CYCLES = 2.5
 BESIDE = 40
 """Neighbours that give the floor, to either side."""
 
+CLOSE, FAR = 5, 12
+"""Neighbours that no taper reaches, and that are still near."""
+
+STEEP = 4.0
+"""Times the floor that these have to have to be taken for it."""
+
 ODDS = 1e-5
 """Of a line where there is none, over all frequencies and channels."""
 
@@ -102,8 +108,8 @@ def highest(pieces: Pieces, taken: Sequence[float]) -> float | None:
         stands = np.zeros(int(band.sum()))
         for channel in power[band].T:
             # median of Gamma(W) over its mean, by Wilson and Hilferty
-            level = _floor(channel) / count / (1 - 1 / (9 * count)) ** 3
-            stands += channel / level
+            level = _floor(channel) / (1 - 1 / (9 * count)) ** 3
+            stands += channel / _on_a_slope(channel, level) * count
         degrees = count * power.shape[1]
         at = int(np.argmax(stands))
         odds = _beyond(float(stands[at]), degrees) + np.log(LOOKS * len(stands))
@@ -173,6 +179,26 @@ def _floor(power: Array) -> Array:
     middle = (np.arange(parts) + 0.5) * each
     floor: Array = np.interp(np.arange(len(power)), middle, level)
     return np.maximum(floor, 1e-300)
+
+
+def _on_a_slope(power: Array, floor: Array) -> Array:
+    """The floor, or what lies close to either side where that is far above it.
+
+    What settles or drifts has the more power the lower the frequency; a line stands out
+    of that, too.
+    """
+    totals = np.concatenate([[0.0], np.cumsum(power)])
+    at = np.arange(len(power))
+    sides = []
+    for low, high in ((-FAR, -CLOSE), (CLOSE + 1, FAR + 1)):
+        first = np.clip(at + low, 0, len(power))
+        last = np.clip(at + high, 0, len(power))
+        mean = (totals[last] - totals[first]) / np.maximum(last - first, 1)
+        sides.append(np.where(last > first, mean, np.inf))
+    # beyond the lowest frequency there is but more of a slope
+    beside = np.where(np.isfinite(sides[1]), np.maximum(*sides), sides[0])
+    level: Array = np.where(beside > STEEP * floor, np.minimum(beside, power), floor)
+    return level
 
 
 def _beyond(x: float, count: int) -> float:

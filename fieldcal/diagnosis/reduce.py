@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.noise import noise_of, rounding
+from fieldcal.diagnosis.noise import rounding
 from fieldcal.diagnosis.thermometer import Thermometer
+from fieldcal.diagnosis.vibration import shaking
 from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.positions import angles
@@ -34,9 +35,6 @@ STEPS = 100_000
 
 SPAN = 50
 """Samples over which stamps that come in bursts are even."""
-
-LOUDER = 6.0
-"""Significance from which a window counts as noisier than the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,11 +146,18 @@ def reduce(source: Source) -> Rows:
     block, rate = masked(source.block, source.usable), rate_of(source.block)
     windows = spans(block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
-    noise, levels = levels_of(block, windows[held], rate)
+    seen = shaking(block, windows[held], rate)
+    noise, source = seen.noise, replace(source, block=seen.block)
     bounds = [_cut(block.t, a, b, rate, len(held)) for a, b in windows[held]]
     rows = [len(b) for b in bounds]
-    level = np.repeat(levels, rows, axis=0)
-    out = averaged(source, np.concatenate(bounds), np.repeat(held, rows), level, noise)
+    out = averaged(
+        source,
+        np.concatenate(bounds),
+        np.repeat(held, rows),
+        np.repeat(seen.levels, rows, axis=0),
+        noise,
+        np.repeat(seen.variance, rows, axis=0),
+    )
     off = np.tile(rounding(block, windows[held], noise), (len(out.x), 1))
     # the Earth turns a device of unknown orientation about any of its axes; one that
     # was never turned has it in its bias
@@ -175,6 +180,7 @@ def averaged(
     position: NDArray[np.intp],
     level: Array,
     noise: Array,
+    variance: Array,
 ) -> Rows:
     """Average between bounds.
 
@@ -184,6 +190,7 @@ def averaged(
     position : (n,) where the device was held
     level : (n, 6) standard deviation of one sample
     noise : (6,) the usual one
+    variance : (n, 3) of the samples of the accelerometers, (m/s^2)^2
 
     """
     block, about = source.block, source.about
@@ -204,7 +211,7 @@ def averaged(
         since_turn=t - source.arrived[position],
         warming=warming,
         heating=heating,
-        variance=np.nan_to_num(level[:, :3] ** 2),
+        variance=np.nan_to_num(variance),
         position=position,
         rate=table_rate(about, position),
         base_force=force_home(about.gravity),
@@ -260,38 +267,6 @@ def _middle(values: Array) -> Array:
         known = column[np.isfinite(column)]
         out[c] = np.median(known) if len(known) else np.nan
     return out
-
-
-def levels_of(
-    block: Block, windows: NDArray[np.intp], rate: float
-) -> tuple[Array, Array]:
-    """Deviation of one sample: usual (6,), and in each window (w, 6).
-
-    The usual one is that of the quiet windows. Others have more, and vibration comes on
-    top of the noise, whatever the noise's colour.
-    """
-    out = np.empty((len(windows), 6))
-    for i, (a, b) in enumerate(windows):
-        squares = [_squares(triad[a:b]) for triad in (block.acc, block.gyr)]
-        out[i] = np.sqrt(np.concatenate(squares) / 2)
-    low = np.sort(out, axis=0)[(len(out) - 1) // 4]  # nan comes last
-    margin = LOUDER / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
-    louder = out > low * np.exp(margin)
-    quiet = ~louder.any(axis=1)
-    noise = noise_of(block, windows[quiet] if quiet.any() else windows, rate)
-    more = np.where(louder, out**2 - low**2, 0.0)
-    return noise, np.sqrt(noise**2 + np.maximum(more, 0.0))
-
-
-def _squares(values: Array) -> Array:
-    """Mean square of the steps of each column, nan where there is none."""
-    steps = np.diff(values, axis=0)
-    known = np.isfinite(steps)
-    count = known.sum(axis=0)
-    if not known.all():
-        steps[~known] = 0.0
-    total = np.einsum("nc,nc->c", steps, steps)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -36,6 +36,10 @@ FLOOR = 1e-3
 """Smallest scatter that is looked at, of the largest residual."""
 
 
+RIDGE = 1e-9
+"""Information on what the cells do not tell, so that it can be solved for."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Scene:
     """Residuals (m,), design (m, k), white noise (m,), prior's information (k, k).
@@ -99,11 +103,17 @@ def _scene(bench: Bench, fit: Fit, axes: list[int]) -> _Scene:
     for c in axes:
         known = np.flatnonzero(np.isfinite(mean[:, c]))[:MOST_CELLS]
         parts.append((c, known))
+    sd = np.concatenate([sd[k, c] for c, k in parts])
+    design = [np.column_stack([d[k, c] for d in columns]) for c, k in parts]
+    whole = np.concatenate(design)
+    strength = np.linalg.norm(whole / sd[:, None], axis=0)
+    told = strength > 0
+    prior = np.maximum(prior[told] / strength[told] ** 2, RIDGE)
     return _Scene(
         np.concatenate([mean[k, c] for c, k in parts]),
-        np.concatenate([np.column_stack([d[k, c] for d in columns]) for c, k in parts]),
-        np.concatenate([sd[k, c] for c, k in parts]),
-        np.diag(np.maximum(prior, 0.0)),
+        whole[:, told] / strength[told],
+        sd,
+        np.diag(prior),
         np.concatenate([np.full(len(k), c) for c, k in parts]),
         np.concatenate([position[k] for _, k in parts]),
         np.concatenate([t[k, c] for c, k in parts]),

@@ -6,7 +6,8 @@ with covariance N^2 T, and phi_k - u phi_T on the way a bridge with
 
     N^2 (min(t, t') - u' t - u t' + u u' T)
 
-for which the accelerometers' rows are whitened.
+for which the accelerometers' rows are whitened. Biases that wander from one window to
+the next may be off by as much on the way.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from fieldcal.diagnosis.attitude import geometry
 from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
 from fieldcal.diagnosis.model import State, Term
 from fieldcal.diagnosis.turns import NOTHING, Turn, Undo
+from fieldcal.diagnosis.whiten import factor
 from fieldcal.effects import Motion, Sensor, catalogue, columns
 from fieldcal.samples import CHANNELS, Array
 
@@ -272,7 +274,9 @@ class Turntable:
         path, close = turn.carried(design[:, 3:] / state.scale[3:, None])
         swung = turn.swung(path) * state.scale[:3, None]
         on_way = turn.means(design[:, :3] + swung)
-        spread = self._density * np.sqrt(turn.t[-1] - turn.t[0])
+        length = turn.t[-1] - turn.t[0]
+        loose = self._loose(turn)[3:] / np.abs(state.scale[3:])
+        spread = np.hypot(self._density * np.sqrt(length), loose * length)
         across = turn.across / np.hypot(spread, turn.blur)[:, None]
         whiten = self._whitener(turn)
         z = np.concatenate(
@@ -321,6 +325,17 @@ class Turntable:
         f, closure, _ = geometry(x, turn.positions, turn.attitude, turn.done)
         return state.output(replace(turn.x, f=f)), closure
 
+    def _loose(self, turn: Turn) -> Array:
+        """By how much each bias may have changed from one window to the next, (6,)."""
+        x, out = self._bench.rows.x, np.zeros(6)
+        p, q = turn.positions
+        ends = [int(np.flatnonzero(x.position == p)[-1])]
+        ends.append(int(np.flatnonzero(x.position == q)[0]))
+        for part in self._bench.errors.parts:
+            f = factor(part.kind, x, part.channel)[ends]
+            out[part.channel] += part.size**2 * float(((f[1] - f[0]) ** 2).sum())
+        return np.sqrt(out)
+
     def _whitener(self, turn: Turn) -> Array:
         """L^-1 of the accelerometers' rows on the way, (3 k, 3 k)."""
         middle = (turn.t[turn.cut[1:]] + turn.t[turn.cut[:-1]]) / 2 - turn.t[0]
@@ -329,6 +344,8 @@ class Turntable:
         bridge = np.minimum.outer(middle, middle) + np.outer(done, done) * length
         bridge -= np.outer(middle, done) + np.outer(done, middle)
         cov = np.diag((turn.sd**2).ravel())
+        same = np.equal.outer(*[np.tile(np.arange(3), len(turn.sd))] * 2)
+        cov += same * np.tile(self._loose(turn)[:3] ** 2, len(turn.sd))
         for axis in range(3):
             along = np.broadcast_to(np.eye(3)[axis][:, None], (len(turn.t), 3, 1))
             arm = turn.means(turn.swung(along)[:, :, 0]) * self._fit.state.scale[:3]

@@ -133,8 +133,21 @@ def _quick(piece: Array, rate: float) -> Array:
         known = [i for i, p in enumerate(parts) if np.isfinite(piece[p, c]).any()]
         if known:
             level = [float(np.nanmedian(piece[parts[i], c])) for i in known]
-            out[:, c] = piece[:, c] - np.interp(rows, centre[known], level)
+            out[:, c] = piece[:, c] - _course(rows, centre[known], level)
     return out
+
+
+def _course(rows: NDArray[np.intp], centre: Array, level: list[float]) -> Array:
+    """Straight from part to part, and on beyond the first and the last."""
+    course = np.interp(rows, centre, level)
+    for end, side in (
+        (slice(0, 2), rows < centre[0]),
+        (slice(-2, None), rows > centre[-1]),
+    ):
+        if len(centre) > 1:
+            line = np.polynomial.Polynomial.fit(centre[end], level[end], 1)
+            course[side] = line(rows[side])
+    return course
 
 
 def _fault(

@@ -42,7 +42,7 @@ class NoiseLevel(Chain):
         t = recording.block.t
         samples = max(int(recording.still.sum()), 2)
         for first in (0, 3):
-            noise = recording.noise[first : first + 3]
+            noise = recording.quick[first : first + 3]
             if not np.isfinite(noise).all() or not noise.all():
                 continue
             worst, ratio = louder(noise)

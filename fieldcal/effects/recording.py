@@ -27,7 +27,8 @@ class Recording:
     windows : (p, 2) first and one past the last sample of each position's window
     x : what each position should bring about, p rows
     scale, bias : (6,) nominal calibration, in `samples.CHANNELS` order
-    noise : (6,) standard deviation of one sample from short-lag differences
+    noise : (6,) standard deviation of one sample, as means over a second obey it
+    quick : (6,) the same, as one sample differs from the next
     limits : (2,) full scale of accelerometers and gyroscopes, SI; nan where unknown
     rate_hz : nominal rate; nan where unknown
 
@@ -39,6 +40,7 @@ class Recording:
     scale: Array
     bias: Array
     noise: Array
+    quick: Array
     limits: Array
     rate_hz: float
 

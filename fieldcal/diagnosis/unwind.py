@@ -1,0 +1,65 @@
+"""What the turns say beyond the windows, one effect after the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.diagnosis.estimate import RELAX
+from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.model import Term
+from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.diagnosis.reduce import rate_of
+from fieldcal.diagnosis.turning import Turning, Turntable
+from fieldcal.diagnosis.turns import NOTHING, Turn, turns
+
+PASSES = 12
+"""Of fits to the turns at most, each beginning where the last one came to."""
+
+
+def turned(
+    prepared: Prepared, bench: Bench, fit: Fit, price: float
+) -> tuple[tuple[Turn, ...], Turntable | None, Turning | None]:
+    """What the turns show beyond the windows."""
+    if any(t.effect.kind == "motion" for t in prepared.tones):
+        return (), None, None  # a base that rocks turns the device as well
+    made, table, found = _unwound(prepared, bench, fit, price, closures=False)
+    if found is not None and not found.steady:
+        made, table, found = _unwound(prepared, bench, fit, price, closures=True)
+    return made, table, found
+
+
+def _unwound(
+    prepared: Prepared, bench: Bench, fit: Fit, price: float, closures: bool
+) -> tuple[tuple[Turn, ...], Turntable | None, Turning | None]:
+    """One effect after the other, as long as one more is worth it.
+
+    What is fitted is to first order in the errors of the gyroscopes and in what the
+    turns change of the windows' model, so those found are taken out, and the model is
+    put where windows and turns agree, before the turns are integrated again.
+    """
+    interval = 1 / rate_of(prepared.source.block)
+    made = tuple(turns(prepared.source, bench.rows, fit))
+    table: Turntable | None = None
+    found: Turning | None = None
+    undo, bent = NOTHING, True
+    terms: tuple[Term, ...] = ()
+    for _ in range(PASSES if made else 0):
+        table = Turntable(bench, fit, made, interval, undo)
+        more = table.fit(terms, table.seen(closures), RELAX)
+        moved = bench.at(fit, fit.values + more.values[: len(fit.values)])
+        bent = bench.bends(fit, moved)
+        chosen = terms if bent else table.better(terms, price, closures).terms
+        more = table.fit(chosen, table.seen(closures), RELAX)
+        there = np.array([undo.of(name) for name in more.names])
+        found = replace(more, values=more.values + there)
+        if chosen == terms and not bent:
+            break
+        fit = moved if bent else fit
+        undo, terms = table.undo(found), chosen
+        again = tuple(turns(prepared.source, bench.rows, fit, undo))
+        if len(again) != len(made):
+            break
+        made = again
+    return made, table, found

@@ -44,6 +44,9 @@ DETERMINED = 0.1
 """A parameter is determined when its variance is less than this part of the prior's."""
 
 
+FAR = 5.0
+"""Longest step away from a fit, standard deviations."""
+
 BENT = 1.0
 """By how much squares may part from their linear prediction."""
 
@@ -201,11 +204,17 @@ class Bench:
             score,
         )
 
-    def at(self, fit: Fit, values: Array) -> Fit:
-        """The same model where its columns have other values, (k,)."""
-        state = self._unpack(fit.state, values)
-        names, prior, centre, shape = self._about(state)
-        return self._result(state, names, prior, centre, shape)
+    def moved(self, fit: Fit, step: Array) -> Fit:
+        """The same model with its columns changed by a step, (k,), or part of it.
+
+        Beyond FAR standard deviations what is linear here says nothing.
+        """
+        step = step * min(1.0, FAR / max(float(np.abs(step / fit.sigma).max()), FAR))
+        _, _, _, shape = self._about(fit.state)
+        values = fit.values
+        step[shape] = np.clip(step[shape], -0.5 * values[shape], values[shape])
+        state = self._unpack(fit.state, values + step)
+        return self._result(state, *self._about(state))
 
     def ahead(self, fit: Fit) -> Array:
         """Newton's step from where a model stands to its optimum, (k,)."""

@@ -125,8 +125,10 @@ def _turned_off(bench: Bench, fit: Fit, left: NDArray[np.bool_], apart: Array) -
     return out
 
 
-def cells(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Means over parts of the windows.
+def cells(
+    rows: Rows, residual: Array, parts: Sequence[float] = CELLS
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Means over parts of the windows, the parts being given by their ends.
 
     Returns
     -------
@@ -138,7 +140,7 @@ def cells(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     means, sds, position = [], [], []
     for p in np.unique(rows.x.position):
         at = np.flatnonzero(rows.x.position == p)
-        cuts = np.unique(np.round(np.array(CELLS) * len(at)).astype(int))
+        cuts = np.unique(np.round(np.array(parts) * len(at)).astype(int))
         for a, b in zip(cuts[:-1], cuts[1:], strict=True):
             part = at[a:b]
             use = np.isfinite(residual[part]) & rows.used[part]

@@ -178,13 +178,20 @@ class Search:
     def _tidied(self, model: Model) -> Model:
         """Without what has become idle, and with what does better swapped in."""
         for less in self.smaller(model):
-            if less.objective > model.objective:
+            if less.objective > model.objective and not self._stays(model, less):
                 return self._tidied(less)
             if len(model.chosen) > 1 and not model.random:
                 swapped = max(self.larger(less), key=lambda m: m.objective)
                 if swapped.objective > model.objective + 1e-6:
                     return self._tidied(swapped)
         return model
+
+    def _stays(self, model: Model, less: Model) -> bool:
+        """Whether a cause that chance could replace predicts what is left out better."""
+        by_chance = model.random and less.random == model.random
+        close = less.objective < model.objective + TIE
+        more = foretells(model) - foretells(less) if by_chance and close else 0.0
+        return more > MARGIN
 
     def rivals(self, model: Model) -> list[Model]:
         """Models with one hypothesis exchanged for another."""

@@ -29,7 +29,13 @@ from fieldcal.samples import Array
 MOST_CELLS = 160
 """Of one axis; of longer recordings the first so many tell."""
 
-STEPS = 200
+FEWEST_CELLS = 24
+"""Of one axis, if the recording has so many rows."""
+
+EARLY = 1.5
+"""Cells at the start of a window are shorter: what happens after a turn is there."""
+
+STEPS = 120
 """Evaluations of one likelihood at most."""
 
 FLOOR = 1e-3
@@ -94,9 +100,11 @@ def together(bench: Bench, fit: Fit, axes: list[int]) -> float:
 
 def _scene(bench: Bench, fit: Fit, axes: list[int]) -> _Scene:
     rows = bench.rows
-    mean, sd, position = cells(rows, fit.residual)
-    t = cells(rows, np.repeat(rows.x.t[:, None], 6, axis=1))[0]
-    columns = [cells(rows, c)[0] for c in np.moveaxis(fit.design, 2, 0)]
+    each = max(4, -(-FEWEST_CELLS // bench.windows))
+    ends = (np.linspace(0, 1, each + 1) ** EARLY).tolist()
+    mean, sd, position = cells(rows, fit.residual, ends)
+    t = cells(rows, np.repeat(rows.x.t[:, None], 6, axis=1), ends)[0]
+    columns = [cells(rows, c, ends)[0] for c in np.moveaxis(fit.design, 2, 0)]
     flat = fit.jacobian.reshape(-1, len(fit.names))
     prior = np.diag(np.linalg.inv(fit.covariance) - flat.T @ flat)
     parts = []

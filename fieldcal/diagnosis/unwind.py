@@ -48,7 +48,7 @@ def _unwound(
     for _ in range(PASSES if made else 0):
         table = Turntable(bench, fit, made, interval, undo)
         more = table.fit(terms, table.seen(closures), RELAX)
-        moved = bench.at(fit, fit.values + more.values[: len(fit.values)])
+        moved = bench.moved(fit, more.values[: len(fit.values)])
         bent = bench.bends(fit, moved)
         chosen = terms if bent else table.better(terms, price, closures).terms
         more = table.fit(chosen, table.seen(closures), RELAX)

@@ -187,7 +187,7 @@ class Search:
         return model
 
     def _stays(self, model: Model, less: Model) -> bool:
-        """Whether a cause that chance could replace predicts what is left out better."""
+        """Whether a cause that chance could replace predicts the unseen better."""
         by_chance = model.random and less.random == model.random
         close = less.objective < model.objective + TIE
         more = foretells(model) - foretells(less) if by_chance and close else 0.0

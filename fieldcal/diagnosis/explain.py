@@ -34,7 +34,7 @@ SEES_EARTH = 20.0
 
 THERMAL = {*("temperature_bias", "temperature_scale"), "thermal_hysteresis", "warm_up"}
 
-LAG = 0.03
+LAG = 0.05
 """Part of its course by which the sensors' temperature is not the thermometer's."""
 
 TOGETHER = 5.0

@@ -36,7 +36,7 @@ CLOSE, FAR = 5, 12
 STEEP = 4.0
 """Times the floor that these have to have to be taken for it."""
 
-ODDS = 1e-5
+ODDS = 1e-3
 """Of a line where there is none, over all frequencies and channels."""
 
 NEAR = 2.0
@@ -129,7 +129,7 @@ def _spectra(pieces: Pieces) -> Iterator[tuple[Array, int, Array]]:
     used = np.flatnonzero(power.any(axis=0))
     for c in used:
         yield power[:, [c]], count, hz
-    if sum(map(len, pieces.samples)) > COHERENT or len(pieces.samples) < 2:
+    if sum(map(len, pieces.samples)) > COHERENT:
         return
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():

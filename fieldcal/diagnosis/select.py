@@ -24,8 +24,9 @@ from fieldcal.diagnosis.candidates import Hypothesis
 from fieldcal.diagnosis.contender import Choice, Model, Rules, foretells
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
-from fieldcal.diagnosis.scatter import Wander, dropped, wanders
+from fieldcal.diagnosis.scatter import UNKNOWN, Wander, dropped, wanders
 from fieldcal.diagnosis.variants import with_one
+from fieldcal.diagnosis.whiten import SMOOTH
 
 EXTRA = 6.9
 """Of ln 1000."""
@@ -108,13 +109,19 @@ class Search:
             best = self._followed(model, first)
             gain = best.objective - model.objective
         if by_chance > 0 and gain > 0 and abs(by_chance - gain) < TIE:
-            return self._foretelling(model, first, best, random)
+            margin = MARGIN + UNKNOWN * (chance.name.partition(":")[0] in SMOOTH)
+            return self._foretelling(model, first, best, random, margin)
         if by_chance > gain or (0 < gain < WEAK and by_chance > gain - MARGIN):
             return random if by_chance > 0 else None
         return best if gain > 0 else None
 
     def _foretelling(
-        self, model: Model, first: Sequence[Model], best: Model, random: Model
+        self,
+        model: Model,
+        first: Sequence[Model],
+        best: Model,
+        random: Model,
+        margin: float,
     ) -> Model:
         """Chance or a cause: whichever predicts the positions left out better."""
         ranked = sorted(first, key=lambda m: -m.objective)[:BEAM]
@@ -123,7 +130,7 @@ class Search:
         more = foretells(cause) - foretells(random)
         if more > MARGIN:
             return cause
-        return random if more < -MARGIN or random.objective > best.objective else best
+        return random if more < -margin or random.objective > best.objective else best
 
     def _instead(self, model: Model) -> list[Model]:
         """With the likeliest causes, and the random parts as small as these leave them.

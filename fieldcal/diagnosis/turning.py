@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from fieldcal.diagnosis.attitude import geometry
 from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
 from fieldcal.diagnosis.model import State, Term
-from fieldcal.diagnosis.turns import NOTHING, Turn, Undo
+from fieldcal.diagnosis.turns import NOTHING, Turn, Undo, errors_of
 from fieldcal.diagnosis.whiten import factor
 from fieldcal.effects import Motion, Sensor, catalogue, columns
 from fieldcal.samples import CHANNELS, Array
@@ -266,7 +266,7 @@ class Turntable:
         """Whitened observations, design and which rows are closures, of one turn."""
         state = self._fit.state
         output = state.output(turn.x)
-        off = (output[:, 3:] - state.bias[3:]) / state.scale[3:] - turn.x.w
+        off = (errors_of(self._fit, turn.x) - turn.rid) / state.scale[3:]
         phi, end = turn.carried(off[:, :, None])
         seen = turn.means(output[:, :3])
         seen = seen + turn.means(turn.swung(phi)[:, :, 0]) * state.scale[:3]

@@ -99,6 +99,7 @@ class Turn:
     acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
     closure : (3,) rad, phi_T as seen
     blur : rad, what sampling leaves open of it
+    rid : (m + 1, 3) rad/s, errors that the model has and the outputs were rid of
     across : (3, 3) projection on what of the closure is known
     start_force : (3,) f_p, m/s^2
     interval : s between the samples that `acc` is made of
@@ -117,6 +118,7 @@ class Turn:
     start_force: Array
     interval: float
     blur: float
+    rid: Array
 
     @property
     def t(self) -> Array:
@@ -168,10 +170,32 @@ def turns(source: Source, rows: Rows, fit: Fit, undo: Undo = NOTHING) -> list[Tu
         if x.rate[np.isin(x.position, (p, q))].any():
             continue
         stretch = _moving(source, rows, (p, q), int(windows[p, 1]), int(windows[q, 0]))
-        made = _turn(source, rows, fit, x, undo, (p, q), *stretch) if stretch else None
-        if made is not None:
-            found.append(made)
+        if stretch is None:
+            continue
+        about = _About(source, rows, fit, x, undo, (p, q), *stretch)
+        if (made := _turn(about, None)) is not None:
+            found.append(_turn(about, made) or made)
     return found
+
+
+def errors_of(fit: Fit, x: Experience) -> Array:
+    """What the model has wrong of the gyroscopes beside bias and scale, (n, 3)."""
+    state = fit.state
+    return state.output(x)[:, 3:] - state.bias[3:] - state.scale[3:] * x.w
+
+
+@dataclass(frozen=True, slots=True)
+class _About:
+    """One turn to be followed, by the model of the windows."""
+
+    source: Source
+    rows: Rows
+    fit: Fit
+    x: Experience
+    undo: Undo
+    pair: tuple[int, int]
+    first: int
+    last: int
 
 
 def _moving(
@@ -203,16 +227,10 @@ def _still(off: Array, noise: Array) -> int:
     return int(np.argmax((angle > AWAY * spread).any(axis=1)))
 
 
-def _turn(
-    source: Source,
-    rows: Rows,
-    fit: Fit,
-    x: Experience,
-    undo: Undo,
-    pair: tuple[int, int],
-    first: int,
-    last: int,
-) -> Turn | None:
+def _turn(about: _About, before: Turn | None) -> Turn | None:
+    """Follow a turn; the second time rid of what the model has wrong on the way."""
+    source, rows, x, pair = about.source, about.rows, about.x, about.pair
+    first, last = about.first, about.last
     block, rate = source.block, rate_of(source.block)
     each = max(1, round(FINE_S * rate))
     count = (last - first - 1) // each
@@ -224,13 +242,18 @@ def _turn(
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
     ends = [x.w[at].mean(axis=0) for at in (rows_p, rows_q)]
     earth = (1 - part) * ends[0] + part * ends[1]
-    inertial = _undone(block, fit, undo, t)
+    rid: Array = np.zeros((len(edge), 3))
+    if before is not None:
+        rid = errors_of(about.fit, before.x)
+        if not rid.any():
+            return before
+    inertial = _undone(block, about.fit, about.undo, t, _between(t, t[edge], rid))
     for _ in range(2):  # the Earth's rate turns with the device, once it is known how
         angle = small_turns(t, inertial - earth, edge) / source.pace
         size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
         attitude, done = carry(angle), size / size[-1]
         there = between(attitude, done, *ends)
-        earth = np.column_stack([np.interp(t, t[edge], w) for w in there.T])
+        earth = _between(t, t[edge], there)
     if np.arccos(np.clip((np.trace(attitude[-1]) - 1) / 2, -1, 1)) < LEAST:
         return None
     if astray(x, pair, attitude[-1]):
@@ -254,17 +277,24 @@ def _turn(
         x.f[rows_p].mean(axis=0),
         1 / rate,
         blur(t, inertial - earth, each),
+        rid,
     )
 
 
-def _undone(block: Block, fit: Fit, undo: Undo, t: Array) -> Array:
+def _between(t: Array, at: Array, values: Array) -> Array:
+    """Columns of values given at some instants, straight between them, (n, k)."""
+    return np.column_stack([np.interp(t, at, column) for column in values.T])
+
+
+def _undone(block: Block, fit: Fit, undo: Undo, t: Array, rid: Array) -> Array:
     """Angular rate at some samples, (n, 3) rad/s."""
     first, n = int(np.searchsorted(block.t, t[0])), len(t)
     span = slice(max(first - n, 0), first + 2 * n)
     late = t + undo.delay
     seen = [np.interp(late, block.t[span], g) for g in block.gyr[span].T]
     response = np.diag(fit.state.scale[3:]) + undo.matrix
-    rate: Array = np.linalg.solve(response, np.array(seen) - fit.state.bias[3:, None]).T
+    rest = np.array(seen) - fit.state.bias[3:, None] - rid.T
+    rate: Array = np.linalg.solve(response, rest).T
     return rate
 
 

@@ -1,0 +1,163 @@
+"""Concealed by a second program: named, with the right numbers, and nothing besides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ladder import (
+    HEIGHT_M,
+    LADDER,
+    LATITUDE_DEG,
+    NAVIGATION,
+    TACTICAL,
+    Array,
+    Device,
+    Fault,
+    Ride,
+    record,
+    ride,
+    windows,
+)
+from session_folders import write_session
+
+from fieldcal.diagnosis import diagnose
+from fieldcal.diagnosis.result import Diagnosis
+from fieldcal.session import Session
+
+
+def diagnosed(
+    folder: Path, device: Device, *faults: Fault, seed: int = 1, setting: float = 0.0
+) -> Diagnosis:
+    ridden = ride(device, seed, setting)
+    positions = [
+        {"alpha_deg": float(a), "beta_deg": float(b), "start_s": s, "end_s": e}
+        for (a, b), (s, e) in zip(LADDER, windows(), strict=True)
+    ]
+    nominal = {
+        "acc_bias": [b + 0.01 for b in device.acc_bias],
+        "acc_scale": list(device.acc_scale),
+        "gyr_bias": list(device.gyr_bias),
+        "gyr_scale": [1.0, 1.0, 1.0],
+    }
+    grade = "navigation" if device is NAVIGATION else "tactical"
+    write_session(
+        folder,
+        record(device, ridden, faults),
+        positions,
+        site={"latitude_deg": LATITUDE_DEG, "height_m": HEIGHT_M},
+        device={"name": "second", "grade": grade},
+        nominal=nominal,
+    )
+    session = Session.open(folder)
+    return diagnose(session.block, session.about)
+
+
+def named(said: Diagnosis) -> list[str]:
+    return [effect.id for effect in said.effects]
+
+
+def agrees(said: Diagnosis, name: str, truth: dict[str, float]) -> None:
+    """Every parameter within 3.5 of its standard uncertainties."""
+    (effect,) = [e for e in said.effects if e.id == name]
+    for parameter, value in truth.items():
+        found = effect.parameters[parameter]
+        assert isinstance(found.value, float) and found.sigma
+        assert abs(found.value - value) < 3.5 * found.sigma, (parameter, found)
+
+
+def walk(ridden: Ride, out: Array) -> None:
+    steps = 0.002 * np.sqrt(np.diff(ridden.t, prepend=0.0))
+    out[:, :3] += np.cumsum(
+        steps[:, None] * ridden.rng.standard_normal((len(out), 3)), 0
+    )
+
+
+def vibration(ridden: Ride, out: Array) -> None:
+    """An engine runs in three of the windows, 2 m/s^2 rms."""
+    on = np.isin(ridden.held, (1, 2, 4))[:, None]
+    wave = np.sqrt(8.0) * np.sin(2 * np.pi * 17.3 * ridden.t)[:, None]
+    out[:, :3] += on * (wave + 4.0 * np.array([5e-3, -4e-3, 3e-3]))
+
+
+def play(ridden: Ride, out: Array) -> None:
+    """Where a joint with play stands depends on where it came from."""
+    out[:, :3] += ridden.turned[:, None] * [0.02, -0.015, 0.01]
+
+
+def course(ridden: Ride, out: Array) -> None:
+    """All axes follow one smooth course that no effect has."""
+    part = ridden.t / ridden.t[-1]
+    out[:, :3] += (part**3 - part)[:, None] * [0.06, -0.05, 0.04]
+
+
+def coupling(ridden: Ride, out: Array) -> None:
+    matrix = [[0, 0.006, 0.004], [-0.005, 0, 0.012], [0.009, 0.005, 0]]
+    out[:, 3:] += ridden.w @ np.array(matrix).T
+
+
+def drift(ridden: Ride, out: Array) -> None:
+    out[:, :3] += ridden.t[:, None] * [1e-4, -8e-5, 0.0]
+
+
+def heating(ridden: Ride, out: Array) -> None:
+    rate = np.gradient(ridden.warming, ridden.t)
+    out[:, :3] += rate[:, None] * [0.5, -0.4, 0.3]
+
+
+@pytest.mark.parametrize(
+    "device", [TACTICAL, NAVIGATION], ids=["tactical", "navigation"]
+)
+def test_nothing_left_out(tmp_path: Path, device: Device) -> None:
+    assert diagnosed(tmp_path / "s", device).verdict == "consistent"
+
+
+def test_angles_set_by_hand_say_nothing_of_the_gyroscopes(tmp_path: Path) -> None:
+    """Beta is corrected by a fraction of a degree after alpha's large turn."""
+    said = diagnosed(tmp_path / "s", TACTICAL, seed=12, setting=0.2)
+    assert named(said) == ["angle_setting"]
+    agrees(said, "angle_setting", {"sigma_deg": 0.2})
+
+
+def test_a_walk_beyond_the_noise_of_a_second(tmp_path: Path) -> None:
+    said = diagnosed(tmp_path / "s", TACTICAL, walk)
+    assert named(said) == ["random_walk"]
+    agrees(said, "random_walk", dict.fromkeys(("ax", "ay", "az"), 0.002))
+
+
+def test_a_line_that_shakes_three_windows(tmp_path: Path) -> None:
+    said = diagnosed(tmp_path / "s", TACTICAL, vibration)
+    assert named(said) == ["vibration_rectification"]
+    agrees(said, "vibration_rectification", {"x": 5e-3, "y": -4e-3, "z": 3e-3})
+
+
+@pytest.mark.parametrize("fault", [play, course])
+def test_axes_that_go_together_do_not_wander(tmp_path: Path, fault: Fault) -> None:
+    said = diagnosed(tmp_path / "s", TACTICAL, fault)
+    assert said.verdict == "unexplained" and "random_walk" not in named(said)
+    assert {m.channel for m in said.mismatch} >= {"ax", "ay"}
+
+
+def test_rates_that_the_turns_show_are_known_to_the_windows(tmp_path: Path) -> None:
+    """Gyroscopes that see the Earth see it through their cross-coupling."""
+    said = diagnosed(tmp_path / "s", NAVIGATION, coupling)
+    assert named(said) == ["gyro_cross_coupling"]
+    agrees(said, "gyro_cross_coupling", {"s12": 0.006, "s23": 0.012, "s31": 0.009})
+    (found,) = said.effects
+    assert found.evidence["delta_chi2"] > 100
+    assert found.evidence["held_out_gain"] > 0.5
+
+
+def test_a_drift_is_no_noise(tmp_path: Path) -> None:
+    said = diagnosed(tmp_path / "s", NAVIGATION, drift)
+    assert named(said) == ["bias_drift"]
+    agrees(said, "bias_drift", {"ax": 1e-4, "ay": -8e-5})
+
+
+def test_a_temperature_that_rises_once_leaves_it_open(tmp_path: Path) -> None:
+    """Towards an end at an even pace: its rate is as good as itself, or as time."""
+    said = diagnosed(tmp_path / "s", TACTICAL, heating)
+    (found,) = said.effects
+    heard = {found.id, *found.aliases}
+    assert heard >= {"temperature_bias", "thermal_hysteresis", "warm_up"}

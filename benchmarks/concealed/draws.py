@@ -186,17 +186,39 @@ def _turning(
     session: Session, before: Block, off: Array, turning: Array, noise: Array
 ) -> float:
     """The same for what shows while the device is turned."""
-    if "lever_arm" in session.concealed:
-        return float(np.sqrt(((off[turning, :3] / noise[:3]) ** 2).sum()))
+    shift = off[:, :3]
     if "time_delay" in session.concealed:
         late = session.concealed["time_delay"]["seconds"] * session.profile.gravity
-        rates = before.gyr - np.array(session.profile.truth.gyr_bias)
-        return float(np.sqrt(((late * rates[turning] / noise[:3]) ** 2).sum()))
+        shift = late * (before.gyr - np.array(session.profile.truth.gyr_bias))
     total = 0.0
     for one, two in zip(session.windows, session.windows[1:], strict=False):
-        gap = (before.t >= one.end) & (before.t < two.start)
-        total += float(((off[gap, 3:].sum(axis=0) / noise[3:]) ** 2).sum() / gap.sum())
+        gap: Array = (before.t >= one.end) & (before.t < two.start)
+        if {"lever_arm", "time_delay"} & set(session.concealed):
+            total += _on_the_way(session, before.t[gap], shift[gap], noise)
+        else:
+            whole = off[gap, 3:].sum(axis=0) / noise[3:]
+            total += float((whole**2).sum() / gap.sum())
     return float(np.sqrt(total))
+
+
+def _on_the_way(session: Session, t: Array, shift: Array, noise: Array) -> float:
+    """Squares of a shift of the accelerometers (n, 3) during a turn.
+
+    What the gyroscopes' noise makes of the attitude on the way is smooth as well: a
+    bridge between the ends, seen through gravity.
+    """
+    each = max(1, len(t) // 200)
+    n = len(t) // each * each
+    middle = t[:n].reshape(-1, each).mean(axis=1) - t[0]
+    mean = shift[:n].reshape(-1, each, 3).mean(axis=1)
+    length = t[-1] - t[0]
+    bridge = np.minimum.outer(middle, middle) - np.outer(middle, middle) / length
+    astray = session.profile.gravity * noise[3:] * np.sqrt(np.median(np.diff(t)))
+    total = 0.0
+    for c in range(3):
+        cov = noise[c] ** 2 / each * np.eye(len(middle)) + astray[c] ** 2 * bridge
+        total += float(mean[:, c] @ np.linalg.solve(cov, mean[:, c]))
+    return total
 
 
 def _means(session: Session, before: Block, off: Array, noise: Array) -> float:

@@ -19,7 +19,7 @@ CLEAR = 6.0
 ALIKE = 9.0
 """Squares (two degrees of freedom) that the three may differ by."""
 
-SHARP = 10.0
+SHARP = 5.0
 """Standard deviations of the common change in at least two axes by themselves."""
 
 LARGEST = 5e-3

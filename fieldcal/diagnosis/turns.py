@@ -49,7 +49,7 @@ PIECES = 60
 MARGIN_S = 0.6
 LONGEST_S = 60.0
 
-CLEARLY = 30.0
+CLEARLY = 2.0
 """How far motion has to stand out for its ends to be seen; else the gap is taken."""
 
 AWAY = 5.0

@@ -178,13 +178,11 @@ def size(session: Session) -> float:
     if ids and ids <= set(LINES):
         return float(np.sqrt(((off[inside] / noise) ** 2).sum()))
     if ids and ids <= set(TURNING):
-        return _turning(session, before, off, ~inside, noise)
+        return _turning(session, before, off, noise)
     return _means(session, before, off, noise)
 
 
-def _turning(
-    session: Session, before: Block, off: Array, turning: Array, noise: Array
-) -> float:
+def _turning(session: Session, before: Block, off: Array, noise: Array) -> float:
     """The same for what shows while the device is turned."""
     shift = off[:, :3]
     if "time_delay" in session.concealed:
@@ -192,12 +190,13 @@ def _turning(
         shift = late * (before.gyr - np.array(session.profile.truth.gyr_bias))
     total = 0.0
     for one, two in zip(session.windows, session.windows[1:], strict=False):
-        gap: Array = (before.t >= one.end) & (before.t < two.start)
+        first, last = np.searchsorted(before.t, [one.end, two.start])
+        gap = slice(int(first), int(last))
         if {"lever_arm", "time_delay"} & set(session.concealed):
             total += _on_the_way(session, before.t[gap], shift[gap], noise)
         else:
             whole = off[gap, 3:].sum(axis=0) / noise[3:]
-            total += float((whole**2).sum() / gap.sum())
+            total += float((whole**2).sum() / max(last - first, 1))
     return float(np.sqrt(total))
 
 

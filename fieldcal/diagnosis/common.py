@@ -22,6 +22,9 @@ ALIKE = 9.0
 SHARP = 5.0
 """Standard deviations of the common change in at least two axes by themselves."""
 
+ANOMALY = 5e-5
+"""Relative departure of gravity from the normal one that any site has."""
+
 LARGEST = 5e-3
 """More than a wrong site makes of gravity."""
 
@@ -43,7 +46,7 @@ def common_scale(explanation: Explanation) -> Found | None:
     common = float(sigma**2 * (one @ weight @ change))
     rest = change - common
     alone = np.abs(change) * np.sqrt(1 / np.diag(np.linalg.inv(weight)))
-    if abs(common) < CLEAR * sigma or abs(common) > LARGEST:
+    if not max(CLEAR * float(sigma), ANOMALY) <= abs(common) <= LARGEST:
         return None
     if rest @ weight @ rest > ALIKE or (alone > SHARP).sum() < 2:
         return None

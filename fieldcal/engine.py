@@ -47,7 +47,8 @@ class Engine:
         judge where the device is
     recorder : the session folder being written
     give_up : s of device time away from where it should be after which the hold is
-        given up; None waits for ever, as for a person
+        given up, if the host's clock has gone on as well; None waits for ever, as for
+        a person
     taken : averages of positions taken before, by number; what is taken is added
     warmth : judges whether the device is still warming up; None does not ask
 
@@ -172,7 +173,7 @@ class Engine:
         for block in self._stream:
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before
-            placing.add(block)
+            placing.add(block, self._driver.host_time())
             wish = self._wish(hold, averaging=False)
             if wish == "confirm" and self._warmth and self._warmth.waits:
                 self._warmth.waived = True
@@ -200,8 +201,12 @@ class Engine:
         if not quiet and (said := placing.complaint()):
             self._recorder.mark("wrong", position=hold.index, text=said)
             self._operator.tell(said)
-        if self._give_up and placing.waited > self._give_up and not placing.arrived:
-            what = placing.problem or f"it has not come to rest in {self._give_up:g} s"
+        if placing.arrived or not self._give_up:
+            return
+        if placing.waited_enough(self._give_up):
+            what = (
+                placing.problem or f"it has not come to rest in {placing.waited:.0f} s"
+            )
             raise WrongPosition(f"{hold.position.name}: {what}")
 
     def _ask_back(self, placing: Placing) -> bool:

@@ -23,7 +23,7 @@ from fieldcal.description import Description
 from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, Skipped, Stopped, WrongPosition
 from fieldcal.link_marks import LinkMarks, Recording
-from fieldcal.placing import GAP, Placing, force
+from fieldcal.placing import GAP, SETTLING, Placing, force
 from fieldcal.plan import Hold, Note, Plan, Step
 from fieldcal.samples import Array, Block, pieces
 from fieldcal.view import Operator, Phase, View, Wish
@@ -72,6 +72,7 @@ class Engine:
         self._taken = {} if taken is None else taken
         self._warmth = warmth
         self._held: Held | None = None
+        self._hold_now: Hold | None = None
         self._noise: Noise | None = None
         self._left: int | None = None
         self._before: int | None = None
@@ -129,6 +130,7 @@ class Engine:
                 return None
 
     def _hold(self, hold: Hold) -> Average:
+        self._hold_now = hold
         while True:
             name = hold.position.name
             self._recorder.mark("asked", position=hold.index, name=name)
@@ -157,11 +159,14 @@ class Engine:
     def _silent(self) -> None:
         """Say that nothing comes, before anybody thinks that we are stuck."""
         self._silence += 1
+        said = (
+            f"no samples come from {self._driver.name}: check cable and power; it"
+            " goes on by itself once they do"
+        )
+        if self._silence >= 2 and self._hold_now:
+            self._view("silent", self._hold_now, reason=said)
         if self._silence == 2:
-            self._tell(
-                f"no samples come from {self._driver.name}: check cable and power; it"
-                " goes on by itself once they do"
-            )
+            self._tell(said)
         if self._operator.wish() == "stop":
             raise Stopped("stopped by the operator")
 
@@ -186,11 +191,11 @@ class Engine:
             reason = placing.reason
             if placing.arrived and waits and self._warmth:
                 said = self._warmth.says
-                reason = f"{said}; Enter goes on" if said else "settling"
-                if said and not cold:
-                    cold = True
-                    self._tell(f"{said}: waiting for it, Enter goes on")
+                reason = f"{said}; Enter goes on" if said else SETTLING
             self._view("turning", hold, placing.where, placing.meter, reason=reason)
+            if reason.endswith("Enter goes on") and not cold:
+                cold = True
+                self._tell(reason)
             if placing.arrived and not waits and wish != "wait":
                 return
             self._complain(hold, placing, quiet=wish == "wait")
@@ -212,7 +217,10 @@ class Engine:
     def _ask_back(self, placing: Placing) -> bool:
         """Answer an operator who wants to go on at a wrong place."""
         if placing.usable and placing.problem:
-            self._tell(f"{placing.problem}; press Enter once more to take it like this")
+            self._tell(
+                f"{placing.problem}; press Enter once more to take it like this, and"
+                " the result is NO-GO"
+            )
             return True
         self._tell(f"not yet: {placing.problem or placing.reason}")
         return False

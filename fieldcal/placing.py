@@ -26,6 +26,11 @@ PATIENCE = 3.0
 REMIND = 60.0
 """Time at the same wrong place after which it is said again, s."""
 
+LISTENING, MOVING = "listening to the noise", "moving: waiting for it to rest"
+SETTLING, TURNING = "settling", "waiting for the turn"
+ORDINARY = (LISTENING, MOVING, SETTLING, TURNING)
+"""What every turn waits for; any other reason wants the operator to do something."""
+
 GAP = 0.5
 """Longest time without samples that a rest may have, s."""
 
@@ -133,10 +138,10 @@ class Placing:
     def reason(self) -> str:
         """What it waits for, for the operator."""
         if self._stillness.since is None:
-            return "moving: waiting for it to rest"
+            return MOVING if np.isfinite(self.meter) else LISTENING
         if self.arrival is not None and not self.arrival.ok:
-            return self.problem if self.seconds >= PATIENCE else "waiting for the turn"
-        return "settling"
+            return self.problem if self.seconds >= PATIENCE else TURNING
+        return SETTLING
 
     @property
     def problem(self) -> str:

@@ -131,10 +131,10 @@ def test_a_position_never_reached_is_given_up(bench: Bench) -> None:
 
 
 class Fast(InProcess):
-    """A device that runs at eighty times the host's clock."""
+    """A device that runs at ten times the host's clock."""
 
     def host_time(self) -> float:
-        return self.device.time / 80
+        return self.device.time / 10
 
 
 def test_a_fast_device_gives_whoever_turns_it_some_time_by_the_clock(

@@ -93,6 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal import junit, limits
+    from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.further import check_heard, results
     from fieldcal.history import History, default_path
     from fieldcal.session import read_marks
@@ -125,6 +126,8 @@ def run(args: argparse.Namespace) -> int:
             page = _report(each, history.path)
             if page and not args.json:
                 sys.stdout.write(f"report:   {page}\n")
+    if not args.json:
+        show_decision(found)
     check_heard(others)
     good = all(each.good for each in (found, *further.values()))
     return 0 if good and result["decision"]["go"] else 1
@@ -291,7 +294,6 @@ def _show(
     truth: dict[str, Any] | None,
     further: Mapping[str, Calibration],
 ) -> None:
-    from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.table import show
     from fieldcal.session import RESULT
 
@@ -302,7 +304,6 @@ def _show(
         sys.stdout.write(json.dumps({**found.to_json(), **more}) + "\n")
         return
     show(found, truth)
-    show_decision(found)
     for name, each in further.items():
         sys.stdout.write(f"\n{name}\n")
         show(each)

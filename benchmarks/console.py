@@ -52,7 +52,14 @@ def watch(folder: Path, wire: str = "mip") -> Seen:
     with VirtualDevice([*options, "--height", "170"]) as device:
         url = f"serial:{device.port}?format={wire}"
         call = ["-m", "fieldcal", "run", "two_position", "--device", url]
-        call += ["--seconds", str(SECONDS), "-o", str(folder), "--no-report"]
+        call += [
+            "--seconds",
+            str(SECONDS),
+            "-o",
+            str(folder),
+            "--no-report",
+            "--level=0.01",
+        ]
         call += ["--latitude", "50.45", "--height", "170"]
         child = pexpect.spawn(
             sys.executable, call, dimensions=(24, 80), encoding="utf-8", timeout=60

@@ -17,6 +17,7 @@ from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.description import Description
 from fieldcal.error_growth import TIMES, Growth, growth
 from fieldcal.family import expected
+from fieldcal.level import tilt_is_found, unsaid
 from fieldcal.limits import Limits
 from fieldcal.verification import Verification
 
@@ -92,6 +93,7 @@ def decide(
     checks = [
         _fit(found, limits),
         *_uncertainty(found, limits),
+        *_level(found, about),
         *_change(found, limits, seen.family),
         _verification(seen.verification, limits),
         *_temperature(np.asarray(seen.temperatures, float), limits),
@@ -167,6 +169,17 @@ def _uncertainty(found: Calibration, limits: Limits) -> list[Check]:
             value = float(sigma[worst])
             checks.append(Check(f"{group} uncertainty", ok, says, value, limit, unit))
     return checks
+
+
+def _level(found: Calibration, about: Description) -> list[Check]:
+    """Whether anybody knows how level the base was: a tilt is taken for a bias."""
+    if tilt_is_found(found) or "acc_bias" not in found.groups:
+        return []
+    level = found.info.get("level_sigma_deg")
+    if level is None:
+        return [Check("level", False, unsaid(about))]
+    says = f"the base is level to ± {level:.2g}°, as was said: the ± have it in them"
+    return [Check("level", True, says)]
 
 
 def _change(

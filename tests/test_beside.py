@@ -25,7 +25,15 @@ def led(
     devices: Sequence[VirtualDevice], urls: Sequence[str], *options: str
 ) -> tuple[int, Any, str]:
     """A run of two positions in which somebody turns all devices when told to."""
-    run = [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+    run = [
+        sys.executable,
+        "-m",
+        "fieldcal",
+        "run",
+        "two_position",
+        "--headless",
+        "--level=0.001",
+    ]
     run += ["--seconds", "10", "--json", "--latitude", "50.45", *options]
     for url in urls:
         run += ["--device", url]

@@ -47,7 +47,8 @@ def solved(folder: Path) -> Calibration:
 
     session = Session.open(folder)
     still = rests(session)
-    found = solve(observations(session.about, still.averages, still.rows))
+    seen = observations(session.about, still.averages, still.rows)
+    found = solve(seen, level_sigma_deg=session.about.level_deg)
     found = with_turns_between(found, session, still)
     found = replace(found, warnings=(*still.warnings, *found.warnings))
     found = with_installed(with_provenance(found, session.about), session)

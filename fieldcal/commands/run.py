@@ -71,6 +71,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seed", default="1", metavar="N", help="of the virtual device's noise")
     add("--seconds", type=float, metavar="S", help="averaging time (default: 30)")
     add("--sigma", type=float, metavar="M/S^2", help="stop averaging at this ± instead")
+    add(
+        "--level",
+        type=float,
+        metavar="DEG",
+        help="how level the base is, 1σ about each axis; two positions cannot see it",
+    )
     add("--verify", action="store_true", help="one more position, which is not fitted")
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
     add("--history", type=Path, metavar="FILE", help="instead of the usual history")
@@ -162,6 +168,7 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
 
         session, tables = resumed(args.resume)
         tables["run"] = {**tables["run"], **_given(args)}
+        tables = _with_level(args, tables)
         return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder
     if not args.procedure:
         raise InputError(
@@ -179,9 +186,17 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         if not isinstance(tables.get("run", {}), dict):
             raise InputError(f"{name}: run must be a table: write [run]")
         tables["run"] = {**tables.get("run", {}), **_given(args)}
+    tables = _with_level(args, tables)
     task = plan_file.task(tables, name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
+
+
+def _with_level(args: argparse.Namespace, tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables with how level the base is, if an option says it."""
+    if args.level is None or not isinstance(tables.get("site", {}), dict):
+        return tables
+    return {**tables, "site": {**tables.get("site", {}), "level_deg": args.level}}
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
@@ -211,6 +226,7 @@ def _record(
     """Hold the positions, record and solve; and what a virtual device conceals."""
     from fieldcal.beside import beside
     from fieldcal.commands.run_device import device
+    from fieldcal.level import level_unknown
     from fieldcal.recorder import Recorder
     from fieldcal.running import Running, taken_before
     from fieldcal.session import Session
@@ -226,6 +242,8 @@ def _record(
             recorder = stack.enter_context(beside(further, own, task.tables))
             operator = stack.enter_context(_operator(args, task, mover, folder))
             recorder.tell = operator.tell
+            if unseen := level_unknown(task.about):
+                operator.tell(unseen)
             if args.resume:
                 recorder.mark("resumed", taken=sorted(taken))
             patience = PATIENCE_HEADLESS if args.headless else PATIENCE

@@ -70,8 +70,9 @@ def say(console: Console, mark: str, text: str) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    if not console.is_terminal:
-        console.print(f"{mark}{text}", markup=False, soft_wrap=True)
+    if not (mark and console.is_terminal):
+        whole = not console.is_terminal
+        console.print(f"{mark}{text}", markup=False, soft_wrap=whole)
         return
     grid = Table.grid()
     grid.add_column(width=len(mark))

@@ -203,6 +203,7 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
     """The table [run] as far as options say it."""
     given: dict[str, Any] = {
         "device": args.device,
+        "further": args.further or None,
         "seconds": args.seconds,
         "sigma": args.sigma,
         "verify": args.verify or None,
@@ -238,7 +239,7 @@ def _record(
             taken = taken_before(Session.open(folder), task) if args.resume else {}
             tables = None if args.resume else task.tables
             own = stack.enter_context(Recorder(folder, tables))
-            further = [] if args.resume else args.further
+            further = task.run.get("further", [])
             recorder = stack.enter_context(beside(further, own, task.tables))
             operator = stack.enter_context(_operator(args, task, mover, folder))
             recorder.tell = operator.tell

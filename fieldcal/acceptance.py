@@ -289,4 +289,4 @@ def _link(link: Mapping[str, int] | None, limits: Limits) -> list[Check]:
 
 
 def _of(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"
+    return "" if unit == "1" else f" {unit.replace('^2', '²')}"

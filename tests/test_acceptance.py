@@ -69,7 +69,7 @@ def test_a_sound_calibration_is_go_and_says_what_it_could_not_check() -> None:
     ("found", "seen", "says"),
     [
         (calibration(good=False), {}, "the estimate itself is bad"),
-        (calibration((0.03, 1e-4, 1e-5)), {}, "acc_bias x is known to ± 0.03 m/s^2"),
+        (calibration((0.03, 1e-4, 1e-5)), {}, "acc_bias x is known to ± 0.03 m/s²"),
         (calibration((1e-3, 1e-2, 1e-5)), {}, "acc_scale x is known to ± 0.01"),
         (calibration((1e-3, 1e-4, 1e-3)), {}, "gyr_bias x is known to ± 0.001 rad/s"),
         (calibration(), {"temperatures": [70.0]}, "70.0 to 70.0 °C"),

@@ -44,7 +44,7 @@ def show_decision(found: Calibration, out: IO[str] | None = None) -> None:
 def _growth(growth: dict[str, Any]) -> str:
     """One sentence about what errors grow to."""
     parts = [
-        f"{name} ± {growth[key]:.2g}{unit}"
+        f"{name} ± {float(f'{growth[key]:.2g}'):g}{unit}"
         for name, key, unit in (
             ("tilt", "tilt_sigma_deg", "°"),
             ("heading", "heading_sigma_deg", "°"),

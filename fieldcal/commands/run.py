@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.further import Devices
-from fieldcal.commands.site import add_site, site_tables
+from fieldcal.commands.site import add_site, given_tables, over, site_tables
 from fieldcal.errors import FieldcalError, InputError
 
 if TYPE_CHECKING:
@@ -164,11 +164,16 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
     if args.resume:
         if args.procedure or args.output:
             raise InputError("--resume goes on with what it finds: give it alone")
+        if given_tables(args):
+            raise InputError(
+                "--resume goes on with the device and place its session.toml names:"
+                " leave those options out"
+            )
         from fieldcal.running import resumed
 
         session, tables = resumed(args.resume)
         tables["run"] = {**tables["run"], **_given(args)}
-        tables = _with_level(args, tables)
+        tables = over(tables, _level(args))
         return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder
     if not args.procedure:
         raise InputError(
@@ -185,18 +190,17 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         tables = plan_file.read(Path(name))
         if not isinstance(tables.get("run", {}), dict):
             raise InputError(f"{name}: run must be a table: write [run]")
+        tables = over(tables, given_tables(args))
         tables["run"] = {**tables.get("run", {}), **_given(args)}
-    tables = _with_level(args, tables)
+    tables = over(tables, _level(args))
     task = plan_file.task(tables, name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
 
 
-def _with_level(args: argparse.Namespace, tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables with how level the base is, if an option says it."""
-    if args.level is None or not isinstance(tables.get("site", {}), dict):
-        return tables
-    return {**tables, "site": {**tables.get("site", {}), "level_deg": args.level}}
+def _level(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """How level the base is, if an option says it."""
+    return {} if args.level is None else {"site": {"level_deg": args.level}}
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from fieldcal.error_growth import TIMES, Growth, growth
 from fieldcal.family import expected
 from fieldcal.level import tilt_is_found, unsaid
 from fieldcal.limits import Limits
+from fieldcal.solve.joint import SUSPECT
 from fieldcal.verification import Verification
 
 REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
@@ -92,6 +93,7 @@ def decide(
     """Check a calibration against limits."""
     checks = [
         _fit(found, limits),
+        *_odd_positions(found),
         *_uncertainty(found, limits),
         *_level(found, about),
         *_change(found, limits, seen.family),
@@ -140,6 +142,14 @@ def _fit(found: Calibration, limits: Limits) -> Check:
         f" {limits.fit_chance:.2g}"
     )
     return Check("fit", ok, says, chance, limits.fit_chance, "1")
+
+
+def _odd_positions(found: Calibration) -> list[Check]:
+    """Say beside the decision that a position does not fit the others."""
+    if max(found.info.get("bad_position", ()), default=0.0) < SUSPECT:
+        return []
+    told = [said for said in found.warnings if said.startswith("the position ")]
+    return [Check("positions", None, said) for said in told]
 
 
 def _first(found: Calibration) -> str:

@@ -119,6 +119,16 @@ def test_a_tilt_that_nobody_saw_and_nobody_excluded_is_no_go() -> None:
     assert "level" not in [check.name for check in decided(found).checks]
 
 
+def test_a_position_that_does_not_fit_is_told_beside_the_decision() -> None:
+    rng = np.random.default_rng(2)
+    windows = [_held(p, rng) for p in FIVE]
+    windows[1] = _held(Position.deg(22.0, 0.4), rng)
+    made = decided(solve(Observations.of(FIVE, windows, G)))
+    told = [check for check in made.checks if check.name == "positions"]
+    assert [check.ok for check in told] == [None]
+    assert told[0].says.startswith("the position α = 22.5°, β = 0°")
+
+
 def _only(found: Calibration, groups: tuple[str, ...]) -> Calibration:
     rows = [i for i, n in enumerate(found.names) if n.startswith(groups)]
     return Calibration(

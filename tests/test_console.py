@@ -131,6 +131,17 @@ def test_everything_fits_80_by_24(operator: ConsoleOperator, phase: Phase) -> No
     assert len(lines) <= 24 and max(map(len, lines)) <= 80
 
 
+def test_many_positions_leave_room_for_what_is_said() -> None:
+    console = Console(file=io.StringIO(), width=80, height=24, force_terminal=True)
+    with ConsoleOperator("t", FIVE * 6, Nobody(), console) as made:
+        made.place(Hold(14, FIVE[4], 30.0))
+        made.tell("a sentence of the usual length about what happened, and what to do")
+        made.show(view("turning", hold=Hold(14, FIVE[4], 30.0)))
+        said = screen(made)
+    assert len(said.splitlines()) <= 24 and "15  α = 45°, β = 5°" in said
+    assert "link: 100 Hz" in said and "! a sentence of the usual" in said
+
+
 def test_plain_lines_for_a_log() -> None:
     out = io.StringIO()
     console = Console(file=out, width=200)

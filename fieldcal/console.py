@@ -19,6 +19,7 @@ from rich.text import Text
 from fieldcal import gauges
 from fieldcal.gauges import alert
 from fieldcal.keyboard import HELP, Keyboard
+from fieldcal.letters import drawable, large
 from fieldcal.movers import Mover
 from fieldcal.plan import Hold
 from fieldcal.positions import Position
@@ -28,7 +29,9 @@ FRAMES = 8.0
 """Drawings a second."""
 
 TALL = 32
-"""Lines from which there is room around the instruction."""
+"""Lines from which there is room for letters three lines tall."""
+
+TURN = "TURN TO"
 
 FEWEST = 3
 """Positions that are listed however little room there is."""
@@ -204,36 +207,47 @@ class ConsoleOperator:
     def _instruction(self) -> list[Text]:
         """The one thing to do now, in large letters, and what belongs to it."""
         words, detail, colour = self._words()
+        turn = self._hold.position if words == TURN and self._hold else None
         style = f"bold reverse {colour}".strip()
         width = self._console.width - 4
-        lines = [f"  {words}", f"  {detail}"]
         if self._console.height >= TALL:
-            lines = ["", *lines, ""]
-        return [Text(line.ljust(width), style=style) for line in lines]
+            lines = ["", *large(words), *_angles(turn, width - 4), "", detail, ""]
+        else:
+            lines = [_spaced(words) + (f"   {turn.name}" if turn else ""), detail]
+        return [Text(f"  {line}".ljust(width), style=style) for line in lines]
 
     def _words(self) -> tuple[str, str, str]:
         """What is said large, what small, and its colour."""
         hold = self._hold
         view = self._view if self._view and self._view.hold is hold else None
         if hold is None:
-            return _large("WAIT"), "for the device", ""
+            return "WAIT", "for the device", ""
         number = f"position {hold.index + 1} of {len(self._positions)}"
         if view is None or view.phase == "turning":
             if view is None or view.arrival is None or not view.arrival.ok:
-                turn = f"{_large('TURN TO')}   {hold.position.name}"
                 wrong = view is not None and alert(view)
-                return turn, f"{number}, then let go", "yellow" if wrong else "cyan"
+                return TURN, f"{number}, then let go", "yellow" if wrong else "cyan"
             if alert(view):
-                return _large("WAIT"), f"{number}: it is in place, hands off", "yellow"
-            return _large("HANDS OFF"), f"{number}: it is in place", "cyan"
+                return "WAIT", f"{number}: it is in place, hands off", "yellow"
+            return "HANDS OFF", f"{number}: it is in place", "cyan"
         if view.phase == "silent":
-            what = "nothing is lost of what was taken"
-            return _large("NO SAMPLES"), f"{number}: {what}", "red"
+            return "NO SAMPLES", f"{number}: nothing is lost of what was taken", "red"
         if view.phase == "averaging":
-            return _large("HOLD STILL"), f"{number}: do not touch the device", "green"
-        return _large("TAKEN"), number, "green"
+            return "HOLD STILL", f"{number}: do not touch the device", "green"
+        return "TAKEN", number, "green"
 
 
-def _large(words: str) -> str:
+def _angles(position: Position | None, width: int) -> list[str]:
+    """Where to turn, large if there is room for it."""
+    if position is None:
+        return []
+    alpha, beta = position.degrees or (np.nan, np.nan)
+    text = f"α {alpha:g}°  β {beta:g}°"
+    drawn = large(text) if drawable(text) else [position.name]
+    fits = max(map(len, drawn)) <= width
+    return ["", *(drawn if fits else [position.name])]
+
+
+def _spaced(words: str) -> str:
     """Letters set apart: larger than their neighbours on any terminal."""
     return "   ".join(" ".join(word) for word in words.split())

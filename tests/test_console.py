@@ -11,6 +11,7 @@ from rich.console import Console
 from fieldcal.arrival import Arrival
 from fieldcal.console import ConsoleOperator
 from fieldcal.driver import Health
+from fieldcal.letters import drawable, large
 from fieldcal.movers import Nobody
 from fieldcal.plan import Hold
 from fieldcal.positions import FIVE
@@ -129,6 +130,20 @@ def test_everything_fits_80_by_24(operator: ConsoleOperator, phase: Phase) -> No
     operator.tell("α is turned the wrong way: it is at α = -22.3°, β = 0.1° instead")
     lines = screen(operator).splitlines()
     assert len(lines) <= 24 and max(map(len, lines)) <= 80
+
+
+def test_on_a_tall_screen_the_instruction_is_read_from_afar() -> None:
+    out = io.StringIO()
+    console = Console(file=out, width=100, height=40, force_terminal=True)
+    made = ConsoleOperator("t", FIVE, Nobody(), console)
+    made.place(HOLD)
+    made.show(view("turning"))
+    console.print(made.screen())
+    lines = out.getvalue()
+    for line in [*large("TURN TO"), *large("α 22.5°  β 0°")]:
+        assert line in lines
+    assert len(lines.splitlines()) <= 40
+    assert not drawable("WAIT FOR ME?") and drawable("HOLD STILL")
 
 
 def test_many_positions_leave_room_for_what_is_said() -> None:

@@ -18,7 +18,7 @@ from typing import TypeVar
 import numpy as np
 
 from fieldcal.arrival import Arrival, Held
-from fieldcal.breaks import Again, gap, restarted
+from fieldcal.breaks import Again, begun_again, gap, restarted
 from fieldcal.description import Description
 from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, Skipped, Stopped, WrongPosition
@@ -47,8 +47,8 @@ class Engine:
         judge where the device is
     recorder : the session folder being written
     give_up : s of device time away from where it should be after which the hold is
-        given up, if the host's clock has gone on as well; None waits for ever, as for
-        a person
+        given up, if the host's clock has gone on as well; None waits for ever, and
+        begins a window that was disturbed again for ever, as for a person
     taken : averages of positions taken before, by number; what is taken is added
     warmth : judges whether the device is still warming up; None does not ask
 
@@ -130,13 +130,20 @@ class Engine:
                 return None
 
     def _hold(self, hold: Hold) -> Average:
-        self._hold_now = hold
+        self._hold_now, tries = hold, 0
         while True:
             name = hold.position.name
             self._recorder.mark("asked", position=hold.index, name=name)
             self._operator.place(hold)
             self._arrive(hold)
-            average = self._average(hold)
+            try:
+                average = self._average(hold)
+            except Moved as moved:
+                if self._give_up is not None:
+                    raise
+                tries += 1
+                self._tell(begun_again(moved, tries))
+                continue
             if average is not None:
                 return average
 

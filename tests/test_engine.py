@@ -164,6 +164,15 @@ def test_who_never_holds_still_is_told_so_in_the_end(bench: Bench) -> None:
         bench.engine.run(hold_all(TWO[:1], 30.0))
 
 
+def test_a_person_in_the_wind_is_told_what_to_do_and_may_go_on(bench: Bench) -> None:
+    bench.turner.bump_at = [10.0] * 7
+    driver, turner = bench.turner.driver, bench.turner
+    Engine(driver, turner, ABOUT, bench.recorder).run(hold_all(TWO[:1], 15.0))
+    assert len(turner.told) == 7 and events(bench).count("window") == 1
+    assert "times now" not in turner.told[1]
+    assert "disturbed 7 times now: fix the device better" in turner.told[6]
+
+
 def test_a_hold_ends_early_once_the_sigma_asked_for_is_reached(bench: Bench) -> None:
     average: Average = bench.engine.run(hold(0, TWO[0], 120.0, sigma=5e-3))
     assert average.end - average.start < 60.0

@@ -159,7 +159,7 @@ class First:
         whenever the process is killed.
         """
         for other in self.others:
-            if event == "asked":
+            if event in ("asked", "insisted"):
                 other.mark(event, **what)
             elif event == "window":
                 span = (self._times.host(what[end]) for end in ("start_s", "end_s"))

@@ -53,12 +53,13 @@ def led(
 
 
 def started(
-    stack: ExitStack, speed: str, once: bool = True
+    stack: ExitStack, speed: str, *last: str, once: bool = True
 ) -> tuple[list[VirtualDevice], list[str]]:
     devices, urls = [], []
     for link, bias in zip(LINKS, BIASES, strict=True):
         options = [*link.split(), "--speed", speed, f"--acc-bias={bias}"]
         options += ["--latitude=50.45", "--height=0"]
+        options += last if link == LINKS[-1] else ()
         devices.append(stack.enter_context(VirtualDevice(options, once)))
         urls.append(address(options, devices[-1].port))
     return devices, urls
@@ -101,6 +102,7 @@ def check(root: Path, truths: Sequence[Any], urls: Sequence[str], result: Any) -
             found = written["parameters"][group]
             off = np.subtract(found["value"], truth[group])
             assert np.abs(off / np.array(found["sigma"])).max() < 4.5, (folder, group)
+        assert written["decision"]["go"]
         session = Session.open(folder)
         assert not session.warnings and (np.diff(session.block.t) > 0).all()
         if folder != sessions[0]:
@@ -121,6 +123,17 @@ def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) ->
     assert result["verdict"] == "good" and set(result["further"]) == {"device-3"}
     marks = list(Session.open(tmp_path / "s" / "device-2").marks())
     assert marks[-1]["event"] == "failed"
+
+
+def test_a_further_device_is_decided_about_by_itself(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20", "--gyr-noise=0.02,0.02,0.02")
+        code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
+    assert code == 1, said
+    assert result["decision"]["go"]
+    further = {name: each["decision"] for name, each in result["further"].items()}
+    assert further["device-2"]["go"] and not further["device-3"]["go"]
+    assert "gyr_bias" in further["device-3"]["reasons"][0]
 
 
 def test_times_go_over_the_hosts_clock() -> None:

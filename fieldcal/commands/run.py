@@ -99,7 +99,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal import junit, limits
-    from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.further import check_heard, results
     from fieldcal.history import History, default_path
     from fieldcal.session import read_marks
@@ -125,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     if args.junit:
         known = list(read_marks(marks))
         junit.write(args.junit, task.procedure, task.positions, known, result)
-    further = results(others)
+    further = results(others, bounds, history)
     _show(args, found, folder, truth, further)
     if not args.no_report:
         for each in (folder, *(folder / name for name in further)):
@@ -133,10 +132,27 @@ def run(args: argparse.Namespace) -> int:
             if page and not args.json:
                 sys.stdout.write(f"report:   {page}\n")
     if not args.json:
-        show_decision(found)
+        _show_decisions(found, further)
     check_heard(others)
-    good = all(each.good for each in (found, *further.values()))
-    return 0 if good and result["decision"]["go"] else 1
+    return 0 if all(map(_go, (found, *further.values()))) else 1
+
+
+def _go(found: Calibration) -> bool:
+    return found.good and bool(found.info["decision"]["go"])
+
+
+def _show_decisions(found: Calibration, further: Mapping[str, Calibration]) -> None:
+    """That of the first device last, but for a line on each that is NO-GO."""
+    from fieldcal.commands.decision_view import show_decision
+
+    for name, each in further.items():
+        sys.stdout.write(f"\n{name}\n")
+        show_decision(each)
+    if further:
+        sys.stdout.write("\nthe first device\n")
+    show_decision(found)
+    for name, each in further.items():
+        sys.stdout.write(f"{name}: {'GO' if _go(each) else 'NO-GO, see above'}\n")
 
 
 def _report(folder: Path, history: Path) -> Path | None:

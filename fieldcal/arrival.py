@@ -82,7 +82,7 @@ def judge(
     """
     norm = float(np.linalg.norm(f))
     alpha, beta = np.rad2deg(angles_of(_without_offset(f, gravity, held)))
-    seen = (tenth(alpha), tenth(beta))
+    seen = (float(alpha), float(beta))
     if abs(norm - gravity) > NORM * gravity:
         problem = (
             f"the accelerometers read {norm:.2f} m/s² in all, gravity is"
@@ -161,7 +161,7 @@ def _nearest_slip(
 
 def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:
     a, b = wanted.degrees or (0.0, 0.0)
-    where = f"the device is at α = {seen[0]:.1f}°, β = {seen[1]:.1f}°"
+    where = f"the device is at α = {tenth(seen[0]):.1f}°, β = {tenth(seen[1]):.1f}°"
     asked = f"asked for is α = {a:g}°, β = {b:g}°"
     if slip:
         return f"{slip}: {where}, {asked}"

@@ -17,7 +17,9 @@ from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.description import Description
 from fieldcal.error_growth import TIMES, Growth, growth
 from fieldcal.family import expected
+from fieldcal.level import tilt_is_found, unsaid
 from fieldcal.limits import Limits
+from fieldcal.solve.joint import SUSPECT
 from fieldcal.verification import Verification
 
 REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
@@ -91,7 +93,9 @@ def decide(
     """Check a calibration against limits."""
     checks = [
         _fit(found, limits),
+        *_odd_positions(found),
         *_uncertainty(found, limits),
+        *_level(found, about),
         *_change(found, limits, seen.family),
         _verification(seen.verification, limits),
         *_temperature(np.asarray(seen.temperatures, float), limits),
@@ -140,6 +144,14 @@ def _fit(found: Calibration, limits: Limits) -> Check:
     return Check("fit", ok, says, chance, limits.fit_chance, "1")
 
 
+def _odd_positions(found: Calibration) -> list[Check]:
+    """Say beside the decision that a position does not fit the others."""
+    if max(found.info.get("bad_position", ()), default=0.0) < SUSPECT:
+        return []
+    told = [said for said in found.warnings if said.startswith("the position ")]
+    return [Check("positions", None, said) for said in told]
+
+
 def _first(found: Calibration) -> str:
     return found.warnings[0] if found.warnings else "see the fit"
 
@@ -167,6 +179,17 @@ def _uncertainty(found: Calibration, limits: Limits) -> list[Check]:
             value = float(sigma[worst])
             checks.append(Check(f"{group} uncertainty", ok, says, value, limit, unit))
     return checks
+
+
+def _level(found: Calibration, about: Description) -> list[Check]:
+    """Whether anybody knows how level the base was: a tilt is taken for a bias."""
+    if tilt_is_found(found) or "acc_bias" not in found.groups:
+        return []
+    level = found.info.get("level_sigma_deg")
+    if level is None:
+        return [Check("level", False, unsaid(about))]
+    says = f"the base is level to ± {level:.2g}°, as was said: the ± have it in them"
+    return [Check("level", True, says)]
 
 
 def _change(
@@ -276,4 +299,4 @@ def _link(link: Mapping[str, int] | None, limits: Limits) -> list[Check]:
 
 
 def _of(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"
+    return "" if unit == "1" else f" {unit.replace('^2', '²')}"

@@ -51,6 +51,7 @@ class Arrival:
     alpha_deg, beta_deg : angles the accelerometers show, offset of the base removed
         where an earlier position tells it
     problem : one sentence for the operator, empty when ok
+    limit_deg : how far it may be off; nan where only the norm is judged
 
     """
 
@@ -58,6 +59,7 @@ class Arrival:
     alpha_deg: float
     beta_deg: float
     problem: str = ""
+    limit_deg: float = np.nan
 
 
 def judge(
@@ -94,9 +96,16 @@ def judge(
     miss = _miss(wanted, f, gravity, held)
     slip, slip_miss = _nearest_slip(wanted, f, gravity, held, others or {})
     slipped = slip_miss < min(miss / 2, limit) and miss > NEAR
+    within = float(np.rad2deg(limit))
     if miss <= limit and not slipped:
-        return Arrival(True, *seen)
-    return Arrival(False, *seen, _explain(wanted, seen, slip if slipped else ""))
+        return Arrival(True, *seen, limit_deg=within)
+    problem = _explain(wanted, seen, slip if slipped else "")
+    return Arrival(False, *seen, problem, within)
+
+
+def tenth(angle: float) -> float:
+    """Round an angle as it is shown, deg; what is rounded to zero has no sign."""
+    return round(float(angle), 1) + 0.0
 
 
 def _force(position: Position, gravity: float) -> Array:
@@ -152,9 +161,10 @@ def _nearest_slip(
 
 def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:
     a, b = wanted.degrees or (0.0, 0.0)
-    where = f"the device is at α = {seen[0]:.1f}°, β = {seen[1]:.1f}°"
+    where = f"the device is at α = {tenth(seen[0]):.1f}°, β = {tenth(seen[1]):.1f}°"
     asked = f"asked for is α = {a:g}°, β = {b:g}°"
     if slip:
         return f"{slip}: {where}, {asked}"
-    off = (a - seen[0], b - seen[1])
-    return f"{where}, {asked}: turn it by {off[0]:+.1f}° in α, {off[1]:+.1f}° in β"
+    off = {"α": tenth(a - seen[0]), "β": tenth(b - seen[1])}
+    turns = [f"{by:+.1f}° in {name}" for name, by in off.items() if by]
+    return f"{where}, {asked}: turn it by {', '.join(turns) or 'a little'}"

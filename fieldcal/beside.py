@@ -28,6 +28,7 @@ from fieldcal.errors import FieldcalError
 from fieldcal.link_marks import LinkMarks
 from fieldcal.recorder import Recorder
 from fieldcal.samples import Block
+from fieldcal.session import DESCRIPTION
 
 BATCHES = 1 << 17
 """Batches whose times are kept: more than an hour."""
@@ -104,9 +105,9 @@ class Beside:
         try:
             for block in self._driver.blocks():
                 with self._lock:
-                    self._recorder.append(block)
-                    self._times.add(block)
-                marks.take(block)
+                    recorded = self._recorder.append(block)
+                    self._times.add(recorded)
+                marks.take(recorded)
                 if self._ends:
                     break
             marks.end()
@@ -152,14 +153,18 @@ class First:
         self._recorder.rejoin()
 
     def mark(self, event: str, **what: Any) -> None:
-        """Append a mark, and a window to all sessions."""
-        self._recorder.mark(event, **what)
+        """Append a mark, and a window to all sessions.
+
+        The first device's comes last: what it says is taken, the others have as well,
+        whenever the process is killed.
+        """
         for other in self.others:
-            if event == "asked":
+            if event in ("asked", "insisted"):
                 other.mark(event, **what)
             elif event == "window":
                 span = (self._times.host(what[end]) for end in ("start_s", "end_s"))
                 other.window(what["position"], *span)
+        self._recorder.mark(event, **what)
 
 
 @contextmanager
@@ -167,6 +172,8 @@ def beside(
     urls: Sequence[str], recorder: Recorder, about: Mapping[str, Any]
 ) -> Iterator[First]:
     """Record further devices into ``device-2``, ``device-3``, … of a session.
+
+    A session that is there already is gone on with.
 
     Parameters
     ----------
@@ -188,7 +195,9 @@ def beside(
             if grade := about.get("device", {}).get("grade"):
                 device["grade"] = grade
             folder = recorder.folder / f"device-{number}"
-            own = stack.enter_context(Recorder(folder, {**about, "device": device}))
+            known = (folder / DESCRIPTION).exists()
+            tables = None if known else {**about, "device": device}
+            own = stack.enter_context(Recorder(folder, tables))
             others.append(Beside(driver, own))
             stack.callback(others[-1].end)
         yield First(recorder, others)

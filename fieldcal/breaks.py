@@ -19,6 +19,21 @@ class Again(Exception):
         self.index = index
 
 
+OFTEN = 3
+"""Disturbed windows in one position from which the remedy is said as well."""
+
+
+def begun_again(moved: Moved, times: int) -> str:
+    """What an operator is told whose window was disturbed so many times."""
+    said = f"{moved}; hold still, the window starts again"
+    if times < OFTEN:
+        return said
+    return (
+        f"{said}, disturbed {times} times now: fix the device better, or shelter it"
+        " from the wind"
+    )
+
+
 def gap(last: float, now: float) -> Moved:
     """Samples are missing between two device times, s."""
     return Moved(

@@ -17,7 +17,9 @@ from rich.panel import Panel
 from rich.text import Text
 
 from fieldcal import gauges
+from fieldcal.gauges import alert
 from fieldcal.keyboard import HELP, Keyboard
+from fieldcal.letters import drawable, large
 from fieldcal.movers import Mover
 from fieldcal.plan import Hold
 from fieldcal.positions import Position
@@ -27,10 +29,12 @@ FRAMES = 8.0
 """Drawings a second."""
 
 TALL = 32
-"""Lines from which there is room around the instruction."""
+"""Lines from which there is room for letters three lines tall."""
 
-FIXED = 16
-"""Lines of the screen that are not the list of positions."""
+TURN = "TURN TO"
+
+FEWEST = 3
+"""Positions that are listed however little room there is."""
 
 
 class ConsoleOperator:
@@ -66,10 +70,12 @@ class ConsoleOperator:
         self._verification = verification
         self._taken: dict[int, float] = {}
         self._said: list[str] = []
+        self._said_before: list[str] = []
+        self._waited = ""
         self._view: View | None = None
         self._hold: Hold | None = None
         self._drawn = 0.0
-        self._line = ""
+        self._lines: set[str] = set()
         self._live: Live | None = None
         screen = self._console.is_terminal and not self._console.is_dumb_terminal
         if screen and not plain:
@@ -93,6 +99,8 @@ class ConsoleOperator:
     def place(self, hold: Hold) -> None:
         """Ask for a position."""
         self._hold = hold
+        self._said = self._said_before = self._said[-1:]
+        self._lines.clear()
         self._taken.pop(hold.index, None)
         self._bell()
         if self._keyboard:
@@ -104,8 +112,12 @@ class ConsoleOperator:
         self._draw()
 
     def tell(self, text: str) -> None:
-        """Keep a sentence on the screen."""
-        self._said = [*(t for t in self._said[-1:] if t != text), text]
+        """Keep a sentence on the screen, unless it is the reason that stands there."""
+        shown = alert(self._view) if self._view else ""
+        if shown and text.endswith(shown):
+            self._waited = text.removesuffix(shown)
+        else:
+            self._said = [*(t for t in self._said[-1:] if t != text), text]
         self._bell()
         self._log(f"! {text}")
         self._draw()
@@ -117,7 +129,11 @@ class ConsoleOperator:
 
     def show(self, view: View) -> None:
         """Draw the view, unless the last drawing is too recent."""
+        begins = view.phase == "averaging" and self._phase != "averaging"
         self._view = view
+        self._waited = self._waited if alert(view) else ""
+        if begins:
+            self._said = self._said_before  # what was said of the turn is done
         if view.phase == "taken":
             known = view.sigma[:3][np.isfinite(view.sigma[:3])]
             self._taken[view.hold.index] = float(known.max()) if len(known) else np.nan
@@ -132,20 +148,29 @@ class ConsoleOperator:
         if self._live:
             self._console.bell()
 
+    @property
+    def _phase(self) -> str:
+        return self._view.phase if self._view else ""
+
+    def _log_state(self, text: str) -> None:
+        """Log a state once for each time that a position is asked for."""
+        if text not in self._lines:
+            self._lines.add(text)
+            self._log(text)
+
     def _log(self, text: str) -> None:
-        if self._live is None and text != self._line:
-            self._line = text
+        if self._live is None:
             self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def _log_view(self, view: View) -> None:
         where = f"position {view.hold.index + 1}"
-        if view.phase == "turning":
-            self._log(f"{where}: {view.reason.partition(':')[0]}")
-        elif view.phase == "averaging":
+        if view.phase == "averaging":
             step = 10 * int(view.elapsed // 10)
-            self._log(f"{where}: averaging, {step} of {view.hold.seconds:g} s")
-        else:
-            self._log(f"{where}: taken, ± {gauges.sigma(view)}")
+            self._log_state(f"{where}: averaging, {step} of {view.hold.seconds:g} s")
+        elif view.phase == "taken":
+            self._log(f"{where}: taken, ± {gauges.sigma(view) or 'not known'}")
+        elif not alert(view):
+            self._log_state(f"{where}: {view.reason}")
 
     def _draw(self) -> None:
         if self._live:
@@ -154,48 +179,75 @@ class ConsoleOperator:
 
     def screen(self) -> RenderableType:
         """What is shown now."""
-        parts: list[RenderableType] = [*self._instruction(), Text()]
-        if self._view and self._hold is self._view.hold:
-            parts += [gauges.gauges(self._view, self._said), Text()]
-        rows = max(3, self._console.height - FIXED)
-        now = self._hold.index if self._hold else -1
-        parts.append(
-            gauges.listing(self._positions, self._taken, now, rows, self._verification)
-        )
-        parts += [Text(f"! {text}", style="bold yellow") for text in self._said]
-        if self._view:
-            parts.append(gauges.link(self._view))
+        view, now = self._view, self._hold.index if self._hold else -1
+        above: list[RenderableType] = [*self._instruction(), Text()]
+        if view and self._hold is view.hold:
+            above.append(gauges.gauges(view))
+        why = alert(view) if view else ""
+        said = [*self._said, self._waited + why]
+        above += [Text(f"! {text}", style="bold yellow") for text in said if text]
+        above.append(Text())
+        below: list[RenderableType] = []
+        if view:
+            below.append(gauges.link(view))
         if self._keyboard and self._keyboard.there:
-            parts.append(Text(f"keys: {HELP}", style="dim"))
-        return Panel(Group(*parts), title=self._title, title_align="left")
+            below.append(Text(f"keys: {HELP}"))
+        rows = max(FEWEST, self._console.height - 2 - self._lines_of(*above, *below))
+        listed = gauges.listing(
+            self._positions, self._taken, now, rows, self._verification
+        )
+        whole = Group(*above, listed, *below)
+        return Panel(whole, title=Text(self._title), title_align="left")
+
+    def _lines_of(self, *parts: RenderableType) -> int:
+        """Count the lines that parts of the screen take within its frame."""
+        inside = self._console.options.update(width=self._console.width - 4)
+        return len(self._console.render_lines(Group(*parts), inside))
 
     def _instruction(self) -> list[Text]:
         """The one thing to do now, in large letters, and what belongs to it."""
         words, detail, colour = self._words()
+        turn = self._hold.position if words == TURN and self._hold else None
         style = f"bold reverse {colour}".strip()
         width = self._console.width - 4
-        lines = [f"  {words}", f"  {detail}"]
         if self._console.height >= TALL:
-            lines = ["", *lines, ""]
-        return [Text(line.ljust(width), style=style) for line in lines]
+            lines = ["", *large(words), *_angles(turn, width - 4), "", detail, ""]
+        else:
+            lines = [_spaced(words) + (f"   {turn.name}" if turn else ""), detail]
+        return [Text(f"  {line}".ljust(width), style=style) for line in lines]
 
     def _words(self) -> tuple[str, str, str]:
         """What is said large, what small, and its colour."""
-        view, hold = self._view, self._hold
+        hold = self._hold
+        view = self._view if self._view and self._view.hold is hold else None
         if hold is None:
-            return _large("WAIT"), "for the device", ""
-        if view is None or view.hold is not hold or view.phase == "turning":
-            number = f"position {hold.index + 1} of {len(self._positions)}"
-            now = view if view is not None and view.hold is hold else None
-            if now and now.arrival is not None and now.arrival.ok:
-                return _large("HANDS OFF"), f"{number}: it is in place", "cyan"
-            turn = f"{_large('TURN TO')}   {hold.position.name}"
-            return turn, f"{number}, then let go", "cyan"
+            return "WAIT", "for the device", ""
+        number = f"position {hold.index + 1} of {len(self._positions)}"
+        if view is None or view.phase == "turning":
+            if view is None or view.arrival is None or not view.arrival.ok:
+                wrong = view is not None and alert(view)
+                return TURN, f"{number}, then let go", "yellow" if wrong else "cyan"
+            if alert(view):
+                return "WAIT", f"{number}: it is in place, hands off", "yellow"
+            return "HANDS OFF", f"{number}: it is in place", "cyan"
+        if view.phase == "silent":
+            return "NO SAMPLES", f"{number}: nothing is lost of what was taken", "red"
         if view.phase == "averaging":
-            return _large("HOLD STILL"), "do not touch the device", "green"
-        return _large("TAKEN"), "", "green"
+            return "HOLD STILL", f"{number}: do not touch the device", "green"
+        return "TAKEN", number, "green"
 
 
-def _large(words: str) -> str:
+def _angles(position: Position | None, width: int) -> list[str]:
+    """Where to turn, large if there is room for it."""
+    if position is None:
+        return []
+    alpha, beta = position.degrees or (np.nan, np.nan)
+    text = f"α {alpha:g}°  β {beta:g}°"
+    drawn = large(text) if drawable(text) else [position.name]
+    fits = max(map(len, drawn)) <= width
+    return ["", *(drawn if fits else [position.name])]
+
+
+def _spaced(words: str) -> str:
     """Letters set apart: larger than their neighbours on any terminal."""
     return "   ".join(" ".join(word) for word in words.split())

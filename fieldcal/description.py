@@ -22,6 +22,9 @@ from fieldcal.positions import Position
 from fieldcal.samples import Array
 
 FORMAT = 1
+STEEPEST = 10.0
+"""Largest uncertainty of a base that one may call level, deg."""
+
 GRADES = ("tactical", "navigation")
 
 ACC_UNITS = {"m/s^2": 1.0, "g": G0, "mg": 1e-3 * G0, "V": 1.0, "count": 1.0}
@@ -52,6 +55,8 @@ class Description:
     units : of "acceleration" and "angular_rate" in the samples
     limits : full scale of the same two, in SI; absent where unknown
     latitude_deg, height_m, gravity : the site; gravity in m/s^2
+    level_deg : how level the base was made, one sigma about each level axis; None where
+        nobody said
     axes : the mounting, procedure axis x, y, z is device axis ...
     nominal : (3,) for each of `TRIADS`: the calibration a simulation starts from
     model : parameters of the effects that the simulation includes, by id
@@ -68,6 +73,7 @@ class Description:
     latitude_deg: float
     height_m: float
     gravity: float
+    level_deg: float | None
     axes: tuple[str, ...]
     nominal: Mapping[str, Array]
     model: Mapping[str, Mapping[str, Any]]
@@ -147,6 +153,7 @@ def parse(raw: Mapping[str, Any]) -> Description:
         latitude_deg=latitude,
         height_m=height,
         gravity=_positive(site, "site", "gravity") or gravity(latitude, height),
+        level_deg=_level(site),
         axes=tuple(axes),
         nominal={name: _triad(_table(raw, "nominal"), name) for name in TRIADS},
         model=_model(_table(raw, "model")),
@@ -179,6 +186,16 @@ def _positive(table: Mapping[str, Any], name: str, key: str) -> float | None:
     if value <= 0:
         raise InputError(f"[{name}] {key} = {value:g} must be above 0; mend it")
     return value
+
+
+def _level(site: Mapping[str, Any]) -> float | None:
+    level = _positive(site, "site", "level_deg")
+    if level is not None and level > STEEPEST:
+        raise InputError(
+            f"[site] level_deg = {level:g} is no level base: give one sigma in degrees,"
+            f" up to {STEEPEST:g}"
+        )
+    return level
 
 
 def _choice(

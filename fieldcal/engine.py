@@ -18,12 +18,12 @@ from typing import TypeVar
 import numpy as np
 
 from fieldcal.arrival import Arrival, Held
-from fieldcal.breaks import Again, gap, restarted
+from fieldcal.breaks import Again, begun_again, gap, restarted
 from fieldcal.description import Description
 from fieldcal.driver import Driver
 from fieldcal.errors import FieldcalError, Moved, Skipped, Stopped, WrongPosition
 from fieldcal.link_marks import LinkMarks, Recording
-from fieldcal.placing import GAP, Placing, force
+from fieldcal.placing import GAP, SETTLING, Placing, force
 from fieldcal.plan import Hold, Note, Plan, Step
 from fieldcal.samples import Array, Block, pieces
 from fieldcal.view import Operator, Phase, View, Wish
@@ -47,7 +47,8 @@ class Engine:
         judge where the device is
     recorder : the session folder being written
     give_up : s of device time away from where it should be after which the hold is
-        given up; None waits for ever, as for a person
+        given up, if the host's clock has gone on as well; None waits for ever, and
+        begins a window that was disturbed again for ever, as for a person
     taken : averages of positions taken before, by number; what is taken is added
     warmth : judges whether the device is still warming up; None does not ask
 
@@ -71,6 +72,7 @@ class Engine:
         self._taken = {} if taken is None else taken
         self._warmth = warmth
         self._held: Held | None = None
+        self._hold_now: Hold | None = None
         self._noise: Noise | None = None
         self._left: int | None = None
         self._before: int | None = None
@@ -128,12 +130,20 @@ class Engine:
                 return None
 
     def _hold(self, hold: Hold) -> Average:
+        self._hold_now, tries = hold, 0
         while True:
             name = hold.position.name
             self._recorder.mark("asked", position=hold.index, name=name)
             self._operator.place(hold)
             self._arrive(hold)
-            average = self._average(hold)
+            try:
+                average = self._average(hold)
+            except Moved as moved:
+                if self._give_up is not None:
+                    raise
+                tries += 1
+                self._tell(begun_again(moved, tries))
+                continue
             if average is not None:
                 return average
 
@@ -156,11 +166,14 @@ class Engine:
     def _silent(self) -> None:
         """Say that nothing comes, before anybody thinks that we are stuck."""
         self._silence += 1
+        said = (
+            f"no samples come from {self._driver.name}: check cable and power; it"
+            " goes on by itself once they do"
+        )
+        if self._silence >= 2 and self._hold_now:
+            self._view("silent", self._hold_now, reason=said)
         if self._silence == 2:
-            self._tell(
-                f"no samples come from {self._driver.name}: check cable and power; it"
-                " goes on by itself once they do"
-            )
+            self._tell(said)
         if self._operator.wish() == "stop":
             raise Stopped("stopped by the operator")
 
@@ -172,7 +185,7 @@ class Engine:
         for block in self._stream:
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before
-            placing.add(block)
+            placing.add(block, self._driver.host_time())
             wish = self._wish(hold, averaging=False)
             if wish == "confirm" and self._warmth and self._warmth.waits:
                 self._warmth.waived = True
@@ -185,11 +198,11 @@ class Engine:
             reason = placing.reason
             if placing.arrived and waits and self._warmth:
                 said = self._warmth.says
-                reason = f"{said}; Enter goes on" if said else "settling"
-                if said and not cold:
-                    cold = True
-                    self._tell(f"{said}: waiting for it, Enter goes on")
+                reason = f"{said}; Enter goes on" if said else SETTLING
             self._view("turning", hold, placing.where, placing.meter, reason=reason)
+            if reason.endswith("Enter goes on") and not cold:
+                cold = True
+                self._tell(reason)
             if placing.arrived and not waits and wish != "wait":
                 return
             self._complain(hold, placing, quiet=wish == "wait")
@@ -200,14 +213,21 @@ class Engine:
         if not quiet and (said := placing.complaint()):
             self._recorder.mark("wrong", position=hold.index, text=said)
             self._operator.tell(said)
-        if self._give_up and placing.waited > self._give_up and not placing.arrived:
-            what = placing.problem or f"it has not come to rest in {self._give_up:g} s"
+        if placing.arrived or not self._give_up:
+            return
+        if placing.waited_enough(self._give_up):
+            what = (
+                placing.problem or f"it has not come to rest in {placing.waited:.0f} s"
+            )
             raise WrongPosition(f"{hold.position.name}: {what}")
 
     def _ask_back(self, placing: Placing) -> bool:
         """Answer an operator who wants to go on at a wrong place."""
         if placing.usable and placing.problem:
-            self._tell(f"{placing.problem}; press Enter once more to take it like this")
+            self._tell(
+                f"{placing.problem}; press Enter once more to take it like this, and"
+                " the result is NO-GO"
+            )
             return True
         self._tell(f"not yet: {placing.problem or placing.reason}")
         return False

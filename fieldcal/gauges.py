@@ -12,6 +12,8 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from fieldcal.arrival import tenth
+from fieldcal.placing import ORDINARY
 from fieldcal.positions import Position
 from fieldcal.view import View
 
@@ -21,7 +23,7 @@ METER = 20
 BAR = 30
 """Width of the bar that fills while averaging, characters."""
 
-SCALE = 31
+SCALE = 19
 """Width of the inclinometer, characters; odd, as the middle is where it should be."""
 
 SPANS = (2.0, 5.0, 10.0, 30.0, 90.0, 180.0)
@@ -31,25 +33,47 @@ NEAR = 1.0
 """Off by less than this, deg, an angle is not asked to be turned."""
 
 
-def angles(view: View) -> list[tuple[str, float, float]]:
-    """Name, angle seen and angle wanted of both joints, deg, where it can be told."""
-    wanted = view.hold.position.degrees
-    if view.arrival is None or wanted is None:
+def alert(view: View) -> str:
+    """Why it waits, where that wants the operator to do something; else empty."""
+    return "" if view.reason in ORDINARY or view.phase == "taken" else view.reason
+
+
+def angles(view: View) -> list[tuple[str, Text]]:
+    """Name and inclinometer of both joints, where it can be told."""
+    wanted, now = view.hold.position.degrees, view.arrival
+    if now is None or wanted is None:
         return []
-    seen = (view.arrival.alpha_deg, view.arrival.beta_deg)
-    return list(zip("αβ", seen, wanted, strict=True))
+    seen = (now.alpha_deg, now.beta_deg)
+    return [
+        (name, inclinometer(there, asked, now.limit_deg, now.ok))
+        for name, there, asked in zip("αβ", seen, wanted, strict=True)
+    ]
 
 
-def inclinometer(seen: float, wanted: float) -> Text:
-    """Where it is (o), where it should be (the middle), and which way to turn."""
-    off = wanted - seen
+def inclinometer(
+    seen: float, wanted: float, limit: float = np.nan, ok: bool = False
+) -> Text:
+    """Where it is (o), where it should be (the middle), and which way to turn.
+
+    Parameters
+    ----------
+    seen, wanted : deg
+    limit : how far it may be off, deg; nan where that is not known
+    ok : whether both angles together are close enough
+
+    """
+    off = tenth(wanted - seen)
     span = next((s for s in SPANS if s >= abs(off)), SPANS[-1])
     middle = SCALE // 2
     place = int(np.clip(round(middle - off / span * middle), 0, SCALE - 1))
     cells = ["·"] * SCALE
     cells[middle], cells[place] = "|", "o"
-    order = "close enough" if abs(off) < NEAR else f"turn {off:+.1f}°"
-    return Text(f"[{''.join(cells)}] {seen:+6.1f}° to {wanted:+.1f}°  {order}")
+    within = f" ± {limit:.1f}°" if np.isfinite(limit) else ""
+    there = ok or abs(off) < NEAR
+    way = "→" if off > 0 else "←"
+    order = "close enough" if there else f"turn {off:+.1f}° {way}"
+    where = f"[{''.join(cells)}] {tenth(seen):+6.1f}° to {tenth(wanted):+.1f}°{within}"
+    return Text.assemble(where, "  ", (order, "green" if there else "bold yellow"))
 
 
 def stillness(level: float) -> Text:
@@ -57,9 +81,10 @@ def stillness(level: float) -> Text:
     if not np.isfinite(level):
         return Text("listening to the device's noise")
     filled = int(np.clip(round(level * METER / 2), 0, METER))
-    word = "still" if level < 1 else "MOVING"
-    style = "" if level < 1 else "yellow"
-    return Text(f"[{'#' * filled:<{METER}}] {word}", style=style)
+    bar = f"{'#' * filled:·<{METER}}"
+    limit = METER // 2
+    word, style = ("still", "green") if level < 1 else ("MOVING", "bold yellow")
+    return Text.assemble(f"[{bar[:limit]}|{bar[limit:]}] ", (word, style))
 
 
 def sigma(view: View) -> str:
@@ -70,20 +95,29 @@ def sigma(view: View) -> str:
         parts.append(f"{1e3 * np.nanmax(acc):.2f} mm/s²")
     if np.isfinite(gyr).any():
         parts.append(f"{1e3 * np.nanmax(gyr):.3f} mrad/s")
-    return ", ".join(parts) or "not known yet"
+    return ", ".join(parts) or ""
 
 
-def gauges(view: View, told: Sequence[str]) -> Table:
+def by_the_end(view: View) -> str:
+    """Standard error to be expected when the window is full, by white noise."""
+    acc = view.sigma[:3][np.isfinite(view.sigma[:3])]
+    if view.hold.sigma:
+        return f", wanted ± {1e3 * view.hold.sigma:.2f} mm/s²"
+    if not len(acc) or view.elapsed >= view.hold.seconds:
+        return ""
+    then = float(acc.max()) * np.sqrt(view.elapsed / view.hold.seconds)
+    return f", by the end about ± {1e3 * then:.2f} mm/s²"
+
+
+def gauges(view: View) -> Table:
     """Everything that is measured now."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(width=9)
     grid.add_column()
-    if view.phase == "turning":
-        for name, seen, wanted in angles(view):
-            grid.add_row(name, inclinometer(seen, wanted))
-        problem = view.arrival.problem if view.arrival else ""
-        below = bool(told and problem and view.reason.endswith(problem))
-        grid.add_row("waits for", "the turn: see below" if below else view.reason)
+    if view.phase in ("turning", "silent"):
+        for name, scale in angles(view):
+            grid.add_row(name, scale)
+        grid.add_row("status", "see below" if alert(view) else view.reason)
     else:
         seconds = view.hold.seconds
         share = min(1.0, view.elapsed / seconds)
@@ -91,11 +125,11 @@ def gauges(view: View, told: Sequence[str]) -> Table:
         left = max(0.0, seconds - view.elapsed)
         grid.add_row("averaging", bar)
         grid.add_row("time left", f"{left:.0f} s of {seconds:.0f} s")
-        reached = f"± {sigma(view)}"
-        if view.hold.sigma:
-            reached += f", wanted ± {1e3 * view.hold.sigma:.2f} mm/s²"
+        known = sigma(view)
+        reached = f"± {known}{by_the_end(view)}" if known else "not known yet"
         grid.add_row("reached", reached)
-    grid.add_row("stillness", stillness(view.stillness))
+    if view.phase != "silent":
+        grid.add_row("stillness", stillness(view.stillness))
     return grid
 
 
@@ -124,7 +158,7 @@ def listing(
             state = f"taken   ± {1e3 * taken[i]:.2f} mm/s²"
         else:
             state = "now" if i == now else ""
-        style = "bold" if i == now else "dim" if i not in taken else ""
+        style = "bold" if i == now else ""
         name = positions[i].name + (" (verification)" if i == verification else "")
         table.add_row(f"{i + 1}", name, state, style=style)
     return table
@@ -135,7 +169,8 @@ def link(view: View) -> Text:
     health = view.health
     rate = f"{view.rate_hz:.0f} Hz" if np.isfinite(view.rate_hz) else "no rate yet"
     parts = [rate, f"{health.samples} samples"]
-    parts.append(f"{health.gaps} gaps, {health.missing} missing, {health.bad} bad")
+    gaps = "1 gap" if health.gaps == 1 else f"{health.gaps} gaps"
+    parts.append(f"{gaps}, {health.missing} missing, {health.bad} bad frames")
     if np.isfinite(view.temperature):
         parts.append(f"{view.temperature:.1f} °C")
     if health.restarts:
@@ -143,4 +178,5 @@ def link(view: View) -> Text:
     if health.clock and health.clock.real_time:
         clock = health.clock
         parts.append(f"clock {clock.fast_ppm:+.0f} ± {clock.sigma_ppm:.1g} ppm")
-    return Text("link: " + " · ".join(parts), style="dim")
+    lost = health.missing or health.bad or health.restarts
+    return Text("link: " + " · ".join(parts), style="yellow" if lost else "")

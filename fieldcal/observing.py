@@ -105,12 +105,12 @@ def rests(session: Session) -> Rests:
         try:
             found, noise, said = _take(block, window, noise, grain)
         except FieldcalError as error:
-            warnings.append(f"position {i} is left out: {error}")
+            warnings.append(f"position {i + 1} is left out: {error}")
             continue
         rows.append(i)
         averages.append(found)
         if said:
-            warnings.append(f"position {i}: {said}")
+            warnings.append(f"position {i + 1}: {said}")
     if not rows:
         raise SessionError(f"{session.folder}: no window can be used; {warnings[-1]}")
     return Rests(tuple(rows), tuple(averages), tuple(warnings))

@@ -26,8 +26,20 @@ PATIENCE = 3.0
 REMIND = 60.0
 """Time at the same wrong place after which it is said again, s."""
 
+LISTENING, MOVING = "listening to the noise", "moving: waiting for it to rest"
+SETTLING, TURNING = "settling", "waiting for the turn"
+ORDINARY = (LISTENING, MOVING, SETTLING, TURNING)
+"""What every turn waits for; any other reason wants the operator to do something."""
+
 GAP = 0.5
 """Longest time without samples that a rest may have, s."""
+
+LEAST = 10.0
+"""Wait by the host's clock before a position is given up, s.
+
+A virtual device at 80 times the clock has waited for 90 s when the mover, and whoever
+reads it, have had 1.1 s.
+"""
 
 
 class Placing:
@@ -46,7 +58,8 @@ class Placing:
     arrival : where the device rests, None while it moves
     where : where it is, as far as that can be told while it moves
     f : (3,) specific force there, procedure axes, m/s^2; None likewise
-    waited : s of samples since it was asked for
+    waited : s of samples since it was asked for, by the device's clock
+    waited_host : the same by the host's, which may have gone on less
 
     """
 
@@ -57,8 +70,8 @@ class Placing:
         self._others = _others(hold, about)
         self._began: float | None = None
         self._start()
-        self._last = np.nan
-        self.waited = 0.0
+        self._last = self._last_host = np.nan
+        self.waited = self.waited_host = 0.0
 
     def _start(self) -> None:
         self._stillness = Stillness()
@@ -78,8 +91,14 @@ class Placing:
         """Rest so far, s."""
         return self._resting.seconds
 
-    def add(self, block: Block) -> None:
-        """Take in the block that follows; a time without any is no waiting."""
+    def add(self, block: Block, host: float) -> None:
+        """Take in the block that follows; a time without any is no waiting.
+
+        `host` is the time by the host's clock, s.
+        """
+        if self._last_host < host:
+            self.waited_host += min(GAP, host - self._last_host)
+        self._last_host = host
         away = float(block.t[0]) - self._last
         if away > GAP:
             self._start()
@@ -119,10 +138,10 @@ class Placing:
     def reason(self) -> str:
         """What it waits for, for the operator."""
         if self._stillness.since is None:
-            return "moving: waiting for it to rest"
+            return MOVING if np.isfinite(self.meter) else LISTENING
         if self.arrival is not None and not self.arrival.ok:
-            return self.problem if self.seconds >= PATIENCE else "waiting for the turn"
-        return "settling"
+            return self.problem if self.seconds >= PATIENCE else TURNING
+        return SETTLING
 
     @property
     def problem(self) -> str:
@@ -134,6 +153,10 @@ class Placing:
         if self._left:
             problem = f"turned too early, position {number} is not done: {problem}"
         return problem
+
+    def waited_enough(self, give_up: float) -> bool:
+        """Whether it was waited for so many s, and whoever turns it had the time to."""
+        return self.waited > give_up and self.waited_host > min(give_up, LEAST)
 
     def complaint(self) -> str:
         """What is to be said aloud now: once for a rest, and again every minute."""

@@ -10,8 +10,8 @@ from fieldcal.driver import Health
 from fieldcal.plan import Hold
 from fieldcal.samples import Array
 
-Phase = Literal["turning", "averaging", "taken"]
-"""What the engine waits for: to be in place, for the window, for the next step."""
+Phase = Literal["turning", "averaging", "taken", "silent"]
+"""What the engine waits for: to be in place, the window, the next step, samples."""
 
 Wish = Literal["confirm", "repeat", "skip", "stop", "wait"]
 """What an operator may want: a key, or a mover that is still at work (wait)."""

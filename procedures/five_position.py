@@ -23,4 +23,5 @@ def plan(
     """Hold the positions of `about` for `seconds` each and solve."""
     held = yield from hold_each(about.positions, seconds, sigma)
     seen = observations(about, list(held.values()), list(held))
-    return with_left_out(solve(seen), about.positions, held)
+    found = solve(seen, level_sigma_deg=about.level_deg)
+    return with_left_out(found, about.positions, held)

@@ -1,7 +1,8 @@
 """Two positions: bias and scale factor of the accelerometers, bias of the gyroscopes.
 
 Home, then both joints turned by small angles. The base must be level: what it is tilted
-by goes into the biases (one degree: 0.17 m/s^2), and two positions cannot see it.
+by goes into the biases (one degree: 0.17 m/s^2), and two positions cannot see it. How
+level it is has to be said, and is part of every uncertainty.
 Source: Avrutov and Pozniak 2023, (11)-(14), (36), (45)-(48).
 """
 
@@ -24,4 +25,5 @@ def plan(
     """Hold the positions of `about` for `seconds` each and solve."""
     held = yield from hold_each(about.positions, seconds, sigma)
     seen = observations(about, list(held.values()), list(held))
-    return with_left_out(solve(seen, method="two_position"), about.positions, held)
+    found = solve(seen, method="two_position", level_sigma_deg=about.level_deg)
+    return with_left_out(found, about.positions, held)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,7 @@ def calibration(
         7,
         1e-3,
         good=good,
+        info={"level_sigma_deg": 0.02},
     )
 
 
@@ -67,7 +69,7 @@ def test_a_sound_calibration_is_go_and_says_what_it_could_not_check() -> None:
     ("found", "seen", "says"),
     [
         (calibration(good=False), {}, "the estimate itself is bad"),
-        (calibration((0.03, 1e-4, 1e-5)), {}, "acc_bias x is known to ± 0.03 m/s^2"),
+        (calibration((0.03, 1e-4, 1e-5)), {}, "acc_bias x is known to ± 0.03 m/s²"),
         (calibration((1e-3, 1e-2, 1e-5)), {}, "acc_scale x is known to ± 0.01"),
         (calibration((1e-3, 1e-4, 1e-3)), {}, "gyr_bias x is known to ± 0.001 rad/s"),
         (calibration(), {"temperatures": [70.0]}, "70.0 to 70.0 °C"),
@@ -100,6 +102,33 @@ def test_a_required_group_that_is_missing_is_no_go_unless_its_sensor_is_not_read
     assert decided(_only(whole, ("acc_bias", "acc_scale"))).go
 
 
+def test_a_tilt_that_nobody_saw_and_nobody_excluded_is_no_go() -> None:
+    whole = calibration()
+    unsaid = decided(replace(whole, info={}))
+    assert not unsaid.go and len(unsaid.reasons) == 1
+    assert "how level the base is" in unsaid.reasons[0]
+    assert "--level" in unsaid.reasons[0] and "0.17 m/s²" in unsaid.reasons[0]
+    said = [check for check in decided(whole).checks if check.name == "level"]
+    assert [check.ok for check in said] == [True] and "± 0.02°" in said[0].says
+    seen = replace(whole, info={}, method="scalar")
+    assert decided(seen).go, "the norm of the force knows of no tilt"
+    rng = np.random.default_rng(1)
+    windows = [_held(p, rng) for p in FIVE]
+    found = solve(Observations.of(FIVE, windows, G))
+    assert {"base_tilt", "angle_offset"} & set(found.groups)
+    assert "level" not in [check.name for check in decided(found).checks]
+
+
+def test_a_position_that_does_not_fit_is_told_beside_the_decision() -> None:
+    rng = np.random.default_rng(2)
+    windows = [_held(p, rng) for p in FIVE]
+    windows[1] = _held(Position.deg(22.0, 0.4), rng)
+    made = decided(solve(Observations.of(FIVE, windows, G)))
+    told = [check for check in made.checks if check.name == "positions"]
+    assert [check.ok for check in told] == [None]
+    assert told[0].says.startswith("the position α = 22.5°, β = 0°")
+
+
 def _only(found: Calibration, groups: tuple[str, ...]) -> Calibration:
     rows = [i for i, n in enumerate(found.names) if n.startswith(groups)]
     return Calibration(
@@ -111,15 +140,14 @@ def _only(found: Calibration, groups: tuple[str, ...]) -> Calibration:
         7.0,
         7,
         1e-3,
+        info=found.info,
     )
 
 
 def _shifted(found: Calibration, by: float) -> Calibration:
     values = found.values.copy()
     values[0] += by
-    return Calibration(
-        "joint", found.names, values, found.covariance, found.units, 7.0, 7, 1e-3
-    )
+    return replace(found, values=values)
 
 
 def test_a_change_is_judged_by_the_history_of_the_device() -> None:

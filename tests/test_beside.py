@@ -15,18 +15,22 @@ from fieldcal.commands.virtual import address
 from fieldcal.movers import VirtualDevice
 from fieldcal.positions import Position
 from fieldcal.samples import Block
-from fieldcal.session import Session
+from fieldcal.session import Session, read_marks
 
 LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
 BIASES = ["0.2,-0.3,0.1", "-0.1,0.4,0.2", "0.3,0.1,-0.2"]
 
 
 def led(
-    devices: Sequence[VirtualDevice], urls: Sequence[str], *options: str
+    devices: Sequence[VirtualDevice],
+    urls: Sequence[str],
+    *options: str,
+    killed_at: int | None = None,
 ) -> tuple[int, Any, str]:
     """A run of two positions in which somebody turns all devices when told to."""
-    run = [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
-    run += ["--seconds", "10", "--json", "--latitude", "50.45", *options]
+    run = [sys.executable, "-m", "fieldcal", "run", "--headless", "--json", *options]
+    if "--resume" not in options:
+        run += ["two_position", "--level=0.001", "--seconds=10", "--latitude=50.45"]
     for url in urls:
         run += ["--device", url]
     said = []
@@ -37,6 +41,9 @@ def led(
         for line in process.stderr:
             said.append(line.strip())
             told = json.loads(line) if line.startswith("{") else {}
+            if told.get("event") == "place" and told["position"] == killed_at:
+                process.kill()
+                break
             if told.get("event") == "place":
                 angles = [(0.0, 0.0), (45.0, 5.0)][told["position"]]
                 for device in devices:
@@ -45,12 +52,15 @@ def led(
     return process.returncode, json.loads(out or "null"), said[-1]
 
 
-def started(stack: ExitStack, speed: str) -> tuple[list[VirtualDevice], list[str]]:
+def started(
+    stack: ExitStack, speed: str, *last: str, once: bool = True
+) -> tuple[list[VirtualDevice], list[str]]:
     devices, urls = [], []
     for link, bias in zip(LINKS, BIASES, strict=True):
         options = [*link.split(), "--speed", speed, f"--acc-bias={bias}"]
         options += ["--latitude=50.45", "--height=0"]
-        devices.append(stack.enter_context(VirtualDevice(options)))
+        options += last if link == LINKS[-1] else ()
+        devices.append(stack.enter_context(VirtualDevice(options, once)))
         urls.append(address(options, devices[-1].port))
     return devices, urls
 
@@ -63,7 +73,28 @@ def test_three_devices_on_three_links_have_a_session_and_a_result_each(
         code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
         truths = [device.truth for device in devices]
     assert code == 0, said
-    sessions = [tmp_path / "s", *folders(tmp_path / "s")]
+    check(tmp_path / "s", truths, urls, result)
+
+
+def test_all_devices_are_gone_on_with_after_a_kill(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20", once=False)
+        session = tmp_path / "s"
+        led(devices, urls, "-o", str(session), killed_at=1)
+        folder = folders(session)[0]
+        before = list(read_marks(folder / "marks.jsonl"))
+        code, result, said = led(devices, [], "--resume", str(session))
+        truths = [device.truth for device in devices]
+    assert code == 0, said
+    check(session, truths, urls, result)
+    taken = [m for m in before if m["event"] == "window"]
+    after = [m for m in read_marks(folder / "marks.jsonl") if m["event"] == "window"]
+    assert len(taken) == 1 and after[0] == taken[0] and len(after) == 2
+
+
+def check(root: Path, truths: Sequence[Any], urls: Sequence[str], result: Any) -> None:
+    """Whether every device has its session, and a result that is right."""
+    sessions = [root, *folders(root)]
     assert [path.name for path in sessions] == ["s", "device-2", "device-3"]
     for folder, truth, url in zip(sessions, truths, urls, strict=True):
         written = json.loads((folder / "result.json").read_text())
@@ -71,6 +102,7 @@ def test_three_devices_on_three_links_have_a_session_and_a_result_each(
             found = written["parameters"][group]
             off = np.subtract(found["value"], truth[group])
             assert np.abs(off / np.array(found["sigma"])).max() < 4.5, (folder, group)
+        assert written["decision"]["go"]
         session = Session.open(folder)
         assert not session.warnings and (np.diff(session.block.t) > 0).all()
         if folder != sessions[0]:
@@ -91,6 +123,17 @@ def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) ->
     assert result["verdict"] == "good" and set(result["further"]) == {"device-3"}
     marks = list(Session.open(tmp_path / "s" / "device-2").marks())
     assert marks[-1]["event"] == "failed"
+
+
+def test_a_further_device_is_decided_about_by_itself(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20", "--gyr-noise=0.02,0.02,0.02")
+        code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
+    assert code == 1, said
+    assert result["decision"]["go"]
+    further = {name: each["decision"] for name, each in result["further"].items()}
+    assert further["device-2"]["go"] and not further["device-3"]["go"]
+    assert "gyr_bias" in further["device-3"]["reasons"][0]
 
 
 def test_times_go_over_the_hosts_clock() -> None:

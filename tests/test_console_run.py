@@ -113,6 +113,12 @@ def wrong_angle(console: Console) -> None:
     take(console, 2, 22.5, 0.0)
 
 
+def forgets_a_position(console: Console) -> None:
+    asked(console, 3)
+    console.turn(45.0, 2.5)
+    console.wait("this is position 4, position 3 comes first")
+
+
 def bump(console: Console) -> None:
     take(console, 3, 22.5, 2.5)
     console.device.ask(bump={})
@@ -140,7 +146,8 @@ def walks_away(console: Console) -> None:
 
 
 ERRORS: list[Callable[[Console], None]] = [
-    *(wrong_angle, bump, wrong_direction, too_early, walks_away),
+    *(wrong_angle, forgets_a_position, bump),
+    *(wrong_direction, too_early, walks_away),
 ]
 
 

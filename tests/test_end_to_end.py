@@ -86,7 +86,7 @@ def test_solving_the_recorded_session_gives_the_same_numbers(
 def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
     done = run(
         *("two_position", "--headless", "--virtual", "--speed", "max", "--json"),
-        *("-o", str(tmp_path / "s")),
+        *("-o", str(tmp_path / "s"), "--level=0.01"),
     )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -94,6 +94,38 @@ def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
     found = result["parameters"]["acc_bias"]
     off = np.subtract(found["value"], result["virtual"]["acc_bias"])
     assert (np.abs(off) < 4.5 * np.array(found["sigma"])).all()
+
+
+def test_a_tilt_that_two_positions_cannot_see_is_never_go(tmp_path: Path) -> None:
+    """Unsaid it is NO-GO, and said it is in the uncertainty, without a second turn."""
+    done = run(
+        *("two_position", "--headless", "--virtual=--base-tilt=0.5,-0.3", "--json"),
+        *("--speed", "max", "-o", str(tmp_path / "s")),
+    )
+    assert done.returncode == 1, done.stderr
+    told = [json.loads(line) for line in done.stderr.splitlines()]
+    first = next(i for i, line in enumerate(told) if line["event"] == "place")
+    assert any("how level the base is" in line.get("text", "") for line in told[:first])
+    result = json.loads(done.stdout)
+    truth = result["virtual"]["acc_bias"]
+    assert "how level the base is" in result["decision"]["reasons"][0]
+    off = np.subtract(result["parameters"]["acc_bias"]["value"], truth)
+    assert np.abs(off).max() > 0.03, "the tilt is taken for a bias"
+    again = solved(tmp_path / "s", "--level", "0.5")
+    assert again["level_sigma_deg"] == pytest.approx(0.5)
+    found = again["parameters"]["acc_bias"]
+    off = np.subtract(found["value"], truth)
+    assert (np.abs(off) < 3 * np.array(found["sigma"])).all()
+    assert "acc_bias" in again["decision"]["reasons"][0], "known too badly for a launch"
+    assert solved(tmp_path / "s", "--level", "0.001")["decision"]["go"]
+
+
+def solved(session: Path, *options: str) -> dict[str, Any]:
+    """What `fieldcal solve` makes of a session."""
+    call = [*BASE[:-1], "solve", str(session), "--json", *options]
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
 def test_killed_at_any_moment_the_session_holds_all_but_the_last_quarter_second(

@@ -130,6 +130,25 @@ def test_a_position_never_reached_is_given_up(bench: Bench) -> None:
     assert events(bench) == ["asked", "window", "asked", "wrong"]
 
 
+class Fast(InProcess):
+    """A device that runs at ten times the host's clock."""
+
+    def host_time(self) -> float:
+        return self.device.time / 10
+
+
+def test_a_fast_device_gives_whoever_turns_it_some_time_by_the_clock(
+    tmp_path: Path,
+) -> None:
+    driver = Fast(VirtualDevice(seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        bench = make(recorder, driver)
+        bench.turner.slips, bench.turner.corrects = [(30, 5)], False
+        with pytest.raises(WrongPosition, match="turn it by"):
+            bench.engine.run(hold_all(TWO, 10.0))
+    assert 10.0 < driver.host_time() < 10.5
+
+
 def test_a_bump_rejects_the_window_and_it_is_taken_again(bench: Bench) -> None:
     bench.turner.bump_at = [8.0]
     average = bench.engine.run(hold_all(TWO[:1], 20.0))[0]
@@ -143,6 +162,15 @@ def test_who_never_holds_still_is_told_so_in_the_end(bench: Bench) -> None:
     bench.turner.bump_at = [10.0] * 9
     with pytest.raises(CalibrationFailed, match="without a disturbance in 5 tries"):
         bench.engine.run(hold_all(TWO[:1], 30.0))
+
+
+def test_a_person_in_the_wind_is_told_what_to_do_and_may_go_on(bench: Bench) -> None:
+    bench.turner.bump_at = [10.0] * 7
+    driver, turner = bench.turner.driver, bench.turner
+    Engine(driver, turner, ABOUT, bench.recorder).run(hold_all(TWO[:1], 15.0))
+    assert len(turner.told) == 7 and events(bench).count("window") == 1
+    assert "times now" not in turner.told[1]
+    assert "disturbed 7 times now: fix the device better" in turner.told[6]
 
 
 def test_a_hold_ends_early_once_the_sigma_asked_for_is_reached(bench: Bench) -> None:
@@ -255,10 +283,10 @@ def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
         for wanted, there in itertools.permutations(range(5), 2):
             known = Held(FIVE[wanted - 1], f[wanted - 1]) if wanted else None
             placing = Placing(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
-            placing.add(_resting(f[there]))
+            placing.add(_resting(f[there]), 4.0)
             assert not placing.arrived, (wanted, there)
             placing = Placing(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
-            placing.add(_resting(f[wanted]))
+            placing.add(_resting(f[wanted]), 4.0)
             assert placing.arrived, (wanted, placing.problem)
 
 
@@ -287,9 +315,9 @@ def _resting(f: Array) -> Block:
 def test_nothing_is_known_of_a_time_without_samples() -> None:
     placing = Placing(Hold(0, FIVE[0], 10.0), FIVE_ABOUT, None)
     block = _resting(np.array([0.0, -9.81, 0.0]))
-    placing.add(block[:150])
+    placing.add(block[:150], 1.5)
     assert placing.seconds > 1.0
-    placing.add(block[300:])
+    placing.add(block[300:], 3.0)
     assert placing.seconds < 1.5 and not placing.arrived
 
 

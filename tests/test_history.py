@@ -155,7 +155,8 @@ def bench(folder: Path) -> Session:
 
 def test_old_values_do_not_enter_a_new_calibration(tmp_path: Path) -> None:
     session = bench(tmp_path / "s")
-    found, still = solve(observe(session)[0]), rests(session)
+    found = solve(observe(session)[0], level_sigma_deg=0.001)
+    still = rests(session)
     clean, go = assess(found, session, still, BOUNDS, None)
     poisoned = filled(tmp_path / "h.sqlite", *[1e6] * 9)
     with_it, no_go = assess(found, session, still, BOUNDS, poisoned)

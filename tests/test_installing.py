@@ -25,7 +25,15 @@ HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
 
 def recalibrated(folder: Path, has: str) -> tuple[int, Any]:
     virtual = f"--virtual=--mavlink tcpin:127.0.0.1:0?{has} --rate 200"
-    run = [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+    run = [
+        sys.executable,
+        "-m",
+        "fieldcal",
+        "run",
+        "two_position",
+        "--headless",
+        "--level=0.001",
+    ]
     run += ["--seconds", "10", "--speed", "20", "--json", "-o", str(folder), virtual]
     done = subprocess.run(run, capture_output=True, text=True, check=False, timeout=60)
     return done.returncode, json.loads(done.stdout)
@@ -113,7 +121,15 @@ def test_a_run_that_is_told_to_end_gives_the_calibration_back(
         assert sim.stdout
         place = sim.stdout.readline().strip()
         run = subprocess.Popen(
-            [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+            [
+                sys.executable,
+                "-m",
+                "fieldcal",
+                "run",
+                "two_position",
+                "--headless",
+                "--level=0.001",
+            ]
             + ["--device", f"mavlink:{place}?installed=identity"]
             + ["-o", str(tmp_path / "s")],
             stderr=subprocess.DEVNULL,

@@ -49,7 +49,15 @@ class Run:
         name, _, conceals = link.partition(" ")
         virtual = f"{LINKS[name].format(folder)} {conceals} --control {self._control}"
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+            [
+                sys.executable,
+                "-m",
+                "fieldcal",
+                "run",
+                "two_position",
+                "--headless",
+                "--level=0.001",
+            ]
             + ["--seconds", "10", "--json", "--speed", speed, *more]
             + [f"--virtual={virtual}", "-o", str(self.folder)],
             stdout=subprocess.PIPE,
@@ -126,7 +134,15 @@ def failed(
 ) -> tuple[int, str]:
     """Exit code and last line of a run in whose midst faults happen."""
     run = subprocess.Popen(
-        [sys.executable, "-m", "fieldcal", "run", "two_position", "--headless"]
+        [
+            sys.executable,
+            "-m",
+            "fieldcal",
+            "run",
+            "two_position",
+            "--headless",
+            "--level=0.001",
+        ]
         + ["--device", url, "-o", str(folder), "--patience", "0"],
         stderr=subprocess.PIPE,
         text=True,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import json
+import re
 import stat
 import sys
+import tomllib
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -18,7 +21,8 @@ from jsonschema import Draft202012Validator
 
 from fieldcal import plan_file
 from fieldcal.cli import main
-from fieldcal.errors import MoverFailed, PlanError
+from fieldcal.commands.run import add_arguments, make_task
+from fieldcal.errors import InputError, MoverFailed, PlanError
 from fieldcal.movers import Command, VirtualDevice
 from fieldcal.positions import FIVE, Position
 
@@ -182,7 +186,7 @@ def run(folder: Path, device: VirtualDevice, fails: str, junit: Path) -> int:
     call = script(folder, CALLER.format(control=device.control, fails=fails))
     mover = {"kind": "command", "command": call, "timeout_s": 30.0}
     tables = {
-        "site": {"latitude_deg": 50.45, "height_m": 170.0},
+        "site": {"latitude_deg": 50.45, "height_m": 170.0, "level_deg": 0.001},
         **plan(
             seconds=8.0,
             device=f"serial:{device.port}?format=witmotion",
@@ -231,3 +235,29 @@ def test_a_turntable_that_jams_ends_the_run_with_3(
     assert suite.get("failures") == suite.get("errors") == "1"
     (error,) = suite.iter("error")
     assert "jammed" in error.get("message", "")
+
+
+def parsed(*arguments: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    return parser.parse_args(arguments)
+
+
+def test_what_options_say_goes_over_the_plan(tmp_path: Path) -> None:
+    path = tmp_path / "plan.toml"
+    path.write_text(tomlkit.dumps({"site": {"latitude_deg": 50.0}, **plan()}))
+    said = ["--latitude", "60", "--serial", "A1", "--level", "0.1"]
+    about = make_task(parsed(str(path), *said))[0].about
+    assert about.latitude_deg == 60.0 and about.device["serial"] == "A1"
+    assert about.level_deg == 0.1
+    about = make_task(parsed(str(path)))[0].about
+    assert about.latitude_deg == 50.0 and about.level_deg is None
+    with pytest.raises(InputError, match="leave those options out"):
+        make_task(parsed("--resume", str(tmp_path), "--latitude", "60"))
+
+
+def test_the_plan_of_the_readme_is_one() -> None:
+    readme = (Path(__file__).parent.parent / "README.md").read_text("utf-8")
+    blocks = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+    assert len(blocks) == 1
+    assert len(plan_file.task(tomllib.loads(blocks[0]), "README.md").positions) == 5

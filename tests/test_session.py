@@ -170,6 +170,8 @@ def test_windows_of_a_live_session_stand_in_its_marks(tmp_path: Path) -> None:
     [
         ("format = 2", "format = 2"),
         ("[site]\ngravity = 0", "[site] gravity = 0 must be above 0"),
+        ("[site]\nlevel_deg = -0.1", "[site] level_deg = -0.1 must be above 0"),
+        ("[site]\nlevel_deg = 20", "level_deg = 20 is no level base"),
         ("[site]\nlatitude_deg = 'x'", "latitude_deg = 'x' is not a number"),
         ("[site]\nlatitude_deg = 100.0", "latitude 100"),
         ("[units]\nacceleration = 'furlong'", "'furlong' is none of: m/s^2"),

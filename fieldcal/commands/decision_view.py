@@ -6,11 +6,17 @@ from typing import IO, Any
 
 from fieldcal.calibration import Calibration
 
+GO = "GO: within all limits that could be checked"
+NO_GO = "NO-GO: do not launch on this, for the reasons marked NO"
+
 MARKS = {True: "ok  ", False: "NO  ", None: "?   "}
 
 
 def show_decision(found: Calibration, out: IO[str] | None = None) -> None:
-    """Print decision, checks, and what is left for a navigator; nothing without one.
+    """Print what is left for a navigator, checks and decision; nothing without one.
+
+    The decision comes last, with its reasons just above it: what is on the screen when
+    all is over.
 
     Parameters
     ----------
@@ -20,28 +26,30 @@ def show_decision(found: Calibration, out: IO[str] | None = None) -> None:
     """
     from rich.console import Console
 
+    from fieldcal.commands.table import say
+
     decision = found.info.get("decision")
     if not decision:
         return
     console = Console(file=out, highlight=False)
-    word, style = ("GO", "green") if decision["go"] else ("NO-GO", "red")
-    console.print(f" {word} ", style=f"bold reverse {style}")
-    for check in decision["checks"]:
-        text = f"{MARKS[check['ok']]}{check['says']}"
-        console.print(text, markup=False, soft_wrap=True)
     for growth in found.info.get("expectation", []):
-        console.print(_growth(growth), markup=False, soft_wrap=True)
+        say(console, "", _growth(growth))
+    order = {True: 0, None: 1, False: 2}
+    for check in sorted(decision["checks"], key=lambda each: order[each["ok"]]):
+        say(console, MARKS[check["ok"]], check["says"])
+    word, style = (GO, "green") if decision["go"] else (NO_GO, "red")
+    console.print(f" {word} ", style=f"bold reverse {style}", markup=False)
 
 
 def _growth(growth: dict[str, Any]) -> str:
     """One sentence about what errors grow to."""
     parts = [
-        f"{name} ± {growth[key]:.2g} {unit}"
+        f"{name} ± {float(f'{growth[key]:.2g}'):g}{unit}"
         for name, key, unit in (
             ("tilt", "tilt_sigma_deg", "°"),
             ("heading", "heading_sigma_deg", "°"),
-            ("level velocity", "level_velocity_sigma_m_s", "m/s"),
-            ("vertical velocity", "vertical_velocity_sigma_m_s", "m/s"),
+            ("level velocity", "level_velocity_sigma_m_s", " m/s"),
+            ("vertical velocity", "vertical_velocity_sigma_m_s", " m/s"),
         )
         if growth[key] is not None
     ]

@@ -12,6 +12,8 @@ from fieldcal.errors import DeviceError, FieldcalError
 if TYPE_CHECKING:
     from fieldcal.beside import Beside
     from fieldcal.calibration import Calibration
+    from fieldcal.history import History
+    from fieldcal.limits import Limits
 
 
 class Devices(argparse.Action):
@@ -31,10 +33,11 @@ class Devices(argparse.Action):
             namespace.further = [*namespace.further, values]
 
 
-def solved(folder: Path) -> Calibration:
-    """Solve the session of one of several devices, and write its result."""
+def solved(folder: Path, bounds: Limits, history: History) -> Calibration:
+    """Solve the session of one of several devices, decide, and write its result."""
     from dataclasses import replace
 
+    from fieldcal.assessing import assess
     from fieldcal.commands.installing import with_installed
     from fieldcal.observing import (
         observations,
@@ -47,21 +50,25 @@ def solved(folder: Path) -> Calibration:
 
     session = Session.open(folder)
     still = rests(session)
-    found = solve(observations(session.about, still.averages, still.rows))
+    seen = observations(session.about, still.averages, still.rows)
+    found = solve(seen, level_sigma_deg=session.about.level_deg)
     found = with_turns_between(found, session, still)
     found = replace(found, warnings=(*still.warnings, *found.warnings))
     found = with_installed(with_provenance(found, session.about), session)
+    found, _ = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
     return found
 
 
-def results(others: Sequence[Beside]) -> dict[str, Calibration]:
+def results(
+    others: Sequence[Beside], bounds: Limits, history: History
+) -> dict[str, Calibration]:
     """Results of the further devices that were heard to the end, by folder."""
     found = {}
     for other in others:
         if other.failed is None:
             try:
-                found[other.folder.name] = solved(other.folder)
+                found[other.folder.name] = solved(other.folder, bounds, history)
             except FieldcalError as fault:
                 other.failed = fault
     return found

@@ -45,8 +45,9 @@ def lines(calibration: Calibration) -> list[str]:
     told = []
     for name, of in calibration.info.get("install", {}).items():
         value, sigma = number(of["value"], of["sigma"])
-        was = f"{of['was']:.6g}"
-        told.append(f"install {name} = {value} ± {sigma} {of['unit']} (it was {was})")
+        unit = "" if of["unit"] == "1" else f" {of['unit']}"
+        was = f"(it was {of['was']:.6g}{unit})"
+        told.append(f"install {name} = {value} ± {sigma}{unit} {was}")
     return told
 
 

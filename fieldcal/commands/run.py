@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.further import Devices
-from fieldcal.commands.site import add_site, site_tables
+from fieldcal.commands.site import add_site, given_tables, over, site_tables
 from fieldcal.errors import FieldcalError, InputError
 
 if TYPE_CHECKING:
@@ -71,6 +71,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--seed", default="1", metavar="N", help="of the virtual device's noise")
     add("--seconds", type=float, metavar="S", help="averaging time (default: 30)")
     add("--sigma", type=float, metavar="M/S^2", help="stop averaging at this ± instead")
+    add(
+        "--level",
+        type=float,
+        metavar="DEG",
+        help="how level the base is, 1σ about each axis; two positions cannot see it",
+    )
     add("--verify", action="store_true", help="one more position, which is not fitted")
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
     add("--history", type=Path, metavar="FILE", help="instead of the usual history")
@@ -118,16 +124,35 @@ def run(args: argparse.Namespace) -> int:
     if args.junit:
         known = list(read_marks(marks))
         junit.write(args.junit, task.procedure, task.positions, known, result)
-    further = results(others)
+    further = results(others, bounds, history)
     _show(args, found, folder, truth, further)
     if not args.no_report:
         for each in (folder, *(folder / name for name in further)):
             page = _report(each, history.path)
             if page and not args.json:
                 sys.stdout.write(f"report:   {page}\n")
+    if not args.json:
+        _show_decisions(found, further)
     check_heard(others)
-    good = all(each.good for each in (found, *further.values()))
-    return 0 if good and result["decision"]["go"] else 1
+    return 0 if all(map(_go, (found, *further.values()))) else 1
+
+
+def _go(found: Calibration) -> bool:
+    return found.good and bool(found.info["decision"]["go"])
+
+
+def _show_decisions(found: Calibration, further: Mapping[str, Calibration]) -> None:
+    """That of the first device last, but for a line on each that is NO-GO."""
+    from fieldcal.commands.decision_view import show_decision
+
+    for name, each in further.items():
+        sys.stdout.write(f"\n{name}\n")
+        show_decision(each)
+    if further:
+        sys.stdout.write("\nthe first device\n")
+    show_decision(found)
+    for name, each in further.items():
+        sys.stdout.write(f"{name}: {'GO' if _go(each) else 'NO-GO, see above'}\n")
 
 
 def _report(folder: Path, history: Path) -> Path | None:
@@ -155,10 +180,16 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
     if args.resume:
         if args.procedure or args.output:
             raise InputError("--resume goes on with what it finds: give it alone")
+        if given_tables(args):
+            raise InputError(
+                "--resume goes on with the device and place its session.toml names:"
+                " leave those options out"
+            )
         from fieldcal.running import resumed
 
         session, tables = resumed(args.resume)
         tables["run"] = {**tables["run"], **_given(args)}
+        tables = over(tables, _level(args))
         return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder
     if not args.procedure:
         raise InputError(
@@ -175,16 +206,24 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         tables = plan_file.read(Path(name))
         if not isinstance(tables.get("run", {}), dict):
             raise InputError(f"{name}: run must be a table: write [run]")
+        tables = over(tables, given_tables(args))
         tables["run"] = {**tables.get("run", {}), **_given(args)}
+    tables = over(tables, _level(args))
     task = plan_file.task(tables, name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
+
+
+def _level(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """How level the base is, if an option says it."""
+    return {} if args.level is None else {"site": {"level_deg": args.level}}
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
     """The table [run] as far as options say it."""
     given: dict[str, Any] = {
         "device": args.device,
+        "further": args.further or None,
         "seconds": args.seconds,
         "sigma": args.sigma,
         "verify": args.verify or None,
@@ -208,6 +247,7 @@ def _record(
     """Hold the positions, record and solve; and what a virtual device conceals."""
     from fieldcal.beside import beside
     from fieldcal.commands.run_device import device
+    from fieldcal.level import level_unknown
     from fieldcal.recorder import Recorder
     from fieldcal.running import Running, taken_before
     from fieldcal.session import Session
@@ -219,10 +259,12 @@ def _record(
             taken = taken_before(Session.open(folder), task) if args.resume else {}
             tables = None if args.resume else task.tables
             own = stack.enter_context(Recorder(folder, tables))
-            further = [] if args.resume else args.further
+            further = task.run.get("further", [])
             recorder = stack.enter_context(beside(further, own, task.tables))
             operator = stack.enter_context(_operator(args, task, mover, folder))
             recorder.tell = operator.tell
+            if unseen := level_unknown(task.about):
+                operator.tell(unseen)
             if args.resume:
                 recorder.mark("resumed", taken=sorted(taken))
             patience = PATIENCE_HEADLESS if args.headless else PATIENCE
@@ -291,7 +333,6 @@ def _show(
     truth: dict[str, Any] | None,
     further: Mapping[str, Calibration],
 ) -> None:
-    from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.table import show
     from fieldcal.session import RESULT
 
@@ -302,7 +343,6 @@ def _show(
         sys.stdout.write(json.dumps({**found.to_json(), **more}) + "\n")
         return
     show(found, truth)
-    show_decision(found)
     for name, each in further.items():
         sys.stdout.write(f"\n{name}\n")
         show(each)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from typing import Any
 
 
@@ -12,28 +13,53 @@ def add_site(parser: argparse.ArgumentParser) -> None:
     add = group.add_argument
     add("--name", help="name of the device")
     add("--serial", help="its serial number, the key of its history")
-    add("--grade", choices=("tactical", "navigation"), default="tactical")
-    add("--latitude", type=float, default=None, metavar="DEG", help="default: 45")
-    add("--height", type=float, default=0.0, metavar="M", help="above the ellipsoid")
+    add("--grade", choices=("tactical", "navigation"), help="default: tactical")
+    add("--latitude", type=float, metavar="DEG", help="default: 45")
+    add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
     add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
     add(
         "--mounting",
-        default="+x,+y,+z",
         metavar="X,Y,Z",
-        help="procedure axis x, y, z is device axis ... (z-up unit: +x,-z,+y)",
+        help="procedure axis x, y, z is device axis ... (default: +x,+y,+z; z-up unit:"
+        " +x,-z,+y)",
     )
 
 
 def site_tables(args: argparse.Namespace, name: str) -> dict[str, Any]:
     """Tables of a session.toml from the options; `name` where none is given."""
-    device = {"name": args.name or name, "grade": args.grade}
-    if args.serial:
-        device["serial"] = args.serial
-    site = {
-        "latitude_deg": 45.0 if args.latitude is None else args.latitude,
-        "height_m": args.height,
+    tables = {
+        "device": {"name": name, "grade": "tactical"},
+        "site": {"latitude_deg": 45.0, "height_m": 0.0},
+        "frame": {"mounting": ["+x", "+y", "+z"]},
     }
-    if args.gravity is not None:
-        site["gravity"] = args.gravity
-    frame = {"mounting": [axis.strip() for axis in args.mounting.split(",")]}
-    return {"device": device, "site": site, "frame": frame}
+    return over(tables, given_tables(args))
+
+
+def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """Only what the options say."""
+    axes = args.mounting and [axis.strip() for axis in args.mounting.split(",")]
+    tables = {
+        "device": {"name": args.name, "serial": args.serial, "grade": args.grade},
+        "site": {
+            "latitude_deg": args.latitude,
+            "height_m": args.height,
+            "gravity": args.gravity,
+        },
+        "frame": {"mounting": axes},
+    }
+    said = {
+        name: {key: value for key, value in table.items() if value is not None}
+        for name, table in tables.items()
+    }
+    return {name: table for name, table in said.items() if table}
+
+
+def over(
+    tables: Mapping[str, Any], given: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Lay what is given over tables; what is no table is left to whoever parses it."""
+    out = dict(tables)
+    for name, table in given.items():
+        if isinstance(out.get(name, {}), Mapping):
+            out[name] = {**out.get(name, {}), **table}
+    return out

@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
         tilt=args.tilt,
         cross=args.cross,
         as_printed=args.as_printed,
-        level_sigma_deg=args.level,
+        level_sigma_deg=session.about.level_deg if args.level is None else args.level,
         heading_sigma_deg=args.heading,
         angle_sigma_deg=args.angles or 0.0,
     )

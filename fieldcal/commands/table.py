@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.wording import number, title
 from fieldcal.commands.installing import lines
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def show(
@@ -52,17 +55,30 @@ def show(
     _tell(console, calibration)
 
 
-def _tell(console: Any, calibration: Calibration) -> None:
-    def line(text: str) -> None:
-        console.print(text, markup=False, soft_wrap=True)
-
-    line(_fit(calibration))
+def _tell(console: Console, calibration: Calibration) -> None:
+    say(console, "", _fit(calibration))
     for told in lines(calibration):
-        line(told)
+        say(console, "", told)
     for warning in calibration.warnings:
-        line(f"! {warning}")
+        say(console, "! ", warning)
     good = "good" if calibration.good else "BAD: do not use these numbers"
-    line(f"verdict: {good}")
+    say(console, "", f"verdict: {good}")
+
+
+def say(console: Console, mark: str, text: str) -> None:
+    """Print a sentence behind a mark: between words on a terminal, else as one line."""
+    from rich.table import Table
+    from rich.text import Text
+
+    if not (mark and console.is_terminal):
+        whole = not console.is_terminal
+        console.print(f"{mark}{text}", markup=False, soft_wrap=whole)
+        return
+    grid = Table.grid()
+    grid.add_column(width=len(mark))
+    grid.add_column()
+    grid.add_row(Text(mark), Text(text))
+    console.print(grid)
 
 
 def concealed_values(truth: Mapping[str, Any]) -> dict[str, float]:

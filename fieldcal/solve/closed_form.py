@@ -92,6 +92,9 @@ def two_position(
         rms=0.0,
         gain=gain,
         warnings=_warnings(observations, scaled, bare, level_sigma, as_printed),
+        extra={"level_sigma_deg": float(np.rad2deg(level_sigma))}
+        if level_sigma
+        else {},
     )
     return whole.only(np.concatenate([scaled | bare, scaled]))
 
@@ -136,7 +139,7 @@ def _warnings(
         notes.append(
             "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to "
             f"{observations.gravity * np.deg2rad(0.1):.3f} m/s^2 unseen; take five "
-            "positions, or say how level it is"
+            "positions, or say how level it is (--level)"
         )
     if as_printed:
         notes.append("as printed: the sign of (5) makes the scale factor of z negative")

@@ -269,11 +269,11 @@ def _bad_position(observations: Observations, bad: Array) -> str:
     name = observations.positions[worst].name
     if bad[worst] > robust.CERTAIN:
         return (
-            f"position {worst} ({name}) disagrees with all others and was given no "
-            "weight: take it again"
+            f"the position {name} disagrees with all others and was given no weight: "
+            "take it again"
         )
     return (
-        f"position {worst} ({name}) may be disturbed (probability "
+        f"the position {name} may be disturbed (probability "
         f"{100 * bad[worst]:.0f} %) and has less weight, which the uncertainties "
         "include: take it again"
     )

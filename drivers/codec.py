@@ -144,7 +144,7 @@ class Codec(ABC):
         ones = np.ones(len(raw.six))
         arrived = t_host[raw.which]
         t = clock.times(raw.stamps, ones if steps is None else steps, arrived)
-        new = ~np.isnan(t)
+        new = ~np.isnan(t) if np.isnan(t).any() else slice(None)
         columns = (raw.six[:, :3], raw.six[:, 3:], raw.temperature, raw.seq, arrived)
         return Block.of(t[new], *(column[new] for column in columns))
 

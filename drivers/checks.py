@@ -69,7 +69,9 @@ def crc16(data: Bytes, starts: Index, ends: Index) -> Words:
     sizes, group, counts = np.unique(
         ends - starts, return_inverse=True, return_counts=True
     )
-    for i, (size, count) in enumerate(zip(sizes.tolist(), counts.tolist(), strict=True)):
+    for i, (size, count) in enumerate(
+        zip(sizes.tolist(), counts.tolist(), strict=True)
+    ):
         which = np.flatnonzero(group == i)
         if count < FEW:
             each = (data[starts[k] : ends[k]] for k in which.tolist())

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import ACC_UNITS, GYR_UNITS
+from fieldcal.drivers.checks import sums
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, rows
@@ -92,12 +93,8 @@ class Codec(Base):
         at = at[(kind >= TIME) & (kind <= 0x5F)]
         whole = at[at + SIZE <= len(data)]
         good = np.ones(len(at), dtype=bool)
-        if len(whole):
-            raw = rows(data, whole, SIZE)
-            total = raw[:, 0].copy()
-            for i in range(1, SIZE - 1):
-                total += raw[:, i]
-            good[: len(whole)] = total == raw[:, -1]
+        last = whole + SIZE - 1
+        good[: len(whole)] = sums(data, whole, last) == data[last]
         undecided = len(data) - (len(data) > 0 and int(data[-1]) == 0x55)
         return Candidates(at, at + SIZE, good, undecided)
 

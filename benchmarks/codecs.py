@@ -23,8 +23,8 @@ from fieldcal.drivers.serial_imu import SerialPort
 from fieldcal.samples import Block
 from fieldcal.sim_device.wire import open_wire
 
-SAMPLES = 200_000
-RUNS = 11
+SAMPLES = 500_000
+RUNS = 7
 """Runs of each, in turn; medians are shown, and the median of the ratios of pairs."""
 
 GOALS = {"text": 0.1, "vnimu": 0.1}

@@ -29,6 +29,9 @@ from fieldcal.drivers.framing import Bytes, Index, rows
 FEW = 32
 """Stretches of one length for which tables do not pay."""
 
+MOST = 1 << 18
+"""Bytes looked up at a time: strange bytes may be in hundreds of stretches each."""
+
 Words = NDArray[np.uint16]
 
 
@@ -76,10 +79,11 @@ def crc16(data: Bytes, starts: Index, ends: Index) -> Words:
         if count < FEW:
             each = (data[starts[k] : ends[k]] for k in which.tolist())
             found[which] = [crc_hqx(stretch.tobytes(), 0) for stretch in each]
-        else:
-            places = rows(data, starts[which], size) + 256 * np.arange(size)[::-1]
-            parts = _remainders(size).take(places)
-            found[which] = np.bitwise_xor.reduce(parts, axis=1)  # (3)
+            continue
+        table, at = _remainders(size), 256 * np.arange(size)[::-1]
+        for some in np.array_split(which, 1 + count * size // MOST):
+            parts = table.take(rows(data, starts[some], size) + at)
+            found[some] = np.bitwise_xor.reduce(parts, axis=1)  # (3)
     return found
 
 

@@ -45,15 +45,15 @@ for _ in sys.stdin:
 """
 
 
-def stream(name: str) -> bytes:
+def stream(name: str, samples: int = SAMPLES) -> bytes:
     """Bytes of the samples, one after the other."""
     rng = np.random.default_rng(1)
     sent = Block.of(
-        np.arange(SAMPLES) / 1000,
-        rng.normal(0, 10, (SAMPLES, 3)),
-        rng.normal(0, 1, (SAMPLES, 3)),
-        rng.normal(25, 1, SAMPLES),
-        np.arange(SAMPLES, dtype=float),
+        np.arange(samples) / 1000,
+        rng.normal(0, 10, (samples, 3)),
+        rng.normal(0, 1, (samples, 3)),
+        rng.normal(25, 1, samples),
+        np.arange(samples, dtype=float),
     )
     return open_wire(name).encode(sent)
 

@@ -15,6 +15,7 @@ import serial
 
 from fieldcal.driver import Driver
 from fieldcal.drivers.codec import open_codec, recognise
+from fieldcal.drivers.mavlink_heard import autopilot
 from fieldcal.drivers.options import split
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
@@ -91,6 +92,7 @@ class Imu(Driver):
         self.health = self._codec.health
         self._skew = Skew(self.health)
         baud = int(options.number("baud", self._codec.bauds[0], 50, 1e8))
+        self._baud = baud
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
         options.finish()
         self._reader = Reader(port, lambda: SerialPort(port, baud), patience)
@@ -126,6 +128,12 @@ class Imu(Driver):
     def _garbage(self) -> str:
         data = b"".join(chunk.data for chunk in self._heard)[-RECENT:]
         known = recognise(data, self._heard[-1].t_host - self._heard[0].t_host)
+        if known is None and (heard := autopilot(data)):
+            query = f"&{heard.query}" if heard.query else ""
+            return (
+                f"these are no {self._format} bytes but an autopilot's; try "
+                f"mavlink:{self.name}?baud={self._baud}{query}"
+            )
         if known is None:
             return (
                 "bytes come, but no format that is known; check the baud rate, or ask "

@@ -19,7 +19,8 @@ from fieldcal.drivers.can_frames import pack_message
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.serial_imu import POLL, SerialPort, reason
+from fieldcal.drivers.serial_imu import SerialPort, reason
+from fieldcal.drivers.tcp import POLL
 from fieldcal.errors import DeviceError, InputError
 
 if TYPE_CHECKING:

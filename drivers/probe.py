@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from fieldcal.drivers.codec import codec_class, formats, recognise
 from fieldcal.drivers.mavlink_heard import autopilot
-from fieldcal.drivers.serial_imu import SerialPort
+from fieldcal.drivers.serial_imu import open_port
 from fieldcal.errors import DeviceError
 
 SILENT = 2
@@ -93,7 +93,7 @@ def _told(port: str, baud: int, data: bytes, took: float) -> Finding | None:
 
 def _listen(port: str, baud: int, seconds: float) -> tuple[bytes, float]:
     """Bytes of a port, and how long they took."""
-    link = SerialPort(port, baud)
+    link = open_port(port, baud)
     try:
         data, begin = bytearray(), monotonic()
         took = 0.0

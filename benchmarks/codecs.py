@@ -23,8 +23,8 @@ from fieldcal.drivers.serial_imu import SerialPort
 from fieldcal.samples import Block
 from fieldcal.sim_device.wire import open_wire
 
-SAMPLES = 200_000
-RUNS = 11
+SAMPLES = 500_000
+RUNS = 7
 """Runs of each, in turn; medians are shown, and the median of the ratios of pairs."""
 
 GOALS = {"text": 0.1, "vnimu": 0.1}
@@ -45,15 +45,15 @@ for _ in sys.stdin:
 """
 
 
-def stream(name: str) -> bytes:
+def stream(name: str, samples: int = SAMPLES) -> bytes:
     """Bytes of the samples, one after the other."""
     rng = np.random.default_rng(1)
     sent = Block.of(
-        np.arange(SAMPLES) / 1000,
-        rng.normal(0, 10, (SAMPLES, 3)),
-        rng.normal(0, 1, (SAMPLES, 3)),
-        rng.normal(25, 1, SAMPLES),
-        np.arange(SAMPLES, dtype=float),
+        np.arange(samples) / 1000,
+        rng.normal(0, 10, (samples, 3)),
+        rng.normal(0, 1, (samples, 3)),
+        rng.normal(25, 1, samples),
+        np.arange(samples, dtype=float),
     )
     return open_wire(name).encode(sent)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic, perf_counter, process_time, sleep
 
-from benchmarks.codecs import SAMPLES, TOLD, stream
+from benchmarks.codecs import TOLD, stream
 from fieldcal.driver import Driver, open_driver
 from fieldcal.errors import DeviceError
 
@@ -52,8 +52,9 @@ sys.stdin.readline()
 
 def carried(name: str, count: int) -> tuple[int, int, float]:
     """Samples sent to each, the most that one of the drivers lost, share of a core."""
-    data = stream(name)
-    size, cores = len(data) // SAMPLES, sorted(os.sched_getaffinity(0))
+    samples = int(RATE * SECONDS)
+    data, cores = stream(name, samples), sorted(os.sched_getaffinity(0))
+    size = len(data) // samples
     with TemporaryDirectory() as folder:
         file = Path(folder, "stream")
         file.write_bytes(data)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import errno
 import logging
+import socket
 from collections.abc import Mapping
+from contextlib import suppress
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +19,8 @@ from fieldcal.drivers.can_frames import pack_message
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.serial_imu import POLL, SerialPort, reason
+from fieldcal.drivers.serial_imu import SerialPort, reason
+from fieldcal.drivers.tcp import POLL
 from fieldcal.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
@@ -28,6 +31,9 @@ MOST = 2000
 
 LONGEST = 0.02
 """Longest time that frames are collected before they are handed on, s."""
+
+WAITING = 1 << 21
+"""Bytes that the kernel is asked to keep for us: its own 200 KB are 0.1 s of a bus."""
 
 _NO_CAN = (
     "the kernel has no CAN; load it with `modprobe can_raw`, or use another interface,"
@@ -106,6 +112,9 @@ class BusSource:
 
     def __init__(self, bus: BusABC) -> None:
         self._bus = bus
+        with suppress(NotImplementedError, OSError):  # a bus that is no socket
+            with socket.fromfd(bus.fileno(), socket.AF_INET, socket.SOCK_DGRAM) as own:
+                own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WAITING)
 
     def read(self) -> bytes:
         """Return rows of the frames that came, waiting `POLL` seconds for the first.

@@ -17,7 +17,7 @@ import numpy as np
 
 from fieldcal.driver import Health
 from fieldcal.drivers import protocols
-from fieldcal.drivers.framing import Bytes, Candidates, Found, resolve
+from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, resolve
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
@@ -144,7 +144,7 @@ class Codec(ABC):
         ones = np.ones(len(raw.six))
         arrived = t_host[raw.which]
         t = clock.times(raw.stamps, ones if steps is None else steps, arrived)
-        new = ~np.isnan(t)
+        new = ~np.isnan(t) if np.isnan(t).any() else slice(None)
         columns = (raw.six[:, :3], raw.six[:, 3:], raw.temperature, raw.seq, arrived)
         return Block.of(t[new], *(column[new] for column in columns))
 
@@ -161,15 +161,19 @@ class Codec(ABC):
         found = resolve(self.scan(array), len(data))
         self.health.bad += found.bad
         self.health.skipped += found.skipped
-        marks = np.array(self._arrivals)
-        late = np.searchsorted(marks[:, 0] - self._begin, found.ends)
         block = None
         if len(found.starts):
-            block = self.decode(array, found, marks[late, 1])
+            block = self.decode(array, found, self._arrived(found.ends))
         self._rest = data[found.rest :]
         self._begin += found.rest
         self._arrivals = [mark for mark in self._arrivals if mark[0] > self._begin]
         return block
+
+    def _arrived(self, ends: Index) -> Array:
+        """When the frames that end there were all there, (m,) s."""
+        marks = np.array(self._arrivals)
+        done = np.searchsorted(ends, marks[:, 0] - self._begin, side="right")
+        return np.repeat(marks[:, 1], np.diff(done, prepend=0))
 
 
 def recognise(data: bytes, seconds: float) -> tuple[str, Likeness] | None:

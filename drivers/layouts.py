@@ -87,6 +87,8 @@ def in_order(parts: Iterable[Raw]) -> Raw | None:
     some = list(parts)
     if not some:
         return None
+    if len(some) == 1:
+        return some[0]
     joined = [np.concatenate(column) for column in zip(*some, strict=True)]
     order = np.argsort(joined[0], kind="stable")
     return Raw(*(column[order] for column in joined))
@@ -106,9 +108,14 @@ def alike(data: Bytes, found: Found, walk: Walk) -> Iterator[Alike]:
         if layout is None:
             left = left[1:]
             continue
-        same = left[lengths[left] == size]
+        candidates = lengths[left] == size
+        same = left[candidates]
         frames = rows(data, found.starts[same], size)
-        marks = list(layout.marks)
-        match = (frames[:, marks] == frames[0, marks]).all(axis=1)
-        yield Alike(same[match], frames[match], layout.fields)
-        left = np.setdiff1d(left, same[match], assume_unique=True)
+        match = np.ones(len(same), dtype=bool)
+        for mark in layout.marks:
+            match &= frames[:, mark] == frames[0, mark]
+        if not match.all():
+            same, frames = same[match], frames[match]
+            candidates[candidates] = match
+        yield Alike(same, frames, layout.fields)
+        left = left[~candidates]

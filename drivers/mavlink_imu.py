@@ -45,14 +45,17 @@ HEARTBEAT = 3.0
 USUAL = 50.0
 """Rate that is asked for, Hz: a radio link carries it."""
 
+FIRST = 2.0
+"""Longest wait for samples that tell unit and rate, s: there may be none yet."""
+
 RETURN = 4.0
 """How long giving back the installed calibration may take, s."""
 
 QUIET = 2.0
 """Time without samples after which the rate is asked for again, s: a reboot."""
 
-RECENT = 256
-"""Samples that the rate is told from."""
+FEW, RECENT = 16, 256
+"""Least and most samples that the rate is told from."""
 
 Places = tuple[int, int]
 
@@ -260,6 +263,16 @@ class Imu(Driver):
         if self._talk.installed is not None and self._talk.installed.taken_out:
             self._early.clear()  # these came before the calibration was out
             self._decoder.drop()
+        self._meet(monotonic() + FIRST)
+
+    def _meet(self, until: float) -> None:
+        """Listen until the unit and the rate are known; the samples wait."""
+        while monotonic() < until:
+            if self._decoder.acc_unit and len(self._recent) >= FEW:
+                return
+            block = self._hear(0.05)
+            if block is not None:
+                self._early.append(block)
 
     def _check_one(self) -> None:
         """Refuse to choose between several vehicles."""
@@ -282,7 +295,8 @@ class Imu(Driver):
         elif self._talk.vehicle:
             cause = f"an autopilot is there, but sends no {wanted}; try another message"
         else:
-            cause = "bytes come, but no heartbeat of an autopilot; check baud rate"
+            cause = "bytes come, but no heartbeat of an autopilot; check baud rate and"
+            cause += f" what is plugged in: `fieldcal ports --probe {self.name}`"
         sent = "went silent" if health.samples else "has sent no sample"
         asked = "".join(f" ({sentence})" for sentence in self._talk.says)
         return f"{self.name} {sent} for {timeout:g} s: {cause}{asked}"

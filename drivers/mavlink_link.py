@@ -15,7 +15,8 @@ from contextlib import suppress
 from typing import Protocol
 
 from fieldcal.drivers.reader import Source
-from fieldcal.drivers.serial_imu import POLL, SerialPort
+from fieldcal.drivers.serial_imu import SerialPort
+from fieldcal.drivers.tcp import POLL, Tcp, cannot
 from fieldcal.errors import DeviceError, InputError
 
 WAITING = 1 << 20
@@ -25,8 +26,6 @@ MOST = 512
 """Datagrams taken at once."""
 
 SIZE = 1 << 16
-CALL = 5.0
-"""How long a call may take to be answered, s."""
 
 
 class Line(Source, Protocol):
@@ -56,7 +55,7 @@ class Udp:
             self._socket.setblocking(False)
         except OSError as fault:
             self._socket.close()
-            raise DeviceError(_cannot(place, fault)) from fault
+            raise DeviceError(cannot(place, fault)) from fault
 
     def read(self) -> bytes:
         """Return all datagrams that are there, waiting `POLL` s for the first."""
@@ -78,42 +77,6 @@ class Udp:
 
     def close(self) -> None:
         """Release the socket."""
-        self._socket.close()
-
-
-class Tcp:
-    """A call to an autopilot that waits for one."""
-
-    def __init__(self, place: tuple[str, int]) -> None:
-        self._place = place
-        try:
-            self._socket = socket.create_connection(place, CALL)
-        except OSError as fault:
-            raise DeviceError(_cannot(place, fault)) from fault
-
-    def read(self) -> bytes:
-        """Return all that is there, waiting `POLL` seconds for the first byte.
-
-        Raises
-        ------
-        OSError
-            If the peer has closed.
-
-        """
-        ready, _, _ = select.select([self._socket], [], [], POLL)
-        if not ready:
-            return b""
-        data = self._socket.recv(SIZE)
-        if not data:
-            raise ConnectionResetError(f"{self._place[0]}:{self._place[1]} has closed")
-        return data
-
-    def write(self, data: bytes) -> None:
-        """Send."""
-        self._socket.sendall(data)
-
-    def close(self) -> None:
-        """Hang up."""
         self._socket.close()
 
 
@@ -146,11 +109,3 @@ def _place(endpoint: str, rest: str) -> tuple[str, int]:
             f"mavlink: {endpoint} needs host and port, as in udp:0.0.0.0:14550"
         )
     return host, int(port)
-
-
-def _cannot(place: tuple[str, int], fault: OSError) -> str:
-    why = fault.strerror or str(fault)
-    return (
-        f"cannot open {place[0]}:{place[1]}: {why}; check host and port, and that no "
-        "other program (a ground station) has it"
-    )

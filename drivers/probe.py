@@ -7,7 +7,8 @@ from time import monotonic
 from typing import NamedTuple
 
 from fieldcal.drivers.codec import codec_class, formats, recognise
-from fieldcal.drivers.serial_imu import SerialPort
+from fieldcal.drivers.mavlink_heard import autopilot
+from fieldcal.drivers.serial_imu import open_port
 from fieldcal.errors import DeviceError
 
 SILENT = 2
@@ -24,7 +25,7 @@ class Finding(NamedTuple):
     ----------
     port : its path
     url : address that opens it, empty if no format was known
-    format : name of the format, empty if none was known
+    format : name of the format, or mavlink; empty if none was known
     baud : rate at which it was known, 0 if none
     rate_hz : samples a second, as they arrived
     says : one sentence
@@ -53,21 +54,15 @@ def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> Find
     heard = silent = 0
     for baud in bauds() if rates is None else rates:
         try:
-            data, took = _listen(port, baud, seconds)
+            data, found = _answer(port, baud, seconds)
         except (DeviceError, OSError) as fault:
             return Finding(port, "", "", 0, 0.0, str(fault))
         heard += len(data)
         silent += not data
         if silent >= SILENT and not heard:
             break
-        known = recognise(data, took)
-        if known is not None:
-            name, like = known
-            query = f"&{like.query}" if like.query else ""
-            url = f"serial:{port}?format={name}&baud={baud}{query}"
-            rate = like.samples / took
-            says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
-            return Finding(port, url, name, baud, rate, says)
+        if found:
+            return found
     says = (
         "bytes come, but no format that is known"
         if heard
@@ -76,15 +71,35 @@ def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> Find
     return Finding(port, "", "", 0, 0.0, says)
 
 
-def _listen(port: str, baud: int, seconds: float) -> tuple[bytes, float]:
-    """Bytes of a port, and how long they took."""
-    link = SerialPort(port, baud)
+def _told(port: str, baud: int, data: bytes, took: float) -> Finding | None:
+    """Say whose bytes these are; None if that is not known."""
+    if known := recognise(data, took):
+        name, like = known
+        query = f"&{like.query}" if like.query else ""
+        url = f"serial:{port}?format={name}&baud={baud}{query}"
+        rate = like.samples / took
+        says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
+        return Finding(port, url, name, baud, rate, says)
+    if heard := autopilot(data):
+        query = f"&{heard.query}" if heard.query else ""
+        url, rate = f"mavlink:{port}?baud={baud}{query}", heard.samples / took
+        sends = "no message of an IMU until it is asked"
+        if heard.message:
+            sends = f"{heard.message} about {rate:.0f} times a second"
+        says = f"an autopilot (MAVLink) at {baud} baud, which sends {sends}"
+        return Finding(port, url, "mavlink", baud, rate, says)
+    return None
+
+
+def _answer(port: str, baud: int, seconds: float) -> tuple[bytes, Finding | None]:
+    """Bytes of a port, and whose they are; it stays open until that is known."""
+    link = open_port(port, baud)
     try:
         data, begin = bytearray(), monotonic()
         took = 0.0
         while took < seconds and not (len(data) > ENOUGH and took > seconds / 4):
             data += link.read()
             took = monotonic() - begin
-        return bytes(data), took
+        return bytes(data), _told(port, baud, bytes(data), took)
     finally:
         link.close()

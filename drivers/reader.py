@@ -68,6 +68,7 @@ class Reader:
         self._changed = Condition()
         self._chunks: list[Chunk] = []
         self._held = 0
+        self._awaited = 1
         self._delivered = 0.0
         self._closing = False
         self._fault: Exception | None = None
@@ -86,12 +87,8 @@ class Reader:
         """
         deadline = time.monotonic() + timeout
         with self._changed:
-            pause = min(deadline, self._delivered + BATCH) - time.monotonic()
-            if pause > 0:
-                self._changed.wait_for(lambda: self._ended or self._plenty, pause)
-            self._changed.wait_for(
-                lambda: self._chunks or self._ended, deadline - time.monotonic()
-            )
+            self._await(self._limit // 2, min(deadline, self._delivered + BATCH))
+            self._await(1, deadline)
             chunks, self._chunks, self._held = self._chunks, [], 0
             self._delivered = time.monotonic()
             self._changed.notify_all()
@@ -108,9 +105,13 @@ class Reader:
             self._changed.notify_all()
         self._thread.join()
 
-    @property
-    def _plenty(self) -> bool:
-        return self._held >= self._limit // 2
+    def _await(self, size: int, until: float) -> None:
+        """Wait for so many bytes; who reads wakes nobody for less."""
+        self._awaited = size
+        self._changed.wait_for(
+            lambda: self._held >= size or self._ended,
+            max(0.0, until - time.monotonic()),
+        )
 
     @property
     def _ended(self) -> bool:
@@ -147,7 +148,8 @@ class Reader:
                 self._changed.wait_for(lambda: not self._held or self._closing)
             self._chunks.append(chunk)
             self._held += len(chunk.data)
-            self._changed.notify_all()
+            if self._held >= self._awaited:
+                self._changed.notify_all()
 
     def _mend(self) -> bool:
         """Open the source again; False when patience or the driver ends."""

@@ -2,7 +2,7 @@
 
 Options: ``format`` (a file of protocols/), ``baud``, ``reconnect`` (how long to try
 again after a hang-up, s; 0 for not at all), and those of the format. The port may also
-be a pty, or any URL that pyserial knows, such as ``socket://192.168.1.5:4001``.
+be a pty, ``socket://192.168.1.5:4001``, or any other URL that pyserial knows.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ import serial
 
 from fieldcal.driver import Driver
 from fieldcal.drivers.codec import open_codec, recognise
+from fieldcal.drivers.mavlink_heard import autopilot
 from fieldcal.drivers.options import split
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
+from fieldcal.drivers.tcp import POLL, Tcp
 from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Block, Grain
 
-POLL = 0.1
-"""Longest wait for a byte before the reader looks whether it should end, s."""
+SOCKET = "socket://"
 
 HEARD, RECENT = 4096, 1 << 14
 """Chunks and bytes kept to tell what it is that comes, if it is not the format."""
@@ -75,6 +76,19 @@ class SerialPort:
         self._serial.close()
 
 
+def open_port(port: str, baud: int) -> SerialPort | Tcp:
+    """Open a port, or ``socket://HOST:PORT``; errors as of these.
+
+    pyserial reads a socket byte by byte, and forgets the last ones when it closes.
+    """
+    if not port.startswith(SOCKET):
+        return SerialPort(port, baud)
+    host, _, number = port.removeprefix(SOCKET).rstrip("/").rpartition(":")
+    if not host or not number.isdecimal() or not 0 < int(number) < 65536:
+        raise InputError(f"{port} needs host and port, as in socket://192.168.1.5:4001")
+    return Tcp((host, int(number)))
+
+
 class Imu(Driver):
     """A serial port and the codec of what comes from it."""
 
@@ -91,9 +105,10 @@ class Imu(Driver):
         self.health = self._codec.health
         self._skew = Skew(self.health)
         baud = int(options.number("baud", self._codec.bauds[0], 50, 1e8))
+        self._baud = baud
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
         options.finish()
-        self._reader = Reader(port, lambda: SerialPort(port, baud), patience)
+        self._reader = Reader(port, lambda: open_port(port, baud), patience)
 
     @property
     def reconnecting(self) -> bool:
@@ -126,6 +141,12 @@ class Imu(Driver):
     def _garbage(self) -> str:
         data = b"".join(chunk.data for chunk in self._heard)[-RECENT:]
         known = recognise(data, self._heard[-1].t_host - self._heard[0].t_host)
+        if known is None and (heard := autopilot(data)):
+            query = f"&{heard.query}" if heard.query else ""
+            return (
+                f"these are no {self._format} bytes but an autopilot's; try "
+                f"mavlink:{self.name}?baud={self._baud}{query}"
+            )
         if known is None:
             return (
                 "bytes come, but no format that is known; check the baud rate, or ask "

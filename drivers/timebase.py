@@ -187,7 +187,8 @@ class Stamps:
         if self._count < EARLY:
             return stamps[:0]
         stamps = stamps[: self._renewal - self._count]
-        d = np.diff(stamps, prepend=self._stamp)
+        d = np.empty(len(stamps))
+        d[:1], d[1:] = stamps[:1] - self._stamp, stamps[1:] - stamps[:-1]
         least = 0.0 if self._coarse else 1e-12
         odd = np.flatnonzero(~((d >= least) & (d < 1.5 * self._period)))
         s = stamps[: odd[0] if len(odd) else len(stamps)] + self._offset

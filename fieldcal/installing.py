@@ -13,10 +13,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from fieldcal.drivers.mavlink_installed import Installed, identity
 from fieldcal.drivers.mavlink_parameters import Parameters, same
 from fieldcal.drivers.mavlink_talk import listed
 from fieldcal.errors import DeviceError, InputError
-from fieldcal.session import write_whole
+from fieldcal.session import DESCRIPTION, Session, write_whole
 
 SAVED = "installed-before-"
 """What the name of a file with an old set begins with."""
@@ -105,8 +106,30 @@ def note_done(path: Path, **what: Any) -> None:
     write_whole(path, json.dumps({**document, **what}, indent=2) + "\n")
 
 
+def taken_out(folder: Path) -> list[Path]:
+    """Save the set that a run set to no calibration; no file if it did not.
+
+    A run gives it back when it ends; one that was killed, or lost the link, did not.
+    """
+    session = Session.open(folder)
+    device = session.about.raw.get("run", {}).get("device", "")
+    for mark in reversed(list(session.marks())):
+        told = mark.get("installed") if mark.get("event") == "device" else None
+        if not (told and told.get("taken_out")):
+            continue
+        known = Installed.from_table(told)
+        new = identity(known)
+        old = {name: known.values[name] for name in new}
+        if old != new:  # else a run before it had taken out what there was
+            first = device if isinstance(device, str) else device[0]
+            return [save(folder, first, old, new)]
+    return []
+
+
 def saved(path: Path) -> tuple[Path, dict[str, Any]]:
     """The last set that was saved in a session and written, or the one of a file.
+
+    Where nothing was written: what a run had taken out and could not give back.
 
     Raises
     ------
@@ -115,6 +138,8 @@ def saved(path: Path) -> tuple[Path, dict[str, Any]]:
 
     """
     files = sorted(path.glob(f"{SAVED}*.json")) if path.is_dir() else [path]
+    if not files and (path / DESCRIPTION).is_file():
+        files = taken_out(path)
     for file in reversed(files):
         try:
             document = json.loads(file.read_text("utf-8"))

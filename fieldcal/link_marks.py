@@ -24,6 +24,9 @@ LONG = 0.5
 CLOCK = 30.0
 """Time between two marks of the clock, s of the host's clock."""
 
+LIVE = ("rate_hz", "says")
+"""Notes of a driver that go with the samples."""
+
 COUNTS = ("gaps", "missing", "repeated", "restarts", "bad", "skipped")
 
 
@@ -60,6 +63,7 @@ class LinkMarks:
         self._marked = -EVERY
         self._clocked = monotonic()
         self._grain = Grain()
+        self._facts = self._told()
 
     def take(self, block: Block) -> None:
         """Note what happened up to these samples."""
@@ -69,6 +73,9 @@ class LinkMarks:
         if self._grain != self._driver.grain:
             self._grain = self._driver.grain
             self._recorder.mark("grain", **self._label, **asdict(self._grain))
+        if self._told() != self._facts:
+            self._facts = self._told()
+            self._recorder.mark("device", **self._label, **self._driver.notes)
         if self._counts() == self._before:
             self._clock()
             return
@@ -85,6 +92,10 @@ class LinkMarks:
         if self._counts() != self._before:
             self._mark()
         self._clock(at_once=True)
+
+    def _told(self) -> dict[str, Any]:
+        """What the driver knows of the device, without what changes all the time."""
+        return {k: v for k, v in self._driver.notes.items() if k not in LIVE}
 
     def _counts(self) -> dict[str, int]:
         return {name: getattr(self._driver.health, name) for name in COUNTS}

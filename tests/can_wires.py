@@ -112,3 +112,13 @@ def until_the_end(imu: Driver) -> Block:
         for block in imu.blocks():
             got.append(block)
     return concat(got)
+
+
+def until(imu: Driver, wanted: int) -> Block:
+    """All samples until there are so many, and those that came with the last."""
+    got: list[Block] = []
+    for block in imu.blocks():
+        got.append(block)
+        if sum(map(len, got)) >= wanted:
+            break
+    return concat([*got, imu.drain()])

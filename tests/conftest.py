@@ -1,6 +1,8 @@
 """What every test needs: property tests that do not depend on the machine's speed."""
 
 import os
+import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -39,3 +41,23 @@ def shared() -> Path:
     if not SHARED.is_dir():
         pytest.skip(f"{SHARED.name}/ is not beside the project: no recordings to read")
     return SHARED
+
+
+@pytest.fixture
+def namespace() -> Iterator[tuple[str, ...]]:
+    """A network of its own with multicast on its loopback."""
+    name = f"fieldcal{os.getpid()}"
+    if shutil.which("ip") is None:
+        pytest.skip("no `ip` to make a network namespace with")
+    made = subprocess.run(
+        ["ip", "netns", "add", name], capture_output=True, check=False
+    )
+    if made.returncode:
+        pytest.skip(f"no network namespace: {made.stderr.decode().strip()}")
+    inside = ("ip", "netns", "exec", name)
+    try:
+        for command in ("ip link set lo up", "ip route add 224.0.0.0/4 dev lo"):
+            subprocess.run([*inside, *command.split()], check=True)
+        yield inside
+    finally:
+        subprocess.run(["ip", "netns", "del", name], check=True)

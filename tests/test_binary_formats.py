@@ -187,6 +187,46 @@ def test_esf_raw_in_bursts() -> None:
     np.testing.assert_allclose(block.gyr[9], np.deg2rad([1, -1, 0.5]))
 
 
+KINDS = {16: 0, 17: 1, 18: 2, 14: 3, 13: 4, 5: 5, 12: 6}
+PER_UNIT = np.array([2.0**10] * 3 + [np.rad2deg(2.0**12)] * 3 + [100])
+
+
+def read_by_the_library(messages: list[bytes]) -> list[list[float]]:
+    """Samples of ESF-RAW messages, value by value, as the library takes them apart."""
+    pyubx2 = pytest.importorskip("pyubx2")
+    samples: dict[int, list[float]] = {}
+    for raw in messages:
+        message = pyubx2.UBXReader.parse(raw)
+        for i in range(1, (len(raw) - 12) // 8 + 1):
+            word = getattr(message, f"data_{i:02d}")
+            tag = int.from_bytes(getattr(message, f"sTag_{i:02d}"), "little")
+            column = KINDS[word[3]]
+            value = int.from_bytes(word[:3], "little", signed=True)
+            row = samples.setdefault(tag, [np.nan] * 7)
+            row[column] = value / PER_UNIT[column]
+    return list(samples.values())
+
+
+@pytest.mark.parametrize("per_message", [1, 3])
+@pytest.mark.parametrize("shuffled", ["never", "once", "always"])
+def test_esf_raw_is_what_the_library_reads(shuffled: str, per_message: int) -> None:
+    rng = np.random.default_rng(per_message)
+    messages, tag = [], 0
+    for i in range(30):
+        order, payload = list(KINDS), bytes(4)
+        for _ in range(per_message):
+            if shuffled == "always" or (shuffled == "once" and i == 17):
+                order = rng.permutation(list(KINDS)).tolist()
+            tag += 256
+            for kind in order:
+                value = int(rng.integers(-(2**23), 2**23))
+                payload += ubx_word(kind, value) + struct.pack("<I", tag)
+        messages.append(ubx_message(3, payload))
+    block = fed(codec("ubx"), b"".join(messages))
+    seven = np.column_stack([block.six, block.temperature])
+    np.testing.assert_allclose(seven, read_by_the_library(messages), rtol=1e-12)
+
+
 @pytest.mark.parametrize("counted", [True, False])
 def test_esf_meas_of_two_sensors_is_put_together(counted: bool) -> None:
     pyubx2 = pytest.importorskip("pyubx2")

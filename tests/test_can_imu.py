@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 import re
-import shutil
 import subprocess
 import sys
 import threading
@@ -162,26 +161,6 @@ def test_hang_up_and_return_is_a_gap(
         assert imu.health.gaps == 1 and imu.health.missing > 300
         t = np.concatenate([before.t, after.t])
         assert (np.diff(t) > 0).all() and np.diff(t).max() > 3.9
-
-
-@pytest.fixture
-def namespace() -> Iterator[tuple[str, ...]]:
-    """A network of its own with multicast on its loopback."""
-    name = f"fieldcal{os.getpid()}"
-    if shutil.which("ip") is None:
-        pytest.skip("no `ip` to make a network namespace with")
-    made = subprocess.run(
-        ["ip", "netns", "add", name], capture_output=True, check=False
-    )
-    if made.returncode:
-        pytest.skip(f"no network namespace: {made.stderr.decode().strip()}")
-    inside = ("ip", "netns", "exec", name)
-    try:
-        for command in ("ip link set lo up", "ip route add 224.0.0.0/4 dev lo"):
-            subprocess.run([*inside, *command.split()], check=True)
-        yield inside
-    finally:
-        subprocess.run(["ip", "netns", "del", name], check=True)
 
 
 HOST = """

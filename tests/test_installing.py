@@ -149,3 +149,40 @@ def test_a_run_that_is_told_to_end_gives_the_calibration_back(
             np.testing.assert_allclose(imu.installed.of("acc_offset"), [0.5, 0, 0])
             assert imu.installed.values["INS_GYROFFS_Z"] == pytest.approx(0.01)
         sim.terminate()
+
+
+def test_what_a_killed_run_left_out_can_be_given_back(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--mavlink", f"tcpin:127.0.0.1:0?{HAS}", "--speed", "5"]
+    folder = tmp_path / "s"
+    with subprocess.Popen(
+        [sys.executable, "-m", "fieldcal", "sim", *options],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as sim:
+        assert sim.stdout
+        place = sim.stdout.readline().strip()
+        run = subprocess.Popen(
+            [sys.executable, "-m", "fieldcal", "run", "five_position", "--headless"]
+            + ["--device", f"mavlink:{place}?installed=identity", "-o", str(folder)],
+            stderr=subprocess.DEVNULL,
+        )
+        file, deadline = folder / "samples.arrows", monotonic() + 30
+        while not (file.exists() and file.stat().st_size > 10_000):
+            assert monotonic() < deadline and run.poll() is None
+            sleep(0.02)
+        run.kill()
+        run.wait()
+        with open_driver(f"mavlink:{place}") as imu:
+            assert isinstance(imu, Imu) and imu.installed is not None
+            np.testing.assert_array_equal(imu.installed.of("acc_offset"), 0)
+        assert main(["undo", str(folder), "--yes"]) == 0
+        assert "INS_ACCOFFS_X: 0 -> 0.5" in capsys.readouterr().out
+        with open_driver(f"mavlink:{place}") as imu:
+            assert isinstance(imu, Imu) and imu.installed is not None
+            np.testing.assert_allclose(imu.installed.of("acc_offset"), [0.5, 0, 0])
+            assert imu.installed.values["INS_ACCSCAL_Y"] == pytest.approx(1.02)
+        assert main(["undo", str(folder), "--yes"]) == 2
+        assert "nothing was written from there" in capsys.readouterr().err
+        sim.terminate()

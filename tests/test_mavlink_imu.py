@@ -141,16 +141,19 @@ def test_what_cannot_be_given_back_is_named() -> None:
 
 
 def test_a_recording_keeps_what_is_installed(tmp_path: Path) -> None:
-    place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5"
+    place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5&acc_unit=mm/s^2"
     with autopilot(place, "--speed", "50") as (where, _):
         command = [sys.executable, "-m", "fieldcal", "run", "two_position"]
-        command += ["--headless", "--device", f"mavlink:{where}?rate=100"]
-        command += ["-o", str(tmp_path / "session")]
+        command += ["--headless", "--seconds", "5", "-o", str(tmp_path / "session")]
+        command += ["--device", f"mavlink:{where}?message=RAW_IMU&rate=100"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr  # nobody turned it
+    assert "asked for 100 Hz, got 100 Hz" in done.stderr
     first = (tmp_path / "session" / "marks.jsonl").read_text().splitlines()[0]
     mark = json.loads(first)
-    assert mark["event"] == "device" and mark["message"] == "HIGHRES_IMU"
+    assert mark["event"] == "device" and mark["message"] == "RAW_IMU"
+    assert mark["acc_unit"] == "mm/s^2"
+    assert mark["rate_hz"] == pytest.approx(100, rel=0.01)
     assert mark["installed"]["parameters"]["INS_ACCOFFS_X"] == 0.5
 
 

@@ -18,6 +18,7 @@ from fieldcal.drivers.mavlink_log import split
 from fieldcal.drivers.mavlink_samples import Decoder
 from fieldcal.drivers.options import Options
 from fieldcal.errors import DeviceError, InputError
+from fieldcal.link_marks import LinkMarks
 from fieldcal.samples import Array, Block, Grain, concat
 
 G = 9.80665
@@ -117,6 +118,23 @@ def test_the_log_plays_as_a_device(log: bytes, tmp_path: Path) -> None:
         pytest.raises(DeviceError, match="ended"),
     ):
         list(imu.blocks())
+
+
+def test_a_unit_that_shows_later_is_marked_then(log: bytes, tmp_path: Path) -> None:
+    class Marks(list[dict[str, Any]]):
+        def mark(self, event: str, **what: Any) -> None:
+            self.append({"event": event, **what})
+
+    path, kept = tmp_path / "flight.tlog", Marks()
+    path.write_bytes(log[:200_000])
+    with open_driver(f"mavlink:{path}?speed=max&message=RAW_IMU") as imu:
+        assert imu.notes["acc_unit"] == ""
+        marks = LinkMarks(imu, kept)
+        with pytest.raises(DeviceError, match="has ended after"):
+            for block in imu.blocks():
+                marks.take(block)
+    (told,) = [mark for mark in kept if mark["event"] == "device"]
+    assert told["acc_unit"] == "mg" and told["vehicle"] == (1, 1)
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:

@@ -43,7 +43,8 @@ def test_the_wrong_baud_rate(
         url = f"serial:{device.port}?format=mip&baud=115200"
         said = failed(url, tmp_path / "s", capsys)
     assert "no format that is known; check the baud rate" in said
-    with VirtualDevice(["--serial", "mip", "--baud", "921600"]) as device:
+    sends = ["--serial", "mip", "--baud", "921600"]
+    with VirtualDevice(sends, once=False) as device:  # a probe comes and goes
         assert main(["ports", "--probe", "--seconds", "2", device.port]) == 0
     assert "?format=mip&baud=921600" in capsys.readouterr().out
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+import socket
 import subprocess
 import sys
 import threading
@@ -103,6 +104,21 @@ def test_what_came_before_a_hang_up_is_delivered(pty: tuple[int, str]) -> None:
         assert len(collect(imu, 50)) == 50
         with pytest.raises(DeviceError, match="hung up"):
             collect(imu, 1)
+
+
+def test_a_port_behind_a_network_to_its_last_byte() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        place = f"socket://127.0.0.1:{server.getsockname()[1]}"
+        with open_driver(f"serial:{place}?format=witmotion&reconnect=0") as imu:
+            call, _ = server.accept()
+            with call:
+                call.sendall(b"".join(CYCLES) + ACC[:5])
+            assert collect(imu, len(CYCLES)).tolist() == list(range(len(CYCLES)))
+            assert imu.health.skipped == imu.health.gaps == 0
+            with pytest.raises(DeviceError, match=f"{place} hung up: check cable"):
+                collect(imu, 1)
+    with pytest.raises(DeviceError, match="Connection refused; check host and port"):
+        open_driver(f"serial:{place}")
 
 
 def test_unplugged_and_back_resumes_with_a_gap(tmp_path: Path) -> None:
@@ -222,6 +238,8 @@ def test_permission_denied(tmp_path: Path) -> None:
         "serial:x?format=morse",
         "serial:x?bauds=9600",
         "serial:x?baud",
+        "serial:socket://127.0.0.1",
+        "serial:socket://:4001",
     ],
 )
 def test_addresses_that_are_none(url: str) -> None:

@@ -17,6 +17,7 @@ u-blox M8 protocol, UBX-ESF.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
@@ -26,6 +27,8 @@ from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, head
 from fieldcal.drivers.layouts import Raw, in_order
 from fieldcal.drivers.options import Options
 from fieldcal.samples import Array, Block, Grain
+
+Words = NDArray[np.uint32]
 
 SYNC = b"\xb5\x62"
 HEAD, TAIL, LONGEST = 6, 2, 4104
@@ -53,7 +56,7 @@ class Codec(Base):
         tick = options.number("tick_us", TICK_US, 1e-3, 1e6) * 1e-6
         self._number = MEAS if meas else RAW
         self._tick = 1e-3 if meas else tick
-        self._held = np.empty((0, 9))
+        self._held: Array = np.empty((0, 9))
         self._usual: Mask | None = None
         span = 2**32 * 1e-3 if meas else 2**TAG_BITS * tick
         self._clock = Clock(self.health, options, span=span)
@@ -92,7 +95,7 @@ class Codec(Base):
             which = np.flatnonzero(ours & (kinds == kind))
             payload = rows(data, starts[which], kind >> 8)[:, HEAD:-TAIL]
             read = _meas if self._number == MEAS else _raw
-            values = read(np.ascontiguousarray(payload))
+            values = read(payload)
             if values is not None:
                 parts.append(_samples(which, *values))
         order = in_order(parts)
@@ -104,11 +107,7 @@ class Codec(Base):
     def _join(self, raw: Raw, t_host: Array) -> tuple[Raw, Array]:
         """Put samples of one tag together; hold back the last while it lacks values."""
         ahead = [raw.stamps, t_host, raw.six, raw.temperature]
-        table = np.vstack([self._held, np.column_stack(ahead)])
-        sample = np.cumsum(np.diff(table[:, 0], prepend=np.nan) != 0) - 1
-        joined = np.full((sample[-1] + 1, table.shape[1]), np.nan)
-        row, column = np.nonzero(~np.isnan(table))
-        joined[sample[row], column] = table[row, column]
+        joined = _merged(np.vstack([self._held, np.column_stack(ahead)]))
         lacks = int(np.isnan(joined[-1, 2:8]).any())
         self._held = joined[len(joined) - lacks :]
         joined = self._like_the_first(joined[: len(joined) - lacks])
@@ -124,31 +123,66 @@ class Codec(Base):
         """
         if self._number == MEAS or not len(joined):
             return joined
-        known = ~np.isnan(joined[:, 2:8])
+        lacks = np.isnan(joined[:, 2:8])
         if self._usual is None:
-            self._usual = known[0]
-        alike = (known | ~self._usual).all(axis=1)
+            self._usual = ~lacks[0]
+        if not lacks.any():
+            return joined
+        alike = ~(lacks & self._usual).any(axis=1)
         self.health.bad += int(np.count_nonzero(~alike))
         return joined[alike]
 
 
-def _samples(which: Index, words: Index, tags: Index) -> Raw:
+def _samples(which: Index, words: Words, tags: Index) -> Raw:
     """Samples of messages of k values, words and tags (m, k); stamps in ticks."""
     begins = np.ones(tags.shape, dtype=bool)
     begins[:, 1:] = tags[:, 1:] != tags[:, :-1]
-    sample = np.cumsum(begins.ravel()) - 1
-    kind, value = (words >> 24).ravel() & 0x3F, (words & 0xFFFFFF).ravel()
-    signed = np.where(value >= 1 << 23, value - (1 << 24), value)
-    columns = np.full((sample[-1] + 1, len(SCALES)), np.nan)
-    known = COLUMN[kind] >= 0
-    columns[sample[known], COLUMN[kind[known]]] = signed[known]
+    kinds = words >> 24 & 0x3F
+    values = (words << 8).view(np.int32) >> 8  # with the sign of 24 bits
+    if (kinds == kinds[0]).all() and (begins == begins[0]).all():
+        columns = _like_the_first_message(kinds[0], values, begins[0])
+    else:
+        columns = _one_by_one(kinds.ravel(), values.ravel(), begins.ravel())
     columns *= SCALES
-    message = np.repeat(which, words.shape[1])[begins.ravel()]
+    message = which[np.flatnonzero(begins) // words.shape[1]]
     stamps = tags[begins].astype(float)
-    whole = ~np.isnan(columns[:, :6]).all(axis=1)
-    unknown = np.full(np.count_nonzero(whole), np.nan)
-    six, temperature = columns[whole, :6], columns[whole, 6]
-    return Raw(message[whole], six, temperature, stamps[whole], unknown)
+    lacks = np.isnan(columns[:, :6])
+    some = ~lacks.all(axis=1) if lacks.any() else slice(None)
+    six, temperature = columns[some, :6], columns[some, 6]
+    unknown = np.full(len(six), np.nan)
+    return Raw(message[some], six, temperature, stamps[some], unknown)
+
+
+def _merged(table: Array) -> Array:
+    """Join rows that follow each other with one tag, which stands in column 0."""
+    begins = np.diff(table[:, 0], prepend=np.nan) != 0
+    if begins.all():
+        return table
+    sample = np.cumsum(begins) - 1
+    joined = np.full((sample[-1] + 1, table.shape[1]), np.nan)
+    row, column = np.nonzero(~np.isnan(table))
+    joined[sample[row], column] = table[row, column]
+    return joined
+
+
+def _like_the_first_message(kinds: Index, values: Index, begins: Mask) -> Array:
+    """Columns of samples where all messages hold the same kinds in the same order."""
+    sample = np.cumsum(begins) - 1
+    columns = np.full((len(values), sample[-1] + 1, len(SCALES)), np.nan)
+    for i, column in enumerate(COLUMN[kinds].tolist()):
+        if column >= 0:
+            columns[:, sample[i], column] = values[:, i]
+    return columns.reshape(-1, len(SCALES))
+
+
+def _one_by_one(kinds: Index, values: Index, begins: Mask) -> Array:
+    """Columns of samples, whatever kinds the messages hold."""
+    sample = np.cumsum(begins) - 1
+    columns = np.full((sample[-1] + 1, len(SCALES)), np.nan)
+    column = COLUMN[kinds]
+    known = column >= 0
+    columns[sample[known], column[known]] = values[known]
+    return columns
 
 
 def _size(data: Bytes, starts: Index) -> Index:
@@ -162,15 +196,15 @@ def _check(data: Bytes, starts: Index, ends: Index) -> Mask:
     return good
 
 
-def _raw(payload: Bytes) -> tuple[Index, Index] | None:
+def _raw(payload: Bytes) -> tuple[Words, Index] | None:
     """Words and tags of ESF-RAW payloads of one size, (m, k) each."""
     if payload.shape[1] < 12 or payload.shape[1] % 8 != 4:
         return None
-    pairs = np.ascontiguousarray(payload[:, 4:]).view("<u4").astype(np.int64)
-    return pairs[:, 0::2], pairs[:, 1::2] & ((1 << TAG_BITS) - 1)
+    pairs = np.ascontiguousarray(payload[:, 4:]).view("<u4").astype(np.uint32)
+    return pairs[:, 0::2].copy(), pairs[:, 1::2] & ((1 << TAG_BITS) - 1)
 
 
-def _meas(payload: Bytes) -> tuple[Index, Index] | None:
+def _meas(payload: Bytes) -> tuple[Words, Index] | None:
     """Words and tags of ESF-MEAS payloads of one size, (m, k) each."""
     if payload.shape[1] < 12:
         return None
@@ -179,5 +213,5 @@ def _meas(payload: Bytes) -> tuple[Index, Index] | None:
     if payload.shape[1] < 8 + 4 * count or not count:
         return None
     words = np.ascontiguousarray(payload[:, 8 : 8 + 4 * count]).view("<u4")
-    tags = np.ascontiguousarray(payload[:, :4]).view("<u4").astype(np.int64)
-    return words.astype(np.int64), np.repeat(tags, count, axis=1)
+    tags = np.ascontiguousarray(payload[:, :4]).view("<u4").astype(np.uint32)
+    return words.astype(np.uint32), np.repeat(tags, count, axis=1)

@@ -17,10 +17,9 @@ fields from the same, tables of the groups.
 
 from __future__ import annotations
 
-from binascii import crc_hqx
-
 import numpy as np
 
+from fieldcal.drivers.checks import crc16
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index
@@ -85,12 +84,10 @@ class Codec(Base):
     def scan(self, data: Bytes) -> Candidates:
         """Every 0xFA that a possible header follows."""
         starts, ends, undecided = _lengths(data)
-        raw = data.tobytes()
-        good = [
-            end > len(raw) or crc_hqx(raw[start + 1 : end], 0) == 0
-            for start, end in zip(starts.tolist(), ends.tolist(), strict=True)
-        ]
-        return Candidates(starts, ends, np.array(good, dtype=bool), undecided)
+        good = np.ones(len(starts), dtype=bool)
+        whole = np.flatnonzero(ends <= len(data))
+        good[whole] = crc16(data, starts[whole] + 1, ends[whole]) == 0
+        return Candidates(starts, ends, good, undecided)
 
     def reset(self) -> None:
         """Forget half a message."""
@@ -119,26 +116,26 @@ def _samples(some: Alike, pair: tuple[int, int]) -> Raw:
 
 def _lengths(data: Bytes) -> tuple[Index, Index, int]:
     """Where messages may begin and end, and the first byte that cannot be told yet."""
-    at = np.flatnonzero(data == SYNC)
     padded = np.concatenate([data, np.zeros(2 + 2 * len(LENGTHS), np.uint8)])
+    at = np.flatnonzero(data == SYNC)
+    at = at[padded[at + 1] < 1 << len(LENGTHS)]
     groups = padded[at + 1]
     word = at + 2
     payload = np.zeros(len(at), dtype=np.int64)
-    possible = (groups > 0) & (groups < 1 << len(LENGTHS))
+    possible = groups > 0
     for group, totals in enumerate(TOTALS):
-        has = groups >> group & 1 == 1
-        if not has.any():
-            continue
-        total = totals[padded[word] | padded[word + 1].astype(np.int64) << 8]
-        possible &= ~has | (total > 0)
-        payload += np.where(has, total, 0)
-        word = word + 2 * has
+        has = np.flatnonzero(groups >> group & 1)
+        low, high = padded[word[has]], padded[word[has] + 1]
+        total = totals[low | high.astype(np.int64) << 8]
+        possible[has] &= total > 0
+        payload[has] += total
+        word[has] += 2
     ends = word + payload + 2
     possible &= ends - at <= LONGEST
     short = word > len(data)
     keep = possible & ~short
     # a header that is cut off may be anything
-    undecided = at[short & (groups < 1 << len(LENGTHS))]
+    undecided = at[short]
     return at[keep], ends[keep], int(undecided[0]) if len(undecided) else len(data)
 
 

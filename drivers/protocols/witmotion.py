@@ -34,13 +34,17 @@ from fieldcal.samples import Array, Block, Grain
 SIZE = 11
 TIME, ACC, GYR = 0x50, 0x51, 0x52
 
-SAMPLE = np.dtype(
-    [("six", "f8", 6), ("temperature", "f8"), ("stamp", "f8")]
-    + [("steps", "f8"), ("t_host", "f8")]
-)
-
 Words: TypeAlias = NDArray[Any]
-Samples: TypeAlias = NDArray[Any]
+
+
+class Samples(NamedTuple):
+    """Samples (n, 6), temperatures, stamps, periods since the last, arrivals, (n,)."""
+
+    six: Array
+    temperature: Array
+    stamp: Array
+    steps: Array
+    t_host: Array
 
 
 class Frames(NamedTuple):
@@ -77,7 +81,7 @@ class Codec(Base):
         self._frames = Frames(none, np.empty(0, np.int64), np.empty(0))
         self._cycle = 0
         self._paired: int | None = None
-        self._held = np.empty(0, SAMPLE)
+        self._held = Samples(np.empty((0, 6)), *[np.empty(0)] * 4)
         self._day: int | None = None
 
     @property
@@ -92,12 +96,11 @@ class Codec(Base):
         at = at[(kind >= TIME) & (kind <= 0x5F)]
         whole = at[at + SIZE <= len(data)]
         good = np.ones(len(at), dtype=bool)
-        if len(whole):
-            raw = rows(data, whole, SIZE)
-            total = raw[:, 0].copy()
-            for i in range(1, SIZE - 1):
-                total += raw[:, i]
-            good[: len(whole)] = total == raw[:, -1]
+        # sums of 2, 4 and 8 bytes from every place: two of them make those of 10
+        two = data[:-1] + data[1:]
+        four = two[:-2] + two[2:]
+        eight = four[:-4] + four[4:]
+        good[: len(whole)] = eight[whole] + two[whole + 8] == data[whole + 10]
         undecided = len(data) - (len(data) > 0 and int(data[-1]) == 0x55)
         return Candidates(at, at + SIZE, good, undecided)
 
@@ -135,59 +138,58 @@ class Codec(Base):
         near[:old] = False
         at = np.flatnonzero(near)
         self._cycle = int(cycle[-1])
-        samples = np.empty(len(at), SAMPLE)
-        first = _words(frames.raw, at - 1)
-        samples["six"][:, :3] = first[:, :3] * self._acc
-        samples["six"][:, 3:] = _words(frames.raw, at)[:, :3] * self._gyr
-        samples["temperature"] = first[:, 3] / 100
-        samples["t_host"] = frames.t_host[at]
+        words = np.ascontiguousarray(frames.raw[:, 2:10]).view("<i8")[:, 0]
+        first, second = _four(words[at - 1]), _four(words[at])
+        six = np.hstack([first[:, :3] * self._acc, second[:, :3] * self._gyr])
+        stamp, steps = np.full(len(at), np.nan), np.empty(len(at))
+        stamped = (at >= 2) & (kind[at - 2] == TIME) & ~far[at - 2]
+        stamp[stamped] = self._seconds(words[at[stamped] - 2])
         if len(at):
             before = cycle[at[0]] - 1 if self._paired is None else self._paired
-            samples["steps"] = np.diff(cycle[at], prepend=before)
+            steps[:] = np.diff(cycle[at], prepend=before)
             self._paired = int(cycle[at[-1]])
-        samples["stamp"] = np.nan
-        stamped = (at >= 2) & (kind[at - 2] == TIME) & ~far[at - 2]
-        samples["stamp"][stamped] = self._seconds(_words(frames.raw, at[stamped] - 2))
-        return samples
+        return Samples(six, first[:, 3] / 100, stamp, steps, frames.t_host[at])
 
     def _seconds(self, words: Words) -> Array:
-        """Time in s since midnight of the first day, from words of 0x50, (n, 4)."""
-        year, month, day, hour, minute, second = (
-            words[:, :3].copy().view(np.uint8).astype(np.int64).T
-        )
-        months = np.datetime64("2000-01", "M") + (12 * year + month - 1)
-        days = months.astype("M8[D]").astype(np.int64) + day - 1
+        """Time in s since midnight of the first day, from words of 0x50, (n,)."""
+        date = words & 0xFFFFFF
+        begins = np.flatnonzero(np.diff(date, prepend=-1))
+        days = np.repeat(_days(date[begins]), np.diff(begins, append=len(date)))
         if self._day is None and len(days):
             self._day = int(days[0])
+        hour, minute, second = (words >> place & 0xFF for place in (24, 32, 40))
         clock = ((days - (self._day or 0)) * 24 + hour) * 60 + minute
-        seconds: Array = ((clock * 60 + second) * 1000 + words[:, 3]) * 1e-3
+        seconds: Array = ((clock * 60 + second) * 1000 + (words >> 48)) * 1e-3
         return seconds
 
     def _deliver(self, samples: Samples) -> Block | None:
         """Give samples their time, once it is known whether the device tells it."""
         if not self._decided:
-            samples = np.concatenate([self._held, samples])
-            stamped = np.flatnonzero(~np.isnan(samples["stamp"]))
+            both = zip(self._held, samples, strict=True)
+            samples = Samples(*(np.concatenate(columns) for columns in both))
+            stamped = np.flatnonzero(~np.isnan(samples.stamp))
             if len(stamped):
-                samples = samples[stamped[0] :]
-            elif len(samples) < UNDECIDED:
+                samples = Samples(*(column[stamped[0] :] for column in samples))
+            elif len(samples.stamp) < UNDECIDED:
                 self._held = samples
                 return None
             self._decided = True
-        n = len(samples)
-        raw = Raw(
-            np.arange(n),
-            samples["six"],
-            samples["temperature"],
-            samples["stamp"],
-            np.full(n, np.nan),
-        )
-        return self._timed(self._clock, raw, samples["t_host"], samples["steps"])
+        six, temperature, stamp, steps, t_host = samples
+        n = len(stamp)
+        raw = Raw(np.arange(n), six, temperature, stamp, np.full(n, np.nan))
+        return self._timed(self._clock, raw, t_host, steps)
 
 
-def _words(raw: Bytes, which: Index) -> Words:
-    """The four words of some frames, (m, 4)."""
-    return np.ascontiguousarray(raw[which, 2:10]).view("<i2")
+def _four(words: Words) -> Words:
+    """Four words of 16 bits, (m, 4), of one of 64, (m,)."""
+    return words.view("<i2").reshape(-1, 4)
+
+
+def _days(date: Words) -> Words:
+    """Days since 1970, (m,), of year - 2000, month and day in a byte each."""
+    year, month, day = (date >> place & 0xFF for place in (0, 8, 16))
+    months = np.datetime64("2000-01", "M") + (12 * year + month - 1)
+    return months.astype("M8[D]").astype(np.int64) + day - 1
 
 
 def _repeats(raw: Bytes) -> Mask:

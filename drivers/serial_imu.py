@@ -42,6 +42,13 @@ REASONS = {
 }
 
 
+class _Whole(serial.Serial):  # type: ignore[misc]
+    """A port that keeps what came while it was being opened."""
+
+    def _reset_input_buffer(self) -> None:
+        """A device that speaks at once would lose its first words."""
+
+
 class SerialPort:
     """Bytes of a port, as a reader wants them.
 
@@ -53,9 +60,11 @@ class SerialPort:
     """
 
     def __init__(self, port: str, baud: int) -> None:
-        locked = {} if "://" in port else {"exclusive": True}
         try:
-            self._serial = serial.serial_for_url(port, baud, timeout=POLL, **locked)
+            if "://" in port:
+                self._serial = serial.serial_for_url(port, baud, timeout=POLL)
+            else:
+                self._serial = _Whole(port, baud, timeout=POLL, exclusive=True)
         except ValueError as fault:
             raise InputError(f"cannot open {port} at {baud} baud: {fault}") from fault
         except Exception as fault:

@@ -26,7 +26,7 @@ from fieldcal.samples import Block
 HEAD = 4096
 """First bytes by which a format is known."""
 
-PIECE = 1 << 23
+PIECE = 1 << 20
 """Bytes that are looked at together."""
 
 ROWS = 1 << 16

@@ -128,8 +128,8 @@ class File(Recording):
             for kind, starts in found.items():
                 form = self._formats[kind]
                 if form.name in wanted and starts:
-                    at_bytes = np.array(starts)[:, None] + np.arange(form.size)
-                    out[form.name] = array[at_bytes]
+                    view = np.lib.stride_tricks.sliding_window_view(array, form.size)
+                    out[form.name] = view[np.array(starts)]
             if out:
                 yield out
         if scan and rest:

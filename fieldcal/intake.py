@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.errors import InputError
+from fieldcal.recording import MOST
 from fieldcal.samples import CHANNELS, Array, Block, concat
 
 GROUP = 1 << 16
 """Rows of a row group."""
-
-MOST = 12
-"""Faults of a file that are listed one by one."""
 
 Rows = NDArray[np.bool_]
 

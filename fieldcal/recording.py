@@ -32,6 +32,9 @@ PIECE = 1 << 20
 ROWS = 1 << 16
 """Rows that are looked at together."""
 
+MOST = 12
+"""Faults of a file that are listed one by one."""
+
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 LAST = ("csv_like", "wire")
@@ -121,6 +124,7 @@ class Recording(ABC):
             )
         self.says: list[str] = []
         self.mended: list[str] = []
+        self._more = 0
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """Modules that reading it takes, and the extra of fieldcal that brings them."""
@@ -156,7 +160,12 @@ class Recording(ABC):
                 f"{self.path}: {where}: {what}; copy the file again, or leave such"
                 " places out with --repair"
             )
-        self.mended.append(f"{where}: {what}, left out")
+        if len(self.mended) < MOST:
+            self.mended.append(f"{where}: {what}, left out")
+            self._more = 0
+            return
+        self._more += 1
+        self.mended[MOST:] = [f"{self._more} more damaged places, left out"]
 
 
 def unpacked(path: Path) -> IO[bytes]:

@@ -140,7 +140,7 @@ def _usual(rows: Rows) -> Array:
     """Median number of values in a cell, (6,)."""
     every = -(-len(rows) // _SAMPLE)
     counts = [
-        rows[first : first + _PART][-first % every :: every, 1:7]
+        rows[first : first + _PART][-first % every :: every, 1:7].copy()
         for first in range(0, len(rows), _PART)
     ]
     usual: Array = np.median(np.concatenate(counts), axis=0)
@@ -155,7 +155,10 @@ def _at_rest(rows: Rows, bound: Array) -> list[_Run]:
     usual = _usual(rows)
     every = -(-len(rows) // _SAMPLE)
     some = np.concatenate(
-        [spread[-first % every :: every] for first, spread, _ in _spans(rows, usual)]
+        [
+            spread[-first % every :: every].copy()
+            for first, spread, _ in _spans(rows, usual)
+        ]
     )
     quiet = np.quantile(some, 0.1, axis=0)
     scale = np.where(quiet > 0, quiet, np.inf)

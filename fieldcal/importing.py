@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.errors import InputError, SessionError
+from fieldcal.errors import InputError, SessionError, disk_says
 from fieldcal.intake import Judge, Written, digest
 from fieldcal.joined import Joined
 from fieldcal.recording import Recording
@@ -149,7 +149,9 @@ def bring_in(
             shutil.rmtree(part, ignore_errors=True)
             raise
     except OSError as error:
-        raise SessionError(f"{folder}: cannot be written: {error}") from error
+        raise SessionError(
+            f"{folder}: cannot be written: {disk_says(error)}"
+        ) from error
     return Brought(folder, *brought)
 
 

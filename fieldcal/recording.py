@@ -20,7 +20,7 @@ from pkgutil import iter_modules
 from typing import IO, Any, cast
 
 from fieldcal.description import ACC_UNITS, GYR_UNITS
-from fieldcal.errors import InputError
+from fieldcal.errors import InputError, disk_says
 from fieldcal.samples import Block
 
 HEAD = 4096
@@ -229,9 +229,15 @@ def on_disk(path: Path) -> Iterator[Path]:
     folder = Path(tempfile.mkdtemp(prefix="fieldcal."))
     try:
         whole = folder / path.stem
-        with whole.open("wb") as out:
-            for data in pieces(path):
-                out.write(data)
+        try:
+            with whole.open("wb") as out:
+                for data in pieces(path):
+                    out.write(data)
+        except OSError as error:
+            raise InputError(
+                f"{path}: cannot be unpacked into {folder.parent}: {disk_says(error)},"
+                " by the environment's TMPDIR"
+            ) from error
         yield whole
     finally:
         shutil.rmtree(folder, ignore_errors=True)

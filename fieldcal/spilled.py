@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.samples import Array
 
-IN_MEMORY = 1 << 22
+IN_MEMORY = 1 << 21
 """Bytes that stay in memory."""
 
 

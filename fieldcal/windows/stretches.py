@@ -35,7 +35,7 @@ _LONGEST = 36_000
 _PART = 4096
 """Spans looked at together: all of them at once would take ten times their memory."""
 
-_SAMPLE = 1 << 16
+_SAMPLE = 1 << 15
 """Spans by which the usual is judged: of a longer recording, evenly spread ones."""
 
 _RATE = 0.02

@@ -193,16 +193,17 @@ class Written:
         self._waiting.append(block)
         self._many += len(block)
         if self._many >= GROUP:
-            self._put()
+            self._put(self._many - self._many % GROUP)
 
-    def _put(self) -> None:
+    def _put(self, rows: int) -> None:
+        """Write so many of the rows that wait, in groups."""
         from fieldcal.sample_files import to_batch
 
         one = len(self._waiting) == 1
         whole = self._waiting[0] if one else concat(self._waiting)
-        self._waiting, self._many = [], 0
-        for first in range(0, len(whole), GROUP):
-            part = whole[first : first + GROUP]
+        self._waiting, self._many = [whole[rows:]], len(whole) - rows
+        for first in range(0, rows, GROUP):
+            part = whole[first : min(first + GROUP, rows)]
             self._writer.write_batch(to_batch(part), row_group_size=GROUP)
             self._groups.append((float(part.t[0]), float(part.t[-1])))
             self.rows += len(part)
@@ -210,7 +211,7 @@ class Written:
     def close(self) -> None:
         """Write what waits, and end the file."""
         if self._many:
-            self._put()
+            self._put(self._many)
         self._writer.close()
 
     @property

@@ -18,7 +18,7 @@ HOURS = (1, 4)
 PIECE = 300 * RATE
 
 CHILD = """
-import resource, sys
+import sys
 from pathlib import Path
 from fieldcal.importing import bring_in
 from fieldcal.recording import Wanted, open_recording
@@ -26,7 +26,9 @@ names = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 recording = open_recording(Path(sys.argv[1]), Wanted(names))
 name = recording.streams()[0].name
 brought = bring_in(recording, name, Path(sys.argv[2]), {"format": 1}, 1.0)
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+# ru_maxrss would begin with that of the process that started this one
+status = dict(line.split(":") for line in open("/proc/self/status") if "VmHWM" in line)
+peak = int(status["VmHWM"].split()[0]) / 1024
 print(peak, brought.facts.rows, len(brought.stretches))
 """
 

@@ -232,9 +232,11 @@ class Written:
         from fieldcal.sample_files import from_table
 
         if self._file is None:
-            self._file = pyarrow.parquet.ParquetFile(self._path)
+            self._file = pyarrow.parquet.ParquetFile(self._path, pre_buffer=False)
         if self._read[0] != i:
-            self._read = (i, from_table(self._file.read_row_group(i)))
+            # one thread: each of several would keep memory of its own
+            group = self._file.read_row_group(i, use_threads=False)
+            self._read = (i, from_table(group))
         return self._read[1]
 
     def __enter__(self) -> Written:

@@ -6,7 +6,7 @@ from pkgutil import iter_modules
 
 import benchmarks
 
-available = [m.name for m in iter_modules(benchmarks.__path__) if m.name != "__main__"]
+available = [m.name for m in iter_modules(benchmarks.__path__) if m.name[0] != "_"]
 named = [word for word in sys.argv[1:] if word[0] != "-" and not word.isdigit()]
 wanted = named or available
 if unknown := set(wanted) - set(available):

@@ -1,256 +1,23 @@
 """Importers against merely reading with each format's library, in processor time.
 
-The ratios are medians over pairs. Memory is the peak of a process of its own that
-imports a log, and one of four times the length: it is to be the same. The cost of
-recording is that of ten devices at 1 kHz in real time.
+The ratios are medians over pairs: of reading all samples, of making a session of them,
+and of the latter to reading them and writing the same rows as Parquet by pyarrow, which
+no import can do without. Where a library takes a few milliseconds only the last says
+anything of the import.
 """
 
-import os
-import struct
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import monotonic, process_time, sleep
-from typing import Any
+from time import process_time
 
-import numpy as np
-
+from benchmarks._logs import COLUMNS, ROWS, samples, write_all
 from fieldcal.importing import bring_in
-from fieldcal.recorder import Recorder
 from fieldcal.recording import Wanted, open_recording
-from fieldcal.samples import Block
 
-ROWS = 100_000
-RUNS = 3
-COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
+RUNS = 5
 GOAL = 1.5
-
-LONG = (100e6, 400e6)
-"""Bytes of the logs whose import is watched for its memory."""
-
-DEVICES, RATE, CHUNK, WATCHED = 10, 1000, 20, 5.0
-"""Recording: devices, Hz, samples handed over at once, s."""
-
-
-def samples(n: int) -> Block:
-    """At rest, 1 kHz."""
-    rng = np.random.default_rng(1)
-    acc = rng.normal(0, 0.02, (n, 3)) + [0, 0, -9.8]
-    return Block.of(np.arange(n) / RATE + 1, acc, rng.normal(0, 1e-3, (n, 3)))
-
-
-def dataflash(block: Block) -> bytes:
-    """An ArduPilot log."""
-    out = b""
-    for kind, size, name, letters, labels in (
-        (128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"),
-        (132, 36, "IMU", "QBffffff", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"),
-    ):
-        texts = (text.encode() for text in (name, letters, labels))
-        out += b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", kind, size, *texts)
-    rows = np.zeros(
-        len(block),
-        [("mark", "3u1"), ("t", "<u8"), ("i", "u1"), ("w", "3<f4"), ("f", "3<f4")],
-    )
-    rows["mark"] = (0xA3, 0x95, 0x84)
-    rows["t"], rows["w"], rows["f"] = np.round(block.t * 1e6), block.gyr, block.acc
-    return out + rows.tobytes()
-
-
-def ulog(block: Block) -> bytes:
-    """A PX4 log of sensor_combined."""
-
-    def message(kind: str, body: bytes) -> bytes:
-        return struct.pack("<HB", len(body), ord(kind)) + body
-
-    form = b"sensor_combined:uint64_t timestamp;float[3] gyro_rad;"
-    form += b"float[3] accelerometer_m_s2;"
-    out = b"ULog\x01\x12\x35\x01" + bytes(8) + message("B", bytes(40))
-    out += message("F", form) + message("A", b"\0\1\0sensor_combined")
-    rows = np.zeros(
-        len(block),
-        [("size", "<u2"), ("kind", "u1"), ("id", "<u2"), ("t", "<u8"), ("w", "3<f4"),
-         ("f", "3<f4")],
-    )  # fmt: skip
-    rows["size"], rows["kind"], rows["id"] = 34, ord("D"), 1
-    rows["t"], rows["w"], rows["f"] = np.round(block.t * 1e6), block.gyr, block.acc
-    return out + rows.tobytes()
-
-
-def text(block: Block) -> bytes:
-    """Comma-separated columns."""
-    rows = np.column_stack([block.t, block.six]).tolist()
-    return "\n".join(",".join(f"{x:.6f}" for x in row) for row in rows).encode() + b"\n"
-
-
-def write_tlog(path: Path, block: Block) -> None:
-    """Write a telemetry log of HIGHRES_IMU."""
-    from pymavlink.dialects.v20 import all as dialect
-
-    link: Any = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
-    with path.open("wb") as file:
-        for t, acc, gyr in zip(
-            block.t.tolist(), block.acc.tolist(), block.gyr.tolist(), strict=True
-        ):
-            said = dialect.MAVLink_highres_imu_message(
-                round(t * 1e6), *acc, *gyr, 0, 0, 0, 0, 0, 0, 20, 0xFFFF, 0
-            )
-            file.write(struct.pack(">Q", int(1.7e15 + 1e6 * t)) + said.pack(link))
-            link.seq = (link.seq + 1) % 256
-
-
-def write_can(path: Path, block: Block) -> None:
-    """Write a candump or Vector log."""
-    import can
-
-    with can.Logger(str(path)) as log:
-        for t, acc in zip(block.t.tolist(), block.acc.tolist(), strict=True):
-            data = struct.pack("<3hH", *(round(x * 1000) for x in acc), 0)
-            log.on_message_received(
-                can.Message(
-                    timestamp=1.5e9 + t, arbitration_id=16, data=data,
-                    is_extended_id=False, channel="can0",
-                )
-            )  # fmt: skip
-
-
-DBC = """VERSION ""
-BS_:
-BU_: X
-BO_ 16 A: 8 X
- SG_ ax : 0|16@1- (0.001,0) [0|0] "m/s^2" X
- SG_ ay : 16|16@1- (0.001,0) [0|0] "m/s^2" X
- SG_ az : 32|16@1- (0.001,0) [0|0] "m/s^2" X
-"""
-
-
-def write_mcap(path: Path, block: Block) -> None:
-    """Write raw and calibrated samples as the exporter does."""
-    from fieldcal.calibration import Calibration, Nominal
-    from fieldcal.exporters import Source, mcap
-    from fieldcal.session import Session
-
-    made = path.parent / "recorded"
-    with Recorder(made, {"format": 1}) as recorder:
-        recorder.append(block)
-    none = np.empty(0)
-    unit = Calibration("joint", (), none, np.empty((0, 0)), (), 0.0, 0, 0.0)
-    mcap.write(Source(unit, Nominal(), Session.open(made)), path)
-
-
-def read_ulog(path: Path) -> None:
-    """Read by pyulog."""
-    from pyulog import ULog
-
-    ULog(str(path))
-
-
-def read_dataflash(path: Path) -> None:
-    """Read by pymavlink."""
-    from pymavlink.DFReader import DFReader_binary
-
-    reader = DFReader_binary(str(path))
-    while reader.recv_match(type=["IMU"]) is not None:
-        pass
-    reader.close()
-
-
-def read_tlog(path: Path) -> None:
-    """Read by pymavlink."""
-    from pymavlink import mavutil
-
-    link = mavutil.mavlink_connection(str(path))
-    while link.recv_match(type=["HIGHRES_IMU"]) is not None:
-        pass
-    link.close()
-
-
-def read_can(path: Path) -> None:
-    """Read by python-can."""
-    import can
-
-    with can.LogReader(str(path)) as log:
-        for _ in log:
-            pass
-
-
-def read_mcap(path: Path) -> None:
-    """Read by mcap and mcap-ros2-support."""
-    from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
-
-    with path.open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        for _ in reader.iter_decoded_messages(topics=["/imu/raw"]):
-            pass
-
-
-def read_text(path: Path) -> None:
-    """Read by numpy."""
-    np.loadtxt(path, delimiter=",")
-
-
-def read_hdf5(path: Path) -> None:
-    """Read by h5py."""
-    import h5py
-
-    with h5py.File(path) as file:
-        _ = file["imu"][()]
-
-
-def read_matlab(path: Path) -> None:
-    """Read by scipy."""
-    from scipy.io import loadmat
-
-    loadmat(path)
-
-
-def read_parquet(path: Path) -> None:
-    """Read by pyarrow."""
-    import pyarrow.parquet
-
-    pyarrow.parquet.read_table(path)
-
-
-def write_all(folder: Path) -> dict[str, tuple[Path, Callable[[Path], None], Wanted]]:
-    """Files of every format, what merely reads them, and what the user says of them."""
-    import h5py
-    import pyarrow as pa
-    import pyarrow.parquet
-    from scipy.io import savemat
-
-    block = samples(ROWS)
-    rows = np.column_stack([block.t, block.six])
-    (folder / "imu.dbc").write_text(DBC)
-    (folder / "x.ulg").write_bytes(ulog(block))
-    (folder / "x.bin").write_bytes(dataflash(block))
-    (folder / "x.csv").write_bytes(text(block))
-    write_tlog(folder / "x.tlog", block)
-    write_can(folder / "x.log", block)
-    write_can(folder / "x.blf", block)
-    write_mcap(folder / "x.mcap", block)
-    with h5py.File(folder / "x.h5", "w") as file:
-        file["imu"] = rows
-    savemat(folder / "x.mat", {"imu": rows})
-    columns = dict(zip(COLUMNS, rows.T, strict=True))
-    pyarrow.parquet.write_table(pa.table(columns), folder / "x.parquet")
-    bus = Wanted(options=f"dbc={folder / 'imu.dbc'}&map=ax=ax,ay=ay,az=az")
-    none, named = Wanted(), Wanted(COLUMNS)
-    return {
-        "ulog, pyulog": (folder / "x.ulg", read_ulog, none),
-        "dataflash, pymavlink": (folder / "x.bin", read_dataflash, none),
-        "tlog, pymavlink": (folder / "x.tlog", read_tlog, none),
-        "mcap, mcap-ros2-support": (folder / "x.mcap", read_mcap, none),
-        "candump, python-can": (folder / "x.log", read_can, bus),
-        "blf, python-can": (folder / "x.blf", read_can, bus),
-        "csv, numpy": (folder / "x.csv", read_text, named),
-        "matlab, scipy": (folder / "x.mat", read_matlab, named),
-        "hdf5, h5py": (folder / "x.h5", read_hdf5, named),
-        "parquet, pyarrow": (folder / "x.parquet", read_parquet, named),
-    }
 
 
 def timed(work: Callable[..., object], *arguments: object) -> float:
@@ -273,96 +40,38 @@ def ours(path: Path, wanted: Wanted, folder: Path | None) -> None:
         bring_in(recording, stream, folder, {"format": 1}, 1.0)
 
 
+def written(path: Path) -> None:
+    """Write the rows as Parquet, as plainly as can be."""
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    block = samples(ROWS)
+    columns = dict(zip(COLUMNS, [block.t, *block.six.T], strict=True))
+    pyarrow.parquet.write_table(pa.table(columns), path, compression="lz4")
+
+
 def importing(folder: Path) -> None:
     """Print reading and importing against the library."""
-    print(f"{ROWS} samples                 library  samples  session")
-    for name, (path, read, wanted) in write_all(folder).items():
+    print(f"{ROWS} samples                 library  samples  session  session to")
+    print(f"{'':37}{'':18}          read + write")
+    for name, (path, read, wanted) in write_all(folder, ROWS).items():
         pairs = []
         for run in range(RUNS + 1):
+            made = timed(samples, ROWS)
             theirs = timed(read, path)
+            both = theirs + timed(written, folder / "rows.parquet") - made
             here = timed(ours, path, wanted, None)
             whole = timed(ours, path, wanted, folder / f"{path.name}{run}")
-            pairs.append((theirs, here / theirs, whole / theirs))
+            pairs.append((theirs, here / theirs, whole / theirs, whole / both))
         columns = [median(column) for column in zip(*pairs[1:], strict=True)]
         within = "" if columns[2] <= GOAL else f"  above {GOAL} x"
         print(
             f"  {name:25} {columns[0]:7.3f} s {columns[1]:6.2f} x"
-            f" {columns[2]:6.2f} x{within}"
+            f" {columns[2]:6.2f} x {columns[3]:9.2f} x{within}"
         )
 
 
-CHILD = """
-import resource, sys
-from pathlib import Path
-from fieldcal.importing import bring_in
-from fieldcal.recording import Wanted, open_recording
-path = Path(sys.argv[1])
-names = ("t", "ax", "ay", "az", "gx", "gy", "gz")
-recording = open_recording(path, Wanted(names))
-name = recording.streams()[0].name
-bring_in(recording, name, Path(sys.argv[2]), {"format": 1}, 1.0)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
-"""
-
-
-def write_long(path: Path, size: float) -> None:
-    """Write a log of so many bytes, piece by piece."""
-    make = {".bin": dataflash, ".ulg": ulog, ".csv": text}[path.suffix]
-    piece = samples(ROWS)
-    head = len(make(piece[:0]))
-    if path.suffix == ".csv":
-        head = 0
-    with path.open("wb") as file:
-        file.write(make(piece[:0]).strip(b"\n"))
-        k = 0
-        while file.tell() < size:
-            later = Block.of(piece.t + k * ROWS / RATE, piece.acc, piece.gyr)
-            file.write(make(later)[head:])
-            k += 1
-
-
-def memory(folder: Path) -> None:
-    """Print the peak of importing a long log and a longer one."""
-    print("peak of importing, MB   " + "  ".join(f"{s / 1e6:5.0f} MB" for s in LONG))
-    for ending in (".bin", ".ulg", ".csv"):
-        peaks = []
-        for i, size in enumerate(LONG):
-            path = folder / f"long{i}{ending}"
-            write_long(path, size)
-            done = subprocess.run(
-                [sys.executable, "-c", CHILD, str(path), str(folder / f"{i}{ending}")],
-                capture_output=True, text=True, check=True,
-            )  # fmt: skip
-            peaks.append(float(done.stdout))
-            os.unlink(path)
-        print(f"  {ending:20}" + "  ".join(f"{peak:8.0f}" for peak in peaks))
-
-
-def recording(folder: Path) -> None:
-    """Print what recording costs in real time."""
-    recorders = [Recorder(folder / f"device{i}", {"format": 1}) for i in range(DEVICES)]
-    began, spent = monotonic(), process_time()
-    k = 0
-    while (now := monotonic() - began) < WATCHED:
-        if k * CHUNK / RATE <= now:
-            t = (k * CHUNK + np.arange(CHUNK)) / RATE
-            block = Block.of(t, np.ones((CHUNK, 3)), np.ones((CHUNK, 3)))
-            for recorder in recorders:
-                recorder.append(block)
-            k += 1
-        else:
-            sleep(0.001)
-    share = (process_time() - spent) / (monotonic() - began)
-    for recorder in recorders:
-        recorder.close()
-    print(
-        f"recording {DEVICES} devices at {RATE} Hz: {share:.3f} of a core, to be < 0.25"
-    )
-
-
 def main() -> None:
-    """Print the tables."""
+    """Print the table."""
     with TemporaryDirectory() as folder:
-        recording(Path(folder))
         importing(Path(folder))
-        memory(Path(folder))

@@ -22,6 +22,7 @@ release = version = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
+highlight_language = "text"  # most examples are commands
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["drawn", "_site"]
 suppress_warnings = ["myst.xref_missing"]

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from fieldcal.samples import Array
+
 if TYPE_CHECKING:
     import pyarrow as pa
 
@@ -72,9 +74,28 @@ def checksum(batch: pa.RecordBatch, number: int, row: int) -> int:
     """Checksum of a batch's numbers and of its place."""
     crc = zlib.crc32(b"%d %d" % (number, row))
     for name, column in zip(batch.schema.names, batch.columns, strict=True):
-        values = np.ascontiguousarray(column.to_numpy(zero_copy_only=False))
+        known = column.type == "double"
+        values = numbers(column) if known else column.to_numpy(zero_copy_only=False)
+        values = np.ascontiguousarray(values)
         crc = zlib.crc32(values.data, zlib.crc32(name.encode(), crc))
     return crc
+
+
+def numbers(column: pa.Array | pa.ChunkedArray) -> Array:
+    """Values of a column of float64; nan where there is none.
+
+    Arrow's own way would load all of pandas, where it is installed, to see whether what
+    it is asked for is one of pandas' kinds.
+    """
+    chunks = getattr(column, "chunks", [column])
+    parts = [_numbers(chunk) for chunk in chunks if len(chunk)]
+    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0), *parts])
+
+
+def _numbers(chunk: pa.Array) -> Array:
+    whole = chunk.fill_null(np.nan) if chunk.null_count else chunk
+    first, last = whole.offset, whole.offset + len(whole)
+    return np.frombuffer(whole.buffers()[1], dtype=float)[first:last]
 
 
 class Found(NamedTuple):

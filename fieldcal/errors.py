@@ -19,6 +19,7 @@ Texts are for the operator: what happened, where, what to do now. One sentence.
 
 from __future__ import annotations
 
+import errno
 from typing import ClassVar
 
 
@@ -98,3 +99,28 @@ class Stopped(FieldcalError):
     """The operator ends the run."""
 
     exit_code = 130
+
+
+_DISK = {
+    errno.ENOSPC: "the disk is full: make room on it, or name another",
+    errno.EDQUOT: "your share of the disk is used up: make room, or name another disk",
+    errno.EFBIG: "the disk takes no file of that size: name another disk",
+    errno.EROFS: "the disk is read-only: name another",
+    errno.EACCES: "you may not write there: name another folder",
+    errno.EPERM: "you may not write there: name another folder",
+    errno.ENOTDIR: "a file is in the way of the folder: name another",
+    errno.ENOENT: "the folder is not there: make it, or name another",
+    errno.EIO: "the disk does not answer: put it in again, or name another",
+    errno.ENODEV: "the disk is gone: put it in again, or name another",
+    errno.ENXIO: "the disk is gone: put it in again, or name another",
+    errno.ESTALE: "the disk is gone: put it in again, or name another",
+}
+
+
+def disk_says(error: OSError) -> str:
+    """Why a disk takes nothing, and what to do now.
+
+    >>> disk_says(OSError(errno.ENOSPC, "No space left on device"))
+    'the disk is full: make room on it, or name another'
+    """
+    return _DISK.get(error.errno or 0) or error.strerror or str(error)

@@ -12,14 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.errors import InputError, SessionError
+from fieldcal.errors import InputError, SessionError, disk_says
 from fieldcal.intake import Judge, Written, digest
 from fieldcal.joined import Joined
 from fieldcal.recording import Recording
 from fieldcal.samples import Block
 from fieldcal.session import DESCRIPTION, MARKS, mark_line
+from fieldcal.spilled import Spilled
 from fieldcal.windows.cells import Cells
-from fieldcal.windows.stretches import still_in
+from fieldcal.windows.stretches import still_in, summary
 
 LONG = 5.0
 """Mean periods without a sample that are a gap."""
@@ -148,7 +149,9 @@ def bring_in(
             shutil.rmtree(part, ignore_errors=True)
             raise
     except OSError as error:
-        raise SessionError(f"{folder}: cannot be written: {error}") from error
+        raise SessionError(
+            f"{folder}: cannot be written: {disk_says(error)}"
+        ) from error
     return Brought(folder, *brought)
 
 
@@ -163,18 +166,20 @@ def _fill(
 
     judge = Judge(str(recording.path), recording.place, recording.repair)
     facts, cells = Facts(), Cells()
-    with Written(part / "samples.parquet") as written:
+    with Written(part / "samples.parquet") as written, Spilled(part) as rows:
         for block in recording.blocks(stream):
             good = judge.good(block)
             if len(good):
                 facts.add(good)
                 cells.add(good)
+                rows.add(summary(cells.take_complete()))
                 written.add(good)
         if not facts.rows:
             raise InputError(f"{recording.path}: has no row that can be used")
         facts.left_out = judge.left_out
         written.close()
-        stretches = still_in(cells.table, written.between, still)
+        rows.add(summary(cells.table))
+        stretches = still_in(rows, written.between, still)
     repairs = [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
     text = tomlkit.dumps({**about, "position": positions})

@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.errors import InputError
+from fieldcal.recording import MOST
 from fieldcal.samples import CHANNELS, Array, Block, concat
 
 GROUP = 1 << 16
 """Rows of a row group."""
-
-MOST = 12
-"""Faults of a file that are listed one by one."""
 
 Rows = NDArray[np.bool_]
 
@@ -41,6 +39,7 @@ class Judge:
         self._name, self._place, self._repair = name, place, repair
         self._seen, self._last = 0, -np.inf
         self._runs: list[tuple[str, str, int, int]] = []
+        self._more = [0, 0]
         self.left_out = 0
 
     @property
@@ -48,9 +47,8 @@ class Judge:
         """What was left out, run by run, a sentence each."""
         says = [self._sentence(*run) for run in self._runs[:MOST]]
         if len(self._runs) > MOST:
-            more = self._runs[MOST:]
-            rows = sum(run[3] for run in more)
-            says.append(f"{rows} more rows in {len(more)} more places")
+            places, rows = self._more[0] + 1, self._more[1] + self._runs[MOST][3]
+            says.append(f"{rows} more rows in {places} more places")
         return [f"{sentence}, left out" for sentence in says]
 
     def good(self, block: Block) -> Block:
@@ -83,10 +81,7 @@ class Judge:
         return concat(block[r[0] : r[-1] + 1] for r in parts if not bad[r[0]])
 
     def _faults(self, block: Block) -> Iterator[tuple[str, str, Rows]]:
-        six = block.six
-        empty = (np.nan_to_num(six, nan=0.0) == 0).all(axis=1) & (block.acc == 0).all(
-            axis=1
-        )
+        empty = _all_zero(block)
         if empty.any():
             columns = " ".join(
                 CHANNELS if np.isfinite(block.gyr).any() else CHANNELS[:3]
@@ -95,10 +90,13 @@ class Judge:
             unstamped = empty & (block.t == 0) & later
             yield f"t {columns}", "hold only zeros", unstamped
             yield columns, "hold only zeros", empty & ~unstamped
-        yield "t", "is no time", ~np.isfinite(block.t)
-        for name, column in zip(CHANNELS, six.T, strict=True):
-            if (infinite := np.isinf(column)).any():
-                yield name, "is infinite", infinite
+        timeless = ~np.isfinite(block.t)
+        if timeless.any():
+            yield "t", "is no time", timeless
+        for names, triad in ((CHANNELS[:3], block.acc), (CHANNELS[3:], block.gyr)):
+            infinite = np.isinf(triad)
+            for i in np.flatnonzero(infinite.any(axis=0)):
+                yield names[i], "is infinite", infinite[:, i]
 
     def _backwards(self, t: Array, bad: Rows) -> Rows:
         """Rows that are not later than all good ones before them."""
@@ -138,6 +136,10 @@ class Judge:
                 if same == [column, what] and begin + n == first:
                     self._runs[-1] = (column, what, begin, n + count)
                     continue
+            if len(self._runs) > MOST:
+                # of a log that is bad all over, only the number of its faults is kept
+                self._more[0] += 1
+                self._more[1] += self._runs.pop()[3]
             self._runs.append((column, what, first, count))
 
     def _sentence(self, column: str, what: str, first: int, count: int) -> str:
@@ -145,6 +147,17 @@ class Judge:
         if count > 1:
             rows += f" to {self._place(first + count - 1)}"
         return f"{rows}, column {column}: {what}"
+
+
+def _all_zero(block: Block) -> Rows:
+    """Rows of zeros alone; a missing rate is no number that would speak for one."""
+    empty: Rows = block.acc[:, 0] == 0
+    some = np.flatnonzero(empty)
+    zeros = (block.acc[some] == 0).all(axis=1)
+    empty[some] = zeros & ((block.gyr[some] == 0) | np.isnan(block.gyr[some])).all(
+        axis=1
+    )
+    return empty
 
 
 class Written:
@@ -166,10 +179,13 @@ class Written:
             compression="lz4",
             use_dictionary=False,
             use_byte_stream_split=True,
+            write_statistics=False,
         )
         self._waiting: list[Block] = []
         self._many = 0
         self._groups: list[tuple[float, float]] = []
+        self._file: Any = None
+        self._read = (-1, concat([]))
         self.rows = 0
 
     def add(self, block: Block) -> None:
@@ -177,15 +193,17 @@ class Written:
         self._waiting.append(block)
         self._many += len(block)
         if self._many >= GROUP:
-            self._put()
+            self._put(self._many - self._many % GROUP)
 
-    def _put(self) -> None:
+    def _put(self, rows: int) -> None:
+        """Write so many of the rows that wait, in groups."""
         from fieldcal.sample_files import to_batch
 
-        whole = concat(self._waiting)
-        self._waiting, self._many = [], 0
-        for first in range(0, len(whole), GROUP):
-            part = whole[first : first + GROUP]
+        one = len(self._waiting) == 1
+        whole = self._waiting[0] if one else concat(self._waiting)
+        self._waiting, self._many = [whole[rows:]], len(whole) - rows
+        for first in range(0, rows, GROUP):
+            part = whole[first : min(first + GROUP, rows)]
             self._writer.write_batch(to_batch(part), row_group_size=GROUP)
             self._groups.append((float(part.t[0]), float(part.t[-1])))
             self.rows += len(part)
@@ -193,7 +211,7 @@ class Written:
     def close(self) -> None:
         """Write what waits, and end the file."""
         if self._many:
-            self._put()
+            self._put(self._many)
         self._writer.close()
 
     @property
@@ -203,20 +221,31 @@ class Written:
 
     def between(self, start: float, end: float) -> Iterator[Block]:
         """Samples with start <= t < end, of a file that was closed."""
+        for i, (first, last) in enumerate(self._groups):
+            if first < end and last >= start:
+                yield self._group(i).between(start, end)
+
+    def _group(self, i: int) -> Block:
+        """Samples of a group of rows; stretches that follow each other are in one."""
         import pyarrow.parquet
 
         from fieldcal.sample_files import from_table
 
-        with pyarrow.parquet.ParquetFile(self._path) as file:
-            for i, (first, last) in enumerate(self._groups):
-                if first < end and last >= start:
-                    yield from_table(file.read_row_group(i)).between(start, end)
+        if self._file is None:
+            self._file = pyarrow.parquet.ParquetFile(self._path, pre_buffer=False)
+        if self._read[0] != i:
+            # one thread: each of several would keep memory of its own
+            group = self._file.read_row_group(i, use_threads=False)
+            self._read = (i, from_table(group))
+        return self._read[1]
 
     def __enter__(self) -> Written:
         return self
 
     def __exit__(self, *exc: object) -> None:
         self._writer.close()
+        if self._file is not None:
+            self._file.close()
 
 
 def digest(path: Path) -> dict[str, Any]:

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, ElementTree, SubElement
+from xml.etree.ElementTree import Element, SubElement, tostring
 
-from fieldcal.errors import InputError
 from fieldcal.positions import Position
+from fieldcal.session import write_whole
 
 
 def write(
@@ -36,7 +36,7 @@ def write(
 
     Raises
     ------
-    InputError
+    SessionError
         If the file cannot be written.
 
     """
@@ -59,10 +59,7 @@ def write(
     ):
         suite.set(key, str(len(suite.findall(f"testcase/{kind}"))))
     suite.set("tests", str(len(suite)))
-    try:
-        ElementTree(suite).write(path, encoding="utf-8", xml_declaration=True)
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be written: {fault.strerror}") from fault
+    write_whole(path, tostring(suite, encoding="utf-8", xml_declaration=True))
 
 
 def _position(

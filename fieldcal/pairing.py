@@ -11,6 +11,9 @@ import numpy as np
 
 from fieldcal.samples import Block, concat
 
+PATIENCE = 10.0
+"""Longest time that a sample waits for its partner, s: either sensor may end."""
+
 
 class Pair:
     """Puts each sample of an accelerometer beside the gyroscope's nearest in time.
@@ -33,14 +36,17 @@ class Pair:
         self._gyr += [gyr] if gyr is not None else []
         acc_all, gyr_all = concat(self._acc), concat(self._gyr)
         until = gyr_all.t[-1] if len(gyr_all) else -np.inf
+        if len(acc_all):
+            until = max(until, acc_all.t[-1] - PATIENCE)
         ready = int(np.searchsorted(acc_all.t, until))
         self._acc = [acc_all[ready:]]
         out = self._paired(acc_all[:ready], gyr_all)
         if len(out):
             keep = max(0, int(np.searchsorted(gyr_all.t, out.t[-1])) - 1)
             self._gyr = [gyr_all[keep:]]
-        else:
-            self._gyr = [gyr_all]
+        elif len(gyr_all):
+            late = int(np.searchsorted(gyr_all.t, gyr_all.t[-1] - PATIENCE))
+            self._gyr = [gyr_all[late:]]
         return out
 
     def rest(self) -> Block:

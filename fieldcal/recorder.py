@@ -22,7 +22,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from fieldcal.errors import SessionError
+from fieldcal.errors import SessionError, disk_says
 from fieldcal.sample_files import read, schema, to_batch
 from fieldcal.samples import Block, concat
 from fieldcal.session import DESCRIPTION, MARKS, mark_line, write_whole
@@ -112,7 +112,9 @@ class Recorder:
                 " with it by --resume"
             ) from error
         except OSError as error:
-            raise SessionError(f"{folder}: cannot be written: {error}") from error
+            raise SessionError(
+                f"{folder}: cannot be written: {disk_says(error)}"
+            ) from error
         self._watch = Thread(target=self._keep_up, daemon=True, name="recorder")
         self._watch.start()
 
@@ -131,7 +133,12 @@ class Recorder:
             write_whole(self.folder / DESCRIPTION, tomlkit.dumps(about))
             self._marks = _Growing(self.folder / MARKS)
         except BaseException:
+            # what holds nothing must not be in the way of the next attempt
             self._samples.close()
+            for name in names:
+                (self.folder / name).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                self.folder.rmdir()
             raise
         self._encoder = Encoder(schema())
 
@@ -253,7 +260,8 @@ class Recorder:
 
     def _refused(self, error: OSError) -> SessionError:
         return SessionError(
-            f"{self.folder}: cannot be written: {error}; what was recorded is kept"
+            f"{self.folder}: cannot be written: {disk_says(error)}; what was recorded"
+            " is kept"
         )
 
     def __enter__(self) -> Self:

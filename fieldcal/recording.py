@@ -20,17 +20,20 @@ from pkgutil import iter_modules
 from typing import IO, Any, cast
 
 from fieldcal.description import ACC_UNITS, GYR_UNITS
-from fieldcal.errors import InputError
+from fieldcal.errors import InputError, disk_says
 from fieldcal.samples import Block
 
 HEAD = 4096
 """First bytes by which a format is known."""
 
-PIECE = 1 << 23
+PIECE = 1 << 20
 """Bytes that are looked at together."""
 
 ROWS = 1 << 16
 """Rows that are looked at together."""
+
+MOST = 12
+"""Faults of a file that are listed one by one."""
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
@@ -121,6 +124,7 @@ class Recording(ABC):
             )
         self.says: list[str] = []
         self.mended: list[str] = []
+        self._more = 0
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """Modules that reading it takes, and the extra of fieldcal that brings them."""
@@ -156,7 +160,12 @@ class Recording(ABC):
                 f"{self.path}: {where}: {what}; copy the file again, or leave such"
                 " places out with --repair"
             )
-        self.mended.append(f"{where}: {what}, left out")
+        if len(self.mended) < MOST:
+            self.mended.append(f"{where}: {what}, left out")
+            self._more = 0
+            return
+        self._more += 1
+        self.mended[MOST:] = [f"{self._more} more damaged places, left out"]
 
 
 def unpacked(path: Path) -> IO[bytes]:
@@ -220,9 +229,15 @@ def on_disk(path: Path) -> Iterator[Path]:
     folder = Path(tempfile.mkdtemp(prefix="fieldcal."))
     try:
         whole = folder / path.stem
-        with whole.open("wb") as out:
-            for data in pieces(path):
-                out.write(data)
+        try:
+            with whole.open("wb") as out:
+                for data in pieces(path):
+                    out.write(data)
+        except OSError as error:
+            raise InputError(
+                f"{path}: cannot be unpacked into {folder.parent}: {disk_says(error)},"
+                " by the environment's TMPDIR"
+            ) from error
         yield whole
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fieldcal.arrow_stream import decode, numbers
 from fieldcal.errors import SessionError
 from fieldcal.samples import Array, Block
 
@@ -82,8 +83,6 @@ def _table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
 
 def _read_arrows(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     import pyarrow as pa
-
-    from fieldcal.arrow_stream import decode
 
     data = path.read_bytes()
     found = decode(data, schema())
@@ -211,8 +210,7 @@ def _numbers(path: Path, table: pa.Table, name: str) -> Array:
         return np.empty(0)
     if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
         raise SessionError(f"{path}: column {name} holds {column.type}, not numbers")
-    values: Array = column.cast(pa.float64()).to_numpy()
-    return values
+    return numbers(column.cast(pa.float64()))
 
 
 def _check_columns(path: Path, columns: dict[str, Array]) -> None:
@@ -265,7 +263,7 @@ def _block(columns: dict[str, Array]) -> Block:
 
 def from_table(table: pa.Table) -> Block:
     """Samples of a table with `COLUMNS` that was written here."""
-    return _block({n: table.column(n).to_numpy() for n in table.column_names})
+    return _block({n: numbers(table.column(n)) for n in table.column_names})
 
 
 def schema() -> pa.Schema:
@@ -281,5 +279,10 @@ def to_batch(block: Block) -> pa.RecordBatch:
 
     columns = [block.t, *block.acc.T, *block.gyr.T]
     columns += [block.temperature, block.t_host, block.seq]
-    arrays = [pa.array(np.ascontiguousarray(c, dtype=float)) for c in columns]
+    whole = [np.ascontiguousarray(c, dtype=float) for c in columns]
+    # pa.array would look for pandas first, and load all of it where it is installed
+    arrays = [
+        pa.Array.from_buffers(pa.float64(), len(block), [None, pa.py_buffer(c)])
+        for c in whole
+    ]
     return pa.RecordBatch.from_arrays(arrays, names=list(COLUMNS))

@@ -26,7 +26,7 @@ import numpy as np
 
 from fieldcal import description, sample_files
 from fieldcal.description import ACC_UNITS, GYR_UNITS, Description
-from fieldcal.errors import SessionError
+from fieldcal.errors import SessionError, disk_says
 from fieldcal.positions import Position
 from fieldcal.samples import Array, Block
 
@@ -204,7 +204,7 @@ def _mark(line: str) -> dict[str, Any] | None:
     return mark
 
 
-def write_whole(path: Path, text: str) -> Path:
+def write_whole(path: Path, content: str | bytes) -> Path:
     """Write a file so that a reader finds the old one or the new one, never half.
 
     Raises
@@ -216,8 +216,8 @@ def write_whole(path: Path, text: str) -> Path:
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
+            with os.fdopen(handle, "wb") as file:
+                file.write(content.encode() if isinstance(content, str) else content)
                 file.flush()
                 os.fsync(file.fileno())
             os.chmod(name, 0o644)
@@ -227,5 +227,5 @@ def write_whole(path: Path, text: str) -> Path:
                 os.unlink(name)
             raise
     except OSError as error:
-        raise SessionError(f"{path}: cannot be written: {error}") from error
+        raise SessionError(f"{path}: cannot be written: {disk_says(error)}") from error
     return path

@@ -162,7 +162,7 @@ def test_a_full_disk_is_said_and_what_was_recorded_is_kept(tmp_path: Path) -> No
     full = os.open("/dev/full", os.O_WRONLY)
     os.dup2(full, recorder._samples.fd)
     recorder.append(block(50))
-    with pytest.raises(SessionError, match="No space left"):
+    with pytest.raises(SessionError, match="the disk is full: make room"):
         recorder.flush()
     assert len(Session.open(tmp_path / "s").block) == 50
     os.dup2(disk, recorder._samples.fd)

@@ -104,6 +104,8 @@ def test_every_plot_is_drawn_and_can_be_zoomed(
     close = view(browser)
     assert near[0] < close[0] < close[1] < near[1]
     assert browser.value(f"{RECORD}.dataset.raw") == "true"
+    shown = "document.querySelector('#record .fineness').textContent"
+    assert browser.value(shown) == "Every sample is shown."
     assert min(browser.value(lines)) > 20
     browser.value("document.querySelector('#record .tools button:last-child').click()")
     assert view(browser) == pytest.approx(whole)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -63,21 +64,25 @@ def _write(path: Path, block: Block) -> None:
     import pyarrow as pa
     from pyarrow import csv, parquet
 
-    from fieldcal.errors import InputError
+    from fieldcal.errors import InputError, disk_says
     from fieldcal.sample_files import to_batch
 
     table = pa.Table.from_batches([to_batch(block)])
+    part = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         if path.name.endswith(".csv"):
-            csv.write_csv(table, path)
+            csv.write_csv(table, part)
         elif path.name.endswith(".csv.gz"):
-            with pa.CompressedOutputStream(path, "gzip") as stream:
+            with pa.CompressedOutputStream(part, "gzip") as stream:
                 csv.write_csv(table, stream)
         elif path.name.endswith(".parquet"):
-            parquet.write_table(table, path)
+            parquet.write_table(table, part)
         else:
             raise InputError(
                 f"{path.name}: samples are written as .csv, .csv.gz or .parquet"
             )
+        part.replace(path)
     except OSError as fault:
-        raise InputError(f"{path} cannot be written: {fault}") from fault
+        raise InputError(f"{path}: cannot be written: {disk_says(fault)}") from fault
+    finally:
+        part.unlink(missing_ok=True)

@@ -105,11 +105,13 @@ def _write(
 ) -> None:
     import tomlkit
 
+    from fieldcal.session import write_whole
+
     if path.exists():
         raise InputError(f"{path}: is there already; name another file")
     run_table = {"procedure": "positions", "seconds": seconds}
     whole = {**tables, "run": run_table, "position": [_table(p) for p in chosen]}
-    path.write_text(tomlkit.dumps(whole), encoding="utf-8")
+    write_whole(path, tomlkit.dumps(whole))
 
 
 def _table(position: Position) -> dict[str, Any]:

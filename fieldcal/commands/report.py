@@ -48,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.write(f"written: {page}\n")
     if args.pdf or args.png:
         from fieldcal.report.browser import Browser
+        from fieldcal.session import write_whole
 
         with Browser() as browser:
             browser.open(page)
@@ -57,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
             ):
                 if wanted:
                     path = page.with_suffix(ending)
-                    path.write_bytes(make())
+                    write_whole(path, make())
                     sys.stdout.write(f"written: {path}\n")
     return 0
 

@@ -29,4 +29,5 @@ def write(source: Source, path: Path) -> list[str]:
     ):
         table.writerow([name, f"{value:.12g}", f"{sigma:.6g}", unit])
     write_whole(path, text.getvalue())
-    return [s for s in source.says if "nominal" not in s]
+    says = "raw = bias + M true, M = diag(scale) + cross-coupling, device axes"
+    return [*(s for s in source.says if "nominal" not in s), says]

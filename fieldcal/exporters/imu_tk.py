@@ -42,7 +42,11 @@ def write(source: Source, path: Path) -> list[str]:
     for sensor, file in (("acc", path), ("gyr", path.with_name(name))):
         parts = matrices(*source.linear(sensor))
         write_whole(file, "\n\n".join(_text(part) for part in parts) + "\n")
-    return [*source.says, f"the gyroscopes are in {path.with_name(name)}"]
+    return [
+        *source.says,
+        f"the gyroscopes are in {path.with_name(name)}",
+        "true = T K (raw - B), m/s^2 and rad/s; T, K and B one after the other",
+    ]
 
 
 def _text(array: Array) -> str:

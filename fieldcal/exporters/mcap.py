@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.errors import InputError
+from fieldcal.errors import InputError, disk_says
 from fieldcal.exporters import Source
 from fieldcal.samples import Block
 
@@ -93,7 +93,7 @@ def write(source: Source, path: Path) -> list[str]:
             writer.finish()
         os.replace(part, path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error}") from error
+        raise InputError(f"{path}: cannot be written: {disk_says(error)}") from error
     finally:
         part.unlink(missing_ok=True)
     moved = [f"times begin {shift:g} s later: MCAP has none before 0"] * (shift > 0)

@@ -3,6 +3,9 @@
 Nothing is guessed in silence: columns, rate and units come from the command line; only
 the separator and lines of names at the top are found by themselves. Times are made from
 the rate where the file has none; otherwise they count from the first line.
+
+Arrow reads what is plain, a piece at a time; lines that it does not understand are read
+again one by one, so that each that is none can be named.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal import columns
+from fieldcal.arrow_stream import numbers
 from fieldcal.errors import InputError
 from fieldcal.recording import Recording, Stream, pieces
 from fieldcal.samples import Array, Block
@@ -62,28 +66,32 @@ class File(Recording):
         return f"line {self._skip + row + 1}"
 
     def _first_line(self) -> str:
-        return next((line[:60] for lines in self._lines() for line in lines), "")
+        return next((line[:60] for data in self._pieces() for line in _top(data)), "")
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, a piece of the file at a time."""
         columns.check(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != columns.SKIP]
-        samples, first, separator, seen = columns.Samples(self.wanted), None, None, 0
-        t0 = None
-        for lines in self._lines():
-            if first is None:
-                first = self._heading(lines, use)
-                if first >= len(lines):
+        samples, separator, seen = columns.Samples(self.wanted), None, 0
+        begun, t0 = False, None
+        for data in self._pieces():
+            if not begun:
+                self._skip, begun = self._heading(_top(data), use), True
+                data = _behind(data, self._skip) if self._skip >= 0 else b""
+                if not data.strip():
                     break
-                self._skip, lines = first, lines[first:]
-                separator = self.wanted.separator or _separator(lines[0])
-                self._check_width(lines[0], separator)
-            table = self._table(lines, use, separator, seen)
-            seen += len(table)
+                first = _top(data)[0]
+                separator = self.wanted.separator or _separator(first)
+                self._check_width(first, separator)
+            table = self._table(data, use, separator, seen)
+            n = len(table[0])
+            seen += n
             block = samples.block(
-                {names[i]: c for i, c in zip(use, table.T, strict=True)}, len(table)
+                {names[i]: c for i, c in zip(use, table, strict=True)}, n
             )
+            if not n:
+                continue
             t0 = block.t[0] if t0 is None else t0
             yield replace(block, t=block.t - t0)
         if not seen:
@@ -91,30 +99,31 @@ class File(Recording):
                 f"{self.path}: holds no row of numbers; is it a text file?"
             )
 
-    def _lines(self) -> Iterator[list[str]]:
-        """Lines of the file that are not empty."""
+    def _pieces(self) -> Iterator[bytes]:
+        """Whole lines of the file, many at a time."""
         rest = b""
         for data in pieces(self.path):
             whole, newline, rest = (rest + data).rpartition(b"\n")
-            if newline:
-                yield _split(whole)
-        if rest:
-            yield _split(rest)
+            if newline and whole.strip():
+                yield whole
+        if rest.strip():
+            # a file without a line feed may have the other kind of ends of lines
+            yield rest.replace(b"\r", b"\n")
 
     def _heading(self, lines: Sequence[str], use: Sequence[int]) -> int:
-        """How many lines at the top hold something else than numbers."""
+        """How many lines at the top hold something else than numbers; -1 if all do."""
         if self.wanted.skip is not None:
             return self.wanted.skip
         width = len(self.wanted.columns)
         full = max((_width(line, self._parted(line)) for line in lines[:50]), default=0)
-        for i, line in enumerate(lines[:TOP]):
+        for i, line in enumerate(lines):
             separator = self._parted(line)
             cells = [c.strip() for c in line.split(separator)]
             wanted = [cells[j] for j in use if j < len(cells)]
             whole = separator is None or len(cells) == full or len(cells) == width
             if whole and any(wanted) and all(_is_number(c) for c in wanted if c):
                 return i
-        return len(lines)
+        return -1
 
     def _parted(self, line: str) -> str | None:
         return self.wanted.separator or _separator(line)
@@ -128,19 +137,23 @@ class File(Recording):
             )
 
     def _table(
-        self, lines: list[str], use: list[int], separator: str | None, seen: int
-    ) -> Array:
-        """Numbers of the wanted columns, (n, len(use))."""
+        self, data: bytes, use: list[int], separator: str | None, seen: int
+    ) -> Sequence[Array]:
+        """Numbers of the wanted columns, (n,) each."""
+        plain = _plain(data, len(self.wanted.columns), use, separator)
+        if plain is not None:
+            return plain
+        lines = _split(data)
         every = len(use) == len(self.wanted.columns)
         how: dict[str, Any] = {"delimiter": separator, "ndmin": 2, "comments": None}
         if not every:
             how["usecols"] = use
         try:
-            table: Array = np.loadtxt(lines, **how)
-            return table
+            return list(np.loadtxt(lines, **how).T)
         except ValueError:
             rows = [self._row(n, line, separator) for n, line in enumerate(lines, seen)]
-            return np.array([row for row in rows if row]).reshape(-1, len(use))
+            whole = [row for row in rows if row]
+            return list(np.array(whole, dtype=float).reshape(-1, len(use)).T)
 
     def _row(self, number: int, line: str, separator: str | None) -> list[float]:
         """Numbers of one line, the slow way; nothing of one that is left out."""
@@ -162,8 +175,52 @@ class File(Recording):
         return row
 
 
+def _plain(
+    data: bytes, width: int, use: list[int], separator: str | None
+) -> list[Array] | None:
+    """Numbers of columns by Arrow, (n,) each; None if they are not all numbers."""
+    if separator is None or len(separator) > 1:
+        return None
+    import pyarrow as pa
+    import pyarrow.csv
+
+    names = [str(i) for i in range(width)]
+    wanted = [names[i] for i in use]
+    try:
+        table = pyarrow.csv.read_csv(
+            pa.BufferReader(data),
+            pyarrow.csv.ReadOptions(use_threads=False, column_names=names),
+            pyarrow.csv.ParseOptions(delimiter=separator, quote_char=False),
+            pyarrow.csv.ConvertOptions(
+                column_types=dict.fromkeys(wanted, pa.float64()),
+                include_columns=wanted,
+                null_values=[""],
+            ),
+        )
+    except (pa.ArrowInvalid, ValueError):
+        return None
+    return [numbers(table.column(name)) for name in wanted]
+
+
 def _split(data: bytes) -> list[str]:
-    return [x for x in data.decode(errors="replace").splitlines() if x.strip()]
+    lines = data.decode(errors="replace").replace("\r\n", "\n").split("\n")
+    return [line for line in lines if line.strip()]
+
+
+def _top(data: bytes) -> list[str]:
+    """First lines that are not empty."""
+    return _split(b"\n".join(data.split(b"\n", TOP)[:TOP]))
+
+
+def _behind(data: bytes, many: int) -> bytes:
+    """What stands behind so many lines that are not empty."""
+    at = 0
+    while many and at < len(data):
+        end = data.find(b"\n", at)
+        end = len(data) if end < 0 else end
+        many -= bool(data[at:end].strip())
+        at = end + 1
+    return data[at:]
 
 
 def _separator(line: str) -> str | None:

@@ -1,45 +1,40 @@
-"""ArduPilot dataflash logs (.bin): messages IMU, IMU2, IMU3.
+"""ArduPilot dataflash logs (.bin): messages IMU, IMU2, IMU3, and ISBH with ISBD.
 
-What is in them is calibrated and turned into the body's frame: INS_ACCOFFS,
-INS_ACCSCAL and INS_GYROFFS are taken out, and come along from the PARM messages. A
-message is A3 95, a byte for its type, and fields as the FMT messages say; their letters
-are pymavlink's table. Source: ArduPilot's log format.
+What is in the former is calibrated and turned into the body's frame: INS_ACCOFFS,
+INS_ACCSCAL and INS_GYROFFS are taken out, and come along from the PARM messages. The
+latter are batches at the sensor's own rate, raw where bit 0 of INS_LOG_BAT_OPT is set;
+their numbers are cut toward zero, see `mavlink_units`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.batches import Batch, Batches
+from fieldcal.dataflash_messages import (
+    AXES,
+    BODY,
+    FMT,
+    HEAD,
+    INSTANCES,
+    MARK,
+    Messages,
+)
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
+from fieldcal.drivers.mavlink_units import unbiased
 from fieldcal.errors import InputError
-from fieldcal.recording import Recording, Stream, pieces
+from fieldcal.recording import Recording, Stream
 from fieldcal.samples import Array, Block
 
 WHAT = "ArduPilot dataflash log, .bin"
 
-MARK = b"\xa3\x95"
-FMT = 128
-FMT_SIZE = 89
-
-INSTANCES = {"IMU": 0, "IMU2": 1, "IMU3": 2}
-"""Messages with samples; IMU says itself of which sensor, in logs since 2020."""
-
-
-SIX = {f"{kind}{axis}" for kind in ("Acc", "Gyr") for axis in "XYZ"}
-
-
-class Format(NamedTuple):
-    """A kind of message: its bytes, and its fields as they stand behind the mark."""
-
-    name: str
-    size: int
-    layout: np.dtype[Any]
-    factors: dict[str, float]
+OPTION, RAW = "INS_LOG_BAT_OPT", 1
+"""Parameter, and its bit by which batches are taken before anything is corrected."""
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -57,23 +52,42 @@ class File(Recording):
     def streams(self) -> list[Stream]:
         """Sensors that have samples in the log."""
         self._scan()
-        if not self._sensors:
+        if not self._sensors and not self._sampled:
             raise InputError(
-                f"{self.path}: has no IMU message; set LOG_BITMASK to log the IMU, and"
-                " record again"
+                f"{self.path}: has no IMU message and no batch of samples; set"
+                " LOG_BITMASK to log the IMU, and record again"
             )
         says = "m/s^2, rad/s, calibrated, body's frame"
-        return [Stream(f"IMU.{n}", says) for n in sorted(self._sensors)]
+        found = [Stream(f"IMU.{n}", says) for n in sorted(self._sensors)]
+        says = f"m/s^2, rad/s, batches, {self._state()}"
+        return found + [Stream(f"{BODY}.{n}", says) for n in sorted(self._sampled)]
+
+    def _state(self) -> str:
+        """What was done to the samples of batches before they were written."""
+        option = self._params.get(OPTION)
+        if option is None:
+            return "raw or calibrated: the log lacks " + OPTION
+        raw = int(option) & RAW
+        return "raw, sensor's frame" if raw else "calibrated, body's frame"
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return what the autopilot had installed while it logged."""
         self._scan()
-        number = int(stream.rpartition(".")[2])
+        message, _, last = stream.rpartition(".")
+        number = int(last)
         wanted = [n for some in names(ARDUPILOT, number).values() for n in some]
         values = {n: self._params[n] for n in wanted if n in self._params}
-        installed = Installed(ARDUPILOT, number, values)
-        return {
-            "message": "IMU",
+        raw = message == BODY and int(self._params.get(OPTION, 0)) & RAW
+        if raw:
+            values |= {"AHRS_ORIENTATION": 0.0}
+        installed = Installed(ARDUPILOT, number, values, taken_out=bool(raw))
+        told: dict[str, Any] = {}
+        if message == BODY:
+            acc, gyr = self._sampled[number]
+            told["grain"] = {"acc": acc, "gyr": gyr, "cut": True}
+            told["samples"] = self._state()
+        return told | {
+            "message": message,
             "instance": number,
             "acc_unit": "m/s^2",
             "gyr_unit": "rad/s",
@@ -83,14 +97,53 @@ class File(Recording):
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of one sensor, a piece of the log at a time."""
         self._scan()
-        number = int(stream.rpartition(".")[2])
-        for found in self._messages(set(INSTANCES), scan=False):
-            for name, rows in found.items():
-                form = self._by_name[name]
-                table = rows.view(form.layout)[:, 0]
+        message, _, last = stream.rpartition(".")
+        number = int(last)
+        if message == BODY:
+            yield from self._batches(number)
+            return
+        for found in self._log.tables(set(INSTANCES)):
+            for name, table in found.items():
                 mine = table[_sensor(name, table) == number]
                 if len(mine):
-                    yield _block(mine, form)
+                    yield self._block(mine, name)
+
+    def _block(self, table: NDArray[np.void], name: str) -> Block:
+        def column(column: str) -> Array:
+            factor = self._log.factor(name, column)
+            values: Array = table[column].astype(float) * factor
+            return values
+
+        there = table.dtype.names or ()
+        whole = "TimeUS" in there
+        stamp = 1e-6 * column("TimeUS") if whole else 1e-3 * column("TimeMS")
+        degrees = next((column(n) for n in ("T", "Temp") if n in there), None)
+        return Block.of(
+            stamp,
+            np.column_stack([column(f"Acc{axis}") for axis in "XYZ"]),
+            np.column_stack([column(f"Gyr{axis}") for axis in "XYZ"]),
+            degrees,
+        )
+
+    def _batches(self, number: int) -> Iterator[Block]:
+        """Samples of the batches of one device."""
+        batches, scales = Batches(), dict[int, float]()
+        for found in self._log.tables({HEAD, BODY}):
+            for row in found.get(HEAD, ()):
+                if row["instance"] == number and row["mul"] and row["smp_rate"] > 0:
+                    scales[int(row["N"])] = 1 / float(row["mul"])
+                    batches.begin(int(row["N"]), _batch(row))
+            for row in found.get(BODY, ()):
+                values = np.column_stack([row[axis] for axis in AXES]).astype(float)
+                scale = scales.get(int(row["N"]), np.nan)
+                part = scale * unbiased(values)
+                yield from batches.feed(int(row["N"]), int(row["seqno"]), part)
+            batches.forget()
+        yield from batches.rest()
+        if batches.lost:
+            self.says.append(
+                f"{batches.lost} batches of which a part is missing are left out"
+            )
 
     _scanned = False
 
@@ -98,123 +151,41 @@ class File(Recording):
         """Walk through the log once: which sensors it has, and the parameters."""
         if self._scanned:
             return
-        self._formats: dict[int, Format] = {}
-        self._by_name: dict[str, Format] = {}
+        self._log = Messages(self.path, self.damaged)
         self._sensors: set[int] = set()
+        self._sampled: dict[int, tuple[float, float]] = {}
         self._params: dict[str, float] = {}
-        for found in self._messages({*INSTANCES, "PARM"}, scan=True):
-            for name, rows in found.items():
-                table = rows.view(self._by_name[name].layout)[:, 0]
+        for found in self._log.tables({*INSTANCES, "PARM", HEAD}, scan=True):
+            for name, table in found.items():
                 if name in INSTANCES:
                     self._sensors.update(_sensor(name, table).tolist())
+                    continue
+                if name == HEAD:
+                    self._note_steps(table)
                     continue
                 for row in table:
                     key = bytes(row["Name"]).rstrip(b"\0").decode("ascii", "replace")
                     if np.isfinite(row["Value"]):
                         self._params[key] = float(row["Value"])
+        if self._log.cut is not None:
+            self.says.append(f"the log ends within a message, at byte {self._log.cut}")
         self._scanned = True
 
-    def _messages(
-        self, wanted: set[str], scan: bool
-    ) -> Iterator[dict[str, NDArray[np.uint8]]]:
-        """Bytes of the wanted messages, (n, size), a piece of the log at a time."""
-        rest, base = b"", 0
-        for piece in pieces(self.path):
-            data = rest + piece
-            found, at = self._walk(data, base, scan)
-            rest, base = data[at:], base + at
-            array = np.frombuffer(data, np.uint8)
-            out = {}
-            for kind, starts in found.items():
-                form = self._formats[kind]
-                if form.name in wanted and starts:
-                    at_bytes = np.array(starts)[:, None] + np.arange(form.size)
-                    out[form.name] = array[at_bytes]
-            if out:
-                yield out
-        if scan and rest:
-            self.says.append(f"the log ends within a message, at byte {base}")
-
-    def _walk(
-        self, data: bytes, base: int, scan: bool
-    ) -> tuple[dict[int, list[int]], int]:
-        """Where messages begin, by kind, and where the next one does."""
-        found: dict[int, list[int]] = {}
-        sizes = {kind: form.size for kind, form in self._formats.items()}
-        at, size = 0, len(data)
-        while at + 3 <= size:
-            kind = data[at + 2]
-            length = FMT_SIZE if kind == FMT else sizes.get(kind, 0)
-            if data[at] != 0xA3 or data[at + 1] != 0x95 or not length:
-                if data.count(0xFF, at) == size - at or not data[at:].strip(b"\0"):
-                    # blocks of flash that were never written
-                    return found, size
-                if scan:
-                    self.damaged(f"byte {base + at}", "is no message of a log")
-                at = data.find(MARK, at + 1)
-                if at < 0:
-                    return found, size
-                continue
-            if at + length > size:
-                break
-            if kind == FMT:
-                if scan:
-                    self._define(data[at : at + length], base + at)
-                    sizes = {k: form.size for k, form in self._formats.items()}
-            elif kind in found:
-                found[kind].append(at)
-            else:
-                found[kind] = [at]
-            at += length
-        return found, at
-
-    def _define(self, message: bytes, at: int) -> None:
-        """Keep what a FMT message says."""
-        from pymavlink.DFReader import FORMAT_TO_STRUCT
-
-        kind, size = message[3], message[4]
-        texts = (message[5:9], message[9:25], message[25:89])
-        name, letters, labels = (
-            text.split(b"\0")[0].decode("ascii", "replace") for text in texts
-        )
-        columns = labels.split(",")
-        layout, factors = [("mark", "V3")], {}
-        try:
-            for column, letter in zip(columns, letters, strict=True):
-                code, factor, _ = FORMAT_TO_STRUCT[letter]
-                layout.append((column, _numpy(code)))
-                factors[column] = factor or 1.0
-            form = Format(name, size, np.dtype(layout), factors)
-        except (KeyError, ValueError, TypeError):
-            form = Format("", size, np.dtype("u1"), {})
-        there = set(form.layout.names or ())
-        needed = {"PARM": {"Name", "Value"}, **dict.fromkeys(INSTANCES, SIX)}
-        fits = form.layout.itemsize == size and there >= needed.get(name, set())
-        fits = fits and all(
-            form.layout[n].kind in ("S" if n == "Name" else "iuf")
-            for n in there & {*NUMBERS, *needed.get(name, ())}
-        )
-        if name in INSTANCES:
-            fits = fits and bool(there & {"TimeUS", "TimeMS"})
-        if name in needed and not fits:
-            self.damaged(f"byte {at}", f"defines {name} in a way that does not fit")
-            return
-        if size > 3 and self._formats.setdefault(kind, form).size == size:
-            self._by_name.setdefault(name, form)
+    def _note_steps(self, table: NDArray[np.void]) -> None:
+        """Keep which devices are sampled in batches, and the steps of their numbers."""
+        for row in table[table["mul"] > 0]:
+            steps = list(self._sampled.get(int(row["instance"]), (0.0, 0.0)))
+            steps[int(row["type"] != 0)] = 1 / float(row["mul"])
+            self._sampled[int(row["instance"])] = (steps[0], steps[1])
 
 
-def _numpy(code: str) -> str:
-    """Return numpy's name of a field of `struct`."""
-    return f"S{code[:-1]}" if code.endswith("s") else f"<{_CODES[code]}"
-
-
-NUMBERS = ("TimeUS", "TimeMS", "T", "Temp", "I")
-"""Columns that are read besides those that are needed."""
-
-_CODES = {
-    "b": "i1", "B": "u1", "h": "i2", "H": "u2", "i": "i4", "I": "u4", "q": "i8",
-    "Q": "u8", "e": "f2", "f": "f4", "d": "f8",
-}  # fmt: skip
+def _batch(row: np.void) -> Batch:
+    return Batch(
+        gyro=bool(row["type"]),
+        start=1e-6 * float(row["SampleUS"]),
+        period=1 / float(row["smp_rate"]),
+        length=int(row["smp_cnt"]),
+    )
 
 
 def _sensor(name: str, table: NDArray[np.void]) -> NDArray[np.int64]:
@@ -222,19 +193,3 @@ def _sensor(name: str, table: NDArray[np.void]) -> NDArray[np.int64]:
     if name == "IMU" and "I" in (table.dtype.names or ()):
         return table["I"].astype(np.int64)
     return np.full(len(table), INSTANCES[name])
-
-
-def _block(table: NDArray[np.void], form: Format) -> Block:
-    def column(name: str) -> Array:
-        values: Array = table[name].astype(float) * form.factors[name]
-        return values
-
-    there = table.dtype.names or ()
-    stamp = 1e-6 * column("TimeUS") if "TimeUS" in there else 1e-3 * column("TimeMS")
-    degrees = next((column(n) for n in ("T", "Temp") if n in there), None)
-    return Block.of(
-        stamp,
-        np.column_stack([column(f"Acc{axis}") for axis in "XYZ"]),
-        np.column_stack([column(f"Gyr{axis}") for axis in "XYZ"]),
-        degrees,
-    )

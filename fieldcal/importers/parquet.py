@@ -7,9 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fieldcal import columns
+from fieldcal.arrow_stream import numbers
 from fieldcal.errors import InputError
 from fieldcal.recording import ROWS, Recording, Stream, on_disk
 from fieldcal.sample_files import COLUMNS
@@ -116,7 +115,4 @@ class File(Recording):
                 f"{self.path}: column {name} holds {kind}, not numbers; name another"
                 " with --columns"
             )
-        values: Array = np.asarray(
-            column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
-        )
-        return values
+        return numbers(column.cast(pa.float64(), safe=False))

@@ -1,52 +1,56 @@
-"""PX4 logs (.ulg), read through pyulog, a piece of the log at a time.
+"""PX4 logs (.ulg): definitions through pyulog, samples a piece of the log at a time.
 
-Streams: ``sensor_accel.N``, what sensor N sends with its partner sensor_gyro (raw, in
-the sensor's frame, with temperature), and ``sensor_combined.0``, what PX4 flies by:
-turned into the body's frame, with CAL_ACCn_*, CAL_GYROn_* taken out. Of the several
-slots n of that calibration, the one counts whose id is that of the sensor.
+Streams, of sensor N with its partner, the gyroscope of the same device:
 
-Message definitions and subscriptions are put before each piece, so that pyulog reads
-a log of any length. A damaged log goes on at its next sync message. Source: PX4 user
-guide, ULog File Format.
+    sensor_accel_fifo.N    every sample the sensor took, raw, in the sensor's frame
+    sensor_accel.N         filtered and thinned out by the driver, with temperature
+    sensor_combined.0      what PX4 flies by: turned into the body's frame, with
+                           CAL_ACCn_*, CAL_GYROn_* taken out
+    vehicle_imu.N          integrals over some ms, likewise corrected; only where a log
+                           has none of the others
+
+Of the several slots n of that calibration, the one counts whose id is that of the
+sensor. Source: message definitions of PX4.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fieldcal.batches import Fifo
 from fieldcal.drivers.mavlink_installed import PX4, Installed, names
 from fieldcal.errors import InputError
 from fieldcal.pairing import Pair
-from fieldcal.recording import Recording, Stream, pieces
-from fieldcal.samples import Array, Block
+from fieldcal.recording import Recording, Stream
+from fieldcal.samples import Array, Block, concat
+from fieldcal.ulog_messages import Messages, Table
 
 WHAT = "PX4 log, .ulg"
 
 MAGIC = b"ULog\x01\x12\x35"
-HEADER = 16
 
-KNOWN = frozenset(b"BFIMPQALDOSRCGE")
-"""Types of messages."""
+COMBINED, INTEGRALS = "sensor_combined", "vehicle_imu"
 
-SYNC = bytes((8, 0, ord("S"), 0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12))
+PARTNERS = {"sensor_accel_fifo": "sensor_gyro_fifo", "sensor_accel": "sensor_gyro"}
+"""Topics of accelerometers, and of the gyroscopes that go with them."""
 
-COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
+SAYS = {
+    "sensor_accel_fifo": "m/s^2, rad/s, raw, sensor's frame, every sample",
+    "sensor_accel": "m/s^2, rad/s, raw, sensor's frame",
+    COMBINED: "m/s^2, rad/s, calibrated, body's frame",
+    INTEGRALS: "m/s^2, rad/s, calibrated, body's frame, means over each integral",
+}
 
 NOT_UPDATED = 0x7FFFFFFF
 """What accelerometer_timestamp_relative says where nothing new came."""
 
-DATA = ord("D")
-
-NEVER = 1 << 62
-"""Where nothing was appended."""
-
-Table = dict[str, Array]
+MOST = 32
+"""Samples that a message of a FIFO has room for."""
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -63,237 +67,153 @@ class File(Recording):
 
     def streams(self) -> list[Stream]:
         """Sensors that have samples in the log."""
-        self._scan()
-        found = []
-        there = {topic for n, topic in self._ids.items() if self._seen[n]}
-        for topic, number in sorted(there):
-            if topic == ACCEL:
-                old = "x_raw" in self._fields(ACCEL)
-                what = "calibrated by the driver" if old else "raw, sensor's frame"
-                found.append(Stream(f"{ACCEL}.{number}", f"m/s^2, rad/s, {what}"))
-            elif topic == COMBINED:
-                what = "m/s^2, rad/s, calibrated, body's frame"
-                found.append(Stream(f"{COMBINED}.{number}", what))
+        there = self._log.topics
+        some = [(t, n) for t, n in sorted(there) if t in SAYS and t != INTEGRALS]
+        found = some or [(t, n) for t, n in sorted(there) if t == INTEGRALS]
         if not found:
             raise InputError(
-                f"{self.path}: has no {ACCEL} and no {COMBINED}; log them"
+                f"{self.path}: has none of {', '.join(SAYS)}; log them"
                 " (SDLOG_PROFILE), and record again"
             )
-        return found
+        return [Stream(f"{topic}.{n}", self._what(topic)) for topic, n in found]
+
+    def _what(self, topic: str) -> str:
+        if topic == "sensor_accel" and not self._raw(topic):
+            return "m/s^2, rad/s, calibrated by the driver"
+        return SAYS[topic]
+
+    def _raw(self, topic: str) -> bool:
+        """Whether no calibration has been taken out of a topic."""
+        return topic in PARTNERS and "x_raw" not in self._log.formats.get(topic, ())
 
     def notes(self, stream: str) -> dict[str, Any]:
         """What the log says of the sensor, and the calibration behind its samples."""
-        self._scan()
-        topic = stream.partition(".")[0]
-        raw = topic == ACCEL and "x_raw" not in self._fields(ACCEL)
-        identifier = self._identifier(stream)
-        slot = self._slot("ACC", identifier)
+        topic, number = _parted(stream)
+        raw = self._raw(topic)
+        identifier = self._identifier(topic, number)
         told = {
             "message": topic,
-            "instance": int(stream.rpartition(".")[2]),
+            "instance": number,
             "device_id": identifier,
             "acc_unit": "m/s^2",
             "gyr_unit": "rad/s",
-            "hardware": str(self._info.get("ver_hw", "")),
+            "hardware": str(self._log.info.get("ver_hw", "")),
         }
+        if topic == "sensor_accel_fifo":
+            gyro = (PARTNERS[topic], self._partner(topic, number))
+            steps = [self._first(some, "scale") for some in ((topic, number), gyro)]
+            acc, gyr = (step or 0.0 for step in steps)
+            told["grain"] = {"acc": acc, "gyr": gyr, "cut": False}
+        slot = self._slot(identifier)
         if slot is None:
             return told | {"installed": None}
+        params = self._log.parameters
         wanted = [n for some in names(PX4, slot).values() for n in some]
-        values = {n: self._params[n] for n in wanted if n in self._params}
+        values = {n: params[n] for n in wanted if n in params}
         if raw:
             values |= {"SENS_BOARD_ROT": 0.0}
         installed = Installed(PX4, slot, values, taken_out=raw)
         return told | {"installed": installed.as_table()}
 
-    def _identifier(self, stream: str) -> int | None:
+    def _identifier(self, topic: str, number: int) -> int | None:
         """Id of the accelerometer."""
-        topic, _, number = stream.partition(".")
         if topic == COMBINED:
-            prime = self._params.get("CAL_ACC_PRIME")
+            prime = self._log.parameters.get("CAL_ACC_PRIME")
             return int(prime) if prime else None
-        for tables in self._tables({(ACCEL, int(number))}):
-            ids = tables.get((ACCEL, int(number)), {}).get("device_id")
-            if ids is not None:
-                return int(ids[0])
+        field = "accel_device_id" if topic == INTEGRALS else "device_id"
+        found = self._first((topic, number), field)
+        return None if found is None else int(found)
+
+    def _first(self, topic: tuple[str, int], field: str) -> float | None:
+        """Return the first value of a field."""
+        if topic in self._log.topics and field in self._log.formats.get(topic[0], ()):
+            with self._sensible(topic[0]):
+                for tables in self._log.tables({topic}):
+                    if topic in tables:
+                        return float(tables[topic][field][0])
         return None
 
-    def _slot(self, sensor: str, identifier: int | None) -> int | None:
+    def _partner(self, topic: str, number: int) -> int:
+        """Instance of the gyroscope of the same device, or else of the same number."""
+        gyro = PARTNERS[topic]
+        mine = self._first((topic, number), "device_id")
+        there = sorted(n for name, n in self._log.topics if name == gyro)
+        same = [n for n in there if self._first((gyro, n), "device_id") == mine]
+        return same[0] if mine and len(same) == 1 else number
+
+    def _slot(self, identifier: int | None) -> int | None:
         """Which set of parameters a sensor has."""
-        ids = {n: self._params.get(f"CAL_{sensor}{n}_ID") for n in range(4)}
+        ids = {n: self._log.parameters.get(f"CAL_ACC{n}_ID") for n in range(4)}
         slots = [n for n, value in ids.items() if value and value == identifier]
         return slots[0] if slots else None
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of a sensor, a piece of the log at a time."""
-        self._scan()
-        try:
-            yield from self._blocks(stream)
-        except (KeyError, ValueError, TypeError) as error:
-            raise InputError(
-                f"{self.path}: {stream} is not defined as a sensor is ({error}); copy"
-                " it again from where it came"
-            ) from error
-
-    def _blocks(self, stream: str) -> Iterator[Block]:
-        topic, _, number = stream.partition(".")
-        if topic == COMBINED:
-            wanted = {(COMBINED, int(number))}
-            for tables in self._tables(wanted):
+        topic, number = _parted(stream)
+        with self._sensible(topic):
+            if topic in PARTNERS:
+                yield from self._pairs(topic, number)
+                return
+            reads = _combined if topic == COMBINED else _integrals
+            for tables in self._log.tables({(topic, number)}):
                 for table in tables.values():
-                    yield _combined(table)
-            return
-        pair = Pair()
-        for tables in self._tables({(ACCEL, int(number)), (GYRO, int(number))}):
-            accel, gyro = (tables.get((t, int(number))) for t in (ACCEL, GYRO))
-            block = pair.feed(
-                _sensor(accel, "acc") if accel else None,
-                _sensor(gyro, "gyr") if gyro else None,
-            )
+                    yield reads(table)
+
+    def _pairs(self, topic: str, number: int) -> Iterator[Block]:
+        mine = (topic, number)
+        other = (PARTNERS[topic], self._partner(topic, number))
+        pair, reads = Pair(), {mine: _reader(topic), other: _reader(topic)}
+        for tables in self._log.tables({mine, other} & self._log.topics):
+            read = {some: reads[some](table) for some, table in tables.items()}
+            if other not in self._log.topics:
+                yield from read.values()
+                continue
+            gyro = read.get(other)
+            block = pair.feed(read.get(mine), gyro and _as_rates(gyro))
             if len(block):
                 yield block
-        rest = pair.rest()
-        if len(rest):
+        if len(rest := pair.rest()):
             yield rest
+        if other[1] != number:
+            stream = f"{topic}.{number}"
+            self.says.append(
+                f"{stream} goes with {other[0]}.{other[1]}, the gyroscope of the same"
+                " device"
+            )
         if pair.worst:
             self.says.append(
                 "accelerometer and gyroscope have times of their own: paired with the"
                 f" nearest, {pair.worst * 1e3:.3g} ms apart at most"
             )
 
-    def _fields(self, topic: str) -> str:
-        return self._formats.get(topic, "")
+    @contextmanager
+    def _sensible(self, topic: str) -> Iterator[None]:
+        """Say of a topic that it is not what its name says."""
+        try:
+            yield
+        except (KeyError, ValueError, TypeError) as error:
+            raise InputError(
+                f"{self.path}: {topic} is not defined as a sensor is ({error}); copy it"
+                " again from where it came"
+            ) from error
 
-    _scanned = False
+    _read: Messages | None = None
 
-    def _scan(self) -> None:
-        """Walk through the log once: what is in it, and its parameters."""
-        if self._scanned:
-            return
-        from pyulog import ULog
+    @property
+    def _log(self) -> Messages:
+        """The log, walked through once."""
+        if self._read is None:
+            self._read = Messages(self.path, self.damaged)
+            if self._read.cut is not None:
+                self.says.append(
+                    f"the log ends within a message, at byte {self._read.cut}"
+                )
+        return self._read
 
-        self._head, self._subscribed = b"", b""
-        self._ids: dict[int, tuple[str, int]] = {}
-        self._seen = [0] * 65536
-        self._appended: list[int] = []
-        for _ in self._messages(set(), scan=True):
-            pass
-        with contextlib.redirect_stdout(io.StringIO()):
-            try:
-                read = ULog(io.BytesIO(self._head))
-            except Exception as error:
-                # a spoilt definition makes pyulog raise what it likes
-                raise InputError(
-                    f"{self.path}: its definitions cannot be read: {error}; copy it"
-                    " again from where it came"
-                ) from error
-        self._info = read.msg_info_dict
-        self._params = {
-            k: float(v)
-            for k, v in read.initial_parameters.items()
-            if isinstance(v, int | float)
-        }
-        self._formats = {
-            name: " ".join(field for *_, field in f.fields)
-            for name, f in read.message_formats.items()
-        }
-        self._scanned = True
 
-    def _tables(
-        self, wanted: set[tuple[str, int]]
-    ) -> Iterator[dict[tuple[str, int], Table]]:
-        """What pyulog makes of each piece of the log."""
-        from pyulog import ULog
-
-        for data in self._messages(wanted, scan=False):
-            with contextlib.redirect_stdout(io.StringIO()):
-                try:
-                    read = ULog(io.BytesIO(self._head + self._subscribed + data))
-                except Exception as error:
-                    # as above
-                    raise InputError(
-                        f"{self.path}: cannot be read: {error}; copy it again from"
-                        " where it came"
-                    ) from error
-            yield {
-                (item.name, item.multi_id): item.data
-                for item in read.data_list
-                if (item.name, item.multi_id) in wanted
-            }
-
-    def _messages(self, wanted: set[tuple[str, int]], scan: bool) -> Iterator[bytes]:
-        """Walk through the log; messages of wanted topics, a piece at a time."""
-        rest, base, begun = b"", 0, False
-        for piece in pieces(self.path):
-            data = rest + piece
-            at = 0
-            if not begun:
-                if len(data) < HEADER:
-                    rest = data
-                    continue
-                at, begun = HEADER, True
-                if scan:
-                    self._head = data[:HEADER]
-            out, at = self._walk(data, at, base, wanted, scan)
-            rest, base = data[at:], base + at
-            if out:
-                yield out
-        if scan and (rest or not begun):
-            self.says.append(f"the log ends within a message, at byte {base}")
-
-    def _walk(
-        self, data: bytes, at: int, base: int, wanted: set[tuple[str, int]], scan: bool
-    ) -> tuple[bytes, int]:
-        """Wanted messages of a stretch, and where the next message begins."""
-        ids = {n for n, topic in self._ids.items() if topic in wanted}
-        out, size = bytearray(), len(data)
-        jumps = [offset - base for offset in self._appended if offset >= base]
-        jump = jumps[0] if jumps else NEVER
-        counts = self._seen
-        while at + 3 <= size:
-            end = at + 3 + (data[at] | data[at + 1] << 8)
-            kind = data[at + 2]
-            # nearly all messages are data, so these come first and go fast
-            if kind == DATA and at + 5 <= end <= size and not at < jump < end:
-                number = data[at + 3] | data[at + 4] << 8
-                if scan:
-                    counts[number] += 1
-                elif number in ids:
-                    out += data[at:end]
-                at = end
-                continue
-            if end > jump > at:
-                # what follows was appended after a crash had cut a message
-                at, jumps = jump, jumps[1:]
-                jump = jumps[0] if jumps else NEVER
-                continue
-            if kind not in KNOWN or end == at + 3:
-                back = data.find(SYNC, at)
-                if scan:
-                    self.damaged(f"byte {base + at}", "is no message of a log")
-                if back < 0:
-                    keep = max(at, size - len(SYNC) + 1)
-                    return bytes(out), max(keep, at + 1)
-                at = back
-                continue
-            if end > size:
-                break
-            if scan:
-                self._define(kind, data[at:end])
-            at = end
-        return bytes(out), at
-
-    def _define(self, kind: int, message: bytes) -> None:
-        """Keep what defines the messages that follow."""
-        if kind in b"FIPQM" and not self._ids:
-            self._head += message
-        elif kind == ord("B"):
-            offsets = np.frombuffer(message[19:43], "<u8")
-            self._appended = sorted(int(o) for o in offsets if o)
-        elif kind == ord("A") and len(message) > 6:
-            number = message[4] | message[5] << 8
-            name = message[6:].decode("ascii", errors="replace")
-            self._ids[number] = (name, message[3])
-            self._subscribed += message
+def _parted(stream: str) -> tuple[str, int]:
+    topic, _, number = stream.rpartition(".")
+    return topic, int(number)
 
 
 def _combined(table: Table) -> Block:
@@ -305,8 +225,48 @@ def _combined(table: Table) -> Block:
     return Block.of(table["timestamp"] * 1e-6, acc, gyr)
 
 
-def _three(table: Table, pattern: str, axes: str) -> Array:
-    columns = [np.asarray(table[pattern.format(axis)], dtype=float) for axis in axes]
+def _integrals(table: Table) -> Block:
+    """Means over the time of each integral, at its middle."""
+    triads = []
+    for name in ("delta_velocity", "delta_angle"):
+        seconds = 1e-6 * table[f"{name}_dt"].astype(float)
+        usual = np.where(seconds > 0, seconds, np.nan)[:, None]
+        triads.append(_three(table, f"{name}[{{}}]", "012") / usual)
+    middle = 0.5e-6 * table["delta_velocity_dt"]
+    return Block.of(_stamps(table) - middle, *triads)
+
+
+def _reader(topic: str) -> Callable[[Table], Block]:
+    """What makes samples of the tables of a sensor."""
+    if topic != "sensor_accel_fifo":
+        return _sensor
+    fifo = Fifo()
+    return lambda table: _unpacked(table, fifo)
+
+
+def _sensor(table: Table) -> Block:
+    """Samples of one sensor, as if of an accelerometer."""
+    temperature = table.get("temperature")
+    return Block.of(_stamps(table), _three(table, "{}", "xyz"), None, temperature)
+
+
+def _unpacked(table: Table, fifo: Fifo) -> Block:
+    """Samples of the FIFO of one sensor, as if of an accelerometer."""
+    number = table["samples"].astype(int).clip(0, MOST)
+    some = number > 0
+    number = number[some]
+    if not len(number):
+        return concat([])
+    period = 1e-6 * table["dt"][some].astype(float)
+    t = fifo.times(_stamps(table)[some], number, period)
+    valid = np.arange(MOST) < number[:, None]
+    scale = np.repeat(table["scale"][some].astype(float), number)
+    axes = [_three(table, f"{axis}[{{}}]", range(MOST))[some][valid] for axis in "xyz"]
+    return Block.of(t, scale[:, None] * np.column_stack(axes))
+
+
+def _three(table: Table, pattern: str, parts: Iterable[object]) -> Array:
+    columns = [np.asarray(table[pattern.format(part)], dtype=float) for part in parts]
     return np.column_stack(columns)
 
 
@@ -314,9 +274,6 @@ def _stamps(table: Table) -> Array:
     return np.asarray(table.get("timestamp_sample", table["timestamp"])) * 1e-6
 
 
-def _sensor(table: Table, kind: str) -> Block:
-    """Samples of one sensor; the other's are unknown."""
-    three, t = _three(table, "{}", "xyz"), _stamps(table)
-    if kind == "acc":
-        return Block.of(t, three, None, table.get("temperature"))
-    return Block.of(t, np.full(three.shape, np.nan), three)
+def _as_rates(block: Block) -> Block:
+    """Samples of a gyroscope that were read as if of an accelerometer."""
+    return Block.of(block.t, np.full(block.acc.shape, np.nan), block.acc)

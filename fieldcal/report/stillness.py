@@ -37,7 +37,7 @@ def stillness(material: Material) -> Section | None:
         return None
     t, r = restlessness(cells)
     chart = Chart(
-        "stillness",
+        "how-still",
         "Restlessness over device time",
         f"Restlessness from {r.min():.2g} to {r.max():.2g} times that of rest.",
         Axis(material.clock, "s"),

@@ -82,20 +82,9 @@ class Table:
         trust = np.sqrt(np.minimum(1.0, counts / np.where(usual > 0, usual, 1.0)))
         if (trust == 1.0).all():
             return means
-        laid = line(_held(means))
+        laid = line(held(means))
         steady: Array = laid + trust * np.where(counts > 0, means - laid, 0.0)
         return steady
-
-    @property
-    def level(self) -> Array:
-        """Means as `means`, (m, 6); one of few values is that of the cell before.
-
-        Unlike `steady`, it is true of a device that was turned meanwhile: no line goes
-        through all of its positions.
-        """
-        counts = self.counts
-        usual = np.median(counts, axis=0)
-        return _held(np.where(counts < usual / 2, np.nan, self.means))
 
     @property
     def whole(self) -> int:
@@ -189,25 +178,29 @@ class Cells:
             self._add(block[first : first + _CHUNK])
 
     def _add(self, block: Block) -> None:
-        x = self._centred(block)
+        six = block.six
+        whole = bool(np.isfinite(six).all())
+        x = self._centred(six if whole else np.where(np.isfinite(six), six, np.nan))
         if not self.n:
             self.start = float(block.t[0])
         self.n += len(block)
         self.end = float(block.t[-1])
-        step = np.diff(np.vstack([self._last, x]), axis=0)
+        step = np.empty_like(x)
+        np.subtract(x[:1], self._last, out=step[:1])
+        np.subtract(x[1:], x[:-1], out=step[1:])
+        whole = whole and bool(np.isfinite(self._last).all())
         self._last = x[-1:]
         index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
         first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
+        sums = np.empty((len(first), 32))
+        sums[:, :24] = (_all if whole else _known)(x, step, first)
+        sums[:, 24:26] = _warmth(block.temperature, first)
         size = np.abs(step)
         finest = np.where(size > 0, size, np.inf)
-        sums = [
-            np.add.reduceat(_rows(x, step, block.temperature), first, axis=0),
-            np.minimum.reduceat(finest, first, axis=0),
-        ]
-        self._append(index[first], np.hstack(sums))
+        np.minimum.reduceat(finest, first, axis=0, out=sums[:, 26:])
+        self._append(index[first], sums)
 
-    def _centred(self, block: Block) -> Array:
-        six = np.where(np.isfinite(block.six), block.six, np.nan)
+    def _centred(self, six: Array) -> Array:
         for channel in np.flatnonzero(np.isnan(self._origin)):
             known = np.flatnonzero(~np.isnan(six[:, channel]))
             if known.size:
@@ -250,18 +243,33 @@ def _resolution(finest: Array) -> Array:
     return np.where(np.isfinite(sensor), sensor, 0.0)
 
 
-def _rows(x: Array, step: Array, temperature: Array) -> Array:
-    known, moved, warm = np.isfinite(x), np.isfinite(step), np.isfinite(temperature)
-    return np.column_stack(
-        [
-            known,
-            np.where(known, x, 0.0),
-            np.where(moved, step, 0.0) ** 2,
-            moved,
-            np.where(warm, temperature, 0.0),
-            warm,
-        ]
-    )
+def _all(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
+    """n, S, D, m of cells, (m, 24), of samples of which no value is missing."""
+    number = np.diff(first, append=len(x))[:, None]
+    sums = np.empty((len(first), 24))
+    sums[:, 0:6] = sums[:, 18:24] = number
+    np.add.reduceat(x, first, axis=0, out=sums[:, 6:12])
+    np.add.reduceat(step**2, first, axis=0, out=sums[:, 12:18])
+    return sums
+
+
+def _known(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
+    """n, S, D, m of cells, (m, 24), of the values that are there."""
+    known, moved = np.isfinite(x), np.isfinite(step)
+    squares = np.where(moved, step, 0.0) ** 2
+    rows = np.hstack([known, np.where(known, x, 0.0), squares, moved])
+    sums: Array = np.add.reduceat(rows, first, axis=0)
+    return sums
+
+
+def _warmth(temperature: Array, first: NDArray[np.int64]) -> Array:
+    """Sum and number of the temperatures of cells, (m, 2)."""
+    warm = np.isfinite(temperature)
+    if not warm.any():
+        return np.zeros((len(first), 2))
+    rows = np.column_stack([np.where(warm, temperature, 0.0), warm])
+    sums: Array = np.add.reduceat(rows, first, axis=0)
+    return sums
 
 
 def _ratio(sums: Array, counts: Array) -> Array:
@@ -270,10 +278,19 @@ def _ratio(sums: Array, counts: Array) -> Array:
     return ratio
 
 
-def _held(means: Array) -> Array:
-    """Means with the one before where one is missing, 0 before the first."""
+def held(means: Array, before: Array | None = None) -> Array:
+    """Means (m, c) with the one before where one is missing, 0 before the first.
+
+    Parameters
+    ----------
+    means : nan where missing
+    before : (1, c) means of the cell before the first, none of them missing
+
+    """
+    first = np.zeros((1, means.shape[1])) if before is None else before
+    means = np.vstack([first, means])
     known = np.isfinite(means)
     row = np.maximum.accumulate(
         np.where(known, np.arange(len(means))[:, None], 0), axis=0
     )
-    return np.nan_to_num(np.take_along_axis(means, row, axis=0))
+    return np.take_along_axis(means, row, axis=0)[1:]

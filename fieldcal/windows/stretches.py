@@ -10,13 +10,13 @@ a window must pass, so that no sample of a turn gets in.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from fieldcal.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells, Table
+from fieldcal.windows.cells import CELL, Cells, Table, held
 from fieldcal.windows.limits import Limits
 from fieldcal.windows.verdict import judge
 
@@ -35,14 +35,34 @@ _LONGEST = 36_000
 _PART = 4096
 """Spans looked at together: all of them at once would take ten times their memory."""
 
+_SAMPLE = 1 << 15
+"""Spans by which the usual is judged: of a longer recording, evenly spread ones."""
+
 _RATE = 0.02
 """Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
 
 Runs = list[tuple[int, int]]
 
-
 Between = Callable[[float, float], Iterable[Block]]
 """Samples from a time up to another, s, in order, in blocks."""
+
+
+class Rows(Protocol):
+    """Rows of `summary` of all cells of a recording, in memory or elsewhere."""
+
+    def __len__(self) -> int:
+        """Count the cells."""
+
+    def __getitem__(self, some: slice, /) -> Array:
+        """Give some of them, (k, 13)."""
+
+
+class _Run(NamedTuple):
+    """Spans [first, last) at rest, and the median rate there, (3,) rad/s."""
+
+    first: int
+    last: int
+    rate: Array
 
 
 def still_stretches(
@@ -57,11 +77,18 @@ def still_stretches(
     def between(start: float, end: float) -> list[Block]:
         return [block.between(start, end)]
 
-    return still_in(_cells([block]), between, min_seconds, limits)
+    cells = Cells()
+    cells.add(block)
+    return still_in(summary(cells.table), between, min_seconds, limits)
+
+
+def summary(cells: Table) -> Array:
+    """Start of each cell, s, its counts and means less the origin: (m, 13)."""
+    return np.column_stack([cells.times, cells.counts, cells.means])
 
 
 def still_in(
-    cells: Table,
+    rows: Rows,
     between: Between,
     min_seconds: float = 2.0,
     limits: Limits | None = None,
@@ -70,51 +97,121 @@ def still_in(
 
     Parameters
     ----------
-    cells : of all of it
+    rows : of all of it
     between : gives the samples of a stretch of it
     min_seconds, limits : as in `still_stretches`
 
     """
-    if len(cells) < 2 * _SPAN:
+    if len(rows) < 2 * _SPAN:
         return []
-    means = cells.level
-    view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
-    parts = [view[i : i + _PART] for i in range(0, len(view), _PART)]
-    spread = np.concatenate([part.std(axis=-1) for part in parts])
-    level = np.concatenate([part.mean(axis=-1) for part in parts])
     shortest = max(1.0, min_seconds)
     found: list[tuple[float, float]] = []
     limits = limits or Limits()
-    for first, last in _at_rest(spread, level, limits.noise):
-        for cut in range(first, last, _LONGEST):
-            start = float(cells.times[cut + _SPAN // 2])
-            end = float(cells.times[min(cut + _LONGEST, last - 1) + _SPAN // 2])
-            found += _passing(between, start, end, shortest, limits)
+    for run in _at_rest(rows, limits.noise):
+        start, end = (_time(rows, span) for span in (run.first, run.last - 1))
+        found += _passing(between, start, end, shortest, limits)
     return found
 
 
-def _at_rest(spread: Array, level: Array, bound: Array) -> Runs:
-    """Runs of spans, [first, last), at rest by (1), by their own noise and rate.
+def _time(rows: Rows, span: int) -> float:
+    """Middle of a span, s."""
+    middle = span + _SPAN // 2
+    return float(rows[middle : middle + 1][0, 0])
+
+
+def _spans(rows: Rows, usual: Array) -> Iterator[tuple[int, Array, Array]]:
+    """First span of a part, the spread and the mean of each of them, (k, 6).
+
+    `usual` (6,) is the number of values in a cell. The mean of one with few is that of
+    the cell before: unlike `Table.steady`, that is true of a device that was turned
+    meanwhile, for no line goes through all of its positions.
+    """
+    before: Array = np.zeros((1, 6))
+    for first in range(0, len(rows) - _SPAN + 1, _PART):
+        part = rows[first : first + _PART + _SPAN - 1]
+        counts = part[:, 1:7]
+        means = held(np.where(counts < usual / 2, np.nan, part[:, 7:13]), before)
+        before = means[_PART - 1 : _PART]
+        view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
+        yield first, view.std(axis=-1), view.mean(axis=-1)
+
+
+def _usual(rows: Rows) -> Array:
+    """Median number of values in a cell, (6,)."""
+    every = -(-len(rows) // _SAMPLE)
+    counts = [
+        rows[first : first + _PART][-first % every :: every, 1:7].copy()
+        for first in range(0, len(rows), _PART)
+    ]
+    usual: Array = np.median(np.concatenate(counts), axis=0)
+    return usual
+
+
+def _at_rest(rows: Rows, bound: Array) -> list[_Run]:
+    """Runs of spans at rest by (1), by their own noise and rate.
 
     `bound` (6,) is what no spread at rest exceeds.
     """
-    quiet = np.quantile(spread, 0.1, axis=0)
+    usual = _usual(rows)
+    every = -(-len(rows) // _SAMPLE)
+    some = np.concatenate(
+        [
+            spread[-first % every :: every].copy()
+            for first, spread, _ in _spans(rows, usual)
+        ]
+    )
+    quiet = np.quantile(some, 0.1, axis=0)
     scale = np.where(quiet > 0, quiet, np.inf)
-    ratio = (spread / scale).max(axis=1)
-    valley = np.clip(_valley(ratio), _LEAST, _MOST)
-    kept: Runs = []
-    for first, last in _runs((ratio < valley) & (spread < bound).all(axis=1)):
-        own = np.maximum(np.quantile(spread[first:last], 0.3, axis=0), quiet)
+    valley = np.clip(_valley((some / scale).max(axis=1)), _LEAST, _MOST)
+    kept: list[_Run] = []
+    for first, spread, level in _calm(rows, usual, np.minimum(valley * scale, bound)):
+        own = np.maximum(np.quantile(spread, 0.3, axis=0), quiet)
         own = np.where(own > 0, own, np.inf)
-        calm = (spread[first:last] < _OWN * own).all(axis=1)
-        kept += [(first + a, first + b) for a, b in _runs(calm)]
+        for a, b in _runs((spread < _OWN * own).all(axis=1)):
+            rate = np.median(level[a:b, 3:], axis=0)
+            kept.append(_Run(first + a, first + b, rate))
     if not kept:
         return []
-    rates = np.array([np.median(level[a:b, 3:], axis=0) for a, b in kept])
-    weights = np.array([b - a for a, b in kept])
-    rest = np.median(np.repeat(rates, weights, axis=0), axis=0)
+    rates = np.array([run.rate for run in kept])
+    rest = _weighted_median(rates, np.array([run.last - run.first for run in kept]))
     turning = np.nan_to_num(np.abs(rates - rest)).max(axis=1) > _RATE
     return [run for run, turns in zip(kept, turning, strict=True) if not turns]
+
+
+def _calm(rows: Rows, usual: Array, bound: Array) -> Iterator[tuple[int, Array, Array]]:
+    """Runs of spans whose spread is below `bound` (6,), `_LONGEST` at most.
+
+    Gives the first span of each, with the spread and the mean of all, (k, 6).
+    """
+    waiting: list[tuple[Array, Array]] = []
+    began = length = 0
+    for first, spread, level in _spans(rows, usual):
+        for a, b in _runs((spread < bound).all(axis=1)):
+            goes_on = began + length == first + a and length + b - a <= _LONGEST
+            if waiting and not goes_on:
+                yield began, *_joined(waiting)
+                waiting = []
+            if not waiting:
+                began, length = first + a, 0
+            waiting.append((spread[a:b], level[a:b]))
+            length += b - a
+    if waiting:
+        yield began, *_joined(waiting)
+
+
+def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    spreads, levels = zip(*parts, strict=True)
+    return np.concatenate(spreads), np.concatenate(levels)
+
+
+def _weighted_median(values: Array, weights: Any) -> Array:
+    """Median of each column of `values` (n, c), each counted `weights` (n,) times."""
+    order = np.argsort(values, axis=0)
+    total = np.cumsum(weights[order], axis=0)
+    middle = (2 * total < total[-1]).sum(axis=0)
+    place = np.take_along_axis(order, middle[None], axis=0)
+    median: Array = np.take_along_axis(values, place, axis=0)[0]
+    return median
 
 
 def _valley(ratio: Array) -> float:
@@ -148,13 +245,6 @@ def _passing(
         *_passing(between, start, min(worst.at, end), shortest, limits),
         *_passing(between, max(after, start), end, shortest, limits),
     ]
-
-
-def _cells(blocks: Iterable[Block]) -> Table:
-    cells = Cells()
-    for block in blocks:
-        cells.add(block)
-    return cells.table
 
 
 def _runs(flags: Any) -> Runs:

@@ -93,7 +93,9 @@ function frame(svg, plot, box, yAxis, range, last) {
   const columns = ticksOf(plot.spec.x, x0, x1, Math.max(3.5, box.w / 90));
   for (const tick of columns.ticks) {
     el(svg, "line", { class: "grid", x1: px(tick.at), x2: px(tick.at), y1: box.y, y2: box.y + box.h });
-    if (last) el(svg, "text", { x: px(tick.at), y: box.y + box.h + 17, "text-anchor": "middle" }, tick.text);
+    // a text at the edge stays whole
+    const x = Math.min(px(tick.at), plot.width - 3.7 * tick.text.length);
+    if (last) el(svg, "text", { x, y: box.y + box.h + 17, "text-anchor": "middle" }, tick.text);
   }
   el(svg, "rect", { class: "axis", x: box.x, y: box.y, width: box.w, height: box.h, fill: "none" });
   if (last) el(svg, "text", { x: box.x + box.w / 2, y: box.y + box.h + 36, "text-anchor": "middle" }, axisName(plot.spec.x, columns.factor));
@@ -146,6 +148,20 @@ function drawRecord(plot) {
   plot.canvas.dataset.step = found.level.step.toPrecision(3);
   plot.canvas.dataset.raw = String(found.level.raw);
   plot.found = found;
+  plot.fineness.textContent = fineness(found);
+}
+
+// what a point of the plot stands for, always beside it
+function fineness(found) {
+  if (found.level.raw) return "Every sample is shown.";
+  const shown = "Shown: the least and the greatest of every " + seconds(found.level.step);
+  if (!found.finest) return shown + "; zoom in for more.";
+  return shown + ", the finest that the page holds here. Single samples are at the edges of the windows, all of them in the session's folder.";
+}
+
+function seconds(s) {
+  const [k, unit] = s < 1 ? [1000, "ms"] : [1, "s"];
+  return Number((k * s).toPrecision(2)) + " " + unit;
 }
 
 // a line through samples, or the area between least and greatest of bins; broken at gaps

@@ -27,8 +27,9 @@ function plotOf(figure) {
   plot.series = record ? [] : seriesOf(spec, plot.u, plot.v);
   plot.view = plot.full = fullOf(plot);
   drawLegend(plot);
+  if (record) plot.fineness = html(figure, "p", { class: "fineness", role: "status" });
   plot.readout = html(figure, "p", { class: "readout", "aria-hidden": "true" });
-  plot.canvas.after(plot.readout);
+  plot.canvas.after(...[plot.fineness, plot.readout].filter(Boolean));
   addTools(plot);
   listenPointers(plot);
   listenKeys(plot);

@@ -94,7 +94,7 @@ class Store {
       if (k === p.levels.length) p.levels.push(coarser(p.levels[k - 1]));
       const level = p.levels[k], t = level.t;
       const first = Math.max(0, search(t, from) - 1), last = Math.min(t.length, search(t, to) + 1);
-      if (last - first <= (level.raw ? 4 : 2) * width || t.length < 2 * JOIN) return { level, first, last };
+      if (last - first <= (level.raw ? 4 : 2) * width || t.length < 2 * JOIN) return { level, first, last, finest: k === 0 };
     }
   }
 }

@@ -67,7 +67,7 @@ function sayRecord(plot, u) {
     const lo = level.low[c][i].toPrecision(5), hi = level.high[c][i].toPrecision(5);
     return p.label + " " + (lo === hi ? lo : lo + " … " + hi);
   });
-  const fine = level.raw ? "single samples" : "least and greatest of " + (1000 * level.step).toPrecision(2) + " ms";
+  const fine = level.raw ? "single samples" : "least and greatest of " + seconds(level.step);
   return level.t[i].toFixed(3) + " s:  " + values.join("   ") + "   (" + fine + ")";
 }
 

@@ -31,6 +31,9 @@ LARGE = 4.0
 MEAN = 6.0
 """The mean of a short stretch, in standard deviations."""
 
+SHAKEN, TAILS = 1.5, 1.6
+"""Spread beyond the noise that a machine or a hand makes, and how far its tails go."""
+
 MANY = 50_000
 """Values that tell the usual spread to half a percent."""
 
@@ -47,7 +50,8 @@ def disturbed(z: Array, m: int) -> NDArray[np.intp]:
     `z` is (n, c) in standard deviations, without its slow part; `m` the samples of the
     shortest stretch looked at as a whole.
     """
-    z = z / usual(z)
+    spread = usual(z)
+    z = z / (spread * np.where(spread > SHAKEN, TAILS, 1.0))
     loud: NDArray[np.bool_] = np.any(np.abs(z) > LARGEST, axis=1)
     total = np.vstack([np.zeros(z.shape[1]), np.cumsum(z, axis=0)])
     for width in (m, 4 * m):

@@ -147,7 +147,8 @@ def outside(name: str, rng: np.random.Generator, sigmas: float) -> Session:
         if name == "fading scale":
             session = replace(session, thermometer=False)
         there = size(replace(session, added=_adding(name, channel, which, 1e-3)))
-        if there > 1e-6 and 1e-3 * sigmas / there < 0.1:
+        shown = there > 1e-6 and 1e-3 * sigmas / there < 0.1
+        if shown and not _like_a_step(session, name, channel, which):
             return replace(
                 session,
                 label=f"outside: {name}",
@@ -155,6 +156,24 @@ def outside(name: str, rng: np.random.Generator, sigmas: float) -> Session:
                 channel=("ax", "ay", "az")[channel],
                 sigmas=sigmas,
             )
+
+
+def _like_a_step(session: Session, name: str, channel: int, which: int) -> bool:
+    """Whether in these positions a step of the bias would do for a course as well.
+
+    Where a joint's tooth is met in the last positions only, for one.
+    """
+    middle = np.array([(w.start + w.end) / 2 for w in session.windows])
+    course = OUTSIDE[name](session, middle, channel, which)
+    design = np.column_stack([np.ones(len(middle)), _force(session)[:, channel]])
+
+    def left(columns: Array) -> float:
+        taken = columns @ np.linalg.lstsq(columns, course, rcond=None)[0]
+        return float(((course - taken) ** 2).sum())
+
+    steps = [np.arange(len(middle)) >= i for i in range(1, len(middle))]
+    best = min(left(np.column_stack([design, step])) for step in steps)
+    return name != "one position off" and best < STEPLIKE * left(design)
 
 
 def _adding(
@@ -226,6 +245,9 @@ def _force(session: Session) -> Array:
     force: Array = block.acc[np.searchsorted(block.t, middle)]
     return force
 
+
+STEPLIKE = 0.1
+"""Part of a course's squares that a step may leave to be no course of its own."""
 
 Course = Callable[[Session, Array, int, int], Array]
 OUTSIDE: Mapping[str, Course] = {

@@ -13,7 +13,7 @@ chapter 6 (restricted maximum likelihood).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,6 +33,9 @@ USUAL = {"walk": (3e-3, 3e-4), "offset": (2e-2, 1e-3)}
 
 LONE = 3.0
 """What it costs, ln, that of three axes alike only one should wander."""
+
+COMPARABLE = 0.15
+"""Part of the largest that one of axes alike wanders by at least."""
 
 FEWEST = 4
 """Windows from which their scatter can be told."""
@@ -158,10 +161,16 @@ def fees(errors: Errors) -> float:
     for first in (0, 3):
         parts = [p for p in errors.parts if first <= p.channel < first + 3]
         total += UNKNOWN * sum(p.kind in SMOOTH for p in parts)
-        total += UNKNOWN * (sum(p.kind == "offset" for p in parts) == 1)
+        total += UNKNOWN * (len(alike([p for p in parts if p.kind == "offset"])) == 1)
         total += LONE * (sum(p.kind == "walk" for p in parts) == 1)
         total += sum(_wonder(p) for p in parts)
     return float(total)
+
+
+def alike(parts: Sequence[Part]) -> list[Part]:
+    """Those of about the size of the largest; what is far smaller goes with it."""
+    largest = max((p.size for p in parts), default=0.0)
+    return [p for p in parts if p.size >= COMPARABLE * largest]
 
 
 def _wonder(part: Part) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from fieldcal.diagnosis.explain import Explanation, bare, wandering
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.heldout import cells
+from fieldcal.diagnosis.scatter import alike
 from fieldcal.diagnosis.whiten import SMOOTH, Part, factor
 from fieldcal.effects import Experience
 from fieldcal.samples import Array
@@ -63,10 +64,11 @@ def unknowns(explanation: Explanation) -> list[Unknown]:
     out = [p for p in parts if p.kind in SMOOTH]
     for first in (0, 3):
         scatter = _scatter(explanation, first)
+        offsets = [p for p in scatter if p.kind == "offset"]
         if first in explanation.in_step:
             out += [replace(p, kind="time") if p.kind == "walk" else p for p in scatter]
-        elif sum(p.kind == "offset" for p in scatter) < ALIKE:
-            out += [p for p in scatter if p.kind == "offset"]
+        elif len(alike(offsets)) < ALIKE:
+            out += alike(offsets)
     return [_of(explanation, part) for part in out]
 
 
@@ -78,7 +80,7 @@ def walking(explanation: Explanation) -> list[Part]:
         offsets = [p for p in scatter if p.kind == "offset"]
         if first not in explanation.in_step:
             out += [p for p in scatter if p.kind == "walk"]
-            out += offsets if len(offsets) >= ALIKE else []
+            out += offsets if len(alike(offsets)) >= ALIKE else []
     return out
 
 

@@ -74,11 +74,12 @@ def between(attitude: Array, done: Array, start: Array, end: Array) -> Array:
     return out
 
 
-def blur(t: Array, w: Array, each: int) -> float:
+def blur(t: Array, w: Array, each: int, noise: Array) -> float:
     """How far the attitude is off for want of samples: twice as many would tell, rad.
 
-    From every other sample it comes out otherwise by so much; from all, the error is
-    of the same order at most.
+    From every other sample it comes out otherwise, for their noise, (3,) rad/s, as much
+    as the whole is uncertain, and for the steps; from all, the steps make a third of
+    that or less (Richardson; the rule is of the second order at least).
     """
     whole = (len(t) - 1) // (2 * each) * 2 * each
     ends = []
@@ -87,7 +88,9 @@ def blur(t: Array, w: Array, each: int) -> float:
         edge = np.arange(0, whole // skip + 1, max(each // skip, 1))
         ends.append(carry(small_turns(t[some], w[some], edge))[-1])
     off = ends[0] @ ends[1].T
-    return float(np.linalg.norm([off[2, 1], off[0, 2], off[1, 0]]))
+    apart = off[2, 1] ** 2 + off[0, 2] ** 2 + off[1, 0] ** 2
+    chance = float(noise @ noise) * float(t[-1] - t[0]) ** 2 / len(t)
+    return float(np.sqrt(max(apart - chance, 0.0)) / 3)
 
 
 def accelerations(t: Array, w: Array) -> Array:

@@ -16,10 +16,10 @@ from fieldcal.diagnosis.result import Found, Quantity
 CLEAR = 6.0
 """Standard deviations of the common change."""
 
-ALIKE = 9.0
+ALIKE = 6.0
 """Squares (two degrees of freedom) that the three may differ by."""
 
-SHARP = 5.0
+SHARP = 6.0
 """Standard deviations of the common change in at least two axes by themselves."""
 
 ANOMALY = 5e-5

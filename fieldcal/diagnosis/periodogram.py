@@ -36,6 +36,9 @@ CLOSE, FAR = 5, 12
 STEEP = 4.0
 """Times the floor that these have to have to be taken for it."""
 
+SLOPE = 0.3
+"""Part of the power at a frequency that is below it on a slope; beside a line, less."""
+
 ODDS = 1e-3
 """Of a line where there is none, over all frequencies and channels."""
 
@@ -195,9 +198,12 @@ def _on_a_slope(power: Array, floor: Array) -> Array:
         last = np.clip(at + high, 0, len(power))
         mean = (totals[last] - totals[first]) / np.maximum(last - first, 1)
         sides.append(np.where(last > first, mean, np.inf))
+    below, above = sides
     # beyond the lowest frequency there is but more of a slope
-    beside = np.where(np.isfinite(sides[1]), np.maximum(*sides), sides[0])
-    level: Array = np.where(beside > STEEP * floor, np.minimum(beside, power), floor)
+    beside = np.where(np.isfinite(above), np.maximum(below, above), below)
+    beside = np.where(np.isfinite(below), beside, above)
+    falls = (beside > STEEP * floor) & (below > SLOPE * power)
+    level: Array = np.where(falls, np.minimum(beside, power), floor)
     return level
 
 

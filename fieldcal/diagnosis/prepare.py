@@ -76,7 +76,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     found = tuple(tones(source, rows))
     if found:
         source = replace(source, block=without(source.block, source, rows, found))
-        rows = rows_of(source)
+        rows = _as_shaken(rows_of(source), rows)
         checked = checked_again(checked, source.block, about)
     if not rows.used.any():
         raise InputError(
@@ -87,6 +87,13 @@ def prepare(block: Block, about: Description) -> Prepared:
     source = _counted(source, bench, known)
     bench = _from(bench, source.arrived)
     return Prepared(checked, source, bench, known, found, rest)
+
+
+def _as_shaken(calm: Rows, shaken: Rows) -> Rows:
+    """Rows without lines, but with the vibration that these were part of."""
+    if len(calm.x) != len(shaken.x):
+        return calm
+    return replace(calm, x=replace(calm.x, variance=shaken.x.variance))
 
 
 def bench_of(rows: Rows, about: Description) -> Bench:

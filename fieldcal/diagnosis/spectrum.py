@@ -25,7 +25,7 @@ from fieldcal.diagnosis.reduce import Rows, Source
 from fieldcal.effects import Line, catalogue
 from fieldcal.samples import CHANNELS, Array, Block
 
-STEADY = 0.5
+STEADY = 0.65
 """Part of the energy that one amplitude and phase must take to be a line."""
 
 EXTRA = 6.9

@@ -276,7 +276,9 @@ def _turn(about: _About, before: Turn | None) -> Turn | None:
         across,
         x.f[rows_p].mean(axis=0),
         1 / rate,
-        blur(t, inertial - earth, each),
+        blur(
+            t, inertial - earth, each, rows.noise[3:] / abs(about.fit.state.scale[3:])
+        ),
         rid,
     )
 

@@ -125,6 +125,7 @@ class Bench:
         self.errors = errors or Errors()
         self.relax = relax
         self.whiten = Whitener(rows, self.errors)
+        self._last: tuple[object, Experience] | None = None
         x = rows.x
         self.places = int(x.position.max()) + 1
         self.windows = len(np.unique(x.position))
@@ -323,7 +324,7 @@ class Bench:
 
     def _linearise(self, state: State) -> tuple[Array, Array]:
         """Prediction (n, 6) and its derivative by every column, (n, 6, k)."""
-        x = state.experienced(self.rows.x)
+        x = self._experienced(state)
         bias = np.broadcast_to(np.eye(6), (len(x), 6, 6))
         scale = np.eye(6) * np.hstack([x.f, x.w])[:, None, :]
         both = np.concatenate([bias, scale], axis=2)
@@ -333,6 +334,18 @@ class Bench:
         if self._turns_aside:
             parts.append(self.aside(state).reshape(len(x), 6, -1))
         return state.output(x), np.concatenate(parts, axis=2)
+
+    def _experienced(self, state: State) -> Experience:
+        """What the motion effects make of the rows; once for the same numbers."""
+        moved = [
+            (t.effect.id, t.start, t.columns, v.tobytes())
+            for t, v in zip(state.terms, state.values, strict=True)
+            if isinstance(t.effect, Motion)
+        ]
+        key = (tuple(moved), state.aside.tobytes())
+        if self._last is None or self._last[0] != key:
+            self._last = (key, state.experienced(self.rows.x))
+        return self._last[1]
 
     def _of_term(self, state: State, x: Experience, i: int, term: Term) -> Array:
         out = np.zeros((len(x), 6, len(term.names)))

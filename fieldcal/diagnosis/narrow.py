@@ -46,23 +46,25 @@ def narrower(
     own = np.linalg.inv(fit.covariance[np.ix_(at, at)])
     pull, size = own @ fit.values[at], bench.prior_of(term) ** 2
     rows = own - np.diag(1 / size)
-    whole = _evidence(rows, pull, size, list(range(len(at))))
-    cases = [
-        (kept, tight, _evidence(rows, pull, size * tight**2, kept))
-        for kept in _subsets(fit, term, at)
-        for tight in TIGHT
-    ]
-    kept, tight, found = max(cases, key=lambda case: case[2])
+    whole = float(_evidence(rows, pull, size[None], list(range(len(at))))[0])
+    subsets = _subsets(fit, term, at)
+    sizes = np.square(TIGHT)[:, None] * size
+    cases = np.array([_evidence(rows, pull, sizes, kept) for kept in subsets])
+    best = np.unravel_index(int(np.argmax(cases)), cases.shape)
+    kept, tight, found = subsets[best[0]], TIGHT[best[1]], float(cases[best])
     columns = tuple(term.columns[i] for i in kept)
-    return columns, term.tight * tight, found - whole, float(np.log(len(cases)))
+    return columns, term.tight * tight, found - whole, float(np.log(cases.size))
 
 
-def _evidence(rows: Array, pull: Array, size: Array, kept: list[int]) -> float:
-    s, b = size[kept], pull[kept]
-    inner = rows[np.ix_(kept, kept)] + np.diag(1 / s)
-    inside = np.eye(len(s)) + np.sqrt(np.outer(s, s)) * rows[np.ix_(kept, kept)]
-    squares = 0.5 * float(b @ np.linalg.solve(inner, b))
-    return squares - 0.5 * float(np.linalg.slogdet(inside)[1])
+def _evidence(rows: Array, pull: Array, size: Array, kept: list[int]) -> Array:
+    """Ln Z for some parameters, under each of the priors (p, k); (p,)."""
+    s, b, some = size[:, kept], pull[kept], rows[np.ix_(kept, kept)]
+    one = np.eye(len(kept))
+    inner = some + one / s[:, :, None]
+    inside = one + np.sqrt(s[:, :, None] * s[:, None, :]) * some
+    squares = 0.5 * (np.linalg.solve(inner, b[:, None])[:, :, 0] @ b)
+    out: Array = squares - 0.5 * np.linalg.slogdet(inside)[1]
+    return out
 
 
 def _subsets(fit: Fit, term: Term, at: list[int]) -> list[list[int]]:

@@ -80,12 +80,10 @@ class Whitener:
         for c in sorted({p.channel for p in errors.parts}):
             use = self._used[:, c]
             if use.any():
-                cov = covariance(rows, errors, c)[np.ix_(use, use)]
-                cov += np.diag(rows.sd[use, c] ** 2)
-                lower = np.linalg.cholesky(cov)
-                self._inverse[c] = np.linalg.inv(lower)
-                wider = np.diag(lower) * self._weight[use, c]
-                self.log_det += 2 * float(np.log(wider).sum())
+                inverse = _inverse_root(rows, errors, c)
+                self._inverse[c] = inverse
+                narrower = np.diag(inverse) / self._weight[use, c]
+                self.log_det -= 2 * float(np.log(narrower).sum())
 
     def __call__(self, values: Array) -> Array:
         """Whiten (n, 6) or (n, 6, k); rows that are not used become zero."""
@@ -105,6 +103,20 @@ class Whitener:
             out[use] = self._inverse[c] @ out[use]
             return out
         return out * self._weight[:, c, None]
+
+
+def _inverse_root(rows: Rows, errors: Errors, channel: int) -> Array:
+    """L^-1 of a channel's used rows, window by window where they do not share."""
+    use = rows.used[:, channel]
+    cov = covariance(rows, errors, channel)[np.ix_(use, use)]
+    cov += np.diag(rows.sd[use, channel] ** 2)
+    if any(p.kind != "offset" for p in errors.parts if p.channel == channel):
+        return np.linalg.inv(np.linalg.cholesky(cov))
+    out, position = np.zeros_like(cov), rows.x.position[use]
+    for p in np.unique(position):
+        at = np.ix_(position == p, position == p)
+        out[at] = np.linalg.inv(np.linalg.cholesky(cov[at]))
+    return out
 
 
 def covariance(rows: Rows, errors: Errors, channel: int) -> Array:

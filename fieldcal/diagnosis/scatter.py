@@ -37,6 +37,9 @@ LONE = 3.0
 COMPARABLE = 0.15
 """Part of the largest that one of axes alike wanders by at least."""
 
+ROUNDED = 1e-10
+"""Part of a column's squares that arithmetic may leave of nothing."""
+
 FEWEST = 4
 """Windows from which their scatter can be told."""
 
@@ -217,7 +220,7 @@ def projected(fit: Fit, columns: Array) -> tuple[Array, Array]:
     information = flat.T @ flat - shared.T @ fit.covariance @ shared
     white = fit.white.ravel()
     pull = flat.T @ white - shared.T @ (fit.covariance @ (free.T @ white))
-    return (information + information.T) / 2, pull
+    return _told(information, pull, flat)
 
 
 def projected_channel(fit: Fit, columns: Array, channel: int) -> tuple[Array, Array]:
@@ -228,4 +231,11 @@ def projected_channel(fit: Fit, columns: Array, channel: int) -> tuple[Array, Ar
     flat = fit.jacobian.reshape(-1, free.shape[1])
     kept = fit.covariance @ (flat.T @ fit.white.ravel())
     pull = columns.T @ fit.white[:, channel] - shared.T @ kept
+    return _told(information, pull, columns)
+
+
+def _told(information: Array, pull: Array, columns: Array) -> tuple[Array, Array]:
+    """Both, or zeros if projecting leaves of the columns what is rounded only."""
+    if np.trace(information) < ROUNDED * float((columns**2).sum()):
+        return np.zeros_like(information), np.zeros_like(pull)
     return (information + information.T) / 2, pull

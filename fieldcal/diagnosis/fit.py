@@ -44,13 +44,6 @@ DETERMINED = 0.1
 """A parameter is determined when its variance is less than this part of the prior's."""
 
 
-FAR = 5.0
-"""Longest step away from a fit, standard deviations."""
-
-BENT = 1.0
-"""By how much squares may part from their linear prediction."""
-
-
 @dataclass(frozen=True, slots=True)
 class Fit:
     """A model at its optimum.
@@ -147,7 +140,7 @@ class Bench:
         `near` is a fit to start from: of whatever terms the two have in common.
         """
         state = self._start(tuple(terms), near)
-        names, prior, centre, shape = self._about(state)
+        names, prior, centre, shape = self.about(state)
         p = self._pack(state)
         for _ in range(ITERATIONS):
             prediction, columns = self._linearise(state)
@@ -205,42 +198,12 @@ class Bench:
             score,
         )
 
-    def moved(self, fit: Fit, step: Array) -> Fit:
-        """The same model with its columns changed by a step, (k,), or part of it.
+    def at(self, fit: Fit, values: Array) -> Fit:
+        """The same model where its columns have other values, (k,)."""
+        state = self._unpack(fit.state, values)
+        return self._result(state, *self.about(state))
 
-        Beyond FAR standard deviations what is linear here says nothing.
-        """
-        step = step * min(1.0, FAR / max(float(np.abs(step / fit.sigma).max()), FAR))
-        _, _, _, shape = self._about(fit.state)
-        values = fit.values
-        step[shape] = np.clip(step[shape], -0.5 * values[shape], values[shape])
-        state = self._unpack(fit.state, values + step)
-        return self._result(state, *self._about(state))
-
-    def ahead(self, fit: Fit) -> Array:
-        """Newton's step from where a model stands to its optimum, (k,)."""
-        _, prior, centre, shape = self._about(fit.state)
-        flat = fit.jacobian.reshape(-1, len(fit.names))
-        pull = np.where(shape, 0.0, (fit.values - centre) / prior**2)
-        step: Array = fit.covariance @ (flat.T @ fit.white.ravel() - pull)
-        return step
-
-    def bends(self, fit: Fit, moved: Fit) -> bool:
-        """Whether rows part from what is linear at `fit`, at `moved`."""
-        off = moved.values - fit.values - self.ahead(fit)
-        curvature = np.linalg.inv(fit.covariance)
-        ahead = self.ahead(fit)
-        linear = off @ curvature @ off - ahead @ curvature @ ahead
-        change = self._squares(moved) - self._squares(fit)
-        return bool(abs(change - linear) > BENT)
-
-    def _squares(self, fit: Fit) -> float:
-        """S of a model where it stands."""
-        _, prior, centre, shape = self._about(fit.state)
-        pull = np.where(shape, 0.0, (fit.values - centre) / prior)
-        return float((fit.white**2).sum() + (pull**2).sum())
-
-    def _about(
+    def about(
         self, state: State
     ) -> tuple[tuple[str, ...], Array, Array, NDArray[np.bool_]]:
         """Names of the columns, their priors, and which are shapes."""

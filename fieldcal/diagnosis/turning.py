@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from fieldcal.diagnosis.attitude import geometry
 from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
 from fieldcal.diagnosis.model import State, Term
+from fieldcal.diagnosis.step import ahead
 from fieldcal.diagnosis.turns import NOTHING, Turn, Undo, errors_of
 from fieldcal.diagnosis.whiten import factor
 from fieldcal.effects import Motion, Sensor, catalogue, columns
@@ -119,7 +120,7 @@ class Turntable:
         self._density = bench.rows.noise[3:] * np.sqrt(interval)
         self.pool = tuple(self._pool())
         self._undone = undo
-        self._ahead = bench.ahead(fit)
+        self._ahead = ahead(bench, fit)
         blocks = [self._block(t) for t in made]
         self._z = np.concatenate([z for z, _, _ in blocks])
         self._a = np.vstack([a for _, a, _ in blocks])

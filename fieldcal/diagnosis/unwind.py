@@ -11,6 +11,7 @@ from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.reduce import rate_of
+from fieldcal.diagnosis.step import bends, moved
 from fieldcal.diagnosis.turning import Turning, Turntable
 from fieldcal.diagnosis.turns import NOTHING, Turn, turns
 
@@ -48,15 +49,15 @@ def _unwound(
     for _ in range(PASSES if made else 0):
         table = Turntable(bench, fit, made, interval, undo)
         more = table.fit(terms, table.seen(closures), RELAX)
-        moved = bench.moved(fit, more.values[: len(fit.values)])
-        bent = bench.bends(fit, moved)
+        there = moved(bench, fit, more.values[: len(fit.values)])
+        bent = bends(bench, fit, there)
         chosen = terms if bent else table.better(terms, price, closures).terms
         more = table.fit(chosen, table.seen(closures), RELAX)
-        there = np.array([undo.of(name) for name in more.names])
-        found = replace(more, values=more.values + there)
+        back = np.array([undo.of(name) for name in more.names])
+        found = replace(more, values=more.values + back)
         if chosen == terms and not bent:
             break
-        fit = moved if bent else fit
+        fit = there if bent else fit
         undo, terms = table.undo(found), chosen
         again = tuple(turns(prepared.source, bench.rows, fit, undo))
         if len(again) != len(made):

@@ -233,7 +233,8 @@ def _means(session: Session, before: Block, off: Array, noise: Array) -> float:
     if not session.angles:
         total = _along_force(session, mean[:, :3], change[:, :3], weight / noise[0])
     for c in range(6) if session.angles else range(3, 6):
-        known = [np.ones(len(cuts)), mean[:, c]][: 2 if c < 3 else 1]
+        scaled = c < 3 or session.place == "table"
+        known = [np.ones(len(cuts)), mean[:, c]][: 2 if scaled else 1]
         design = np.column_stack(known) * (weight / noise[c])[:, None]
         rest = change[:, c] * weight / noise[c]
         rest = rest - design @ np.linalg.lstsq(design, rest, rcond=1e-9)[0]

@@ -1,29 +1,22 @@
 """Effects that only turns show, fitted to all turns at once.
 
 The windows' fit stands in as the prior of biases and scale factors, so that windows and
-turns together are one fit. White noise of the gyroscopes of density N makes phi_T a sum
-with covariance N^2 T, and phi_k - u phi_T on the way a bridge with
-
-    N^2 (min(t, t') - u' t - u t' + u u' T)
-
-for which the accelerometers' rows are whitened. Biases that wander from one window to
-the next may be off by as much on the way.
+turns together are one fit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.attitude import geometry
 from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
-from fieldcal.diagnosis.model import State, Term
+from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.step import ahead
-from fieldcal.diagnosis.turns import NOTHING, Turn, Undo, errors_of
-from fieldcal.diagnosis.whiten import factor
+from fieldcal.diagnosis.turn_rows import TurnRows
+from fieldcal.diagnosis.turns import NOTHING, Turn, Undo
 from fieldcal.effects import Motion, Sensor, catalogue, columns
 from fieldcal.samples import CHANNELS, Array
 
@@ -34,12 +27,6 @@ ON_THE_WAY = ("lever_arm", "time_delay")
 
 WIDE = 20.0
 """Priors of what is reported, in typical sizes."""
-
-STEP = 1.0
-"""Of the differences that the design is made of, in standard deviations."""
-
-SHAPE_STEP = 0.1
-"""And for a time constant at most this part of it."""
 
 PART = 0.1
 """Of what the most affected channel shows, from which another one shows it too."""
@@ -117,11 +104,12 @@ class Turntable:
         undo: Undo = NOTHING,
     ) -> None:
         self._bench, self._fit, self._made = bench, fit, list(made)
-        self._density = bench.rows.noise[3:] * np.sqrt(interval)
         self.pool = tuple(self._pool())
         self._undone = undo
         self._ahead = ahead(bench, fit)
-        blocks = [self._block(t) for t in made]
+        density = bench.rows.noise[3:] * np.sqrt(interval)
+        rows = TurnRows(bench, fit, self.pool, density)
+        blocks = [rows.of(t) for t in made]
         self._z = np.concatenate([z for z, _, _ in blocks])
         self._a = np.vstack([a for _, a, _ in blocks])
         self.closing = np.concatenate([c for _, _, c in blocks])
@@ -262,95 +250,3 @@ class Turntable:
             elif group == "time_delay":
                 delay = float(value)
         return Undo(matrix, delay)
-
-    def _block(self, turn: Turn) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Whitened observations, design and which rows are closures, of one turn."""
-        state = self._fit.state
-        output = state.output(turn.x)
-        off = (errors_of(self._fit, turn.x) - turn.rid) / state.scale[3:]
-        phi, end = turn.carried(off[:, :, None])
-        seen = turn.means(output[:, :3])
-        seen = seen + turn.means(turn.swung(phi)[:, :, 0]) * state.scale[:3]
-        design, moved = self._design(turn)
-        path, close = turn.carried(design[:, 3:] / state.scale[3:, None])
-        swung = turn.swung(path) * state.scale[:3, None]
-        on_way = turn.means(design[:, :3] + swung)
-        length = turn.t[-1] - turn.t[0]
-        loose = self._loose(turn)[3:] / np.abs(state.scale[3:])
-        spread = np.hypot(self._density * np.sqrt(length), loose * length)
-        across = turn.across / np.hypot(spread, turn.blur)[:, None]
-        whiten = self._whitener(turn)
-        z = np.concatenate(
-            [across @ (turn.closure - end[:, 0]), whiten @ (turn.acc - seen).ravel()]
-        )
-        width = design.shape[2]
-        a = np.vstack([across @ (close - moved), whiten @ on_way.reshape(-1, width)])
-        return z, a, np.arange(len(z)) < 3
-
-    def _design(self, turn: Turn) -> tuple[Array, Array]:
-        """Outputs at the edges and closure by the windows' columns and the pool's.
-
-        Returns
-        -------
-        outputs : (m + 1, 6, k)
-        closure : (3, k)
-
-        """
-        out = np.zeros((len(turn.x), 6, len(self._fit.names)))
-        moved = np.zeros((3, len(self._fit.names)))
-        shapes = {f"{t.effect.id}.{s}" for t in self._fit.terms for s in t.shape}
-        for j, (name, sigma) in enumerate(
-            zip(self._fit.names, self._fit.sigma, strict=True)
-        ):
-            step = STEP * max(float(sigma), 1e-9)
-            if name in shapes:  # a time constant stays above zero
-                step = min(step, SHAPE_STEP * abs(float(self._fit.values[j])))
-            up, down = (
-                self._there(turn, self._bench.shifted(self._fit, j, sign * step))
-                for sign in (1, -1)
-            )
-            out[:, :, j] = (up[0] - down[0]) / (2 * step)
-            moved[:, j] = (up[1] - down[1]) / (2 * step)
-        more = [
-            columns(t.effect, turn.x, scale=self._bench.scale)
-            for t in self.pool
-            if isinstance(t.effect, Motion | Sensor)
-        ]
-        width = sum(m.shape[2] for m in more)
-        still = np.zeros((3, width))
-        return np.concatenate([out, *more], axis=2), np.hstack([moved, still])
-
-    def _there(self, turn: Turn, state: State) -> tuple[Array, Array]:
-        """Outputs at the edges and the closure, with the windows' model at a state."""
-        x = state.experienced(self._bench.rows.x)
-        f, closure, _ = geometry(x, turn.positions, turn.attitude, turn.done)
-        return state.output(replace(turn.x, f=f)), closure
-
-    def _loose(self, turn: Turn) -> Array:
-        """By how much each bias may have changed from one window to the next, (6,)."""
-        x, out = self._bench.rows.x, np.zeros(6)
-        p, q = turn.positions
-        ends = [int(np.flatnonzero(x.position == p)[-1])]
-        ends.append(int(np.flatnonzero(x.position == q)[0]))
-        for part in self._bench.errors.parts:
-            f = factor(part.kind, x, part.channel)[ends]
-            out[part.channel] += part.size**2 * float(((f[1] - f[0]) ** 2).sum())
-        return np.sqrt(out)
-
-    def _whitener(self, turn: Turn) -> Array:
-        """L^-1 of the accelerometers' rows on the way, (3 k, 3 k)."""
-        middle = (turn.t[turn.cut[1:]] + turn.t[turn.cut[:-1]]) / 2 - turn.t[0]
-        done = np.interp(middle, turn.t - turn.t[0], turn.done)
-        length = turn.t[-1] - turn.t[0]
-        bridge = np.minimum.outer(middle, middle) + np.outer(done, done) * length
-        bridge -= np.outer(middle, done) + np.outer(done, middle)
-        cov = np.diag((turn.sd**2).ravel())
-        same = np.equal.outer(*[np.tile(np.arange(3), len(turn.sd))] * 2)
-        cov += same * np.tile(self._loose(turn)[:3] ** 2, len(turn.sd))
-        for axis in range(3):
-            along = np.broadcast_to(np.eye(3)[axis][:, None], (len(turn.t), 3, 1))
-            arm = turn.means(turn.swung(along)[:, :, 0]) * self._fit.state.scale[:3]
-            arm = arm * self._density[axis]
-            blocks = bridge[:, None, :, None] * np.multiply.outer(arm, arm)
-            cov += blocks.reshape(cov.shape)
-        return np.linalg.inv(np.linalg.cholesky(cov))

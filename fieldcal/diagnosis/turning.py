@@ -22,6 +22,9 @@ from fieldcal.samples import CHANNELS, Array
 
 CANDIDATES = ("gyro_cross_coupling", "gyro_scale", "lever_arm", "time_delay")
 
+SQUARE = 0.02
+"""By how much triads on one board are turned against each other, rad."""
+
 ON_THE_WAY = ("lever_arm", "time_delay")
 """Seen by the accelerometers on the way, if nothing else shakes them there."""
 
@@ -112,9 +115,32 @@ class Turntable:
         blocks = [rows.of(t) for t in made]
         self._z = np.concatenate([z for z, _, _ in blocks])
         self._a = np.vstack([a for _, a, _ in blocks])
+        self._names, self._known = list(fit.names), np.linalg.inv(fit.covariance)
+        if bench.free and any(t.effect.id == "cross_coupling" for t in fit.terms):
+            self._turn_triads(len(fit.names))
         self.closing = np.concatenate([c for _, _, c in blocks])
         self.turn = np.repeat(np.arange(len(made)), [len(z) for z, _, _ in blocks])
         self._rank = sum(int(round(np.trace(t.across))) for t in made)
+
+    def _turn_triads(self, count: int) -> None:
+        """Let the triads be turned against each other, at no cost.
+
+        Where orientations are not known, cross-coupling of the accelerometers is known
+        but for a turn of their axes; against the gyroscopes it shows.
+        """
+        names = self.pool[0].names  # of gyro_cross_coupling, which turns axes as well
+        turned = np.zeros((len(names), 3))
+        for axis, (one, other) in enumerate(
+            (("s32", "s23"), ("s13", "s31"), ("s21", "s12"))
+        ):
+            turned[names.index(one), axis], turned[names.index(other), axis] = 1.0, -1.0
+        new = self._a[:, count : count + len(names)] @ turned
+        self._a = np.hstack([self._a[:, :count], new, self._a[:, count:]])
+        self._ahead = np.concatenate([self._ahead, np.zeros(3)])
+        self._names += [f"triads.{axis}" for axis in "xyz"]
+        whole = np.eye(count + 3) / SQUARE**2
+        whole[:count, :count] = self._known
+        self._known = whole
 
     def _pool(self) -> Iterator[Term]:
         for name in CANDIDATES:
@@ -147,14 +173,14 @@ class Turntable:
     ) -> Turning:
         """Fit some of the pool's effects to some of the rows."""
         width, columns = len(self._ahead), self._columns(terms)
-        names = list(self._fit.names)
+        names = list(self._names)
         sizes: list[float] = []
         for term in (t for t in self.pool if t in terms):
             names += [f"{term.effect.id}.{n}" for n in term.names]
             sizes += list(relax * term.prior)
         a, z = self._a[rows][:, columns], self._z[rows] - self._kept_out(terms, rows)
         precision = np.zeros((len(columns), len(columns)))
-        precision[:width, :width] = np.linalg.inv(self._fit.covariance)
+        precision[:width, :width] = self._known
         precision[range(width, len(columns)), range(width, len(columns))] = (
             1 / np.array(sizes) ** 2
         )

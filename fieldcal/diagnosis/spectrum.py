@@ -176,7 +176,10 @@ def _tuned(pieces: Pieces, effect: Line, near: float, moments: _Moments) -> Tone
 def _fitted(
     pieces: Pieces, effect: Line, hz: float, seen: Complex, counts: Array
 ) -> Tone:
-    weight = np.nan_to_num(1 / pieces.noise**2)
+    heard = (
+        np.nan_to_num(pieces.noise) > 0
+    )  # a channel that never changes tells nothing
+    weight = np.where(heard, 1 / np.where(heard, pieces.noise, 1.0) ** 2, 0.0)
     response = effect.response(pieces.x, hz)
     half = counts[:, None, None] / 2
     weighted = np.conj(response) * weight[:, None] * half

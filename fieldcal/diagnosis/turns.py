@@ -52,6 +52,9 @@ LONGEST_S = 60.0
 CLEARLY = 2.0
 """How far motion has to stand out for its ends to be seen; else the gap is taken."""
 
+TOUCH_S = 5.0
+"""Time before and after the motion that shows, in which smaller ones belong to it."""
+
 AWAY = 5.0
 """Standard deviations of the angle turned from which the device is on its way."""
 
@@ -212,19 +215,28 @@ def _moving(
     total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])
     level = np.abs(total[m:] - total[:-m]) / m
     limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
-    start, end = first, last
-    if level.max() > CLEARLY * limit.min():
-        margin, noise = round(MARGIN_S * rate), rows.noise[3:]
-        start += max(_still(block.gyr[gap] - rest[0], noise) - margin, 0)
-        end -= max(_still(block.gyr[gap][::-1] - rest[1], noise) - margin, 0)
+    if not level.max() > CLEARLY * limit.min():
+        return (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
+    at = np.flatnonzero((level > limit).any(axis=1))
+    noise, each = rows.noise[3:], round(TOUCH_S * rate)
+    before = block.gyr[gap][max(at[0] - each, 0) : at[0]] - rest[0]
+    after = block.gyr[gap][at[-1] + m : at[-1] + m + each] - rest[1]
+    margin = round(MARGIN_S * rate)
+    start = first + int(at[0]) - _touched(before, noise) - margin
+    end = first + int(at[-1]) + m + _touched(after[::-1], noise) + margin
+    start, end = max(start, first), min(end, last)
     return (start, end) if block.t[end - 1] - block.t[start] < LONGEST_S else None
 
 
-def _still(off: Array, noise: Array) -> int:
-    """Samples until the angle turned stands out of the noise; a last touch does too."""
+def _touched(off: Array, noise: Array) -> int:
+    """Samples from where the angle turned stands out of the noise, to the end.
+
+    What is turned too slowly to be seen at once is seen by its sum.
+    """
     angle = np.abs(np.cumsum(off, axis=0))
     spread = noise * np.sqrt(np.arange(1, len(off) + 1))[:, None]
-    return int(np.argmax((angle > AWAY * spread).any(axis=1)))
+    moved = (angle > AWAY * spread).any(axis=1)
+    return len(off) - int(np.argmax(moved)) if moved.any() else 0
 
 
 def _turn(about: _About, before: Turn | None) -> Turn | None:

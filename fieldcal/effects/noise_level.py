@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.effects import Chain, Fault, Param, Recording
+from fieldcal.effects.recording import lsb_of
 from fieldcal.samples import CHANNELS, Array
 
 RATIO = 1.8
@@ -42,7 +43,9 @@ class NoiseLevel(Chain):
         t = recording.block.t
         samples = max(int(recording.still.sum()), 2)
         for first in (0, 3):
-            noise = recording.quick[first : first + 3]
+            # what is rounded more coarsely changes seldom, and then by a whole step
+            steps = [lsb_of(recording.channel(c)) for c in range(first, first + 3)]
+            noise = np.maximum(recording.quick[first : first + 3], steps)
             if not np.isfinite(noise).all() or not noise.all():
                 continue
             worst, ratio = louder(noise)

@@ -82,6 +82,14 @@ def quick_of(block: Block, windows: NDArray[np.intp]) -> Array:
     return np.concatenate(out)
 
 
+def grain_of(block: Block, windows: NDArray[np.intp]) -> Array:
+    """Deviation that rounding alone makes, by the least change in windows, (6,)."""
+    held = [slice(a, b) for a, b in windows if b > a]
+    pieces = [[triad[w] for w in held] for triad in (block.acc, block.gyr)]
+    out: Array = np.concatenate([_grain(p) for p in pieces]) / np.sqrt(12)
+    return out
+
+
 def _grain(pieces: Sequence[Array]) -> Array:
     """Smallest change of each channel from one sample to the next, (c,)."""
     steps = [np.abs(np.diff(p[:GRAIN], axis=0)) for p in pieces]
@@ -104,6 +112,8 @@ def rounding(block: Block, windows: NDArray[np.intp], noise: Array) -> Array:
         step = lsb_of(some[:, c])
         if step > measured > 0:
             before = np.sqrt(max(measured**2 - step**2 / 12, 0.0))
+            if any(np.ptp(p.six[:, c]) == 0 for p in starts if len(p) > 1):
+                before = 0.0  # what stays on one step has next to no noise of its own
             off[c] = bias_of(step, before) / np.sqrt(2)
     return off
 

@@ -9,11 +9,15 @@ import numpy as np
 from fieldcal.diagnosis.estimate import RELAX
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
+from fieldcal.diagnosis.noise import grain_of
 from fieldcal.diagnosis.prepare import Prepared
-from fieldcal.diagnosis.reduce import rate_of
+from fieldcal.diagnosis.reduce import rate_of, spans
 from fieldcal.diagnosis.step import bends, moved
 from fieldcal.diagnosis.turning import Turning, Turntable
 from fieldcal.diagnosis.turns import NOTHING, Turn, turns
+
+ROUGH = 0.7
+"""Part of the noise that rounding makes when it is most of it."""
 
 PASSES = 12
 """Of fits to the turns at most, each beginning where the last one came to."""
@@ -25,10 +29,18 @@ def turned(
     """What the turns show beyond the windows."""
     if any(t.effect.kind == "motion" for t in prepared.tones):
         return (), None, None  # a base that rocks turns the device as well
-    made, table, found = _unwound(prepared, bench, fit, price, closures=False)
-    if found is not None and not found.steady:
+    rough = _rough(prepared, bench)
+    made, table, found = _unwound(prepared, bench, fit, price, closures=rough)
+    if found is not None and not found.steady and not rough:
         made, table, found = _unwound(prepared, bench, fit, price, closures=True)
     return made, table, found
+
+
+def _rough(prepared: Prepared, bench: Bench) -> bool:
+    """Whether accelerometers are rounded so coarsely that a slow turn shows as steps."""
+    source = prepared.source
+    grain = grain_of(source.block, spans(source.block, source.about))
+    return bool((grain[:3] > ROUGH * bench.rows.noise[:3]).any())
 
 
 def _unwound(

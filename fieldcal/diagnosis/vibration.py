@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.noise import noise_of
+from fieldcal.diagnosis.noise import grain_of, noise_of
 from fieldcal.samples import Array, Block
 
 LOUDER = 6.0
@@ -90,11 +90,13 @@ def _compared(
     for i, (a, b) in enumerate(windows):
         squares = [_squares(triad[a:b]) for triad in (block.acc, block.gyr)]
         out[i] = np.sqrt(np.concatenate(squares) / 2)
-    low = np.sort(out, axis=0)[(len(out) - 1) // 4]  # nan comes last
+    grain = grain_of(block, windows)  # outputs may stay on one step all through some
+    low = np.fmax(np.sort(out, axis=0)[(len(out) - 1) // 4], grain)  # nan comes last
     margin = LOUDER / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
     louder = out > low * np.exp(margin)
     loud: NDArray[np.bool_] = np.any(louder, axis=1)
-    noise = noise_of(block, windows if loud.all() else windows[~loud], rate_hz)
+    quiet = windows if loud.all() else windows[~loud]
+    noise = np.fmax(noise_of(block, quiet, rate_hz), grain)
     more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0)
     return noise, more, loud
 

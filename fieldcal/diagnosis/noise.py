@@ -83,7 +83,7 @@ def quick_of(block: Block, windows: NDArray[np.intp]) -> Array:
 
 
 def grain_of(block: Block, windows: NDArray[np.intp]) -> Array:
-    """Deviation that rounding alone makes, by the least change in windows, (6,)."""
+    """Deviation that rounding alone makes, from the least change, (6,)."""
     held = [slice(a, b) for a, b in windows if b > a]
     pieces = [[triad[w] for w in held] for triad in (block.acc, block.gyr)]
     out: Array = np.concatenate([_grain(p) for p in pieces]) / np.sqrt(12)

@@ -37,7 +37,7 @@ def turned(
 
 
 def _rough(prepared: Prepared, bench: Bench) -> bool:
-    """Whether accelerometers are rounded so coarsely that a slow turn shows as steps."""
+    """Whether accelerometers are rounded so that a slow turn shows as steps."""
     source = prepared.source
     grain = grain_of(source.block, spans(source.block, source.about))
     return bool((grain[:3] > ROUGH * bench.rows.noise[:3]).any())

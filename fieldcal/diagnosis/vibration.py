@@ -96,7 +96,8 @@ def _compared(
     louder = out > low * np.exp(margin)
     loud: NDArray[np.bool_] = np.any(louder, axis=1)
     quiet = windows if loud.all() else windows[~loud]
-    noise = np.fmax(noise_of(block, quiet, rate_hz), grain)
+    noise = noise_of(block, quiet, rate_hz)
+    noise = np.where(grain > 0, np.fmax(noise, grain), noise)
     more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0)
     return noise, more, loud
 

@@ -43,10 +43,12 @@ class NoiseLevel(Chain):
         t = recording.block.t
         samples = max(int(recording.still.sum()), 2)
         for first in (0, 3):
+            if not np.isfinite(recording.quick[first : first + 3]).all():
+                continue
             # what is rounded more coarsely changes seldom, and then by a whole step
             steps = [lsb_of(recording.channel(c)) for c in range(first, first + 3)]
             noise = np.maximum(recording.quick[first : first + 3], steps)
-            if not np.isfinite(noise).all() or not noise.all():
+            if not noise.all():
                 continue
             worst, ratio = louder(noise)
             if ratio < RATIO:

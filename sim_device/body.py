@@ -19,6 +19,7 @@ from fieldcal.sim_device.profile import Profile, mounting_axes
 from fieldcal.sim_device.rocking import Bump, Sway
 from fieldcal.sim_device.temperature import course
 from fieldcal.sim_device.vocabulary import AXES
+from fieldcal.sim_device.way import REST, Way
 
 Angles = tuple[float, float]
 
@@ -32,6 +33,7 @@ class Body:
     bumps : of the base, so far and to come
     asked : the angles it was last asked for
     levels : rms of the vibration in each position so far, m/s^2
+    ways : that it is carried along, each from where the joints are when it begins
 
     """
 
@@ -57,6 +59,7 @@ class Body:
         self._shaking = stream(seed, "vibration")
         self._strength = stream(seed, "vibration level")
         self.levels = [self._level()]
+        self.ways: list[Way] = []
         self._start_temperature = float(course(profile.temperature, np.zeros(1))[0][0])
 
     def turn(self, start: float, seconds: float, angles: Angles) -> Angles:
@@ -82,7 +85,19 @@ class Body:
         """Frame of the procedure axes at ascending instants, (n,) s."""
         rocking = [s.rocking() for s in self._sways]
         rocking += [b.rocking() for b in self.bumps]
-        return carried(self._stand, rocking, t, self.joints.at(t))
+        frame = carried(self._stand, rocking, t, self.joints.at(self._held(t)))
+        for way in self.ways:
+            if (on := way.lasts(t)).any():
+                frame = frame.then(
+                    *(np.where(on, v, r) for v, r in zip(way.at(t), REST, strict=True))
+                )
+        return frame
+
+    def _held(self, t: Array) -> Array:
+        """Instants at which the joints were last moved, (n,) s: not while carried."""
+        for way in self.ways:
+            t = np.where(way.lasts(t), way.t[0], t)
+        return t
 
     def life(self, t: Array, vibration: Array) -> Life:
         """What the sensors live through at ascending instants, (n,) s."""
@@ -103,7 +118,9 @@ class Body:
         """Whether nothing moves at any of the instants, so that one stands for all."""
         turned = swing.angle != swing.angle[:, :1]
         shaken = any(b.start <= t[-1] and not b.over(t[0]) for b in self.bumps)
-        return not (self._sways or shaken or swing.rate.any() or turned.any())
+        carried = any(way.lasts(t).any() for way in self.ways)
+        moving = swing.rate.any() or turned.any() or carried
+        return not (self._sways or shaken or moving)
 
     def temperature(self, t: Array) -> Array:
         """Temperature of the sensors, (n,) °C."""

@@ -4,7 +4,8 @@ The frames follow each other from the local level to the device, each turned abo
 axis of the one before by an angle x(t) about the unit axis u:
 
     navigation (East, down, north) -> heading -> tilt of the base -> rocking
-    -> alpha about z -> beta about x -> spin of a rate table -> signed device axes
+    -> alpha about z -> beta about x -> spin of a rate table, or a way that is given
+    -> signed device axes
 
 Attitude q, rate w and its derivative dw are handed down from frame to frame:
 
@@ -72,9 +73,21 @@ class Frame:
 
     def turned(self, axis: Array, angle: Angle) -> Frame:
         """Next frame, turned by `angle` about `axis` of this one."""
-        step = turn(axis, angle.x)
-        w, about = into(step, self.w), axis * angle.rate
-        dw = into(step, self.dw) - cross(about, w) + axis * angle.acceleration
+        about, speeding = axis * angle.rate, axis * angle.acceleration
+        return self.then(turn(axis, angle.x), about, speeding)
+
+    def then(self, step: Array, about: Array, speeding: Array) -> Frame:
+        """Next frame, in any motion against this one.
+
+        Parameters
+        ----------
+        step : (4, n) its attitude in this one
+        about, speeding : (3, n) its rate against this one and the derivative, rad/s and
+            rad/s^2, in its own axes
+
+        """
+        w = into(step, self.w)
+        dw = into(step, self.dw) - cross(about, w) + speeding
         return Frame(multiply(self.q, step), w + about, dw)  # (m1) (m2) (m3)
 
 

@@ -13,6 +13,7 @@ from fieldcal.samples import Array, Block, concat
 from fieldcal.sim_device.device import PIECE, Sensing
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.temperature import recorded
+from fieldcal.sim_device.way import Way
 
 SHARE = 0.6
 """A turn takes at most so much of the gap that it lies in."""
@@ -35,6 +36,7 @@ class Window:
     rate : about procedure axes, rad/s
     turn : when the turn that leads here starts and ends, s; None: amid the gap
     vibration : rms, m/s^2; None: as the profile has it
+    way : the device is carried along to here, in device time; None: the joints turn
 
     """
 
@@ -45,6 +47,7 @@ class Window:
     rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn: tuple[float, float] | None = None
     vibration: float | None = None
+    way: Way | None = None
 
 
 Schedule = Sequence[Window] | Sequence[tuple[float, float, float, float]]
@@ -149,6 +152,8 @@ def _move(sensing: Sensing, windows: list[Window]) -> None:
             start, end = w.turn or (middle - seconds / 2, middle + seconds / 2)
             seconds = max(end - start, shortest) / pace
             body.spin(start / pace, seconds, (w.alpha, w.beta), w.rate)
+        if w.way is not None:
+            body.ways.append(replace(w.way, t=w.way.t / pace))
         if w.vibration is not None:
             body.levels[-1] = w.vibration
 

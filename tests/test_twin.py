@@ -124,14 +124,39 @@ def test_of_a_line_the_replay_leaves_little(
     assert "Of the line it leaves" in said["says"]
 
 
-def test_turns_about_one_joint_come_out_with_the_gyroscopes_scale_factor(
+@pytest.mark.parametrize(
+    ("concealed", "figure", "part"),
+    [
+        ("gyro_scale:s1=0.01,s3=-0.012", "rms_turns_rad", 0.2),
+        ("gyro_cross_coupling:s12=0.02", "rms_turns_rad", 0.6),
+        ("lever_arm:x=0.05,z=-0.03", "rms_turns_acceleration", 0.6),
+        ("time_delay:seconds=0.02", "rms_turns_acceleration", 0.2),
+    ],
+)
+def test_what_shows_in_turns_is_measured_on_the_way(
+    concealed: str,
+    figure: str,
+    part: float,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    _, said, _ = diagnosed(concealing(tmp_path / "s", concealed), capsys)
+    runs = said["twin"]
+    assert runs["twin"][figure] < part * runs["refitted"][figure]
+    # white noise of 0.02 m/s^2 over 0.15 s, and of 0.002 rad/s over some 5 s
+    assert runs["twin"]["rms_turns_acceleration"] == pytest.approx(0.005, rel=0.1)
+    assert runs["twin"]["rms_turns_rad"] < 1e-3
+    assert "instead of" in said["says"]
+
+
+def test_a_twin_without_what_turns_show_is_as_far_off_as_before(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = concealing(tmp_path / "s", "gyro_scale:s1=0.01,s3=-0.012")
+    folder = concealing(tmp_path / "s", "cross_coupling:k12=0.01")
     _, said, _ = diagnosed(folder, capsys)
-    runs = said["twin"]
-    assert runs["twin"]["rms_turns_rad"] < 0.2 * runs["refitted"]["rms_turns_rad"]
-    assert "Turns about one joint" in said["says"]
+    old, new = (said["twin"][run]["rms_turns_rad"] for run in ("refitted", "twin"))
+    assert new == pytest.approx(old, rel=0.1)
+    assert "Turns come out" not in said["says"]
 
 
 def test_what_is_random_gives_spread_and_not_the_same_numbers(

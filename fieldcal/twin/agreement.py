@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from fieldcal.diagnosis.quality import UNITS
 from fieldcal.diagnosis.result import number
 from fieldcal.samples import Array
 from fieldcal.sim_device.profile import Profile
+from fieldcal.twin.ways import Apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +24,7 @@ class Run:
     by_position : (p, 2) rms in each window
     chi2_by_position : (p,) squares a mean of each window, in its white noise
     lines : (k, 2) rms of what is left of each line, m/s^2 and rad/s
-    turns : rms of the integrals of turns about one joint, rad; nan where there are none
+    ways : on the ways between windows; not known where the gyroscopes lost track
 
     """
 
@@ -34,7 +33,7 @@ class Run:
     by_position: Array
     chi2_by_position: Array
     lines: Array
-    turns: float
+    ways: Apart
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
@@ -42,7 +41,8 @@ class Run:
             **_pair(self.rms),
             "chi2_per_dof": number(self.chi2_per_dof),
             "lines": [_pair(line) for line in self.lines],
-            "rms_turns_rad": number(self.turns),
+            "rms_turns_rad": number(self.ways.angle),
+            "rms_turns_acceleration": number(self.ways.force),
         }
 
 
@@ -58,7 +58,7 @@ class Rerun:
     windows : (p, 2) from and to, s
     random : effects that the replay leaves to chance
     triad : that gained most: 0 accelerometers, 1 gyroscopes
-    turned : whether something was found in the turns
+    turned : effects that were found in the turns
 
     """
 
@@ -68,7 +68,7 @@ class Rerun:
     windows: Array
     random: tuple[str, ...]
     triad: int
-    turned: bool
+    turned: tuple[str, ...]
 
     def to_json(self, name: str) -> dict[str, Any]:
         """Return the object of diagnosis.json; `name` is the device file's."""
@@ -110,10 +110,15 @@ class Rerun:
             out.append(
                 f"Of the line it leaves {after[i]:.2g} of {before[i]:.2g} {UNITS[i]}."
             )
-        if self.turned and np.isfinite(new.turns):
+        if {"gyro_scale", "gyro_cross_coupling"} & {*self.turned}:
             out.append(
-                f"Turns about one joint come out {new.turns:.2g} rad off instead of"
-                f" {old.turns:.2g} rad."
+                f"Turns come out {new.ways.angle:.2g} rad off instead of"
+                f" {old.ways.angle:.2g} rad."
+            )
+        if {"lever_arm", "time_delay"} & {*self.turned}:
+            out.append(
+                f"On the way the accelerometers are {new.ways.force:.2g} m/s^2 rms"
+                f" from the recording instead of {old.ways.force:.2g} m/s^2."
             )
         if self.random:
             out.append(

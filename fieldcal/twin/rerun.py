@@ -10,15 +10,14 @@ with the covariance L L^T that the diagnosis has for them. Three devices are com
 the one session.toml describes, the same with bias and scale factor refitted, and the
 twin. What is random is drawn anew in every run of a device, so it is left out of the
 replay and stands in L; what happened to samples has been undone in the recording.
-A line is compared by its amplitude. A turn about a single joint is compared by its
-integral, the gyroscopes' outputs less their bias summed up, whatever its course; the
-course itself was the hand's, and what shows in nothing else is not measured again.
+A line is compared by its amplitude. From window to window each device is carried along
+the way that it reads from the recorded gyroscopes itself (`ways`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,15 +26,15 @@ from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.heldout import rms
-from fieldcal.diagnosis.model import State
 from fieldcal.diagnosis.reduce import Rows
+from fieldcal.diagnosis.turns import NOTHING, Turn, Undo, turns
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import Window, simulate
-from fieldcal.sim_device.vocabulary import Effect
 from fieldcal.twin import device as twin
 from fieldcal.twin import schedule
 from fieldcal.twin.agreement import Rerun, Run
+from fieldcal.twin.ways import apart
 
 RANDOM = ("random_walk", "angle_setting")
 SAMPLES = (
@@ -64,30 +63,13 @@ def rerun(explanation: Explanation, found: Diagnosis, raw: Bench) -> Rerun:
         If the session's windows overlap, so that no device could go through them.
 
     """
-    prepared = explanation.prepared
-    base, always = explanation.base, explanation.always
-    nominal = prepared.source.about.nominal
-    start = float(prepared.source.block.t[0])
-    plain = replace(
-        base.state,
-        bias=np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
-        scale=np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
-    )
     profile = twin.device_of(explanation, found)
-    refitted = raw.fit(always)
-    devices: dict[str, tuple[Bench, Fit, State, Sequence[Effect]]] = {
-        "simulation": (raw, refitted, plain, twin.settled(plain, start)),
-        "refitted": (raw, refitted, refitted.state, twin.settled(base.state, start)),
-        "twin": (explanation.model.bench, explanation.fit, explanation.fit.state, ()),
+    cases = _cases(explanation, profile, raw)
+    known = [{t.positions for t in cases[n].turns} for n in ("refitted", "twin")]
+    runs = {
+        name: _run(explanation, case.only(set.intersection(*known)))
+        for name, case in cases.items()
     }
-    runs = {}
-    for name, (bench, fit, state, effects) in devices.items():
-        device = (
-            profile
-            if name == "twin"
-            else twin.device(explanation, state, list(effects))
-        )
-        runs[name] = _run(explanation, _certain(device), bench, fit, state)
     held = np.unique(raw.rows.x.position)
     old, new = runs["refitted"].rms ** 2, runs["twin"].rms ** 2
     gain = np.nan_to_num((old - new) / np.where(new > 0, new, np.inf), nan=-1.0)
@@ -98,8 +80,56 @@ def rerun(explanation: Explanation, found: Diagnosis, raw: Bench) -> Rerun:
         np.array([_stretch(raw, p) for p in held]),
         tuple(e.id for e in profile.effects if e.id in RANDOM),
         int(np.argmax(gain)),
-        bool(explanation.turning and explanation.turning.terms),
+        explanation.turning.ids if explanation.turning else (),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """A device that is compared: what it is, and where it was by its own lights."""
+
+    device: Profile
+    bench: Bench
+    fit: Fit
+    turns: tuple[Turn, ...]
+
+    def only(self, pairs: Set[tuple[int, int]]) -> _Case:
+        """Without the turns that not every device can follow."""
+        return replace(self, turns=tuple(t for t in self.turns if t.positions in pairs))
+
+
+def _cases(explanation: Explanation, profile: Profile, raw: Bench) -> dict[str, _Case]:
+    """The devices, by name."""
+    source = explanation.prepared.source
+    nominal, start = source.about.nominal, float(source.block.t[0])
+    base, refitted = explanation.base.state, raw.fit(explanation.always)
+    plain = replace(
+        base,
+        bias=np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
+        scale=np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
+    )
+    table, turning = explanation.table, explanation.turning
+    undo = table.undo(turning) if table and turning else NOTHING
+
+    def case(device: Profile, bench: Bench, fit: Fit, undo: Undo) -> _Case:
+        made = turns(source, bench.rows, fit, undo) if explanation.made else ()
+        return _Case(_certain(device), bench, fit, tuple(made))
+
+    return {
+        "simulation": case(
+            twin.device(explanation, plain, twin.settled(plain, start)),
+            raw,
+            replace(refitted, state=plain),
+            NOTHING,
+        ),
+        "refitted": case(
+            twin.device(explanation, refitted.state, twin.settled(base, start)),
+            raw,
+            refitted,
+            NOTHING,
+        ),
+        "twin": case(profile, explanation.model.bench, explanation.fit, undo),
+    }
 
 
 def _certain(profile: Profile) -> Profile:
@@ -108,16 +138,14 @@ def _certain(profile: Profile) -> Profile:
     return replace(profile, effects=tuple(kept))
 
 
-def _run(
-    explanation: Explanation, device: Profile, bench: Bench, fit: Fit, state: State
-) -> Run:
+def _run(explanation: Explanation, case: _Case) -> Run:
     """How far a device's replay is from the recording."""
+    device, bench, turns = case.device, case.bench, case.turns
     source, rows = explanation.prepared.source, bench.rows
     start = float(source.block.t[0])
-    turns = schedule.gaps(explanation)
     shaken = bool(device.every(twin.VIBRATION))
     level = twin.vibration(explanation) * shaken
-    windows = schedule.windows(explanation, state, bench, level)
+    windows = schedule.windows(explanation, case.fit.state, bench, level, turns)
     t = schedule.instants(source.block.t, rows.span, schedule.ENOUGH, turns)
     plain = [e for e in device.effects if e.id not in LINES]
     blocks = [
@@ -128,22 +156,22 @@ def _run(
     ]
     block = replace(blocks[0], t=t)
     replayed = np.mean([_means(b, t, rows.span) for b in blocks], axis=0)
-    apart = np.where(rows.used, rows.y - replayed, np.nan)
+    off = np.where(rows.used, rows.y - replayed, np.nan)
     squares = (bench.whiten(rows.y - replayed) ** 2).sum()
-    white = (apart / rows.sd) ** 2
+    white = (off / rows.sd) ** 2
     places, chi2 = [], []
     for p in np.unique(rows.x.position):
         at: NDArray[np.bool_] = rows.x.position == p
-        places.append(_triads(rms(rows, np.where(at[:, None], apart, np.nan))))
+        places.append(_triads(rms(rows, np.where(at[:, None], off, np.nan))))
         count = np.isfinite(white[at]).sum()
         chi2.append(float(np.nansum(white[at]) / count) if count else np.nan)
     return Run(
-        _triads(rms(rows, apart)),
-        float(squares) / max(fit.dof, 1),
+        _triads(rms(rows, off)),
+        float(squares) / max(case.fit.dof, 1),
         np.array(places),
         np.array(chi2),
         _lines(explanation, device, windows, rows),
-        _turns(explanation, block, np.array(device.truth.gyr_bias), turns),
+        apart(turns, source.block, block),
     )
 
 
@@ -178,28 +206,6 @@ def _line(explanation: Explanation, replayed: Block, rows: Rows, hz: float) -> A
         squares += np.abs(2 * (wave @ apart) / len(wave)) ** 2 / 2
         count += 1
     return _triads(np.where(rows.used.any(axis=0), np.sqrt(squares / count), np.nan))
-
-
-def _turns(
-    explanation: Explanation, replayed: Block, bias: Array, gaps: list[tuple[int, int]]
-) -> float:
-    """Root mean square of the integrals of turns, recorded less replayed, rad."""
-    block, apart = explanation.prepared.source.block, []
-    known = explanation.fit.state.bias[3:]
-    for a, b in gaps:
-        t = block.t[a:b]
-        first = int(np.searchsorted(replayed.t, t[0]))
-        recorded = trapezoid(block.gyr[a:b] - known, t)
-        again = trapezoid(replayed.gyr[first : first + len(t)] - bias, t)
-        apart.append(recorded - again)
-    return float(np.sqrt(np.mean(np.square(apart)))) if apart else np.nan
-
-
-def trapezoid(values: Array, t: Array) -> Array:
-    """Integral of a course (n, 3) by the trapezoid rule, (3,)."""
-    middle = (values[1:] + values[:-1]) / 2
-    out: Array = np.diff(t) @ middle
-    return out
 
 
 def _means(block: Block, t: Array, span: Array) -> Array:

@@ -2,10 +2,13 @@
 
 It is held where the windows held it, as far as a fit knows that: at the angles of
 session.toml with the turns aside that were found, or, where none are known, at those
-that bring about the force that was felt. Turns end when the device came to rest.
+that bring about the force that was felt. From one to the next it is carried as the
+gyroscopes tell; where they do not, a turn ends when the device came to rest.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,9 +16,11 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.fit import Bench
 from fieldcal.diagnosis.model import State
 from fieldcal.diagnosis.reduce import spans
+from fieldcal.diagnosis.turns import Turn
 from fieldcal.frames import angles_of
 from fieldcal.samples import Array
 from fieldcal.sim_device.replay import Window
+from fieldcal.twin.ways import way_of
 
 ENOUGH = 24
 """Samples of a row that give its mean, where nothing oscillates."""
@@ -26,23 +31,25 @@ TURN_S = 4.0
 PUT_S = 60.0
 """The device had stood somewhere for so long before the first window, s."""
 
-HOLES = 3.5
-"""Steps between samples from which some are missing."""
-
 
 def windows(
-    explanation: Explanation, state: State, bench: Bench, shaken: Array
+    explanation: Explanation,
+    state: State,
+    bench: Bench,
+    shaken: Array,
+    turns: Sequence[Turn],
 ) -> list[Window]:
     """The session's windows in time order, from its start, with their turns.
 
     `state` says where the device was in each, `shaken` (p,) is its vibration there,
-    m/s^2.
+    m/s^2; `turns` are those that the gyroscopes have followed.
     """
     source, x = explanation.prepared.source, bench.rows.x
     start, t = float(source.block.t[0]), source.block.t
     felt = state.experienced(x)
     out: list[Window] = []
     bounds = spans(source.block, source.about)
+    ways = {turn.positions[1]: way_of(turn, start) for turn in turns}
     for p in sorted(np.unique(x.position), key=lambda p: int(bounds[p, 0])):
         row = int(np.argmax(x.position == p))
         if x.oriented[row]:
@@ -55,7 +62,8 @@ def windows(
             out.append(Window(alpha, beta, begin - PUT_S, begin - PUT_S + 1.0))
         before = out[-1].end if out else -PUT_S
         rest = float(np.clip(source.arrived[p] - start, before, begin))
-        moves = max(rest - TURN_S, before)
+        way = ways.get(p)
+        moves = max(rest - TURN_S, before) if way is None else float(way.t[0])
         out.append(
             Window(
                 alpha,
@@ -65,40 +73,18 @@ def windows(
                 tuple(x.rate[row].tolist()),
                 (moves, rest) if rest > moves else None,
                 float(shaken[p]) if shaken[p] > 0 else None,
+                way,
             )
         )
     return out
 
 
-def instants(t: Array, span: Array, most: int, gaps: list[tuple[int, int]]) -> Array:
-    """Sample times: in each row `most` evenly spread at the most, and all of gaps."""
+def instants(t: Array, span: Array, most: int, turns: Sequence[Turn]) -> Array:
+    """Sample times: in each row `most` evenly spread at most, and edges of turns."""
     first = np.searchsorted(t, span[:, 0], side="left")
     last = np.searchsorted(t, span[:, 1], side="right")
-    some = [np.arange(a, b) for a, b in gaps]
+    some = [np.searchsorted(t, turn.t) for turn in turns]
     for a, b in zip(first, last, strict=True):
         every = np.linspace(a, b - 1, min(most, b - a))
         some.append(np.round(every).astype(np.intp))
     return t[np.unique(np.concatenate(some))]
-
-
-def gaps(explanation: Explanation) -> list[tuple[int, int]]:
-    """Samples between windows that are a turn about a single joint apart."""
-    rows, source = explanation.prepared.bench.rows, explanation.prepared.source
-    if not rows.used[:, 3:].any(axis=0).all():
-        return []
-    x, bounds = rows.x, spans(source.block, source.about)
-    held = np.unique(x.position)
-    first = [int(np.argmax(x.position == p)) for p in held]
-    out = []
-    for p, q, i, j in zip(held[:-1], held[1:], first[:-1], first[1:], strict=True):
-        moved = [x.alpha[i] != x.alpha[j], x.beta[i] != x.beta[j]]
-        gap = int(bounds[p, 1]), int(bounds[q, 0])
-        known = x.oriented[[i, j]].all() and not x.rate[[i, j]].any()
-        if known and sum(moved) == 1 and gap[1] - gap[0] > 1:
-            steps = np.diff(source.block.t[slice(*gap)])
-            if (
-                steps.max() < HOLES * np.median(steps)
-                and source.usable[slice(*gap)].all()
-            ):
-                out.append(gap)
-    return out

@@ -109,8 +109,8 @@ class Search:
             best = self._followed(model, first)
             gain = best.objective - model.objective
         if by_chance > 0 and gain > 0 and abs(by_chance - gain) < TIE:
-            margin = MARGIN + UNKNOWN * (chance.name.partition(":")[0] in SMOOTH)
-            return self._foretelling(model, first, best, random, margin)
+            nameless = chance.name.partition(":")[0] in SMOOTH
+            return self._foretelling(model, first, best, random, nameless)
         if by_chance > gain or (0 < gain < WEAK and by_chance > gain - MARGIN):
             return random if by_chance > 0 else None
         return best if gain > 0 else None
@@ -121,16 +121,23 @@ class Search:
         first: Sequence[Model],
         best: Model,
         random: Model,
-        margin: float,
+        nameless: bool,
     ) -> Model:
-        """Chance or a cause: whichever predicts the positions left out better."""
+        """Chance or a cause: whichever predicts the positions left out better.
+
+        Where neither does clearly, evidence decides; a cause that leaves nothing comes
+        before a function that no effect makes.
+        """
         ranked = sorted(first, key=lambda m: -m.objective)[:BEAM]
         causes = [m for m in ranked if m.objective > model.objective and m is not best]
         cause = max([best, *causes], key=foretells)
         more = foretells(cause) - foretells(random)
         if more > MARGIN:
             return cause
-        return random if more < -margin or random.objective > best.objective else best
+        if more < -(MARGIN + UNKNOWN * nameless):
+            return random
+        known = nameless and best.leaves_nothing
+        return best if known or best.objective >= random.objective else random
 
     def _instead(self, model: Model) -> list[Model]:
         """With the likeliest causes, and the random parts as small as these leave them.

@@ -9,12 +9,13 @@ outputs, or failing that what the effect's own entry in the catalogue says.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fieldcal.diagnosis.contender import Model, foretells
-from fieldcal.diagnosis.explain import CLOSE, Explanation, allowed, preferred
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.rivals import CLOSE, allowed, preferred
 from fieldcal.diagnosis.scatter import wanders
 from fieldcal.diagnosis.select import MARGIN, TIE
 from fieldcal.effects import Experience, catalogue
@@ -25,6 +26,12 @@ RANDOM = {"walk": "random_walk", "setting": "angle_setting"}
 REACH = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
 SEVERAL = 3
 """Causes that are looked at in the place of chance."""
+
+SAME, PART = 2 * CLOSE, 0.1
+"""Squares that a rival may leave more, at most this part of what is explained."""
+
+PLAUSIBLE = 3.0
+"""Typical sizes that its values may have then."""
 
 TELLING = 5.0
 """Difference in white noise of a window's mean that decides."""
@@ -60,11 +67,44 @@ def aliases(explanation: Explanation) -> Aliases:
             _add(found, name, sorted(theirs - mine))
             if theirs - mine and preferred(rival) <= cost:
                 undecided.add(name)
+    for name, likewise in _alike(explanation):
+        _add(found, name, likewise)
     for name, chance in _chances(explanation):
         _add(found, name, [chance])
         undecided.add(name)
-    ids = {name: tuple(others) for name, others in found.items() if others}
+    for name, others in explanation.instead.items():  # windows alone do not count there
+        found[name] = list(others)
+        undecided = undecided | {name} if others else undecided - {name}
+    ids = {name: tuple(there) for name, there in found.items() if there}
     return Aliases(ids, frozenset(undecided))
+
+
+def _alike(explanation: Explanation) -> Iterator[tuple[str, list[str]]]:
+    """Effects in whose place others leave no more, at the price of more parameters.
+
+    The price is for what is to be believed; what the recording cannot tell apart by its
+    fit, it cannot tell apart.
+    """
+    search, best = explanation.search, explanation.model
+    mine = _causes(best)
+    spare = {
+        name: min(SAME, PART * (search.without(best, name).fit.chi2 - best.fit.chi2))
+        for name in mine
+    }
+    for rival in search.rivals(best):
+        theirs, more = _causes(rival), rival.fit.chi2 - best.fit.chi2
+        for name in sorted(mine - theirs) if _plausible(rival) else ():
+            if more < spare[name]:
+                yield name, sorted(theirs - mine)
+
+
+def _plausible(model: Model) -> bool:
+    """Whether no effect in it is far larger than is usual."""
+    pairs = zip(model.fit.state.terms, model.fit.state.values, strict=True)
+    return all(
+        (np.abs(v) < PLAUSIBLE * model.bench.prior_of(replace(t, tight=1.0))).all()
+        for t, v in pairs
+    )
 
 
 def _causes(model: Model) -> set[str]:

@@ -2,40 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fieldcal.diagnosis.candidates import Hypothesis, hypotheses
 from fieldcal.diagnosis.contender import Model
-from fieldcal.diagnosis.estimate import RELAX, estimate
+from fieldcal.diagnosis.estimate import RELAX
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.prepare import Prepared, refined
 from fieldcal.diagnosis.reduce import rate_of
+from fieldcal.diagnosis.rivals import estimated, gauged, with_turns
 from fieldcal.diagnosis.select import Search
 from fieldcal.diagnosis.together import together
 from fieldcal.diagnosis.turning import Turning, Turntable
-from fieldcal.diagnosis.turns import Turn, turns
+from fieldcal.diagnosis.turns import Turn
 from fieldcal.diagnosis.unwind import turned
 from fieldcal.diagnosis.whiten import Errors, Part
 from fieldcal.frames import EARTH_RATE
 
-CLOSE = 4.6
-"""Of ln 100: an explanation a hundred times less likely is no rival."""
-
-NEARBY, RIVALS = 15.0, 4
-"""How close, by the windows alone, a model must come for its turns to be looked at."""
-
 SEES_EARTH = 20.0
 """Earth rate over the noise of one window from which tactical gyroscopes see it."""
 
-
-THERMAL = {*("temperature_bias", "temperature_scale"), "thermal_hysteresis", "warm_up"}
-
-LAG = 0.05
-"""Part of its course by which the sensors' temperature is not the thermometer's."""
 
 TOGETHER = 5.0
 """How much likelier one course has to be than one for each axis, ln."""
@@ -58,6 +48,7 @@ class Explanation:
     left : parameters that the rows leave open
     made : the turns
     table, turning : what the turns say; None where there are none
+    instead : what would do as well in turns, by the id of what is in the model
     earth : by how much the Earth's rate raises ln Z; 0 where it is not in the model
     in_step : first channels of the triads whose axes seem to wander, in one course
 
@@ -75,6 +66,7 @@ class Explanation:
     made: tuple[Turn, ...]
     table: Turntable | None
     turning: Turning | None
+    instead: Mapping[str, tuple[str, ...]]
     earth: float
     in_step: frozenset[int]
 
@@ -111,15 +103,20 @@ def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
     """What explains windows, and then turns; `told` is known of the windows' rates."""
     always = (*prepared.known, *told)
     search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
-    model, rivals = _with_turns(prepared, search, search.run())
+    model, rivals = with_turns(prepared, search, search.run())
     if any(h.effect.id == "settling" for h, _ in model.chosen):
         prepared = refined(prepared, model.fit)
         errors = model.bench.errors
         bench = prepared.bench.but(errors=errors)
         search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
         model = search.model(model.chosen, bench, None, model.random, model.shaped)
-    wide, fit, left = _estimated(search, model)
+    wide, fit, left = estimated(search, model)
     made, table, turning = turned(prepared, wide, untold(fit, told), search.price)
+    better, instead = gauged(prepared, search, model, turning)
+    if better is not model:
+        model = better
+        wide, fit, left = estimated(search, model)
+        made, table, turning = turned(prepared, wide, untold(fit, told), search.price)
     return Explanation(
         prepared,
         prepared.known,
@@ -133,6 +130,7 @@ def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
         made,
         table,
         turning,
+        instead,
         _earth(search, model),
         _in_step(prepared, model, fit),
     )
@@ -199,77 +197,6 @@ def wandering(errors: Errors, first: int) -> list[Part]:
     ]
 
 
-def _estimated(search: Search, model: Model) -> tuple[Bench, Fit, tuple[str, ...]]:
-    whole = [replace(t, columns=h.variants[0].columns) for h, t in model.chosen]
-    terms = [*search.rules.always, *merged(whole)]
-    return estimate(model.bench, terms, model.fit)
-
-
-def _with_turns(
-    prepared: Prepared, search: Search, best: Model
-) -> tuple[Model, tuple[Model, ...]]:
-    """The best model of windows and turns, and the rivals that come close to it."""
-    level = worth(best) - NEARBY
-    close = [
-        m for m in search.rivals(best) if worth(m) + allowed(search, best, m) > level
-    ]
-    close = [best, *sorted(close, key=lambda m: -m.objective)[:RIVALS]]
-    if len(close) == 1:
-        return best, ()
-    gains = []
-    for model in close:
-        wide, fit, _ = _estimated(search, model)
-        made = turns(prepared.source, wide.rows, fit)
-        if made:
-            interval = 1 / rate_of(prepared.source.block)
-            table = Turntable(wide, fit, made, interval)
-            found = table.better((), search.price, closures=False)
-            score = found.score - search.price * len(found.terms)
-            # turns that nothing explains well do not tell much about the rest
-            gains.append(score / max(1.0, found.chi2 / max(found.dof, 1)))
-        else:
-            gains.append(0.0)
-    totals = [m.objective + g for m, g in zip(close, gains, strict=True)]
-    first = int(np.argmax(totals))
-    chosen, others = close[first], []
-    for model, gain in zip(close, gains, strict=True):
-        less = worth(chosen) + gains[first] - worth(model) - gain
-        if model is not chosen and less < CLOSE + allowed(search, chosen, model):
-            others.append(model)
-    return chosen, tuple(others)
-
-
-def worth(model: Model) -> float:
-    """Evidence of a model, ln, whatever the choice of its effects' variants cost.
-
-    That is paid for believing an effect, not for whether it would explain the same.
-    """
-    return model.objective + sum(model.shaped)
-
-
-def preferred(model: Model) -> float:
-    """What a model paid for effects that are second choice by their nature, ln."""
-    return sum(h.cost for h, _ in model.chosen)
-
-
-def allowed(search: Search, best: Model, other: Model) -> float:
-    """What another model may fall short by for the thermometer alone, ln.
-
-    The sensors are not where the thermometer is: their temperature is known to a part
-    of its course only. Of what an effect of it explains, the square of that part says
-    nothing about which effect it is.
-    """
-    mine, theirs = (
-        {h.effect.id for h, _ in m.chosen if not h.known} for m in (best, other)
-    )
-    if not mine ^ theirs <= THERMAL or not mine - theirs:
-        return 0.0
-    less = best
-    for cause in mine - theirs:
-        less = search.without(less, cause)
-    return LAG**2 * (best.fit.score - less.fit.score)
-
-
 def _pool(prepared: Prepared, bench: Bench) -> list[Hypothesis]:
     return hypotheses(bench, prepared.source.warmth.changes, prepared.navigation)
 
@@ -283,13 +210,3 @@ def _earth(search: Search, model: Model) -> float:
     chosen = model.chosen[:at] + model.chosen[at + 1 :]
     less = search.model(chosen, model.bench, model.fit, model.random)
     return model.fit.score - less.fit.score
-
-
-def merged(terms: Sequence[Term]) -> list[Term]:
-    """Terms of one effect put together."""
-    out: dict[str, Term] = {}
-    for term in terms:
-        old = out.get(term.effect.id)
-        columns = tuple(sorted({*(old.columns if old else ()), *term.columns}))
-        out[term.effect.id] = replace(old or term, columns=columns)
-    return list(out.values())

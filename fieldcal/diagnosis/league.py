@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from fieldcal.diagnosis.contender import Model
-from fieldcal.diagnosis.explain import CLOSE, Explanation
+from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.heldout import held_out, rms
 from fieldcal.diagnosis.result import Found, number
+from fieldcal.diagnosis.rivals import CLOSE
 from fieldcal.samples import Array
 
 FOLLOWED = 3

@@ -159,7 +159,9 @@ def _rise(explanation: Explanation, *names: str) -> dict[str, float]:
     return {"delta_chi2": total, "delta_bic": total, "held_out_gain": np.nan}
 
 
-def of_turns(explanation: Explanation) -> Iterator[Found]:
+def of_turns(
+    explanation: Explanation, aliases: Mapping[str, Sequence[str]]
+) -> Iterator[Found]:
     """Effects that the turns show."""
     turning, table = explanation.turning, explanation.table
     if turning is None or table is None:
@@ -185,7 +187,7 @@ def of_turns(explanation: Explanation) -> Iterator[Found]:
             "delta_bic": delta - len(term.names) * float(np.log(turning.rows.sum())),
             "held_out_gain": 1 - ahead / alone,
         }
-        yield Found(name, found, evidence=evidence)
+        yield Found(name, found, tuple(aliases.get(name, ())), evidence)
 
 
 def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[Found]:

@@ -115,7 +115,7 @@ def _effects(
         found.append(Found(tone.effect.id, values, evidence={"delta_chi2": tone.chi2}))
     found += naming.of_windows(explanation, lost, then, others.ids)
     found += naming.of_chance(explanation, others.ids)
-    found += naming.of_turns(explanation)
+    found += naming.of_turns(explanation, others.ids)
     if explanation.sees_earth:
         evidence = {"delta_chi2": 2 * explanation.earth}
         found.append(Found("earth_rate", {}, evidence=evidence))

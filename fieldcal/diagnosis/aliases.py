@@ -86,7 +86,7 @@ def _alike(explanation: Explanation) -> Iterator[tuple[str, list[str]]]:
     fit, it cannot tell apart.
     """
     search, best = explanation.search, explanation.model
-    mine = _causes(best)
+    mine = set() if best.random else _causes(best)  # chance makes up for what is wrong
     spare = {
         name: min(SAME, PART * (search.without(best, name).fit.chi2 - best.fit.chi2))
         for name in mine

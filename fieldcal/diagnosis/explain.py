@@ -12,10 +12,11 @@ from fieldcal.diagnosis.contender import Model
 from fieldcal.diagnosis.estimate import RELAX
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import Term
-from fieldcal.diagnosis.prepare import Prepared, refined
+from fieldcal.diagnosis.prepare import Prepared, divided, refined
 from fieldcal.diagnosis.reduce import rate_of
 from fieldcal.diagnosis.rivals import estimated, gauged, with_turns
 from fieldcal.diagnosis.select import Search
+from fieldcal.diagnosis.steps import jump_instant
 from fieldcal.diagnosis.together import together
 from fieldcal.diagnosis.turning import Turning, Turntable
 from fieldcal.diagnosis.turns import Turn
@@ -103,7 +104,12 @@ def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
     """What explains windows, and then turns; `told` is known of the windows' rates."""
     always = (*prepared.known, *told)
     search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
-    model, rivals = with_turns(prepared, search, search.run())
+    best = search.run()
+    if (at := _jump(prepared, search, best)) is not None:
+        prepared = divided(prepared, at)
+        search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
+        best = search.run()
+    model, rivals = with_turns(prepared, search, best)
     if any(h.effect.id == "settling" for h, _ in model.chosen):
         prepared = refined(prepared, model.fit)
         errors = model.bench.errors
@@ -134,6 +140,18 @@ def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
         _earth(search, model),
         _in_step(prepared, model, fit),
     )
+
+
+def _jump(prepared: Prepared, search: Search, model: Model) -> float | None:
+    """When the biases jumped, s, if they did."""
+    for hypothesis, term in model.chosen:
+        if "at_s" in term.shape:
+            less = search.without(model, hypothesis.effect.id)
+            at, _ = jump_instant(
+                prepared.source, model.bench, less.fit, model.fit, term
+            )
+            return at
+    return None
 
 
 def _of_rates(found: Explanation) -> tuple[Term, ...]:

@@ -206,6 +206,14 @@ def _settles(bench: Bench, known: tuple[Term, ...]) -> float:
     return total
 
 
+def divided(prepared: Prepared, at: float) -> Prepared:
+    """Without the row in the midst of which something changed, at an instant, s."""
+    rows = prepared.bench.rows
+    across = (rows.span[:, 0] < at) & (at <= rows.span[:, 1])
+    sd = np.where(across[:, None], np.nan, rows.sd)
+    return replace(prepared, bench=prepared.bench.but(rows=replace(rows, sd=sd)))
+
+
 def refined(prepared: Prepared, fit: Fit) -> Prepared:
     """With settling counted from the instant that the samples before windows show."""
     turned = np.isfinite(prepared.source.arrived)

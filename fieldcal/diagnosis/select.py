@@ -134,10 +134,11 @@ class Search:
         more = foretells(cause) - foretells(random)
         if more > MARGIN:
             return cause
-        if more < -(MARGIN + UNKNOWN * nameless):
-            return random
+        likelier = best.objective >= random.objective
         known = nameless and best.leaves_nothing
-        return best if known or best.objective >= random.objective else random
+        if more < -(MARGIN + UNKNOWN * nameless):
+            return best if known and likelier else random
+        return best if known or likelier else random
 
     def _instead(self, model: Model) -> list[Model]:
         """With the likeliest causes, and the random parts as small as these leave them.

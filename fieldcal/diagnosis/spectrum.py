@@ -28,6 +28,9 @@ from fieldcal.samples import CHANNELS, Array, Block
 STEADY = 0.65
 """Part of the energy that one amplitude and phase must take to be a line."""
 
+LASTS = 0.2
+"""Part of it that lies in either half of the windows at least."""
+
 EXTRA = 6.9
 """Of ln 1000: what a line has to be worth beyond the frequencies tried."""
 
@@ -80,11 +83,14 @@ def tones(source: Source, rows: Rows) -> list[Tone]:
 
 
 def without(block: Block, source: Source, rows: Rows, found: Sequence[Tone]) -> Block:
-    """The samples of all windows less the lines."""
+    """The samples less the lines: of all windows, and on the way what sensors add."""
     six = block.six
     where = pieces_of(source, rows)
     for tone in found:
         response = tone.effect.response(where.x, tone.hz) @ tone.causes
+        if tone.effect.kind == "sensor":
+            six -= np.real(wave_of(block.t, tone.hz)[:, None] * response[0])
+            continue
         for seen, t in zip(response, where.times, strict=True):
             at = np.searchsorted(block.t, t)
             six[at] -= np.real(wave_of(t, tone.hz)[:, None] * seen)
@@ -107,7 +113,23 @@ def _explained(pieces: Pieces, near: float) -> Tone | None:
     places = np.log(sum(map(len, pieces.samples)))
     if best.gain <= places + EXTRA or not best.channels:
         return None
-    return best if _share(pieces, best, moments) > STEADY else None
+    steady = _share(pieces, best, moments) > STEADY and _lasts(pieces, best)
+    return best if steady else None
+
+
+def _lasts(pieces: Pieces, tone: Tone) -> bool:
+    """Whether a line takes of the squares in either half of the windows.
+
+    What fades after turns has lines, too, where positions follow one another evenly.
+    """
+    clear = [CHANNELS.index(name) for name in tone.channels]
+    seen = tone.effect.response(pieces.x, tone.hz) @ tone.causes
+    taken = np.zeros(2)
+    for s, t, one in zip(pieces.samples, pieces.times, seen, strict=True):
+        line = np.real(wave_of(t, tone.hz)[:, None] * one)
+        fallen = (((2 * s - line) * line / pieces.noise**2)[:, clear]).sum(axis=1)
+        taken += [part.sum() for part in np.array_split(fallen, 2)]
+    return bool(taken.min() > LASTS * taken.sum())
 
 
 def _share(pieces: Pieces, tone: Tone, moments: _Moments) -> float:

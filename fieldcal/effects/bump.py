@@ -40,6 +40,12 @@ MANY = 50_000
 LONGEST_S = 5.0
 """A disturbance that lasts longer is a change of the device, not a bump."""
 
+AROUND_S = 3.0
+"""Before and after a disturbance, where a jump of the level shows."""
+
+FADES_S = (1.0, 1.5, 2.0, 3.0, 4.5)
+"""Time constants of what fades after a turn; slower ones are no disturbance anyway."""
+
 SHORTEST = 3
 """Samples; a single wild one is left out and not called a bump."""
 
@@ -117,11 +123,13 @@ class Bump(Chain):
             z = np.nan_to_num(z)
             if recording.x.rate[p].any():
                 z[:, :3] = 0.0  # the force goes round with the table
-            for a, b in disturbed(z, max(2, round(0.1 * rate))):
-                if b - a <= LONGEST_S * rate:
-                    out.append(
-                        _fault(recording, t, int(first), int(a), int(b), z, rate)
-                    )
+            shortest = max(2, round(0.1 * rate))
+            for a, b in disturbed(z, shortest):
+                if b - a > LONGEST_S * rate:
+                    continue
+                if _steady(piece / noise, (int(a), int(b)), shortest, rate):
+                    continue
+                out.append(_fault(recording, t, int(first), int(a), int(b), z, rate))
         return out
 
 
@@ -139,6 +147,45 @@ def _quick(piece: Array, rate: float) -> Array:
             level = [float(np.nanmedian(piece[parts[i], c])) for i in known]
             out[:, c] = piece[:, c] - _course(rows, centre[known], level)
     return out
+
+
+def _steady(z: Array, stretch: tuple[int, int], shortest: int, rate: float) -> bool:
+    """Whether the level only jumps there, or fades from the window's start.
+
+    `z` is (n, 6) in standard deviations.
+    """
+    a, b = stretch
+    around = round(AROUND_S * rate)
+    near = np.nan_to_num(z[max(a - around, 0) : b + around])
+    courses = [_jump(near, around // 2)]
+    if a < around:
+        courses += [_fading(near, tau * rate) for tau in FADES_S]
+    rest = (near - c for c in courses if c is not None)
+    return any(len(disturbed(r, shortest)) == 0 for r in rest)
+
+
+def _jump(z: Array, margin: int) -> Array | None:
+    """Level that jumps where means before and after part most, (n, 6).
+
+    None if that leaves fewer than `margin` samples on one side.
+    """
+    n, each = len(z), np.arange(1, len(z))[:, None]
+    total = np.cumsum(z, axis=0)
+    before = total[:-1] / each
+    after = (total[-1] - total[:-1]) / (n - each)
+    gain = ((after - before) ** 2 * each * (n - each)).sum(axis=1)
+    at = int(np.argmax(gain))
+    if min(at + 1, n - at - 1) < margin:
+        return None
+    level: Array = np.where(np.arange(n)[:, None] <= at, before[at], after[at])
+    return level
+
+
+def _fading(z: Array, tau: float) -> Array:
+    """What fades with a time constant, in samples, towards a level, (n, 6)."""
+    design = np.column_stack([np.ones(len(z)), np.exp(-np.arange(len(z)) / tau)])
+    course: Array = design @ np.linalg.lstsq(design, z, rcond=None)[0]
+    return course
 
 
 def _course(rows: NDArray[np.intp], centre: Array, level: list[float]) -> Array:

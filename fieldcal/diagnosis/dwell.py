@@ -17,6 +17,9 @@ from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.reduce import Rows, Source, averaged, rate_of, spans
 from fieldcal.samples import Array, Block
 
+ARRIVAL_S = 0.3
+"""Standard uncertainty of the instant at which a turn by hand ends."""
+
 PIECE_S = 0.2
 MOVING = 7.0
 """Departure of a short mean from the window's that is motion, in standard errors."""

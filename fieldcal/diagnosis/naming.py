@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.diagnosis.dwell import ARRIVAL_S
 from fieldcal.diagnosis.estimate import RELAX, sigmas
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.fit import Fit
@@ -22,10 +23,6 @@ from fieldcal.samples import CHANNELS, Array
 
 MATERIAL = 44.0
 """Twice the rise of ln L from which what wanders is said: less only widens."""
-
-
-ARRIVAL_S = 0.3
-"""Standard uncertainty of the instant at which a turn by hand ends."""
 
 
 @dataclass(frozen=True, slots=True)

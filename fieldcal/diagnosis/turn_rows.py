@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.attitude import geometry
+from fieldcal.diagnosis.dwell import ARRIVAL_S
 from fieldcal.diagnosis.fit import Bench, Fit
 from fieldcal.diagnosis.model import State, Term
 from fieldcal.diagnosis.turns import Turn, errors_of
@@ -26,6 +27,9 @@ from fieldcal.samples import Array
 
 STEP = 1.0
 """Of the differences that the design is made of, in standard deviations."""
+
+BUILT_UP, BUILDS_S = 0.5, 2.0
+"""How far what settles may be off on the way, in its size, and how smoothly, s."""
 
 SHAPE_STEP = 0.1
 """And for a time constant at most this part of it."""
@@ -62,9 +66,11 @@ class TurnRows:
         on_way = turn.means(design[:, :3] + swung)
         length = turn.t[-1] - turn.t[0]
         loose = self._loose(turn)[3:] / np.abs(state.scale[3:])
-        spread = np.hypot(self.density * np.sqrt(length), loose * length)
+        settling = self._settling(turn)
+        density = np.hypot(self.density, BUILT_UP * np.sqrt(length) * settling[3:])
+        spread = np.hypot(density * np.sqrt(length), loose * length)
         across = turn.across / np.hypot(spread, turn.blur)[:, None]
-        whiten = self._whitener(turn)
+        whiten = self._whitener(turn, settling[:3], density)
         z = np.concatenate(
             [across @ (turn.closure - end[:, 0]), whiten @ (turn.acc - seen).ravel()]
         )
@@ -122,20 +128,49 @@ class TurnRows:
             out[part.channel] += part.size**2 * float(((f[1] - f[0]) ** 2).sum())
         return np.sqrt(out)
 
-    def _whitener(self, turn: Turn) -> Array:
-        """L^-1 of the accelerometers' rows on the way, (3 k, 3 k)."""
+    def _settling(self, turn: Turn) -> Array:
+        """What begins to fade at the end of a turn, by the windows' model, (6,)."""
+        never, then = (
+            self.fit.state.output(
+                replace(turn.x, since_turn=np.full(len(turn.t), since))
+            )[-1]
+            for since in (np.inf, 0.0)
+        )
+        sizes: Array = then - never
+        return sizes
+
+    def _built_up(self, turn: Turn, middle: Array) -> Array:
+        """Covariance between pieces of what settling adds to each, for a size of one.
+
+        How it builds up in a turn is not known: smoothly, somewhere between none and
+        all of it; afterwards it fades from an instant that is known so well.
+        """
+        rest = np.isfinite(turn.x.since_turn)
+        k = int(np.argmax(rest)) if rest.any() else len(turn.t) - 1
+        arrived = turn.t[k] - (turn.x.since_turn[k] if rest.any() else 0.0) - turn.t[0]
+        unsure = np.where(middle < arrived + ARRIVAL_S, BUILT_UP, BUILT_UP * ARRIVAL_S)
+        apart = np.subtract.outer(middle, middle) / BUILDS_S
+        out: Array = np.outer(unsure, unsure) * np.exp(-(apart**2) / 2)
+        return out
+
+    def _whitener(self, turn: Turn, settling: Array, density: Array) -> Array:
+        """L^-1 of the accelerometers' rows on the way, (3 k, 3 k).
+
+        `settling` (3,) is what they settle by, `density` (3,) the gyroscopes' noise.
+        """
         middle = (turn.t[turn.cut[1:]] + turn.t[turn.cut[:-1]]) / 2 - turn.t[0]
         done = np.interp(middle, turn.t - turn.t[0], turn.done)
         length = turn.t[-1] - turn.t[0]
         bridge = np.minimum.outer(middle, middle) + np.outer(done, done) * length
         bridge -= np.outer(middle, done) + np.outer(done, middle)
         cov = np.diag((turn.sd**2).ravel())
+        cov += np.kron(self._built_up(turn, middle), np.outer(settling, settling))
         same = np.equal.outer(*[np.tile(np.arange(3), len(turn.sd))] * 2)
         cov += same * np.tile(self._loose(turn)[:3] ** 2, len(turn.sd))
         for axis in range(3):
             along = np.broadcast_to(np.eye(3)[axis][:, None], (len(turn.t), 3, 1))
             arm = turn.means(turn.swung(along)[:, :, 0]) * self.fit.state.scale[:3]
-            arm = arm * self.density[axis]
+            arm = arm * density[axis]
             blocks = bridge[:, None, :, None] * np.multiply.outer(arm, arm)
             cov += blocks.reshape(cov.shape)
         return np.linalg.inv(np.linalg.cholesky(cov))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fieldcal.effects import Experience
 from fieldcal.frames import turn
 from fieldcal.samples import Array
+from fieldcal.solve.rotation import exponential, products
 
 SMOOTH_S = 0.1
 """Means that the angular acceleration is taken from."""
@@ -42,29 +43,25 @@ def carry(angle: Array) -> Array:
     >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0
     array([ 0., -1.,  0.])
     """
-    size = np.linalg.norm(angle, axis=1)[:, None, None]
-    axis = angle[:, :, None] / np.where(size > 0, size, 1.0)
-    x, y, z = axis[:, 0, 0], axis[:, 1, 0], axis[:, 2, 0]
-    zero = np.zeros_like(x)
-    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    steps = np.eye(3) - np.sin(size) * cross + (1 - np.cos(size)) * (cross @ cross)
-    out = np.empty((len(angle) + 1, 3, 3))
-    out[0] = np.eye(3)
-    for k, step in enumerate(steps):
-        out[k + 1] = step @ out[k]
-    return out
+    return np.concatenate([np.eye(3)[None], products(exponential(-angle))])
 
 
 def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
-    """Small turns between edges, (m, 3) rad: the trapezoid rule and its correction.
+    """Small turns between edges, (m, 3) rad: the trapezoid rule and its corrections.
 
-    The next term of Euler and Maclaurin is -dt^2/12 (w'(b) - w'(a)).
+    The next term of Euler and Maclaurin is -dt^2/12 (w'(b) - w'(a)). Where the axis of
+    the turn itself turns, a step of length T is not the integral of its rate, but
+
+        theta = int w dt + T^2/12 w(a) x w(b)
+
+    for a rate that changes evenly (Magnus; the coning term of strapdown attitude).
     """
     step = float(np.median(np.diff(t)))
     slope = np.gradient(w, t, axis=0)[edge]
     length = np.diff(t[edge])[:, None]
-    out: Array = trapezoid_means(t, w, edge) * length
-    return out - step**2 / 12 * np.diff(slope, axis=0)
+    total: Array = trapezoid_means(t, w, edge) * length
+    coning = length**2 / 12 * np.cross(w[edge[:-1]], w[edge[1:]])
+    return total - step**2 / 12 * np.diff(slope, axis=0) + coning
 
 
 def between(attitude: Array, done: Array, start: Array, end: Array) -> Array:

@@ -51,7 +51,7 @@ def integrate(t: Array, w: Array) -> Turn:
     h = np.diff(t)[:, None]
     rate = _mean_rate(h[:, 0], w)
     angle = h * rate + h**2 / 12 * np.cross(w[:-1], w[1:])
-    until = _products(exponential(-angle))
+    until = products(exponential(-angle))
     whole = until[-1]
     # to the middle of a step, since that is where its mean rate acts
     half = until @ exponential(angle / 2)
@@ -89,8 +89,8 @@ def cross_matrix(v: Array) -> Array:
     return np.asarray(x - np.swapaxes(x, -1, -2))
 
 
-def _products(steps: Array) -> Array:
-    """Products E_k ... E_1 for every k, by doubling, (k, 3, 3)."""
+def products(steps: Array) -> Array:
+    """Products E_k ... E_1 of matrices (m, 3, 3), for every k, by doubling."""
     out = steps.copy()
     reach = 1
     while reach < len(out):

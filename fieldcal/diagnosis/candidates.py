@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.fit import Bench
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.model import Term
 from fieldcal.effects import Effect, Motion, Scatter, Sensor, catalogue
 from fieldcal.samples import CHANNELS, Array

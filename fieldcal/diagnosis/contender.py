@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.candidates import Hypothesis
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import foretold
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.scatter import fees

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.reduce import Rows, Source, averaged, rate_of, spans
 from fieldcal.samples import Array, Block
 

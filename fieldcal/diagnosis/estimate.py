@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.scatter import cautious
 

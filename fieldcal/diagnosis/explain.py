@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.candidates import Hypothesis, hypotheses
 from fieldcal.diagnosis.contender import Model
 from fieldcal.diagnosis.estimate import RELAX
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.prepare import Prepared, divided, refined
 from fieldcal.diagnosis.reduce import rate_of
@@ -103,19 +104,7 @@ def explain(prepared: Prepared) -> Explanation:
 def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
     """What explains windows, and then turns; `told` is known of the windows' rates."""
     always = (*prepared.known, *told)
-    search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
-    best = search.run()
-    if (at := _jump(prepared, search, best)) is not None:
-        prepared = divided(prepared, at)
-        search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
-        best = search.run()
-    model, rivals = with_turns(prepared, search, best)
-    if any(h.effect.id == "settling" for h, _ in model.chosen):
-        prepared = refined(prepared, model.fit)
-        errors = model.bench.errors
-        bench = prepared.bench.but(errors=errors)
-        search = Search(prepared.bench, _pool(prepared, prepared.bench), always)
-        model = search.model(model.chosen, bench, None, model.random, model.shaped)
+    prepared, search, model, rivals = _searched(prepared, always)
     wide, fit, left = estimated(search, model)
     made, table, turning = turned(prepared, wide, untold(fit, told), search.price)
     better, instead = gauged(prepared, search, model, turning)
@@ -140,6 +129,33 @@ def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
         _earth(search, model),
         _in_step(prepared, model, fit),
     )
+
+
+def _searched(
+    prepared: Prepared, always: tuple[Term, ...]
+) -> tuple[Prepared, Search, Model, tuple[Model, ...]]:
+    """The best model and its rivals, with rows that suit what they found.
+
+    A jump divides a row, and what settles is counted from when it really begins.
+    """
+
+    def search() -> Search:
+        return Search(prepared.bench, _pool(prepared, prepared.bench), always)
+
+    tried = search()
+    best = tried.run()
+    if (at := _jump(prepared, tried, best)) is not None:
+        prepared = divided(prepared, at)
+        tried = search()
+        best = tried.run()
+    model, rivals = with_turns(prepared, tried, best)
+    if any(h.effect.id == "settling" for h, _ in model.chosen):
+        prepared = refined(prepared, model.fit)
+        bench = prepared.bench.but(errors=model.bench.errors)
+        tried = search()
+        fitted = tried.rules.model
+        model = fitted(model.chosen, bench, None, model.random, model.shaped)
+    return prepared, tried, model, rivals
 
 
 def _jump(prepared: Prepared, search: Search, model: Model) -> float | None:
@@ -226,5 +242,5 @@ def _earth(search: Search, model: Model) -> float:
         return 0.0
     at = there.index(True)
     chosen = model.chosen[:at] + model.chosen[at + 1 :]
-    less = search.model(chosen, model.bench, model.fit, model.random)
+    less = search.rules.model(chosen, model.bench, model.fit, model.random)
     return model.fit.score - less.fit.score

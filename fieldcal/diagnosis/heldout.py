@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.reduce import Rows
 from fieldcal.diagnosis.whiten import covariance

@@ -65,7 +65,7 @@ class Candidate:
 def league(explanation: Explanation, found: Sequence[Found]) -> tuple[Candidate, ...]:
     """Every effect that was tried on the windows, the one that takes most first."""
     search, final = explanation.search, explanation.model
-    plain = search.model((), search.bench)
+    plain = search.rules.model((), search.bench)
     alone = _best_of_each(search.larger(plain))
     beside = _best_of_each(search.larger(final)) if final.chosen else alone
     instead = _best_of_each(search.rivals(final)) if final.chosen else {}
@@ -117,7 +117,7 @@ def _why(
     names = " and ".join(dict.fromkeys(h.effect.id for h, _ in final.chosen))
     if any(h.effect.id == id_ for m in explanation.rivals for h, _ in m.chosen):
         return f"explains it about as well as {names}; this recording cannot tell"
-    gain = _gain(alone[id_], search.model((), search.bench))
+    gain = _gain(alone[id_], search.rules.model((), search.bench))
     if gain <= 0:
         return f"takes no more than chance would: alone its odds are {_odds(gain)}"
     rest = " and ".join(filter(None, [names, *map(_random, final.random)]))

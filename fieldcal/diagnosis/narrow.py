@@ -17,7 +17,8 @@ from itertools import combinations
 
 import numpy as np
 
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.effects import Sensor
 from fieldcal.samples import Array

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from fieldcal.description import Description
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.candidates import hypotheses
 from fieldcal.diagnosis.chain import Checked, check, checked_again
 from fieldcal.diagnosis.dwell import arrivals, beginnings, clamped
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.reduce import Rows, Source, recounted, spans

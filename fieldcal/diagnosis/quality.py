@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.heldout import held_out, rms
 from fieldcal.diagnosis.prepare import Prepared, bench_of

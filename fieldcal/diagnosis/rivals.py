@@ -13,9 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.contender import Model
 from fieldcal.diagnosis.estimate import estimate
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.reduce import rate_of

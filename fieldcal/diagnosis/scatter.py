@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.whiten import SMOOTH, Errors, Part, factor
 from fieldcal.samples import CHANNELS, Array
 

@@ -20,9 +20,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.candidates import Hypothesis
-from fieldcal.diagnosis.contender import Choice, Model, Rules, foretells
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.contender import Model, Rules, foretells
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.scatter import UNKNOWN, Wander, dropped, wanders
 from fieldcal.diagnosis.variants import with_one
@@ -69,10 +69,10 @@ class Search:
 
     def run(self) -> Model:
         """The best model found."""
-        best = self.model((), self.bench)
+        best = self.rules.model((), self.bench)
         seen = {best.parts}
         while (grown := self._grow(best)) is not None:
-            grown = self.model(
+            grown = self.rules.model(
                 grown.chosen, grown.bench, grown.fit, grown.random, grown.shaped
             )
             best = self._tidied(self._anew(grown))
@@ -80,17 +80,6 @@ class Search:
                 break
             seen.add(best.parts)
         return best
-
-    def model(
-        self,
-        chosen: tuple[Choice, ...],
-        bench: Bench,
-        near: Fit | None = None,
-        random: tuple[str, ...] = (),
-        shaped: tuple[float, ...] = (),
-    ) -> Model:
-        """Fit some hypotheses."""
-        return self.rules.model(chosen, bench, near, random, shaped)
 
     def _grow(self, model: Model) -> Model | None:
         """The model with something more in it, if that is better."""
@@ -151,10 +140,12 @@ class Search:
         bench = model.bench
         for name in model.random:
             bench = bench.but(errors=dropped(bench.errors, name))
-        bare = self.model(model.chosen, bench, model.fit, (), model.shaped)
+        bare = self.rules.model(model.chosen, bench, model.fit, (), model.shaped)
         ranked = sorted(self.larger(bare), key=lambda m: -m.objective)[:BEAM]
         return [
-            self._anew(self.model(m.chosen, model.bench, m.fit, model.random, m.shaped))
+            self._anew(
+                self.rules.model(m.chosen, model.bench, m.fit, model.random, m.shaped)
+            )
             for m in ranked
         ]
 
@@ -188,7 +179,7 @@ class Search:
         """The model with something random let in."""
         bench = model.bench.but(errors=chance.errors)
         random = (*model.random, chance.name)
-        return self.model(model.chosen, bench, model.fit, random, model.shaped)
+        return self.rules.model(model.chosen, bench, model.fit, random, model.shaped)
 
     def _tidied(self, model: Model) -> Model:
         """Without what has become idle, and with what does better swapped in."""
@@ -223,7 +214,7 @@ class Search:
     def without(self, model: Model, cause: str) -> Model:
         """The model without an effect, both its triads."""
         kept = [i for i, (h, _) in enumerate(model.chosen) if h.effect.id != cause]
-        return self.model(
+        return self.rules.model(
             tuple(model.chosen[i] for i in kept),
             model.bench,
             model.fit,
@@ -244,20 +235,20 @@ class Search:
         for name in model.random if model.chosen else ():
             bench = model.bench.but(errors=dropped(model.bench.errors, name))
             kept = tuple(r for r in model.random if r != name)
-            less = self.model(model.chosen, bench, model.fit, kept, model.shaped)
+            less = self.rules.model(model.chosen, bench, model.fit, kept, model.shaped)
             chance = {w.name: w for w in wanders(bench, less.fit)}.get(name)
             model = self.with_random(less, chance) if chance else less
         return model
 
     def smaller(self, model: Model) -> list[Model]:
         """The model without each of its parts."""
-        out = []
+        fitted, out = self.rules.model, []
         for i in range(len(model.chosen)):
             rest = model.chosen[:i] + model.chosen[i + 1 :]
             shaped = model.shaped[:i] + model.shaped[i + 1 :]
-            out.append(self.model(rest, model.bench, model.fit, model.random, shaped))
+            out.append(fitted(rest, model.bench, model.fit, model.random, shaped))
         for name in model.random:
             kept = tuple(r for r in model.random if r != name)
             bench = model.bench.but(errors=dropped(model.bench.errors, name))
-            out.append(self.model(model.chosen, bench, model.fit, kept, model.shaped))
+            out.append(fitted(model.chosen, bench, model.fit, kept, model.shaped))
         return out

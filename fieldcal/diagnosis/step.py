@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.samples import Array
 
 FAR = 5.0

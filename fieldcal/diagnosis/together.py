@@ -22,7 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import cells
 from fieldcal.samples import Array
 

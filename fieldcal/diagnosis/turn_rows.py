@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.attitude import geometry
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.dwell import ARRIVAL_S
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import State, Term
 from fieldcal.diagnosis.turns import Turn, errors_of
 from fieldcal.diagnosis.whiten import factor

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.fit import DETERMINED, Bench, Fit
+from fieldcal.diagnosis.bench import DETERMINED, Bench
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.step import ahead
 from fieldcal.diagnosis.turn_rows import TurnRows

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.explain import Explanation, bare, wandering
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import cells
 from fieldcal.diagnosis.scatter import alike
 from fieldcal.diagnosis.whiten import SMOOTH, Part, factor

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.estimate import RELAX
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.noise import grain_of
 from fieldcal.diagnosis.prepare import Prepared

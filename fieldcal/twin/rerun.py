@@ -23,8 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis import Diagnosis
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.fit import Bench, Fit
+from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import rms
 from fieldcal.diagnosis.reduce import Rows
 from fieldcal.diagnosis.turns import NOTHING, Turn, Undo, turns

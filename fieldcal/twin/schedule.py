@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.fit import Bench
 from fieldcal.diagnosis.model import State
 from fieldcal.diagnosis.reduce import spans
 from fieldcal.diagnosis.turns import Turn

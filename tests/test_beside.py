@@ -2,13 +2,13 @@
 
 import json
 import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from processes import RUN
 
 from fieldcal.beside import Times, folders
 from fieldcal.commands.virtual import address
@@ -28,7 +28,7 @@ def led(
     killed_at: int | None = None,
 ) -> tuple[int, Any, str]:
     """A run of two positions in which somebody turns all devices when told to."""
-    run = [sys.executable, "-m", "fieldcal", "run", "--headless", "--json", *options]
+    run = [*RUN, "--headless", "--json", *options]
     if "--resume" not in options:
         run += ["two_position", "--level=0.001", "--seconds=10", "--latitude=50.45"]
     for url in urls:

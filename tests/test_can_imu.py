@@ -17,6 +17,7 @@ import can
 import numpy as np
 import pytest
 from can_wires import until_the_end
+from processes import FIELDCAL, SIM
 
 from fieldcal import description, movers
 from fieldcal.cli import main
@@ -37,7 +38,6 @@ from fieldcal.sim_device.profile import Sampling
 from fieldcal.sim_device.remote import Remote
 from fieldcal.sim_device.vocabulary import effect
 
-SIM = [sys.executable, "-m", "fieldcal", "sim"]
 SLCAN = "interface=slcan&bitrate=500000&dbc=virtual"
 
 
@@ -339,13 +339,12 @@ def test_a_network_without_multicast(
 ) -> None:
     subprocess.run([*namespace, *"ip route del 224.0.0.0/4".split()], check=True)
     url = "can:239.74.163.2?interface=udp_multicast&dbc=virtual"
-    command = [sys.executable, "-m", "fieldcal"]
     for arguments, says in (
         (["run", "two_position", "--device", url, "-o", "s"], "add a route"),
         (["sim", "--can", "udp_multicast:239.74.163.2"], "cannot join"),
     ):
         done = subprocess.run(
-            [*namespace, *command, *arguments],
+            [*namespace, *FIELDCAL, *arguments],
             capture_output=True,
             text=True,
             check=False,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from processes import FIELDCAL
 
 from fieldcal.cli import COMMANDS, main
 
@@ -13,7 +14,7 @@ ZERO_G = "[site]\ngravity = 0.0\n"
 
 
 def fieldcal(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fieldcal", *arguments]
+    command = [*FIELDCAL, *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 

@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import json
-import os
-import pty
 import signal
 import subprocess
-import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic, sleep, time
 from typing import Any
 
 import numpy as np
 import pytest
+from processes import RUN, wait_for_samples
+from talking import talking
 
 from fieldcal.cli import main
 from fieldcal.movers import VirtualDevice
 from fieldcal.session import Session
 from fieldcal.solve import Observations
 
-BASE = [sys.executable, "-m", "fieldcal", "run"]
 TILTED = "--virtual=--base-tilt=1,-1"
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [*BASE, *arguments], capture_output=True, text=True, check=False, timeout=120
+        [*RUN, *arguments], capture_output=True, text=True, check=False, timeout=120
     )
 
 
@@ -122,7 +118,7 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(tmp_path: Path) -> Non
 
 def solved(session: Path, *options: str) -> dict[str, Any]:
     """What `fieldcal solve` makes of a session."""
-    call = [*BASE[:-1], "solve", str(session), "--json", *options]
+    call = [*RUN[:-1], "solve", str(session), "--json", *options]
     done = subprocess.run(call, capture_output=True, text=True, check=False)
     found: dict[str, Any] = json.loads(done.stdout)
     return found
@@ -135,11 +131,11 @@ def test_killed_at_any_moment_the_session_holds_all_but_the_last_quarter_second(
     for attempt in range(4):
         folder = tmp_path / str(attempt)
         process = subprocess.Popen(
-            [*BASE, "five_position", "--headless", TILTED, "--speed", "20"]
+            [*RUN, "five_position", "--headless", TILTED, "--speed", "20"]
             + ["-o", str(folder)],
             stderr=subprocess.DEVNULL,
         )
-        _wait_for(folder / "samples.arrows")
+        wait_for_samples(folder, process, 5000)
         late = _slept(rng.uniform(0.5, 3.0))
         killed = time()
         process.send_signal(signal.SIGKILL)
@@ -164,52 +160,23 @@ def _slept(seconds: float) -> float:
     return late
 
 
-def _wait_for(path: Path, seconds: float = 30.0) -> None:
-    deadline = monotonic() + seconds
-    while not path.exists() or path.stat().st_size < 5000:
-        assert monotonic() < deadline, f"{path} did not appear"
-        sleep(0.02)
-
-
 def test_an_interrupted_run_ends_with_130_and_keeps_what_was_recorded(
     tmp_path: Path,
 ) -> None:
     folder = tmp_path / "s"
     process = subprocess.Popen(
-        [*BASE, "five_position", "--headless", TILTED, "--speed", "20"]
+        [*RUN, "five_position", "--headless", TILTED, "--speed", "20"]
         + ["-o", str(folder)],
         stderr=subprocess.PIPE,
         text=True,
     )
-    _wait_for(folder / "samples.arrows")
+    wait_for_samples(folder, process, 5000)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=20)
     assert process.returncode == 130 and "interrupted" in said
     assert "what was recorded is kept" in said
     session = Session.open(folder)
     assert len(session.block) > 0 and not session.warnings
-
-
-@contextmanager
-def talking(what: bytes) -> Iterator[str]:
-    """A pty on which something talks for ever, 100 times a second."""
-    ours, theirs = pty.openpty()
-    done = threading.Event()
-
-    def talk() -> None:
-        while not done.wait(0.01):
-            if what:
-                os.write(ours, what)
-
-    thread = threading.Thread(target=talk)
-    thread.start()
-    try:
-        yield os.ttyname(theirs)
-    finally:
-        done.set()
-        thread.join()
-        os.close(ours)
-        os.close(theirs)
 
 
 def device_error(
@@ -235,7 +202,7 @@ def test_a_port_that_is_not_there(
 def test_a_port_that_says_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with talking(b"") as port:
+    with talking(lambda i: b"") as port:
         code, said = device_error(f"{port}?format=witmotion", tmp_path / "s", capsys)
     assert code == 3 and "check" in said
     assert (tmp_path / "s" / "session.toml").exists()
@@ -244,7 +211,7 @@ def test_a_port_that_says_nothing(
 def test_a_port_that_says_nothing_sensible(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with talking(bytes(range(128, 160))) as port:
+    with talking(lambda i: bytes(range(128, 160))) as port:
         code, said = device_error(f"{port}?format=witmotion", tmp_path / "s", capsys)
     assert code == 3 and ("format" in said or "baud" in said)
 

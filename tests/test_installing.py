@@ -4,9 +4,9 @@ import json
 import shutil
 import signal
 import subprocess
-import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,12 @@ import pytest
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
 
+from processes import TWO_POSITION, simulated, wait_for_samples
+
 from fieldcal.cli import main
 from fieldcal.driver import open_driver
 from fieldcal.drivers.mavlink_imu import Imu
+from fieldcal.drivers.mavlink_installed import Installed
 from fieldcal.session import mark_line
 
 HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
@@ -25,16 +28,8 @@ HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
 
 def recalibrated(folder: Path, has: str) -> tuple[int, Any]:
     virtual = f"--virtual=--mavlink tcpin:127.0.0.1:0?{has} --rate 200"
-    run = [
-        sys.executable,
-        "-m",
-        "fieldcal",
-        "run",
-        "two_position",
-        "--headless",
-        "--level=0.001",
-    ]
-    run += ["--seconds", "10", "--speed", "20", "--json", "-o", str(folder), virtual]
+    run = [*TWO_POSITION, "--seconds", "10", "--speed", "20", "--json"]
+    run += ["-o", str(folder), virtual]
     done = subprocess.run(run, capture_output=True, text=True, check=False, timeout=60)
     return done.returncode, json.loads(done.stdout)
 
@@ -108,81 +103,60 @@ def test_a_turned_board_says_why_there_is_nothing_to_install(
     assert "install INS" not in said
 
 
+@contextmanager
+def begun(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A run that has taken the calibration out and hears samples; its autopilot."""
+    options = ["--mavlink", f"tcpin:127.0.0.1:0?{HAS}", "--speed", "5"]
+    with simulated(*options) as (place, _):
+        url = f"mavlink:{place}"
+        run = subprocess.Popen(
+            [*TWO_POSITION, "--device", f"{url}?installed=identity", "-o", str(folder)],
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        try:
+            wait_for_samples(folder, run, 10_000)
+            yield run, url
+        finally:
+            run.kill()
+            run.wait()
+
+
+def installed(url: str) -> Installed:
+    """What the autopilot has now."""
+    with open_driver(url) as imu:
+        assert isinstance(imu, Imu) and imu.installed is not None
+        return imu.installed
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_run_that_is_told_to_end_gives_the_calibration_back(
     number: signal.Signals, tmp_path: Path
 ) -> None:
-    options = ["--mavlink", f"tcpin:127.0.0.1:0?{HAS}", "--speed", "5"]
-    with subprocess.Popen(
-        [sys.executable, "-m", "fieldcal", "sim", *options],
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as sim:
-        assert sim.stdout
-        place = sim.stdout.readline().strip()
-        run = subprocess.Popen(
-            [
-                sys.executable,
-                "-m",
-                "fieldcal",
-                "run",
-                "two_position",
-                "--headless",
-                "--level=0.001",
-            ]
-            + ["--device", f"mavlink:{place}?installed=identity"]
-            + ["-o", str(tmp_path / "s")],
-            stderr=subprocess.DEVNULL,
-        )
-        file, deadline = tmp_path / "s" / "samples.arrows", monotonic() + 30
-        while not (file.exists() and file.stat().st_size > 10_000):
-            assert monotonic() < deadline and run.poll() is None
-            sleep(0.02)
+    with begun(tmp_path / "s") as (run, url):
         marks = (tmp_path / "s" / "marks.jsonl").read_text().splitlines()
         kept = json.loads(marks[0])["installed"]  # what to set by hand after a kill -9
         assert kept["taken_out"] and kept["parameters"]["INS_ACCOFFS_X"] == 0.5
         run.send_signal(number)
         run.send_signal(number)
         assert run.wait(20) == 130
-        with open_driver(f"mavlink:{place}") as imu:
-            assert isinstance(imu, Imu) and imu.installed is not None
-            np.testing.assert_allclose(imu.installed.of("acc_offset"), [0.5, 0, 0])
-            assert imu.installed.values["INS_GYROFFS_Z"] == pytest.approx(0.01)
-        sim.terminate()
+        again = installed(url)
+        np.testing.assert_allclose(again.of("acc_offset"), [0.5, 0, 0])
+        assert again.values["INS_GYROFFS_Z"] == pytest.approx(0.01)
 
 
 def test_what_a_killed_run_left_out_can_be_given_back(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["--mavlink", f"tcpin:127.0.0.1:0?{HAS}", "--speed", "5"]
     folder = tmp_path / "s"
-    with subprocess.Popen(
-        [sys.executable, "-m", "fieldcal", "sim", *options],
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as sim:
-        assert sim.stdout
-        place = sim.stdout.readline().strip()
-        run = subprocess.Popen(
-            [sys.executable, "-m", "fieldcal", "run", "five_position", "--headless"]
-            + ["--device", f"mavlink:{place}?installed=identity", "-o", str(folder)],
-            stderr=subprocess.DEVNULL,
-        )
-        file, deadline = folder / "samples.arrows", monotonic() + 30
-        while not (file.exists() and file.stat().st_size > 10_000):
-            assert monotonic() < deadline and run.poll() is None
-            sleep(0.02)
+    with begun(folder) as (run, url):
         run.kill()
         run.wait()
-        with open_driver(f"mavlink:{place}") as imu:
-            assert isinstance(imu, Imu) and imu.installed is not None
-            np.testing.assert_array_equal(imu.installed.of("acc_offset"), 0)
+        np.testing.assert_array_equal(installed(url).of("acc_offset"), 0)
         assert main(["undo", str(folder), "--yes"]) == 0
         assert "INS_ACCOFFS_X: 0 -> 0.5" in capsys.readouterr().out
-        with open_driver(f"mavlink:{place}") as imu:
-            assert isinstance(imu, Imu) and imu.installed is not None
-            np.testing.assert_allclose(imu.installed.of("acc_offset"), [0.5, 0, 0])
-            assert imu.installed.values["INS_ACCSCAL_Y"] == pytest.approx(1.02)
+        again = installed(url)
+        np.testing.assert_allclose(again.of("acc_offset"), [0.5, 0, 0])
+        assert again.values["INS_ACCSCAL_Y"] == pytest.approx(1.02)
         assert main(["undo", str(folder), "--yes"]) == 2
         assert "nothing was written from there" in capsys.readouterr().err
-        sim.terminate()

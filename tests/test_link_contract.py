@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from can_wires import until, until_the_end
+from processes import SIM
 
 from fieldcal import description
 from fieldcal.calibration import Calibration
@@ -85,7 +86,7 @@ with open_driver(url) as imu:
 @contextmanager
 def device(sent: str, truth: Path, speed: str, *before: str) -> Iterator[str]:
     """A virtual device of a minute at 1 kHz with a turn in its midst; its address."""
-    command = [*before, sys.executable, "-m", "fieldcal", "sim", *sent.split()]
+    command = [*before, *SIM, *sent.split()]
     command += [*CONCEALED, "--rate", "1000", "--speed", speed, "--duration", "60"]
     command += ["--once", "--seed", "6", "--truth", str(truth)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from pathlib import Path
-from time import monotonic, sleep
+from time import sleep
 from typing import Any
 
 import numpy as np
 import pytest
+from processes import TWO_POSITION, wait_for_samples
 
 from fieldcal.commands.virtual import address
 from fieldcal.movers import VirtualDevice
@@ -44,33 +44,18 @@ SURVIVED: tuple[dict[str, float], ...] = (
 class Run:
     """A calibration of a virtual device in other processes, and what came of it."""
 
-    def __init__(self, folder: Path, link: str, *more: str, speed: str = "20") -> None:
+    def __init__(self, folder: Path, link: str) -> None:
         self.folder, self._control = folder / "session", folder / "control"
         name, _, conceals = link.partition(" ")
         virtual = f"{LINKS[name].format(folder)} {conceals} --control {self._control}"
         self._process = subprocess.Popen(
-            [
-                sys.executable,
-                "-m",
-                "fieldcal",
-                "run",
-                "two_position",
-                "--headless",
-                "--level=0.001",
-            ]
-            + ["--seconds", "10", "--json", "--speed", speed, *more]
+            [*TWO_POSITION, "--seconds", "10", "--json", "--speed", "20"]
             + [f"--virtual={virtual}", "-o", str(self.folder)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         )
-        self.wait_for_samples()
-
-    def wait_for_samples(self) -> None:
-        file, deadline = self.folder / "samples.arrows", monotonic() + 30
-        while not (file.exists() and file.stat().st_size > 20_000):
-            assert monotonic() < deadline and self._process.poll() is None
-            sleep(0.02)
+        wait_for_samples(self.folder, self._process)
 
     def fault(self, *faults: dict[str, float]) -> None:
         with Remote(self._control) as remote:
@@ -134,23 +119,11 @@ def failed(
 ) -> tuple[int, str]:
     """Exit code and last line of a run in whose midst faults happen."""
     run = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "fieldcal",
-            "run",
-            "two_position",
-            "--headless",
-            "--level=0.001",
-        ]
-        + ["--device", url, "-o", str(folder), "--patience", "0"],
+        [*TWO_POSITION, "--device", url, "-o", str(folder), "--patience", "0"],
         stderr=subprocess.PIPE,
         text=True,
     )
-    samples, deadline = folder / "samples.arrows", monotonic() + 30
-    while not (samples.exists() and samples.stat().st_size > 20_000):
-        assert monotonic() < deadline and run.poll() is None
-        sleep(0.02)
+    wait_for_samples(folder, run)
     for fault in faults:
         device.ask(fault=fault)
     _, said = run.communicate(timeout=60)

@@ -3,9 +3,7 @@
 import json
 import socket
 import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -16,6 +14,8 @@ import pytest
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
 
+from processes import RUN, simulated
+
 from fieldcal.driver import open_driver
 from fieldcal.drivers.mavlink_imu import Imu
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
@@ -25,17 +25,9 @@ BIAS, SCALE = np.array([0.2, -0.3, 0.1]), np.array([1.006, 0.992, 1.008])
 CONCEALED = ["--acc-bias=0.2,-0.3,0.1", "--acc-scale=1.006,0.992,1.008"]
 
 
-@contextmanager
-def autopilot(url: str, *options: str) -> Iterator[tuple[str, str]]:
+def autopilot(url: str, *options: str) -> AbstractContextManager[tuple[str, str]]:
     """Run a virtual autopilot; yields what to open, and its control socket."""
-    command = [sys.executable, "-m", "fieldcal", "sim", "--mavlink", url]
-    command += ["--rate", "200", *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
-        assert sim.stdout
-        try:
-            yield sim.stdout.readline().strip(), sim.stdout.readline().strip()
-        finally:
-            sim.terminate()
+    return simulated("--mavlink", url, "--rate", "200", *options)
 
 
 def order(control: str, **request: Any) -> None:
@@ -143,8 +135,8 @@ def test_what_cannot_be_given_back_is_named() -> None:
 def test_a_recording_keeps_what_is_installed(tmp_path: Path) -> None:
     place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5&acc_unit=mm/s^2"
     with autopilot(place, "--speed", "50") as (where, _):
-        command = [sys.executable, "-m", "fieldcal", "run", "two_position"]
-        command += ["--headless", "--seconds", "5", "-o", str(tmp_path / "session")]
+        command = [*RUN, "two_position", "--headless"]
+        command += ["--seconds", "5", "-o", str(tmp_path / "session")]
         command += ["--device", f"mavlink:{where}?message=RAW_IMU&rate=100"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr  # nobody turned it

@@ -1,15 +1,10 @@
 """`fieldcal ports`: what answers on a pty, at which rate and in which format."""
 
 import json
-import os
-import pty
-import tty
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from threading import Event, Thread
 
 import numpy as np
 import pytest
+from talking import Say, talking
 from wires import STREAMS, nmea
 
 from fieldcal.cli import main
@@ -17,36 +12,6 @@ from fieldcal.driver import open_driver
 from fieldcal.drivers.columns import guess
 from fieldcal.drivers.probe import bauds, probe
 from fieldcal.errors import DeviceSilent
-
-Say = Callable[[int], bytes]
-
-
-@contextmanager
-def talking(say: Say) -> Iterator[str]:
-    """A pty on which something is said 200 times a second."""
-    ours, theirs = pty.openpty()
-    tty.setraw(theirs)
-    os.set_blocking(ours, False)
-    done = Event()
-
-    def talk() -> None:
-        i = 0
-        while not done.wait(0.005):
-            try:
-                os.write(ours, say(i))
-            except BlockingIOError:
-                pass
-            i += 1
-
-    thread = Thread(target=talk)
-    thread.start()
-    try:
-        yield os.ttyname(theirs)
-    finally:
-        done.set()
-        thread.join()
-        os.close(ours)
-        os.close(theirs)
 
 
 def sample(name: str) -> Say:

@@ -8,10 +8,11 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from time import monotonic, sleep
+from time import sleep
 
 import numpy as np
 import pytest
+from processes import wait_for_samples
 
 from benchmarks.kills import Bench, windows
 from fieldcal import description, plan_file
@@ -147,10 +148,7 @@ def test_a_laptop_that_fell_asleep_goes_on_with_right_numbers(tmp_path: Path) ->
     bench = Bench(tmp_path, 3, speed="20")
     try:
         run = bench.start(tmp_path / "s")
-        samples, deadline = tmp_path / "s" / SAMPLES, monotonic() + 30
-        while not (samples.exists() and samples.stat().st_size > 40_000):
-            assert monotonic() < deadline and run.poll() is None
-            sleep(0.02)
+        wait_for_samples(tmp_path / "s", run, 40_000)
         run.send_signal(signal.SIGSTOP)
         sleep(1.5)  # half a minute of the device's time
         run.send_signal(signal.SIGCONT)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import pty
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +16,8 @@ from hypothesis import strategies as st
 
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
+
+from processes import FIELDCAL, simulated
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
@@ -35,14 +36,8 @@ GYR = (0.011, -0.02, 0.006)
 @contextmanager
 def autopilot(query: str = "") -> Iterator[str]:
     """A virtual autopilot that is asked for parameters only; its address."""
-    place = f"tcpin:127.0.0.1:0?{query}"
-    command = [sys.executable, "-m", "fieldcal", "sim", "--mavlink", place]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
-        assert sim.stdout
-        try:
-            yield f"mavlink:{sim.stdout.readline().strip()}?system=1&component=1"
-        finally:
-            sim.terminate()
+    with simulated("--mavlink", f"tcpin:127.0.0.1:0?{query}") as (place, _):
+        yield f"mavlink:{place}?system=1&component=1"
 
 
 def installed(autopilot: int = ARDUPILOT, taken_out: bool = False) -> Installed:
@@ -221,7 +216,7 @@ def test_nobody_there_to_be_asked(
 ) -> None:
     ours, theirs = pty.openpty()
     with autopilot(old_query(installed())) as url:
-        call = [sys.executable, "-m", "fieldcal", "write", str(session)]
+        call = [*FIELDCAL, "write", str(session)]
         done = subprocess.run(
             [*call, "--device", url], stdin=subprocess.DEVNULL, capture_output=True
         )

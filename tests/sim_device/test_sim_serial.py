@@ -6,12 +6,12 @@ import select
 import signal
 import socket
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import SIM
 
 from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Array, concat
@@ -28,7 +28,7 @@ class Sim:
 
     def __init__(self, *options: str) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "fieldcal", "sim", *options],
+            [*SIM, *options],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

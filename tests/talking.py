@@ -1,0 +1,41 @@
+"""Something that talks on a pty for as long as it is listened to."""
+
+from __future__ import annotations
+
+import os
+import pty
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+
+Say = Callable[[int], bytes]
+"""What is said, by how many times something was."""
+
+
+@contextmanager
+def talking(say: Say) -> Iterator[str]:
+    """A pty on which something is said 200 times a second; its path."""
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+    os.set_blocking(ours, False)
+    done = Event()
+
+    def talk() -> None:
+        i = 0
+        while not done.wait(0.005):
+            try:
+                os.write(ours, say(i))
+            except BlockingIOError:
+                pass
+            i += 1
+
+    thread = Thread(target=talk)
+    thread.start()
+    try:
+        yield os.ttyname(theirs)
+    finally:
+        done.set()
+        thread.join()
+        os.close(ours)
+        os.close(theirs)

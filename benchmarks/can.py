@@ -1,16 +1,15 @@
 """CAN frames into samples against python-can with cantools, as ratios in one run."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time, sleep
+from time import process_time
 
 import can
 import numpy as np
 
+from benchmarks._load import load_at_1_khz
 from fieldcal.driver import open_driver
 from fieldcal.drivers.can_frames import FRAME, Frames, pack_message
 from fieldcal.drivers.can_groups import CanHealth
@@ -33,9 +32,6 @@ SPOILT = 999_999
 
 RUNS = 5
 GOAL = 10.0
-WATCHED = 5.0
-"""Time over which the share of the processor is taken, s."""
-
 DATABASE = load(SHIPPED)
 
 
@@ -118,28 +114,6 @@ def compare(
     print(f"{what:34} {slow:6.0f} k/s {fast:6.0f} k/s  {fast / slow:5.1f}  {aim}")
 
 
-def share() -> tuple[float, float]:
-    """Share of a processor that a device at 1 kHz takes, and samples a second."""
-    command = [sys.executable, "-m", "fieldcal", "sim", "--can", "slcan"]
-    command += ["--rate", "1000", "--once"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
-        if sim.stdout is None:
-            raise AssertionError
-        path = sim.stdout.readline().strip()
-        with open_driver(f"can:{path}?interface=slcan&dbc=virtual") as imu:
-            for _ in imu.blocks():
-                break
-            began, spent, n = perf_counter(), process_time(), imu.health.samples
-            for _ in imu.blocks():
-                if perf_counter() - began > WATCHED:
-                    break
-            took, spent = perf_counter() - began, process_time() - spent
-            heard = (imu.health.samples - n) / took
-        sim.terminate()
-    sleep(0.1)
-    return spent / took, heard
-
-
 def spoilt(lost: float, doubled: float, moved: float) -> tuple[int, int, int]:
     """Samples that a bus in trouble lets through, wrong ones, and incomplete ones.
 
@@ -206,8 +180,10 @@ def main() -> None:
             f"{SPOILT} frames, {what}: {whole} samples whole, {incomplete} incomplete,"
             f" {wrong} wrong"
         )
-    load_, heard = share()
+    share, heard = load_at_1_khz(
+        ["--can", "slcan", "--once"], "can:{}?interface=slcan&dbc=virtual"
+    )
     print(
-        f"slcan at 1 kHz: {heard:.0f} samples/s, {100 * load_:.1f} % of a core,"
-        f" {1 / load_:.0f} devices"
+        f"slcan at 1 kHz: {heard:.0f} samples/s, {100 * share:.1f} % of a core,"
+        f" {1 / share:.0f} devices"
     )

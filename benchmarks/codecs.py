@@ -12,11 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time, sleep
+from time import perf_counter, process_time
 from typing import IO, NamedTuple
 
 import numpy as np
 
+from benchmarks._load import load_at_1_khz
 from fieldcal.driver import open_driver
 from fieldcal.drivers.codec import formats
 from fieldcal.drivers.serial_imu import SerialPort
@@ -29,9 +30,6 @@ RUNS = 7
 
 GOALS = {"text": 0.1, "vnimu": 0.1}
 BINARY = 0.3
-WATCHED = 5.0
-"""Time over which the share of the processor is taken, s."""
-
 SENDER = """
 import os, sys, tty
 data = open(sys.argv[1], "rb").read()
@@ -125,26 +123,11 @@ def driven(url: str, orders: IO[str]) -> tuple[Took, int]:
 
 def share(name: str) -> float:
     """Share of a processor that a device at 1 kHz takes, in real time."""
-    command = [sys.executable, "-m", "fieldcal", "sim", "--serial", name]
-    command += ["--rate", "1000", "--once"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
-        if sim.stdout is None:
-            raise AssertionError
-        path = sim.stdout.readline().strip()
-        with open_driver(f"serial:{path}?{TOLD.get(name, '')}format={name}") as imu:
-            for _ in imu.blocks():
-                break
-            began, spent, n = perf_counter(), process_time(), imu.health.samples
-            for _ in imu.blocks():
-                if perf_counter() - began > WATCHED:
-                    break
-            took, spent = perf_counter() - began, process_time() - spent
-            heard = (imu.health.samples - n) / took
-            if not 900 < heard < 1100:
-                print(f"! {name}: {heard:.0f} samples a second instead of 1000")
-        sim.terminate()
-    sleep(0.1)
-    return spent / took
+    url = f"serial:{{}}?{TOLD.get(name, '')}format={name}"
+    taken = load_at_1_khz(["--serial", name, "--once"], url)
+    if not 900 < taken.heard < 1100:
+        print(f"! {name}: {taken.heard:.0f} samples a second instead of 1000")
+    return taken.share
 
 
 TOLD = {"vnimu": "rate=1000&"}
@@ -171,10 +154,10 @@ def main() -> None:
         ratio = median(read.clock / run.clock for read, run in pairs)
         spent = median(read.processor / run.processor for read, run in pairs)
         lost = max(n for _, n in runs)
-        goal, load = GOALS.get(name, BINARY), share(name)
+        goal, taken = GOALS.get(name, BINARY), share(name)
         size, rate = len(data) / 1e6, SAMPLES / took / 1e3
         print(
             f"{name:10} {size / raw:4.0f} MB/s {size / took:4.0f} MB/s {rate:6.0f} k/s"
             f"  {ratio:5.2f}  {goal:4.1f}  {spent:9.2f}  {lost:4d}"
-            f"  {100 * load:4.1f} % of a core"
+            f"  {100 * taken:4.1f} % of a core"
         )

@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import process_time
 from typing import Any
 
 import numpy as np
 
+from benchmarks._load import load_at_1_khz
 from benchmarks.fuzz import BATCH, FRAMES, spoil
 from fieldcal.driver import open_driver
 from fieldcal.drivers.mavlink_samples import KINDS, Decoder
@@ -23,9 +24,6 @@ SAMPLES = 30_000
 RUNS = 7
 GOAL = 3.0
 """What decoding of our own must gain over the library's; without it 1 would do."""
-
-WATCHED = 5.0
-"""Time over which the share of the processor is taken, s."""
 
 SENDER = """
 import socket, sys
@@ -109,24 +107,6 @@ def driven(port: int, name: str) -> float:
     raise AssertionError
 
 
-def share(name: str) -> float:
-    """Share of a processor that an autopilot at 1 kHz takes, in real time."""
-    command = [sys.executable, "-m", "fieldcal", "sim", "--rate", "1000"]
-    command += ["--mavlink", "tcpin:127.0.0.1:0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
-        if sim.stdout is None:
-            raise AssertionError
-        where = sim.stdout.readline().strip()
-        with open_driver(f"mavlink:{where}?message={name}&rate=1000") as imu:
-            began, spent = perf_counter(), process_time()
-            for _ in imu.blocks():
-                if perf_counter() - began > WATCHED:
-                    break
-            took, spent = perf_counter() - began, process_time() - spent
-        sim.terminate()
-    return spent / took
-
-
 def spoilt(name: str) -> tuple[int, int, int]:
     """Frames that came through a million, wrong samples, most bytes kept."""
     rng = np.random.default_rng(99)
@@ -157,10 +137,11 @@ def main() -> None:
             pairs = [(plain(port, name), driven(port, name)) for _ in range(RUNS)]
         loop, ours = (median(column) for column in zip(*pairs, strict=True))
         ratio = median(a / b for a, b in pairs)
-        load = share(name)
+        url = f"mavlink:{{}}?message={name}&rate=1000"
+        share = load_at_1_khz(["--mavlink", "tcpin:127.0.0.1:0"], url).share
         print(
             f"{name:12} {SAMPLES / loop / 1e3:8.0f} k/s {SAMPLES / ours / 1e3:8.0f} k/s"
-            f"  {ratio:5.1f}  {GOAL:4.1f}  {100 * load:4.1f} % of a core"
+            f"  {ratio:5.1f}  {GOAL:4.1f}  {100 * share:4.1f} % of a core"
         )
     for name in ("RAW_IMU", "HIGHRES_IMU"):
         through, wrong, kept = spoilt(name)

@@ -154,9 +154,11 @@ def _nearest_slip(
     slips += [(p.degrees, said) for said, p in others.items() if p.degrees]
     if held and held.position.degrees:
         slips.insert(0, (held.position.degrees, "it has not been turned yet"))
-    misses = [_miss(Position.deg(*angles), f, gravity, held) for angles, _ in slips]
+    there = forces([Position.deg(*angles) for angles, _ in slips], gravity)
+    away = _without_offset(f, gravity, held) - there
+    misses = np.linalg.norm(away, axis=1) / gravity
     best = int(np.argmin(misses))
-    return slips[best][1], misses[best]
+    return slips[best][1], float(misses[best])
 
 
 def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:

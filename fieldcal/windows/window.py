@@ -86,12 +86,13 @@ class Window:
         self._cells = self._sum.table
         self._error: MeanError | None = None
         self._verdict: Verdict | None = None
+        self._covariance: Array | None = None
 
     def add(self, block: Block) -> None:
         """Take in the block that follows; costs as much as the block is long."""
         self._sum.add(block)
         self._cells = self._sum.table
-        self._error = self._verdict = None
+        self._error = self._verdict = self._covariance = None
 
     @property
     def n(self) -> int:
@@ -121,6 +122,12 @@ class Window:
     @property
     def covariance(self) -> Array:
         """Covariance of the mean so far, (6, 6); nan in the first second."""
+        if self._covariance is None:
+            self._covariance = self._widened()
+        return self._covariance
+
+    def _widened(self) -> Array:
+        """Covariance with what rounding adds, and for samples that are missing."""
         if len(self._cells) < FEWEST:
             return np.full((6, 6), np.nan)
         whole = self._mean_error().covariance

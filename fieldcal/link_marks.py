@@ -51,12 +51,11 @@ class LinkMarks:
     ----------
     driver : whose link
     recorder : where the marks go
-    label : keys and values of every mark, such as which of several devices it is
 
     """
 
-    def __init__(self, driver: Driver, recorder: Marker, **label: Any) -> None:
-        self._driver, self._recorder, self._label = driver, recorder, label
+    def __init__(self, driver: Driver, recorder: Marker) -> None:
+        self._driver, self._recorder = driver, recorder
         self._before = self._counts()
         self._last = self._from = self._to = float("nan")
         self._longest = 0.0
@@ -72,10 +71,10 @@ class LinkMarks:
         self._last = float(block.t[-1])
         if self._grain != self._driver.grain:
             self._grain = self._driver.grain
-            self._recorder.mark("grain", **self._label, **asdict(self._grain))
+            self._recorder.mark("grain", **asdict(self._grain))
         if self._told() != self._facts:
             self._facts = self._told()
-            self._recorder.mark("device", **self._label, **self._driver.notes)
+            self._recorder.mark("device", **self._driver.notes)
         if self._counts() == self._before:
             self._clock()
             return
@@ -106,7 +105,7 @@ class LinkMarks:
         where = {}
         if self._longest:
             where = {"from_s": round(self._from, 6), "to_s": round(self._to, 6)}
-        self._recorder.mark("link", **self._label, **where, **more)
+        self._recorder.mark("link", **where, **more)
         self._before, self._longest, self._marked = now, 0.0, monotonic()
 
     def _clock(self, at_once: bool = False) -> None:
@@ -116,4 +115,4 @@ class LinkMarks:
         if not (at_once or monotonic() - self._clocked >= CLOCK):
             return
         self._clocked = monotonic()
-        self._recorder.mark("clock", **self._label, **clock._asdict())
+        self._recorder.mark("clock", **clock._asdict())

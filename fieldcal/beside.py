@@ -169,7 +169,7 @@ class First:
 
 @contextmanager
 def beside(
-    urls: Sequence[str], recorder: Recorder, about: Mapping[str, Any]
+    further: Mapping[str, str], recorder: Recorder, about: Mapping[str, Any]
 ) -> Iterator[First]:
     """Record further devices into ``device-2``, ``device-3``, … of a session.
 
@@ -177,7 +177,7 @@ def beside(
 
     Parameters
     ----------
-    urls : addresses of the further devices
+    further : serial numbers of the further devices by their addresses; empty for none
     recorder : of the first device
     about : tables of the session, which hold for all but the device's name
 
@@ -189,9 +189,11 @@ def beside(
     """
     with ExitStack() as stack:
         others = []
-        for number, url in enumerate(urls, 2):
+        for number, (url, serial) in enumerate(further.items(), 2):
             driver = stack.enter_context(open_driver(url))
             device = {"name": f"device {number}", "address": url}
+            if serial:
+                device["serial"] = serial
             if grade := about.get("device", {}).get("grade"):
                 device["grade"] = grade
             folder = recorder.folder / f"device-{number}"
@@ -201,9 +203,3 @@ def beside(
             others.append(Beside(driver, own))
             stack.callback(others[-1].end)
         yield First(recorder, others)
-
-
-def folders(session: Path) -> list[Path]:
-    """Sessions of the further devices in a session's folder, in order."""
-    found = [path for path in session.glob("device-*") if path.is_dir()]
-    return sorted(found, key=lambda path: (len(path.name), path.name))

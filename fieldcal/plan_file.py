@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,12 @@ class Task:
         return mover
 
     @property
+    def further(self) -> Mapping[str, str]:
+        """Serial number of each further device, by its address; empty if not said."""
+        urls, serials = self.run.get("further", ()), self.run.get("further_serial", ())
+        return dict(zip_longest(urls, serials, fillvalue=""))
+
+    @property
     def positions(self) -> tuple[Position, ...]:
         """All that is to be held, the verification last."""
         last = () if self.verification is None else (self.verification,)
@@ -127,6 +134,7 @@ def task(tables: Mapping[str, Any], name: str) -> Task:
         raise PlanError(f"{name}: {error}") from error
     run = tables.get("run", {})
     _check_positions(about, name)
+    _check_further(about, run, name)
     made = Task(tables, about, run, planned(about))
     _check_mover(made, name)
     return made
@@ -186,6 +194,23 @@ def _check_positions(about: Description, name: str) -> None:
             f" ({positions[0].name}): no scale factor can be determined; turn the"
             " device between them"
         )
+
+
+def _check_further(about: Description, run: Mapping[str, Any], name: str) -> None:
+    """Whether each further device, and each serial number, is one and is named once."""
+    urls, serials = run.get("further", ()), run.get("further_serial", ())
+    if len(serials) > len(urls):
+        raise PlanError(
+            f"{name}: {serials[len(urls)]!r} is the serial number of no device: give"
+            " --serial no more often than --device"
+        )
+    for what, first, more in (
+        ("device", run.get("device"), urls),
+        ("serial number", about.device.get("serial"), serials),
+    ):
+        named = [n for n in (first, *more) if n]
+        if twice := [n for i, n in enumerate(named) if n in named[:i]]:
+            raise PlanError(f"{name}: {what} {twice[0]!r} is named twice: name it once")
 
 
 def _check_mover(made: Task, name: str) -> None:

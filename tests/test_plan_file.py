@@ -21,7 +21,8 @@ from jsonschema import Draft202012Validator
 
 from fieldcal import plan_file
 from fieldcal.cli import main
-from fieldcal.commands.run import add_arguments, make_task
+from fieldcal.commands.run import add_arguments
+from fieldcal.commands.run_task import make_task
 from fieldcal.errors import InputError, MoverFailed, PlanError
 from fieldcal.movers import Command, VirtualDevice
 from fieldcal.positions import FIVE, Position
@@ -56,6 +57,18 @@ def test_a_whole_plan_is_taken() -> None:
         (plan(seconds="30"), '[run] seconds = "30" cannot be'),
         (plan(second=30), "[run] second is not known: there are procedure, seconds"),
         (plan(device="ttyUSB0"), "[run] device = "),
+        (
+            plan(further=["can:can0"], further_serial=["B1", "C1"]),
+            "'C1' is the serial number of no device: give --serial no more often",
+        ),
+        (
+            plan(device="can:can0", further=["can:can0"]),
+            "device 'can:can0' is named tw",
+        ),
+        (
+            plan(further=["can:0", "can:1"], further_serial=["B1", "B1"]),
+            "serial number 'B1' is named twice: name it once",
+        ),
         (plan(mover={}), "[run.mover] kind is missing: write a table [run.mover]"),
         (plan(mover={"kind": "crane"}), "write nothing, command or virtual"),
         (plan(mover={"kind": "command"}), "command is missing"),
@@ -250,6 +263,10 @@ def test_what_options_say_goes_over_the_plan(tmp_path: Path) -> None:
     about = make_task(parsed(str(path), *said))[0].about
     assert about.latitude_deg == 60.0 and about.device["serial"] == "A1"
     assert about.level_deg == 0.1
+    said = ["--device", "can:0", "--device", "can:1", "--device", "can:2"]
+    task, _ = make_task(parsed(str(path), *said, "--serial", "A1", "--serial", "B1"))
+    assert task.run["device"] == "can:0" and task.about.device["serial"] == "A1"
+    assert task.further == {"can:1": "B1", "can:2": ""}
     about = make_task(parsed(str(path)))[0].about
     assert about.latitude_deg == 50.0 and about.level_deg is None
     with pytest.raises(InputError, match="leave those options out"):

@@ -101,6 +101,7 @@ def test_the_command_writes_a_plan_that_run_takes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from fieldcal.commands import run
+    from fieldcal.commands.run_task import make_task
 
     path = tmp_path / "plan.toml"
     assert main(["plan", "--positions", "4", "-o", str(path), "--json"]) == 0
@@ -108,7 +109,7 @@ def test_the_command_writes_a_plan_that_run_takes(
     assert len(said["positions"]) == 4 and said["sigma"]["acc_bias.x"] > 0
     parser = argparse.ArgumentParser()
     run.add_arguments(parser)
-    task, _ = run.make_task(parser.parse_args([str(path)]))
+    task, _ = make_task(parser.parse_args([str(path)]))
     assert len(task.about.positions) == 4 and task.seconds == said["seconds"]
     assert main(["plan", "-o", str(path)]) == 2
     assert main(["plan", "--minutes", "0.5"]) == 2

@@ -6,13 +6,19 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
+from fieldcal.commands.several import Several
 
-def add_site(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of device, site and frame."""
+
+def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
+    """Declare the options of device, site and frame, of `several` devices maybe."""
     group = parser.add_argument_group("device and place")
     add = group.add_argument
     add("--name", help="name of the device")
-    add("--serial", help="its serial number, the key of its history")
+    if several:
+        what = "its serial number, the key of its history; again for each further one"
+        add("--serial", action=Several, help=what)
+    else:
+        add("--serial", help="its serial number, the key of its history")
     add("--grade", choices=("tactical", "navigation"), help="default: tactical")
     add("--latitude", type=float, metavar="DEG", help="default: 45")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")

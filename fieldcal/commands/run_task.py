@@ -1,0 +1,108 @@
+"""What a run is to do, from its options, a plan file or a session broken off."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from datetime import datetime
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldcal.commands.site import given_tables, over, site_tables
+from fieldcal.errors import InputError
+
+if TYPE_CHECKING:
+    from fieldcal.plan_file import Task
+
+
+def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
+    """What is to be done, and the folder it is recorded into.
+
+    Raises
+    ------
+    InputError
+        Naming what is wrong with the plan.
+
+    """
+    from fieldcal import plan_file
+
+    if args.resume:
+        return _resumed(args)
+    if not args.procedure:
+        raise InputError(
+            f"name a procedure ({', '.join(plan_file.PROCEDURES)}) or a plan file"
+        )
+    if args.procedure in plan_file.PROCEDURES:
+        name, tables = "the options", _tables_of_options(args)
+    else:
+        name, tables = args.procedure, _tables_of_file(args)
+    task = plan_file.task(over(tables, _level(args)), name)
+    stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
+
+
+def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
+    from fieldcal import plan_file
+    from fieldcal.running import resumed
+
+    if args.procedure or args.output:
+        raise InputError("--resume goes on with what it finds: give it alone")
+    if given_tables(args):
+        raise InputError(
+            "--resume goes on with the device and place its session.toml names:"
+            " leave those options out"
+        )
+    session, tables = resumed(args.resume)
+    tables["run"] = {**tables["run"], **_given(args)}
+    tables = over(tables, _level(args))
+    return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder
+
+
+def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:
+    from fieldcal import description
+
+    module = import_module(f"fieldcal.procedures.{args.procedure}")
+    tables = {"format": description.FORMAT, **site_tables(args, "device")}
+    tables["position"] = [_table(p.name, p.degrees) for p in module.POSITIONS]
+    tables["run"] = {"procedure": args.procedure, **_given(args)}
+    return tables
+
+
+def _tables_of_file(args: argparse.Namespace) -> dict[str, Any]:
+    from fieldcal import plan_file
+
+    tables = plan_file.read(Path(args.procedure))
+    if not isinstance(tables.get("run", {}), dict):
+        raise InputError(f"{args.procedure}: run must be a table: write [run]")
+    tables = over(tables, given_tables(args))
+    tables["run"] = {**tables.get("run", {}), **_given(args)}
+    return tables
+
+
+def _level(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """How level the base is, if an option says it."""
+    return {} if args.level is None else {"site": {"level_deg": args.level}}
+
+
+def _given(args: argparse.Namespace) -> dict[str, Any]:
+    """The table [run] as far as options say it."""
+    given: dict[str, Any] = {
+        "device": args.device,
+        "further": args.further_device or None,
+        "further_serial": args.further_serial or None,
+        "seconds": args.seconds,
+        "sigma": args.sigma,
+        "verify": args.verify or None,
+        "limits": str(args.limits.absolute()) if args.limits else None,
+    }
+    if args.virtual is not None:
+        speed = ["--speed", args.speed, "--seed", args.seed]
+        options = f"{shlex.join(speed)} {args.virtual}".strip()
+        given["mover"] = {"kind": "virtual", "options": options}
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def _table(name: str, degrees: tuple[float, float] | None) -> dict[str, Any]:
+    alpha, beta = degrees or (0.0, 0.0)
+    return {"name": name, "alpha_deg": round(alpha, 9), "beta_deg": round(beta, 9)}

@@ -15,14 +15,6 @@ TRIES = 5
 """Windows begun in a position before the procedure gives up."""
 
 
-def hold_all(
-    positions: Sequence[Position], seconds: float, sigma: float | None = None
-) -> Plan[tuple[Average, ...]]:
-    """Hold every position for `seconds` of device time; the averages in order."""
-    averages = yield from hold_each(positions, seconds, sigma)
-    return tuple(averages.values())
-
-
 def hold_each(
     positions: Sequence[Position], seconds: float, sigma: float | None = None
 ) -> Plan[dict[int, Average]]:

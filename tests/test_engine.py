@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from fieldcal.frames import turn
 from fieldcal.placing import Placing
 from fieldcal.plan import Hold, Plan, hold
 from fieldcal.positions import FIVE, TWO, Position
-from fieldcal.procedures.holding import hold_all, hold_each
+from fieldcal.procedures.holding import hold_each
 from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block
 from fieldcal.session import Session
@@ -86,6 +86,14 @@ class Bench:
 def bench(tmp_path: Path) -> Iterator[Bench]:
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         yield make(recorder, InProcess(VirtualDevice(seed=3)))
+
+
+def hold_all(
+    positions: Sequence[Position], seconds: float
+) -> Plan[tuple[Average, ...]]:
+    """Hold every position; the averages in order."""
+    held = yield from hold_each(positions, seconds)
+    return tuple(held.values())
 
 
 def make(recorder: Recorder, driver: InProcess) -> Bench:

@@ -199,7 +199,7 @@ def test_a_navigation_device_feels_the_earth_turn_in_any_position() -> None:
     )
     _, still = turned(profile=profile)
     latitude = np.deg2rad(profile.site.latitude_deg)
-    expected = frames.earth_rate(ALPHA, BETA, latitude)
+    expected = frames.turn(ALPHA, BETA) @ frames.earth_rate_home(latitude)
     np.testing.assert_allclose(still.gyr[0], expected, atol=1e-15)
     _, tactical = turned()
     assert not tactical.gyr[0].any()

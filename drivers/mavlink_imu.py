@@ -57,8 +57,6 @@ QUIET = 2.0
 FEW, RECENT = 16, 256
 """Least and most samples that the rate is told from."""
 
-Places = tuple[int, int]
-
 
 class Imu(Driver):
     """A link to an autopilot, or a log of one, and the samples of one of its sensors.

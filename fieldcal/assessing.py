@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.acceptance import Circumstances, Decision, decide, with_decision
+from fieldcal.acceptance import Circumstances, decide, with_decision
 from fieldcal.calibration import Calibration
 from fieldcal.errors import FieldcalError
 from fieldcal.history import History, family
@@ -33,8 +33,8 @@ def assess(
     still: Rests,
     limits: Limits,
     history: History | None,
-) -> tuple[Calibration, Decision]:
-    """Decide, and add the decision to the calibration.
+) -> Calibration:
+    """The calibration with the decision about it, and where and when it was taken.
 
     Parameters
     ----------
@@ -68,9 +68,7 @@ def assess(
     site = {"latitude_deg": session.about.latitude_deg}
     site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
     info = {**found.info, "site": site, "taken_at": taken_at(marks)}
-    return with_decision(
-        replace(found, warnings=tuple(warnings), info=info), made
-    ), made
+    return with_decision(replace(found, warnings=tuple(warnings), info=info), made)
 
 
 def remember(history: History, session: Session, found: Calibration) -> str:

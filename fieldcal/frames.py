@@ -68,12 +68,6 @@ def earth_rate_home(latitude: float) -> Array:
     return EARTH_RATE * np.array([0.0, -np.sin(latitude), np.cos(latitude)])  # (38)
 
 
-def earth_rate(alpha: ArrayLike, beta: ArrayLike, latitude: float) -> Array:
-    """Earth's rate in procedure axes, (..., 3) rad/s; `latitude` in rad, (39)."""
-    seen: Array = turn(alpha, beta) @ earth_rate_home(latitude)  # (39)
-    return seen
-
-
 def angles_of(direction: ArrayLike) -> tuple[float, float]:
     """Turns alpha, beta in rad that bring about a specific force along `direction`.
 

@@ -8,7 +8,7 @@ Source: MAVLink common messages; the cut is what a cast in C does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,6 @@ ACC_UNITS = {"mg": 1e3 / STANDARD_GRAVITY, "mm/s^2": 1e3}
 
 ALL_BUT_PRESSURE = 0x11FF
 """Fields of HIGHRES_IMU that are new: three triads, and the temperature."""
-
-Packet = Callable[[Any], bytes]
 
 
 def whole(values: Array) -> Array:

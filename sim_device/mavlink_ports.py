@@ -54,7 +54,7 @@ class UdpPort:
         self.place = (host, port) if waits else place
         self.address = f"{'udpout' if waits else 'udp'}:{host}:{port}"
         self._peer = None if waits else place
-        self._waits, self._last = waits, -math.inf
+        self._last = -math.inf
 
     def fileno(self) -> int:
         """Return the socket."""

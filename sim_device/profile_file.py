@@ -1,8 +1,7 @@
-"""Device files: a virtual device written down, and made from a session.toml.
+"""Device files: a virtual device written down.
 
 A device file has the tables of `Profile` under their names, `format = 1` on top, and
 ``[effects.ID]`` with parameters, or ``[[effects.ID]]`` for what happens more than once.
-Of a session.toml its [nominal] becomes the truth and its [model] the effects.
 """
 
 from __future__ import annotations
@@ -16,16 +15,12 @@ from typing import Any
 import numpy as np
 
 from fieldcal.errors import InputError
-from fieldcal.sim_device.chain import STANDARD_GRAVITY
-from fieldcal.sim_device.profile import Profile, Truth
-from fieldcal.sim_device.replay import Window
+from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import CATALOGUE, Effect, effect
 
 FORMAT = 1
 
 _TABLES = {f.name: type(f.default) for f in fields(Profile) if f.name != "effects"}
-_ACCELERATION = {"g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
-_ANGULAR_RATE = {"deg/s": np.pi / 180, "mrad/s": 1e-3}
 
 
 def read(path: Path) -> Profile:
@@ -39,21 +34,6 @@ def read(path: Path) -> Profile:
     """
     try:
         return from_tables(_load(path))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-
-
-def read_session(path: Path) -> tuple[Profile, list[Window]]:
-    """Device and windows of a session.toml: what its simulation starts from.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or a position has no angles.
-
-    """
-    try:
-        return from_session(_load(path))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -79,35 +59,6 @@ def from_tables(tables: Mapping[str, Any]) -> Profile:
         name: _part(name, kind, _table(tables, name)) for name, kind in _TABLES.items()
     }
     return Profile(**parts, effects=_effects(_table(tables, "effects")))
-
-
-def from_session(tables: Mapping[str, Any]) -> tuple[Profile, list[Window]]:
-    """Device and windows of a parsed session.toml.
-
-    Raises
-    ------
-    InputError
-        Naming the table and the key, or the position without angles.
-
-    """
-    model = _table(tables, "model")
-    ids = model.get("effects", [])
-    mine = {
-        name: {k: v for k, v in _table(tables, name).items() if k in _names(kind)}
-        for name, kind in _TABLES.items()
-        if name in tables
-    }
-    mine["range"] = _range_in_si(tables, mine.get("range", {}))
-    mine["truth"] = {
-        "acc_bias": [0.0] * 3,
-        "acc_scale": [1.0] * 3,
-        "gyr_bias": [0.0] * 3,
-        "gyr_scale": [1.0] * 3,
-        **{k: v for k, v in _table(tables, "nominal").items() if k in _names(Truth)},
-    }
-    mine["effects"] = {id_: model.get(id_, {}) for id_ in ids}
-    rows = tables.get("position", [])
-    return from_tables(mine), [_window(i, row) for i, row in enumerate(rows)]
 
 
 def to_toml(profile: Profile) -> str:
@@ -227,40 +178,6 @@ def _written(one: Effect) -> dict[str, Any]:
         given[vector[0]] = 0.0
     words = {k: v for k, v in one.words.items() if v}
     return {**given, **words}
-
-
-def _range_in_si(
-    tables: Mapping[str, Any], given: Mapping[str, Any]
-) -> dict[str, float]:
-    """Full scale in SI; what has no unit of its own, as a volt, is left out."""
-    units = _table(tables, "units")
-    acc, gyr = units.get("acceleration", "m/s^2"), units.get("angular_rate", "rad/s")
-    factors = {
-        "acceleration": {"m/s^2": 1.0, **_ACCELERATION}.get(acc),
-        "angular_rate": {"rad/s": 1.0, **_ANGULAR_RATE}.get(gyr),
-    }
-    return {
-        key: _number(f"[range] {key}", value) * factor
-        for key, value in given.items()
-        if (factor := factors[key]) is not None
-    }
-
-
-def _window(i: int, row: Mapping[str, Any]) -> Window:
-    where = f"position {i}"
-    rate = row.get("rate_deg_s")
-    for key in ("start_s", "end_s", *(() if rate else ("alpha_deg", "beta_deg"))):
-        if key not in row:
-            raise InputError(f"{where} has no {key}: it cannot be simulated")
-    alpha, beta = (_number(where, row.get(k, 0.0)) for k in ("alpha_deg", "beta_deg"))
-    turning = _triad(where, rate if rate else [0.0] * 3)
-    return Window(
-        alpha=float(np.deg2rad(alpha)),
-        beta=float(np.deg2rad(beta)),
-        start=_number(where, row["start_s"]),
-        end=_number(where, row["end_s"]),
-        rate=tuple(np.deg2rad(turning).tolist()),
-    )
 
 
 def _plain(value: Any) -> Any:

@@ -107,8 +107,9 @@ def test_a_damaged_file_is_said_and_a_run_goes_on(
     path.write_bytes(content)
     session = bench(tmp_path / "s")
     found = solve(observe(session)[0])
-    made, decision = assess(found, session, rests(session), BOUNDS, History(path))
-    assert decision.checks and np.array_equal(made.values, found.values)
+    made = assess(found, session, rests(session), BOUNDS, History(path))
+    assert made.info["decision"]["checks"]
+    assert np.array_equal(made.values, found.values)
     if content:
         assert any("name another with --history" in w for w in made.warnings)
         assert "not kept" in remember(History(path), session, made)
@@ -157,13 +158,14 @@ def test_old_values_do_not_enter_a_new_calibration(tmp_path: Path) -> None:
     session = bench(tmp_path / "s")
     found = solve(observe(session)[0], level_sigma_deg=0.001)
     still = rests(session)
-    clean, go = assess(found, session, still, BOUNDS, None)
+    clean = assess(found, session, still, BOUNDS, None)
     poisoned = filled(tmp_path / "h.sqlite", *[1e6] * 9)
-    with_it, no_go = assess(found, session, still, BOUNDS, poisoned)
+    with_it = assess(found, session, still, BOUNDS, poisoned)
     assert np.array_equal(with_it.values, clean.values)
     assert np.array_equal(with_it.covariance, clean.covariance)
-    assert go.go and not no_go.go
-    assert "acc_bias x differs from 9 earlier" in no_go.reasons[0]
+    go, no_go = clean.info["decision"], with_it.info["decision"]
+    assert go["go"] and not no_go["go"]
+    assert "acc_bias x differs from 9 earlier" in no_go["reasons"][0]
 
 
 def test_only_runs_that_were_go_or_accepted_are_the_family(tmp_path: Path) -> None:

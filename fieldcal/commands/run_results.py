@@ -39,7 +39,7 @@ def concluded(
 
     found = with_turns_between(found, session, still)
     found = with_installed(with_provenance(found, session.about), session)
-    found, _ = assess(found, session, still, bounds, history)
+    found = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
     if said := remember(history, session, found):
         sys.stderr.write(f"fieldcal run: {said}\n")

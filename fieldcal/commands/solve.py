@@ -119,4 +119,4 @@ def _decided(
         return found
     bounds = limits.read(session.grade, limits_path(session, args.limits))
     history = History(args.history or default_path())
-    return assess(found, session, still, bounds, history)[0]
+    return assess(found, session, still, bounds, history)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -153,64 +152,3 @@ def test_a_file_that_is_wrong_is_refused(tmp_path: Path, text: str, says: str) -
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         profile_file.read(tmp_path / "none.toml")
-
-
-SESSION = """
-format = 1
-[device]
-name = "unit"
-grade = "navigation"
-colour = "grey"
-[sampling]
-rate_hz = 50.0
-[units]
-acceleration = "g"
-[range]
-acceleration = 2.0
-angular_rate = 5.0
-[site]
-latitude_deg = 10.0
-height_m = 5.0
-[frame]
-mounting = ["+x", "-z", "+y"]
-[nominal]
-acc_bias = [0.1, 0.2, 0.3]
-[model]
-effects = ["base_tilt", "earth_rate"]
-[model.base_tilt]
-about_x_deg = 1.0
-[[position]]
-alpha_deg = 30.0
-beta_deg = 5.0
-start_s = 3.0
-end_s = 33.0
-[[position]]
-rate_deg_s = [0.0, 90.0, 0.0]
-start_s = 40.0
-end_s = 50.0
-"""
-
-
-def test_a_session_makes_a_device_and_a_schedule(tmp_path: Path) -> None:
-    path = tmp_path / "session.toml"
-    path.write_text(SESSION)
-    profile, windows = profile_file.read_session(path)
-    assert profile.truth.acc_bias == (0.1, 0.2, 0.3)
-    assert profile.truth.acc_scale == (1.0, 1.0, 1.0)
-    assert profile.sampling.rate_hz == 50.0 and profile.device.grade == "navigation"
-    assert profile.range.acceleration == pytest.approx(2 * 9.80665)
-    assert profile.range.angular_rate == 5.0
-    assert [e.id for e in profile.effects] == ["base_tilt", "earth_rate"]
-    assert np.rad2deg(windows[0].alpha) == pytest.approx(30)
-    assert (windows[0].start, windows[0].end, windows[1].start) == (3.0, 33.0, 40.0)
-    np.testing.assert_allclose(windows[1].rate, [0, np.pi / 2, 0])
-
-
-@pytest.mark.parametrize("gone", ["alpha_deg = 30.0", "start_s = 3.0"])
-def test_a_session_without_angles_or_times_cannot_be_simulated(
-    tmp_path: Path, gone: str
-) -> None:
-    path = tmp_path / "session.toml"
-    path.write_text(SESSION.replace(gone, "", 1))
-    with pytest.raises(InputError, match="position 0 has no"):
-        profile_file.read_session(path)

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from fieldcal.sim_device.profile import (
     Profile,
     Truth,
 )
-from fieldcal.sim_device.profile_file import read_session
+from fieldcal.sim_device.profile_file import from_tables
 from fieldcal.sim_device.replay import Window, simulate
 from fieldcal.sim_device.vocabulary import Effect, effect, parse
 
@@ -154,6 +155,27 @@ def concealed(id_: str, given: dict[str, Any]) -> Effect:
     return effect(id_, numbers)
 
 
+def told(path: Path) -> tuple[Profile, list[Window]]:
+    """Device and windows that a session.toml of another program says it simulated."""
+    tables = tomllib.loads(path.read_text("utf-8"))
+    model = tables["model"]
+    profile = from_tables(
+        {name: tables[name] for name in ("device", "sampling", "site", "frame")}
+        | {"truth": tables["nominal"]}
+        | {"effects": {id_: model.get(id_, {}) for id_ in model["effects"]}}
+    )
+    windows = [
+        Window(
+            float(np.deg2rad(row["alpha_deg"])),
+            float(np.deg2rad(row["beta_deg"])),
+            row["start_s"],
+            row["end_s"],
+        )
+        for row in tables["position"]
+    ]
+    return profile, windows
+
+
 @pytest.mark.parametrize(
     "name", ["p01", "p02", "p03", "p04", "p05", "p07", "p09", "p10"]
 )
@@ -162,7 +184,7 @@ def test_another_programs_sessions_are_reproduced_from_what_they_conceal(
 ) -> None:
     folder = shared / "practice" / name
     answers = json.loads((shared / "practice" / "answers.json").read_text())[name]
-    profile, windows = read_session(folder / "session.toml")
+    profile, windows = told(folder / "session.toml")
     truth = {key: tuple(value) for key, value in answers["truth"].items()}
     profile = replace(profile, truth=Truth(**truth)).having(
         *(concealed(id_, given) for id_, given in answers["concealed"].items())

@@ -69,7 +69,7 @@ class Talk:
         rate: float,
         instance: int,
         wants: Callable[[int, int], bool],
-        take_out: bool = False,
+        take_out: bool,
     ) -> None:
         from pymavlink.dialects.v20 import all as dialect
 

@@ -57,7 +57,7 @@ class ConsoleOperator:
         title: str,
         positions: Sequence[Position],
         mover: Mover,
-        console: Console | None = None,
+        console: Console,
         plain: bool = False,
         keyboard: Keyboard | None = None,
         verification: int | None = None,
@@ -65,7 +65,7 @@ class ConsoleOperator:
         self._title = title
         self._positions = tuple(positions)
         self._mover = mover
-        self._console = console or Console()
+        self._console = console
         self._keyboard = keyboard
         self._verification = verification
         self._taken: dict[int, float] = {}

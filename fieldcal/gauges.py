@@ -50,9 +50,7 @@ def angles(view: View) -> list[tuple[str, Text]]:
     ]
 
 
-def inclinometer(
-    seen: float, wanted: float, limit: float = np.nan, ok: bool = False
-) -> Text:
+def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
     """Where it is (o), where it should be (the middle), and which way to turn.
 
     Parameters
@@ -138,7 +136,7 @@ def listing(
     taken: Mapping[int, float],
     now: int,
     rows: int,
-    verification: int | None = None,
+    verification: int | None,
 ) -> RenderableType:
     """The positions around the present one, with what was reached in each.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import select
 import sys
-from typing import IO, Any, Self
+from typing import Any, Self
 
 from fieldcal.view import Wish
 
@@ -28,16 +28,10 @@ HELP = "Enter confirm · r repeat · s skip · q stop"
 
 
 class Keyboard:
-    """Keys of a terminal; a context manager.
+    """Keys of the terminal that standard input is; a context manager."""
 
-    Parameters
-    ----------
-    terminal : standard input, unless given
-
-    """
-
-    def __init__(self, terminal: IO[str] | None = None) -> None:
-        terminal = terminal or sys.stdin
+    def __init__(self) -> None:
+        terminal = sys.stdin  # None where there is no console at all
         usable = terminal is not None and not terminal.closed and terminal.isatty()
         self._file = terminal.fileno() if usable else -1
         self._before: list[Any] = []

@@ -31,9 +31,9 @@ class Where(Protocol):
 class InProcess(Driver):
     """Samples of a device that is asked, and moved, by a call."""
 
-    def __init__(self, device: VirtualDevice, name: str = "virtual device") -> None:
+    def __init__(self, device: VirtualDevice) -> None:
         self.device = device
-        self.name = name
+        self.name = "virtual device"
         self.health = Health()
         self._n = max(1, round(BLOCK_S * device.rate))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import IO, Any
+from typing import Any
 
 from fieldcal.calibration import Calibration
 
@@ -12,17 +12,11 @@ NO_GO = "NO-GO: do not launch on this, for the reasons marked NO"
 MARKS = {True: "ok  ", False: "NO  ", None: "?   "}
 
 
-def show_decision(found: Calibration, out: IO[str] | None = None) -> None:
+def show_decision(found: Calibration) -> None:
     """Print what is left for a navigator, checks and decision; nothing without one.
 
     The decision comes last, with its reasons just above it: what is on the screen when
     all is over.
-
-    Parameters
-    ----------
-    found : calibration that was decided about
-    out : standard output, unless given
-
     """
     from rich.console import Console
 
@@ -31,7 +25,7 @@ def show_decision(found: Calibration, out: IO[str] | None = None) -> None:
     decision = found.info.get("decision")
     if not decision:
         return
-    console = Console(file=out, highlight=False)
+    console = Console(highlight=False)
     for growth in found.info.get("expectation", []):
         say(console, "", _growth(growth))
     order = {True: 0, None: 1, False: 2}

@@ -206,24 +206,22 @@ def six(unit_acc: str, acc: float, unit_gyr: str, gyr: float) -> tuple[Param, ..
 def columns(
     effect: Motion | Sensor,
     x: Experience,
-    at: Values | None = None,
     scale: Values = (1.0,) * 6,
     shape: Mapping[str, float] = NO_SHAPE,
 ) -> Array:
     """Differentiate the six outputs by an effect's parameters, (n, 6, k).
 
-    Motion effects are differentiated about `at` (zero unless given), by central
-    differences of a thousandth of the typical size; `scale` are the sensors' scale
-    factors, which what they experience is multiplied with.
+    Motion effects are differentiated about zero, by central differences of a thousandth
+    of the typical size; `scale` are the sensors' scale factors, which what they
+    experience is multiplied with.
     """
     if isinstance(effect, Sensor):
         return effect.design(x, shape)
-    start = np.zeros(len(effect.params)) if at is None else np.asarray(at, float)
     out = np.zeros((len(x), 6, len(effect.params)))
     for j, param in enumerate(effect.params):
-        step = np.zeros(len(start))
+        step = np.zeros(len(effect.params))
         step[j] = 1e-3 * param.typical
-        up, down = effect.change(x, start + step), effect.change(x, start - step)
+        up, down = effect.change(x, step), effect.change(x, -step)
         change = np.hstack([up.f - down.f, up.w - down.w]) / (2 * step[j])
         out[:, :, j] = change * np.asarray(scale)
     return out

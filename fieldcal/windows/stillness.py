@@ -60,8 +60,8 @@ class Stillness:
 
     """
 
-    def __init__(self, limits: Limits | None = None) -> None:
-        self._limits = limits or Limits()
+    def __init__(self) -> None:
+        self._limits = Limits()
         self._cells = Cells()
         self._recent: deque[tuple[Array, Array]] = deque(maxlen=SPAN)
         self._finest = np.full(6, np.inf)

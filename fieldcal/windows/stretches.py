@@ -66,7 +66,7 @@ class _Run(NamedTuple):
 
 
 def still_stretches(
-    block: Block, min_seconds: float = 2.0, limits: Limits | None = None
+    block: Block, min_seconds: float = 2.0
 ) -> list[tuple[float, float]]:
     """Find where the device was still, (start, end) in s of device time, in order.
 
@@ -79,7 +79,7 @@ def still_stretches(
 
     cells = Cells()
     cells.add(block)
-    return still_in(summary(cells.table), between, min_seconds, limits)
+    return still_in(summary(cells.table), between, min_seconds)
 
 
 def summary(cells: Table) -> Array:
@@ -88,10 +88,7 @@ def summary(cells: Table) -> Array:
 
 
 def still_in(
-    rows: Rows,
-    between: Between,
-    min_seconds: float = 2.0,
-    limits: Limits | None = None,
+    rows: Rows, between: Between, min_seconds: float
 ) -> list[tuple[float, float]]:
     """`still_stretches` of a recording that does not fit into memory.
 
@@ -99,17 +96,16 @@ def still_in(
     ----------
     rows : of all of it
     between : gives the samples of a stretch of it
-    min_seconds, limits : as in `still_stretches`
+    min_seconds : as in `still_stretches`
 
     """
     if len(rows) < 2 * _SPAN:
         return []
     shortest = max(1.0, min_seconds)
     found: list[tuple[float, float]] = []
-    limits = limits or Limits()
-    for run in _at_rest(rows, limits.noise):
+    for run in _at_rest(rows, Limits().noise):
         start, end = (_time(rows, span) for span in (run.first, run.last - 1))
-        found += _passing(between, start, end, shortest, limits)
+        found += _passing(between, start, end, shortest)
     return found
 
 
@@ -226,7 +222,7 @@ def _valley(ratio: Array) -> float:
 
 
 def _passing(
-    between: Between, start: float, end: float, shortest: float, limits: Limits
+    between: Between, start: float, end: float, shortest: float
 ) -> list[tuple[float, float]]:
     """Parts of a stretch that pass as windows: it is cut where it was disturbed."""
     sums, times = Cells(), [np.nan, np.nan]
@@ -237,13 +233,13 @@ def _passing(
     first, last = float(times[0]), float(times[1])
     if not last - first >= shortest:
         return []
-    worst = judge(sums.table, limits).worst
+    worst = judge(sums.table, Limits()).worst
     if worst.ratio <= 1:
         return [(first, float(np.nextafter(last, np.inf)))]
     after = max(worst.at + worst.seconds, first + CELL)
     return [
-        *_passing(between, start, min(worst.at, end), shortest, limits),
-        *_passing(between, max(after, start), end, shortest, limits),
+        *_passing(between, start, min(worst.at, end), shortest),
+        *_passing(between, max(after, start), end, shortest),
     ]
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib.util import find_spec
 from itertools import pairwise
-from math import inf
 from pathlib import Path
 from time import monotonic
 
@@ -23,7 +22,8 @@ from fieldcal.driver import Driver, Health
 from fieldcal.drivers.can_frames import EXTENDED, FRAME, Frames
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_log import Log, is_log
-from fieldcal.drivers.options import Options, split
+from fieldcal.drivers.options import split
+from fieldcal.drivers.pace import speed
 from fieldcal.drivers.reader import Reader
 from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, InputError
@@ -58,9 +58,8 @@ class Imu(Driver):
         self._log: Log | None = None
         self._reader: Reader | None = None
         if is_log(channel):
-            speed = _speed(options)
+            self._log = Log(Path(channel), speed(options))
             options.finish()
-            self._log = Log(Path(channel), speed)
             return
         told = settings(options)
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
@@ -161,12 +160,6 @@ class Imu(Driver):
 def _hex(identifier: int) -> str:
     wide = identifier & EXTENDED
     return f"0x{identifier & ~EXTENDED:0{8 if wide else 3}X}"
-
-
-def _speed(options: Options) -> float:
-    if options.text("speed") == "max":
-        return inf
-    return options.number("speed", 1.0, 1e-3, 1e6)
 
 
 def _check_installed() -> None:

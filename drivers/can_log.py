@@ -9,14 +9,13 @@ from __future__ import annotations
 import gzip
 from collections.abc import Generator, Iterator
 from itertools import islice
-from math import inf
 from pathlib import Path
-from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
 
 from fieldcal.drivers.can_frames import FRAME, Frames, pack_message
+from fieldcal.drivers.pace import Pace
 from fieldcal.errors import DeviceError, InputError
 
 READERS = {
@@ -58,13 +57,13 @@ class Log:
     def __init__(self, path: Path, speed: float) -> None:
         if not path.is_file():
             raise InputError(f"{path}: there is no such log")
-        self._path, self._speed = path, speed
+        self._path = path
         self._pieces = self._read()
-        self._began, self._first, self.now = -1.0, 0.0, 0.0
         self._piece: Frames = next(self._pieces, np.empty(0, FRAME))
         if not len(self._piece):
             raise InputError(f"{path}: holds no frame; check that it is a CAN log")
         self._first = self.now = float(self._piece["t"][0])
+        self._pace = Pace(self._first, speed)
 
     def take(self, timeout: float) -> Frames:
         """Return the frames that are due, or none after `timeout` seconds.
@@ -81,23 +80,13 @@ class Log:
             raise DeviceError(
                 f"{self._path} has ended after {self.now - self._first:.3f} s"
             )
-        piece = self._piece
-        if self._speed < inf:
-            piece = piece[: self._due(float(piece["t"][0]), timeout)]
+        until = self._pace.wait(float(self._piece["t"][0]), timeout)
+        late = np.flatnonzero(self._piece["t"] > until)
+        piece = self._piece[: late[0] if len(late) else None]
         self._piece = self._piece[len(piece) :]
         if len(piece):
             self.now = float(piece["t"].max())
         return piece
-
-    def _due(self, t: float, timeout: float) -> int:
-        """Wait for the next frame; how many are due then."""
-        if self._began < 0:
-            self._began = monotonic()
-        wait = self._began + (t - self._first) / self._speed - monotonic()
-        sleep(max(0.0, min(wait, timeout)))
-        until = self._first + (monotonic() - self._began) * self._speed
-        late = np.flatnonzero(self._piece["t"] > until)
-        return int(late[0]) if len(late) else len(self._piece)
 
     def _read(self) -> Generator[Frames]:
         try:

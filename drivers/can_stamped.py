@@ -13,7 +13,7 @@ from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import Part
 from fieldcal.drivers.can_samples import STAMP, Samples
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.timebase import Stamps
+from fieldcal.drivers.stamps import Stamps
 from fieldcal.samples import Array, Block
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from fieldcal.driver import Health
 from fieldcal.drivers.arrivals import Arrivals
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.timebase import Rate, Stamps, Timebase
+from fieldcal.drivers.stamps import Stamps
+from fieldcal.drivers.timebase import Rate, Timebase
 from fieldcal.samples import Array
 
 

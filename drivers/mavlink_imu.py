@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections import deque
 from importlib.util import find_spec
-from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -27,6 +26,7 @@ from fieldcal.driver import Driver, Health
 from fieldcal.drivers.mavlink_log import Log, is_log
 from fieldcal.drivers.mavlink_talk import Talk, listed
 from fieldcal.drivers.options import Options, split
+from fieldcal.drivers.pace import speed
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
 from fieldcal.errors import DeviceError, FieldcalError, InputError
@@ -96,7 +96,7 @@ class Imu(Driver):
         self._recent: deque[float] = deque(maxlen=RECENT)
         self._last = monotonic()
         if is_log(endpoint):
-            self._log = Log(Path(endpoint), _speed(options))
+            self._log = Log(Path(endpoint), speed(options))
             options.finish()
             return
         self._open(endpoint, options)
@@ -298,12 +298,6 @@ class Imu(Driver):
         sent = "went silent" if health.samples else "has sent no sample"
         asked = "".join(f" ({sentence})" for sentence in self._talk.says)
         return f"{self.name} {sent} for {timeout:g} s: {cause}{asked}"
-
-
-def _speed(options: Options) -> float:
-    if options.text("speed") == "max":
-        return inf
-    return options.number("speed", 1.0, 1e-3, 1e6)
 
 
 def _check_installed() -> None:

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import gzip
 from bisect import bisect_right
-from math import inf
 from pathlib import Path
-from time import monotonic, sleep
 
 from fieldcal.drivers.mavlink_frames import HEADS, SECOND, SIGNATURE
+from fieldcal.drivers.pace import Pace
 from fieldcal.drivers.reader import Chunk
 from fieldcal.errors import DeviceError, InputError
 
@@ -73,7 +72,7 @@ class Log:
     """
 
     def __init__(self, path: Path, speed: float) -> None:
-        self._path, self._speed = path, speed
+        self._path = path
         try:
             data = path.read_bytes()
             if path.suffix.lower() == ".gz":
@@ -83,8 +82,9 @@ class Log:
         self._chunks = split(data)
         if not self._chunks:
             raise InputError(f"{path}: holds no packet; check that it is a .tlog")
-        self._next, self._began = 0, -1.0
+        self._next = 0
         self.now = self._chunks[0].t_host
+        self._pace = Pace(self.now, speed)
 
     def take(self, timeout: float) -> list[Chunk]:
         """Return the packets that are due, or none after `timeout` seconds.
@@ -99,22 +99,12 @@ class Log:
             seconds = self._chunks[-1].t_host - self._chunks[0].t_host
             raise DeviceError(f"{self._path} has ended after {seconds:.3f} s")
         end = min(self._next + PIECE, len(self._chunks))
-        if self._speed < inf:
-            end = self._due(end, timeout)
+        until = self._pace.wait(self._chunks[self._next].t_host, timeout)
+        end = bisect_right(
+            self._chunks, until, self._next, end, key=lambda chunk: chunk.t_host
+        )
         taken = self._chunks[self._next : end]
         self._next = end
         if taken:
             self.now = taken[-1].t_host
         return taken
-
-    def _due(self, end: int, timeout: float) -> int:
-        """Wait for the next packet; up to which they are due then."""
-        if self._began < 0:
-            self._began = monotonic()
-        first = self._chunks[0].t_host
-        wait = (self._chunks[self._next].t_host - first) / self._speed
-        sleep(max(0.0, min(self._began + wait - monotonic(), timeout)))
-        until = first + (monotonic() - self._began) * self._speed
-        return bisect_right(
-            self._chunks, until, self._next, end, key=lambda chunk: chunk.t_host
-        )

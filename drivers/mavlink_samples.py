@@ -29,7 +29,7 @@ from fieldcal.drivers.mavlink_units import (
     unbiased,
 )
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.timebase import Stamps
+from fieldcal.drivers.stamps import Stamps
 from fieldcal.samples import Array, Block, Grain, concat
 
 Fields = NDArray[np.void]

@@ -12,9 +12,7 @@ from __future__ import annotations
 
 import gzip
 from collections.abc import Mapping
-from math import inf
 from pathlib import Path
-from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
@@ -23,6 +21,7 @@ from fieldcal.driver import Driver, Health
 from fieldcal.drivers import can_log, mavlink_log
 from fieldcal.drivers.codec import open_codec
 from fieldcal.drivers.options import Options, split
+from fieldcal.drivers.pace import Pace, speed
 from fieldcal.errors import DeviceError, InputError
 from fieldcal.observing import grain_of
 from fieldcal.sample_files import ENDINGS, read
@@ -90,10 +89,7 @@ class Samples(Driver):
 
     def __init__(self, address: str) -> None:
         place, options = split(address, "replay")
-        speed = options.text("speed", "1")
-        if speed != "max":
-            speed = str(options.number("speed", 1.0, 1e-3, 1e6))
-        self._speed = inf if speed == "max" else float(speed)
+        played_at = speed(options)
         self.name = place
         self._grain = Grain()
         self._block = self._load(Path(place), options)
@@ -101,7 +97,8 @@ class Samples(Driver):
         if not len(self._block):
             raise InputError(f"{place} holds no sample; check format and options")
         self.health = Health()
-        self._next, self._began = 0, -1.0
+        self._next = 0
+        self._pace = Pace(float(self._block.t[0]), played_at)
         self._now = float(self._block.t_host[0])
 
     def _load(self, place: Path, options: Options) -> Block:
@@ -135,16 +132,10 @@ class Samples(Driver):
         t, i = self._block.t, self._next
         if i == len(t):
             raise DeviceError(f"{self.name} has ended after {t[-1] - t[0]:.3f} s")
-        if self._began < 0:
-            self._began = monotonic()
-        wait = self._began + (t[i] - t[0]) / self._speed - monotonic()
-        if wait > timeout:
-            sleep(timeout)
+        until = min(self._pace.wait(float(t[i]), timeout), t[i] + PIECE)
+        if until < t[i]:
             return None
-        sleep(max(0.0, wait))
-        now = t[0] + (monotonic() - self._began) * self._speed
-        until = min(now, t[i] + PIECE)
-        end = max(i + 1, int(np.searchsorted(t, until, side="right")))
+        end = int(np.searchsorted(t, until, side="right"))
         self._next = end
         self._now = float(self._block.t_host[end - 1])
         self.health.samples += end - i

@@ -1,23 +1,10 @@
-"""The time of each sample: from the device's stamps, its rate, or else its arrivals.
+"""The time of each sample: what gives it, and how from a declared rate.
 
-Stamps (`Stamps`). A stamp s_k is the device's time cut to a resolution q, so the true
-time lies in [s_k, s_k + q). With T the mean interval so far, renewed now and then, and
-k counted from there,
+    t_k = k / rate, k counting also the samples known to be missing             (1)
 
-    t_k = u + k T,  u = min(max(u, s_k - k T), s_k + q - k T)               (1)
-
-is within q of the truth, and as even as the stamps allow; for q = 0 it is the stamp. A
-counter is unwrapped first: where it falls by more than half its span, a span is added.
-A clock that falls by more than `BACK`, or leaps by more than `LEAP` where the host saw
-hardly any time go by, has begun anew: time goes on from the last sample by what the
-host saw.
-
-Rate (`Rate`). t_k = k / rate, k counting also the samples known to be missing.     (2)
 Where a device that has run in real time says nothing for more than `PAUSE`, and what
 comes then is not the samples of that time in a heap, time goes on as the host saw it.
-
-All in s. Symbols: k sample number, T period, q resolution, u phase. `Arrivals` is
-beside this, and `Clock` chooses.
+All in s; k sample number. `Stamps` and `Arrivals` are beside this, and `Clock` chooses.
 """
 
 from __future__ import annotations
@@ -30,15 +17,6 @@ import numpy as np
 from fieldcal.driver import Health
 from fieldcal.samples import Array
 
-BACK = 1.0
-"""A stamp older by more than this is no late sample but a clock begun anew, s."""
-
-LEAP = 60.0
-"""A leap forward by more than this needs the host as a witness, s."""
-
-WITNESS = 0.005
-"""Least share of a leap that the host must have seen: devices run up to 200 x fast."""
-
 PAUSE = 1.0
 """Arrivals so far apart are no jitter, s."""
 
@@ -47,15 +25,6 @@ AT_ONCE = 0.05
 
 IN_STEP = 0.2
 """How far a device that runs in real time may be off its declared rate, relative."""
-
-EARLY = 16
-"""Intervals from which the period is first told."""
-
-RENEW = 1024
-"""Most samples after which the period is told anew."""
-
-CREEP = 0.01
-"""Share of the resolution that time goes on by where many samples share a stamp."""
 
 _NAN = float("nan")
 
@@ -79,7 +48,7 @@ class Timebase(Protocol):
 
 
 class Rate:
-    """Times from a declared rate, (2).
+    """Times from a declared rate, (1).
 
     Parameters
     ----------
@@ -114,7 +83,7 @@ class Rate:
         self._health.gaps += int(np.sum(steps > 1))
         self._health.missing += int(np.sum(steps - 1))
         self._k, self._host = int(k[-1]), float(t_host[-1])
-        t: Array = self._base + k * self._period  # (2)
+        t: Array = self._base + k * self._period  # (1)
         return t
 
     def _pause(self, steps: Array, t_host: Array) -> None:
@@ -138,169 +107,3 @@ class Rate:
         self._base += self._k * self._period + max(self._period, away or 0.0)
         self._k, self._broken = -1, False
         self._health.gaps += 1
-
-
-class Stamps:
-    """Times from the device's own stamps, (1).
-
-    Parameters
-    ----------
-    health : where gaps, missing and repeated samples and restarts are counted
-    resolution : of the stamps, s
-    span : of the counter, s, where it wraps
-
-    """
-
-    def __init__(
-        self, health: Health, resolution: float = 0.0, span: float = float("inf")
-    ) -> None:
-        self._health = health
-        self._resolution, self._span = resolution, span
-        self._offset = 0.0
-        self._t = self._stamp = self._host = self._period = _NAN
-        self._first, self._count = 0.0, 0
-        self._early: list[float] = []
-        self._phase, self._k0, self._renewal = _NAN, 0, EARLY
-
-    def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
-        """Return times (n,), nan for a sample to drop; `stamps` nan where unknown."""
-        parts: list[Array] = [np.empty(0)]
-        i = 0
-        while i < len(stamps):
-            quiet = self._glide(stamps[i : i + RENEW])
-            if len(quiet):
-                i += len(quiet)
-                self._stamp, self._host = float(stamps[i - 1]), float(t_host[i - 1])
-                parts.append(quiet)
-                continue
-            few = slice(i, i + EARLY)
-            pairs = zip(stamps[few].tolist(), t_host[few].tolist(), strict=True)
-            parts.append(np.array([self._step(stamp, host) for stamp, host in pairs]))
-            i += EARLY
-        return np.concatenate(parts)
-
-    def broken(self) -> None:
-        """Do nothing: the stamps show the gap."""
-
-    def _glide(self, stamps: Array) -> Array:
-        """Place at once the first stamps, as many as nothing happens among."""
-        if self._count < EARLY:
-            return stamps[:0]
-        stamps = stamps[: self._renewal - self._count]
-        d = np.empty(len(stamps))
-        d[:1], d[1:] = stamps[:1] - self._stamp, stamps[1:] - stamps[:-1]
-        least = 0.0 if self._coarse else 1e-12
-        odd = np.flatnonzero(~((d >= least) & (d < 1.5 * self._period)))
-        s = stamps[: odd[0] if len(odd) else len(stamps)] + self._offset
-        if not len(s):
-            return s
-        t, phase = self._even(s) if self._resolution else (s, self._phase)
-        if not (t[0] > self._t and np.all(t[1:] > t[:-1])):
-            return s[:0]
-        self._phase, self._t = phase, float(t[-1])
-        self._count += len(t)
-        self._renew()
-        return t
-
-    def _even(self, s: Array) -> tuple[Array, float]:
-        """Return times of coarse stamps, and the phase at the last, (1)."""
-        q, phase, i = self._resolution, self._phase, 0
-        k = self._count + 1 - self._k0 + np.arange(len(s))
-        low = s - k * self._period
-        phases = np.empty(len(s))
-        while i < len(s):
-            out = np.flatnonzero((phase < low[i:]) | (phase > low[i:] + q))
-            stop = i + int(out[0]) if len(out) else len(s)
-            phases[i:stop] = phase
-            if stop < len(s):
-                phase = float(min(max(phase, low[stop]), low[stop] + q))
-                phases[stop] = phase
-            i = stop + 1
-        return phases + k * self._period, phase
-
-    @property
-    def _coarse(self) -> bool:
-        """Whether several samples may share a stamp."""
-        return self._resolution > 0 and not self._period > 2 * self._resolution
-
-    def _step(self, stamp: float, host: float) -> float:
-        if stamp != stamp:
-            k = self._count + 1 - self._k0
-            return self._advance(self._later(self._phase + k * self._period))
-        if self._t != self._t:
-            self._begin(stamp, host)
-            return self._t
-        if stamp < self._stamp - self._span / 2:
-            self._offset += self._span
-        s = stamp + self._offset
-        if self._restarted(s, host):
-            return self._restart(stamp, host)
-        late = 4 * self._resolution if self._coarse else self._resolution
-        if s + late <= self._t or (stamp == self._stamp and not self._coarse):
-            self._health.repeated += 1
-            return _NAN
-        self._stamp, self._host = stamp, host
-        return self._advance(self._place(s))
-
-    def _begin(self, stamp: float, host: float) -> None:
-        self._t = self._first = stamp + self._offset
-        self._count, self._renewal, self._early = 0, EARLY, []
-        self._stamp, self._host = stamp, host
-        self._anchor()
-
-    def _place(self, s: float) -> float:
-        """Time of a sample stamped `s`, (1)."""
-        q, k = self._resolution, self._count + 1 - self._k0
-        if not q or self._period != self._period:
-            return self._later(s)
-        low = s - k * self._period
-        self._phase = min(max(self._phase, low), low + q)
-        return self._later(self._phase + k * self._period)
-
-    def _later(self, t: float) -> float:
-        """Return `t`, or a time just behind the last if it is none."""
-        return t if not t <= self._t else self._t + CREEP * self._resolution
-
-    def _advance(self, t: float) -> float:
-        if t != t:
-            return t
-        d, self._t = t - self._t, t
-        self._count += 1
-        if self._count <= EARLY:
-            self._early.append(d)
-            self._period = float(np.median(self._early))
-            self._anchor()
-            if self._count == EARLY:
-                self._count = sum(max(1, round(d / self._period)) for d in self._early)
-                self._renewal = self._count
-        elif d > 1.5 * self._period + self._resolution:
-            lost = round(d / self._period) - 1
-            self._health.gaps += 1
-            self._health.missing += lost
-            self._count += lost
-            self._anchor()
-        self._renew()
-        return t
-
-    def _renew(self) -> None:
-        """Tell the period anew when it is time."""
-        if self._count >= max(EARLY, self._renewal):
-            self._period = (self._t - self._first) / self._count
-            self._renewal = self._count + min(self._count, RENEW)
-            self._anchor()
-
-    def _anchor(self) -> None:
-        self._phase, self._k0 = self._t, self._count
-
-    def _restarted(self, s: float, host: float) -> bool:
-        leap = s - self._t
-        witnessed = not host - self._host < WITNESS * leap
-        return leap < -BACK or (leap > LEAP and not witnessed)
-
-    def _restart(self, stamp: float, host: float) -> float:
-        self._health.restarts += 1
-        self._health.gaps += 1
-        known = [d for d in (host - self._host, self._period) if d == d and d > 0]
-        self._offset = self._t + max(known, default=1e-3) - stamp
-        self._begin(stamp, host)
-        return self._t

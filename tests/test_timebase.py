@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from fieldcal.driver import Health
 from fieldcal.drivers.arrivals import Arrivals
-from fieldcal.drivers.timebase import Rate, Stamps
+from fieldcal.drivers.stamps import Stamps
+from fieldcal.drivers.timebase import Rate
 from fieldcal.samples import Array
 
 

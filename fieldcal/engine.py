@@ -17,7 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fieldcal.arrival import Arrival, Held
+from fieldcal.arrival import Held
 from fieldcal.breaks import Again, begun_again, gap, restarted
 from fieldcal.description import Description
 from fieldcal.driver import Driver
@@ -25,8 +25,8 @@ from fieldcal.errors import FieldcalError, Moved, Skipped, Stopped, WrongPositio
 from fieldcal.link_marks import LinkMarks, Recording
 from fieldcal.placing import GAP, SETTLING, Placing, force
 from fieldcal.plan import Hold, Note, Plan, Step
-from fieldcal.samples import Array, Block, pieces
-from fieldcal.view import Operator, Phase, View, Wish
+from fieldcal.samples import Block, pieces
+from fieldcal.view import Display, Operator, Wish
 from fieldcal.warmth import Warmth
 from fieldcal.windows import Average, Noise, Window
 
@@ -80,8 +80,7 @@ class Engine:
         self._silence = 0
         driver.on_silence = self._silent
         self._stream = self._record(driver)
-        self._rate = np.nan
-        self._temperature = np.nan
+        self._display = Display(operator, driver)
 
     def run(self, plan: Plan[R]) -> R:
         """Carry out a plan and return its result.
@@ -119,7 +118,7 @@ class Engine:
                     average = self._hold(step)
                     self._taken[step.index] = average
                 else:
-                    self._view("taken", step, reason="taken before")
+                    self._display.taken_before(step, average)
                 if step.position.oriented:
                     f = force(average.mean[None, :3], self._about)
                     self._held = Held(step.position, f)
@@ -156,9 +155,7 @@ class Engine:
             self._silence = 0
             block = self._recorder.append(raw)
             self._link.take(block)
-            if len(block) > 1:
-                self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
-            self._temperature = float(block.temperature[-1])
+            self._display.heard(block)
             if self._warmth:
                 self._warmth.add(block)
             yield from pieces(block, PIECE)
@@ -171,7 +168,7 @@ class Engine:
             " goes on by itself once they do"
         )
         if self._silence >= 2 and self._hold_now:
-            self._view("silent", self._hold_now, reason=said)
+            self._display.silent(self._hold_now, said)
         if self._silence == 2:
             self._tell(said)
         if self._operator.wish() == "stop":
@@ -199,7 +196,7 @@ class Engine:
             if placing.arrived and waits and self._warmth:
                 said = self._warmth.says
                 reason = f"{said}; Enter goes on" if said else SETTLING
-            self._view("turning", hold, placing.where, placing.meter, reason=reason)
+            self._display.turning(hold, placing, reason)
             if reason.endswith("Enter goes on") and not cold:
                 cold = True
                 self._tell(reason)
@@ -267,7 +264,7 @@ class Engine:
                 if self._wish(hold, averaging=True) == "repeat":
                     self._recorder.mark("repeated", position=hold.index)
                     return None
-                self._show_window(hold, window)
+                self._display.averaging(hold, window)
                 if window.elapsed >= hold.seconds or window.done(hold.sigma):
                     break
             average = window.average()
@@ -280,42 +277,10 @@ class Engine:
         where = {"start_s": average.start, "end_s": end}
         self._recorder.mark("window", position=hold.index, **where)
         self._noise = window.noise and window.noise.spectrum
-        self._show_window(hold, window, "taken")
+        self._display.taken(hold, window)
         self._say_if_cold()
         return average
 
     def _say_if_cold(self) -> None:
         if self._warmth and (said := self._warmth.says):
             self._tell(said)
-
-    def _view(
-        self,
-        phase: Phase,
-        hold: Hold,
-        arrival: Arrival | None = None,
-        stillness: float = np.nan,
-        elapsed: float = 0.0,
-        sigma: Array | None = None,
-        reason: str = "",
-    ) -> None:
-        if phase == "taken" and sigma is None:
-            sigma = self._taken[hold.index].sigma
-        view = View(
-            phase,
-            hold,
-            arrival,
-            stillness,
-            elapsed,
-            np.full(6, np.nan) if sigma is None else sigma,
-            reason,
-            self._rate,
-            self._temperature,
-            self._driver.health,
-        )
-        self._operator.show(view)
-
-    def _show_window(
-        self, hold: Hold, window: Window, phase: Phase = "averaging"
-    ) -> None:
-        now = (window.meter, window.elapsed, window.sigma)
-        self._view(phase, hold, None, *now)

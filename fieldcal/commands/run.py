@@ -177,39 +177,37 @@ def _record(
     from fieldcal.running import Running, taken_before
     from fieldcal.session import Session
 
-    with device(task) as (opened, mover):
+    with device(task) as (opened, mover), contextlib.ExitStack() as stack:
         driver = opened()
-        with contextlib.ExitStack() as stack:
-            stack.callback(driver.close)
-            taken = taken_before(Session.open(folder), task) if args.resume else {}
-            tables = None if args.resume else task.tables
-            own = stack.enter_context(Recorder(folder, tables))
-            recorder = stack.enter_context(beside(task.further, own, task.tables))
-            operator = stack.enter_context(_operator(args, task, mover, folder))
-            recorder.tell = operator.tell
-            if unseen := level_unknown(task.about):
-                operator.tell(unseen)
-            if args.resume:
-                recorder.mark("resumed", taken=sorted(taken))
-            patience = PATIENCE_HEADLESS if args.headless else PATIENCE
-            running = Running(
-                task,
-                operator,
-                recorder,
-                opened,
-                bounds,
-                patience if args.patience is None else args.patience,
-                _give_up(args, task),
-                taken,
-            )
-            try:
-                found = running.run(driver)
-            except (FieldcalError, KeyboardInterrupt) as error:
-                recorder.mark("failed", text=str(error) or "interrupted")
-                raise
-            recorder.mark("finished", verdict="good" if found.good else "bad")
+        stack.callback(driver.close)
+        taken = taken_before(Session.open(folder), task) if args.resume else {}
+        own = stack.enter_context(
+            Recorder(folder, None if args.resume else task.tables)
+        )
+        recorder = stack.enter_context(beside(task.further, own, task.tables))
+        operator = stack.enter_context(_operator(args, task, mover, folder))
+        recorder.tell = operator.tell
+        if unseen := level_unknown(task.about):
+            operator.tell(unseen)
+        if args.resume:
+            recorder.mark("resumed", taken=sorted(taken))
+        how_long = (_patience(args), _give_up(args, task))
+        running = Running(task, operator, recorder, opened, bounds, *how_long, taken)
+        try:
+            found = running.run(driver)
+        except (FieldcalError, KeyboardInterrupt) as error:
+            recorder.mark("failed", text=str(error) or "interrupted")
+            raise
+        recorder.mark("finished", verdict="good" if found.good else "bad")
         truth = getattr(mover, "truth", None)
         return found, dict(truth) if truth else None, recorder.others
+
+
+def _patience(args: argparse.Namespace) -> float:
+    """How long a device that is gone is waited for, s."""
+    if args.patience is not None:
+        return float(args.patience)
+    return PATIENCE_HEADLESS if args.headless else PATIENCE
 
 
 def _give_up(args: argparse.Namespace, task: Task) -> float | None:

@@ -34,6 +34,13 @@ INTERRUPTED = 130
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
+    _add_link(parser)
+    _add_course(parser)
+    _add_device(parser)
+
+
+def _add_link(parser: argparse.ArgumentParser) -> None:
+    """Declare where the device is, and as what."""
     add = parser.add_argument_group("link").add_argument
     add(
         "--serial",
@@ -62,6 +69,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ' "tcpin:127.0.0.1:5760?autopilot=px4"',
     )
     add("--port-link", type=Path, metavar="PATH", help="symbolic link to the pty")
+
+
+def _add_course(parser: argparse.ArgumentParser) -> None:
+    """Declare what moves it, how fast time goes, and for how long."""
+    add = parser.add_argument_group("time and orders").add_argument
     add(
         "--control",
         type=Path,
@@ -83,7 +95,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="A,B",
         help="steps of the arrow keys in alpha and beta, deg (default: 22.5,2.5)",
     )
-    _add_device(parser)
 
 
 def _formats() -> str:

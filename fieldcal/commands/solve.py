@@ -61,37 +61,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from dataclasses import replace
-
     from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
-    from fieldcal.observing import (
-        observations,
-        rests,
-        with_provenance,
-        with_turns_between,
-    )
+    from fieldcal.observing import rests, with_provenance
     from fieldcal.session import RESULT, Session
-    from fieldcal.solve import solve
 
     session = Session.open(args.session)
     still = rests(session)
-    seen = observations(session.about, still.averages, still.rows)
-    found = solve(
-        seen,
-        method=args.method,
-        tilt=args.tilt,
-        cross=args.cross,
-        as_printed=args.as_printed,
-        level_sigma_deg=session.about.level_deg if args.level is None else args.level,
-        heading_sigma_deg=args.heading,
-        angle_sigma_deg=args.angles or 0.0,
-    )
-    if args.turns != "no" and not args.as_printed:
-        found = with_turns_between(found, session, still, args.turns == "yes")
-    found = replace(found, warnings=(*still.warnings, *found.warnings))
-    found = with_provenance(found, session.about)
+    found = with_provenance(_solved(args, session, still), session.about)
     found = with_installed(found, session)
     found = _decided(args, found, session, still)
     path = session.write_json(RESULT, found.to_json())
@@ -105,6 +83,29 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(f"written: {path}\n")
     go = found.info.get("decision", {}).get("go", True)
     return 0 if found.good and go else 1
+
+
+def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibration:
+    """What windows and turns say, estimated as the options want it."""
+    from dataclasses import replace
+
+    from fieldcal.observing import observations, with_turns_between
+    from fieldcal.solve import solve
+
+    level = session.about.level_deg if args.level is None else args.level
+    found = solve(
+        observations(session.about, still.averages, still.rows),
+        method=args.method,
+        tilt=args.tilt,
+        cross=args.cross,
+        as_printed=args.as_printed,
+        level_sigma_deg=level,
+        heading_sigma_deg=args.heading,
+        angle_sigma_deg=args.angles or 0.0,
+    )
+    if args.turns != "no" and not args.as_printed:
+        found = with_turns_between(found, session, still, args.turns == "yes")
+    return replace(found, warnings=(*still.warnings, *found.warnings))
 
 
 def _decided(

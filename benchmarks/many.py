@@ -2,22 +2,33 @@
 
 One process on one core hears and decodes N devices at once, each with a driver of its
 own; another process, on the other cores, sends what they say, a batch every 10 ms. N is
-raised until samples are lost or the core has nothing left.
+raised until samples are lost or the core has nothing left. All are on ptys: serial
+devices, adapters on a CAN bus (slcan), and autopilots.
 """
 
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from itertools import accumulate
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic, perf_counter, process_time, sleep
+from typing import NamedTuple
 
-from benchmarks.codecs import TOLD, stream
+import numpy as np
+
+from benchmarks import codecs, mavlink
 from fieldcal.driver import Driver, open_driver
 from fieldcal.errors import DeviceError
+from fieldcal.sim_device import Profile, VirtualDevice
+from fieldcal.sim_device.can_packing import frames
 
 RATE, SECONDS = 1000, 5.0
+SAMPLES = int(RATE * SECONDS)
 FORMATS = ("witmotion", "vectornav", "xsens", "vnimu")
+MESSAGE = "HIGHRES_IMU"
 LOOK = 0.02
 """Time between two looks at all devices, s."""
 
@@ -25,62 +36,106 @@ COUNTS = (25, 50, 100, 150, 200)
 
 SENDER = """
 import os, sys, time, tty
-data, size, count, rate, seconds = open(sys.argv[1], "rb").read(), *map(
-    float, sys.argv[2:6])
-size, count = int(size), int(count)
-ends = [os.openpty() for _ in range(count)]
-for ours, theirs in ends:
+folder, count, rate = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
+greeting, data, ends = (
+    open(f"{folder}/{name}", "rb").read() for name in ("greeting", "data", "ends"))
+at = [0, *map(int, ends.split())]
+ports = [os.openpty() for _ in range(count)]
+for ours, theirs in ports:
     tty.setraw(theirs)
     os.set_blocking(ours, False)
+    os.write(ours, greeting)
     print(os.ttyname(theirs), flush=True)
 sys.stdin.readline()
-began, sent, refused = time.monotonic(), 0, 0
-while sent < rate * seconds:
+began, sent = time.monotonic(), 0
+while sent < len(at) - 1:
     time.sleep(0.01)
-    due = int(min(rate * seconds, (time.monotonic() - began) * rate))
-    batch = data[sent * size : due * size]
-    for ours, _ in ends:
+    due = int(min(len(at) - 1, (time.monotonic() - began) * rate))
+    batch = data[at[sent] : at[due]]
+    for ours, _ in ports:
         try:
-            refused += os.write(ours, batch) < len(batch)
+            os.write(ours, batch)
         except BlockingIOError:
-            refused += 1
+            pass
     sent = due
-print(sent, refused, flush=True)
+print(sent, flush=True)
 sys.stdin.readline()
 """
 
 
-def carried(name: str, count: int) -> tuple[int, int, float]:
+class Line(NamedTuple):
+    """What a device says, and how it is opened.
+
+    Attributes
+    ----------
+    url : address, ``{}`` in the place of the port
+    greeting : bytes before all samples
+    samples : bytes of each sample
+
+    """
+
+    url: str
+    greeting: bytes
+    samples: list[bytes]
+
+
+def serial(name: str) -> Line:
+    """A device on a serial port."""
+    data = codecs.stream(name, SAMPLES)
+    parts = np.frombuffer(data, f"V{len(data) // SAMPLES}")
+    url = f"serial:{{}}?{codecs.TOLD.get(name, '')}format={name}"
+    return Line(url, b"", [part.tobytes() for part in parts])
+
+
+def can() -> Line:
+    """A device of three frames a sample, behind an adapter."""
+    packed = frames(VirtualDevice(Profile(), seed=1).take(SAMPLES))
+    lines = [b"t%03X8%s\r" % (f.identifier, f.data.hex().encode()) for f in packed]
+    samples = [b"".join(lines[i : i + 3]) for i in range(0, len(lines), 3)]
+    return Line("can:{}?interface=slcan&dbc=virtual", b"", samples)
+
+
+def autopilot() -> Line:
+    """An autopilot that is asked for nothing."""
+    heartbeat, samples = mavlink.packets(MESSAGE, SAMPLES)
+    return Line(f"mavlink:{{}}?message={MESSAGE}&rate=0", heartbeat, samples)
+
+
+def carried(line: Line, count: int) -> tuple[int, int, float]:
     """Samples sent to each, the most that one of the drivers lost, share of a core."""
-    samples = int(RATE * SECONDS)
-    data, cores = stream(name, samples), sorted(os.sched_getaffinity(0))
-    size = len(data) // samples
-    with TemporaryDirectory() as folder:
-        file = Path(folder, "stream")
-        file.write_bytes(data)
-        numbers = map(str, (size, count, RATE, SECONDS))
-        with subprocess.Popen(
-            [sys.executable, "-c", SENDER, str(file), *numbers],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        ) as sender:
-            told, orders = sender.stdout, sender.stdin
-            if told is None or orders is None:
-                raise AssertionError
-            ports = [told.readline().strip() for _ in range(count)]
-            os.sched_setaffinity(0, cores[:1])
-            query = f"{TOLD.get(name, '')}format={name}"
-            drivers = [open_driver(f"serial:{port}?{query}") for port in ports]
-            orders.write("\n")
-            orders.flush()
-            got, share = heard(drivers)
-            sent = int(told.readline().split()[0])
-            for driver in drivers:
-                driver.close()
-            orders.write("\n")
-            orders.close()
-    os.sched_setaffinity(0, cores)
+    cores = sorted(os.sched_getaffinity(0))
+    with TemporaryDirectory() as folder, ExitStack() as stack:
+        ends = "\n".join(map(str, accumulate(map(len, line.samples))))
+        for name, content in (
+            ("greeting", line.greeting),
+            ("data", b"".join(line.samples)),
+            ("ends", ends.encode()),
+        ):
+            Path(folder, name).write_bytes(content)
+        sender = stack.enter_context(
+            subprocess.Popen(
+                [sys.executable, "-c", SENDER, folder, str(count), str(RATE)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+        )
+        told, orders = sender.stdout, sender.stdin
+        if told is None or orders is None:
+            raise AssertionError
+        urls = [line.url.format(told.readline().strip()) for _ in range(count)]
+        os.sched_setaffinity(0, cores[:1])
+        stack.callback(os.sched_setaffinity, 0, cores)
+        with ThreadPoolExecutor(count) as pool:  # some listen for a while at first
+            drivers = list(pool.map(open_driver, urls))
+        orders.write("\n")
+        orders.flush()
+        got, share = heard(drivers)
+        sent = int(told.readline())
+        for driver in drivers:
+            driver.close()
+        orders.write("\n")
+        orders.close()
     return sent, sent - min(got), share
 
 
@@ -104,9 +159,10 @@ def heard(drivers: list[Driver]) -> tuple[list[int], float]:
 def main() -> None:
     """Print, for each format, how many devices were carried, and what that took."""
     print(f"{'format':10} {'devices':>7} {'sent':>6} {'lost':>5}  of a core")
-    for name in FORMATS:
+    lines = {name: serial(name) for name in FORMATS}
+    for name, line in {**lines, "slcan": can(), "mavlink": autopilot()}.items():
         for count in COUNTS:
-            sent, lost, share = carried(name, count)
+            sent, lost, share = carried(line, count)
             print(f"{name:10} {count:7} {sent:6} {lost:5}  {100 * share:6.0f} %")
             if lost:
                 break

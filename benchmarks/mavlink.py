@@ -43,8 +43,8 @@ while True:
 """
 
 
-def stream(name: str, count: int = SAMPLES) -> tuple[bytes, bytes]:
-    """Return a heartbeat, and packets of the samples, one after the other."""
+def packets(name: str, count: int = SAMPLES) -> tuple[bytes, list[bytes]]:
+    """Return a heartbeat, and the packet of each sample."""
     from pymavlink.dialects.v20 import all as dialect
 
     rng = np.random.default_rng(1)
@@ -55,14 +55,18 @@ def stream(name: str, count: int = SAMPLES) -> tuple[bytes, bytes]:
         np.full(count, 25.0),
     )
     out = dialect.MAVLink(None, 1, 1)
-    packets = []
+    packed = []
     for message in messages(dialect, KINDS[name].identifier, sent):
-        packets.append(message.pack(out))
+        packed.append(message.pack(out))
         out.seq = (out.seq + 1) % 256
     # a program that is not known is asked for no parameters
-    return dialect.MAVLink_heartbeat_message(2, 0, 0, 0, 4, 3).pack(out), b"".join(
-        packets
-    )
+    return dialect.MAVLink_heartbeat_message(2, 0, 0, 0, 4, 3).pack(out), packed
+
+
+def stream(name: str, count: int = SAMPLES) -> tuple[bytes, bytes]:
+    """Return a heartbeat, and packets of the samples, one after the other."""
+    heartbeat, packed = packets(name, count)
+    return heartbeat, b"".join(packed)
 
 
 @contextmanager

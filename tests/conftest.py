@@ -1,4 +1,7 @@
-"""What every test needs: property tests that do not depend on the machine's speed."""
+"""What every test needs: property tests that do not depend on the machine's speed.
+
+And what many need, and nobody wants to wait for twice.
+"""
 
 import os
 import shutil
@@ -8,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from processes import Recalibrated, recalibrate
 
 # as the commands do: threads for small matrices only wait for each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -30,6 +34,12 @@ def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setenv("FIELDCAL_HISTORY", str(folder / "history.sqlite"))
         patch.setenv("XDG_DATA_HOME", str(folder))
         yield
+
+
+@pytest.fixture(scope="session")
+def recalibrated(tmp_path_factory: pytest.TempPathFactory) -> Recalibrated:
+    """A run of five positions on a tilted base."""
+    return recalibrate(tmp_path_factory.mktemp("run") / "session")
 
 
 SHARED = Path(__file__).parent.parent.parent / "shared"

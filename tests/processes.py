@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -36,3 +39,34 @@ def wait_for_samples(
     while not (file.exists() and file.stat().st_size > size):
         assert monotonic() < deadline and run.poll() is None
         sleep(0.02)
+
+
+@dataclass(frozen=True)
+class Recalibrated:
+    """What a user has of a run.
+
+    Attributes
+    ----------
+    folder : the session; whoever changes something in it makes a copy
+    result : what was printed
+    progress : what was said meanwhile, a line of JSON each
+
+    """
+
+    folder: Path
+    result: dict[str, Any]
+    progress: str
+
+    def copy(self, folder: Path) -> Path:
+        """The session in another folder."""
+        shutil.copytree(self.folder, folder)
+        return folder
+
+
+def recalibrate(folder: Path) -> Recalibrated:
+    """Five positions of a virtual device on a tilted base."""
+    call = [*RUN, "five_position", "--headless", "--virtual=--base-tilt=1,-1"]
+    call += ["--speed", "max", "--seed", "5", "--json", "-o", str(folder)]
+    done = subprocess.run(call, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return Recalibrated(folder, json.loads(done.stdout), done.stderr)

@@ -134,12 +134,13 @@ def test_what_cannot_be_given_back_is_named() -> None:
 
 def test_a_recording_keeps_what_is_installed(tmp_path: Path) -> None:
     place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5&acc_unit=mm/s^2"
-    with autopilot(place, "--speed", "50") as (where, _):
+    with autopilot(place, "--speed", "50") as (where, control):
+        order(control, turn={"alpha_deg": 45, "beta_deg": 5, "at_s": 100})
         command = [*RUN, "two_position", "--headless"]
         command += ["--seconds", "5", "-o", str(tmp_path / "session")]
         command += ["--device", f"mavlink:{where}?message=RAW_IMU&rate=100"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 1, done.stderr  # nobody turned it
+    assert done.returncode == 1, done.stderr  # nobody said how level the base is
     assert "asked for 100 Hz, got 100 Hz" in done.stderr
     first = (tmp_path / "session" / "marks.jsonl").read_text().splitlines()[0]
     mark = json.loads(first)

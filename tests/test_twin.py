@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from processes import Recalibrated
 from session_folders import SITE, places, recorded, write_session
 
 from fieldcal.cli import main
@@ -200,17 +201,16 @@ def test_positions_without_angles_are_replayed_where_they_were(
     assert said["twin"]["refitted"]["chi2_per_dof"] > 2
 
 
-def test_the_circle_closes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_circle_closes(
+    recalibrated: Recalibrated, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A device, its session, its twin, the twin's session: the same calibration."""
-    virtual = "--virtual=--base-tilt=1,-1 --acc-bias=0.3,-0.2,0.1 --gravity=9.81"
-    run = ["--headless", "--speed", "max", "--json", "--gravity", "9.81"]
-    run += ["--seconds", "20"]
-    first, second = tmp_path / "real", tmp_path / "twin"
-    assert main(["run", "five_position", virtual, *run, "-o", str(first)]) == 0
-    real = json.loads(capsys.readouterr().out)["parameters"]
+    first, second = recalibrated.copy(tmp_path / "real"), tmp_path / "twin"
+    real = recalibrated.result["parameters"]
     code, said, _ = diagnosed(first, capsys)
     assert code == 1 and [e["id"] for e in said["effects"]] == ["base_tilt"]
     twin = f"--virtual=--profile={first / 'twin.toml'}"
+    run = ["--headless", "--speed", "max", "--json", "--no-report", "--seconds", "20"]
     assert main(["run", "five_position", twin, *run, "-o", str(second)]) == 0
     again = json.loads(capsys.readouterr().out)["parameters"]
     for group in ("acc_bias", "acc_scale", "gyr_bias", "base_tilt"):

@@ -139,8 +139,7 @@ def test_killed_at_any_moment_the_session_holds_all_but_the_last_moment(
         # what waited in the reader at the kill had not reached the recorder yet, and
         # on a busy machine each of device, reader and recorder waits for its turn
         assert killed - block.t_host[-1] < 1.0 + 4 * late
-        code = main(["solve", str(folder)])
-        assert code in (0, 1, 2)
+        assert main(["solve", str(folder)]) in (1, 2), "two windows are never GO"
 
 
 def _slept(seconds: float) -> float:

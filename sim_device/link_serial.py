@@ -9,11 +9,9 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
-import pty
 import select
 import sys
 import termios
-import tty
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -21,6 +19,7 @@ from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Block
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
+from fieldcal.sim_device.pty_port import open_pty
 from fieldcal.sim_device.uart import heard, listens_at
 from fieldcal.sim_device.wire import Wire
 
@@ -156,14 +155,7 @@ class SerialLink(Link):
 
     def come_back(self) -> None:
         """Open a pty in raw mode, and point the symbolic link to it."""
-        try:
-            self._ours, theirs = pty.openpty()
-        except OSError as error:
-            raise DeviceError(f"no pty to be had: {error.strerror}") from error
-        tty.setraw(theirs)
-        self.port = os.ttyname(theirs)
-        os.close(theirs)
-        os.set_blocking(self._ours, False)
+        self._ours, self.port = open_pty()
         if self._port_link is not None:
             try:
                 _point(self._port_link, self.port)

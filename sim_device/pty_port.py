@@ -14,8 +14,30 @@ from fieldcal.errors import DeviceError
 HEARD = 1 << 16
 
 
+def open_pty() -> tuple[int, str]:
+    """Open a pty in raw mode: our side, which does not block, and the path of theirs.
+
+    Theirs is not held open, so the kernel tells whether a host is there.
+
+    Raises
+    ------
+    DeviceError
+        If there is no pty to be had.
+
+    """
+    try:
+        ours, theirs = pty.openpty()
+    except OSError as error:
+        raise DeviceError(f"no pty to be had: {error.strerror}") from error
+    tty.setraw(theirs)
+    path = os.ttyname(theirs)
+    os.close(theirs)
+    os.set_blocking(ours, False)
+    return ours, path
+
+
 class PtyPort:
-    """Our side of a pty; the host's is not held open, so the kernel tells who is there.
+    """Our side of a pty.
 
     Raises
     ------
@@ -25,15 +47,8 @@ class PtyPort:
     """
 
     def __init__(self) -> None:
-        try:
-            self._ours, theirs = pty.openpty()
-        except OSError as error:
-            raise DeviceError(f"no pty to be had: {error.strerror}") from error
-        tty.setraw(theirs)
-        self.address = os.ttyname(theirs)
+        self._ours, self.address = open_pty()
         self.place = (self.address, 0)
-        os.close(theirs)
-        os.set_blocking(self._ours, False)
 
     def fileno(self) -> int:
         """Return our side."""

@@ -146,7 +146,9 @@ def _broken_off(
     args: argparse.Namespace, task: Task, folder: Path, error: BaseException
 ) -> None:
     """Say what is kept, if anything was begun."""
-    if not os.path.exists(folder / "marks.jsonl"):  # False where nobody may look
+    from fieldcal.session import MARKS
+
+    if not os.path.exists(folder / MARKS):  # False where nobody may look
         return
     sys.stderr.write(
         f"what was recorded is kept in {folder}; to go on:"

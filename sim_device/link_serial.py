@@ -19,7 +19,7 @@ from fieldcal.errors import DeviceError, InputError
 from fieldcal.samples import Block
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
-from fieldcal.sim_device.pty_port import open_pty
+from fieldcal.sim_device.pty_port import forget, open_pty
 from fieldcal.sim_device.uart import heard, listens_at
 from fieldcal.sim_device.wire import Wire
 
@@ -142,9 +142,7 @@ class SerialLink(Link):
         self._out.clear()
         if self._heard:
             self._heard = False
-            theirs = os.open(self.port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-            termios.tcflush(theirs, termios.TCIFLUSH)
-            os.close(theirs)
+            forget(self.port)
 
     def hang_up(self) -> None:
         """Close the pty: the host reads an end of file or an error."""

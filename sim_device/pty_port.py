@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pty
 import select
+import termios
 import tty
 from collections import deque
 from contextlib import suppress
@@ -36,6 +37,13 @@ def open_pty() -> tuple[int, str]:
     return ours, path
 
 
+def forget(path: str) -> None:
+    """Drop what a host left unread when it went: the next one would hear its end."""
+    theirs = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    termios.tcflush(theirs, termios.TCIFLUSH)
+    os.close(theirs)
+
+
 class PtyPort:
     """Our side of a pty.
 
@@ -48,6 +56,7 @@ class PtyPort:
 
     def __init__(self) -> None:
         self._ours, self.address = open_pty()
+        self._heard = False
         self.place = (self.address, 0)
 
     def fileno(self) -> int:
@@ -70,7 +79,11 @@ class PtyPort:
         """Send what the pty takes; what nobody is there for is lost."""
         if not self.listens():
             parts.clear()
+            if self._heard:
+                self._heard = False
+                forget(self.address)
             return
+        self._heard = True
         with suppress(BlockingIOError):
             while parts:
                 sent = os.write(self._ours, parts[0])

@@ -1,8 +1,10 @@
 """An autopilot in another process, over UDP and TCP: samples, answers, and faults."""
 
 import json
+import os
 import socket
 import subprocess
+from collections import deque
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from threading import Thread
@@ -20,6 +22,7 @@ from fieldcal.driver import open_driver
 from fieldcal.drivers.mavlink_imu import Imu
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.samples import Block, concat
+from fieldcal.sim_device.pty_port import PtyPort
 
 BIAS, SCALE = np.array([0.2, -0.3, 0.1]), np.array([1.006, 0.992, 1.008])
 CONCEALED = ["--acc-bias=0.2,-0.3,0.1", "--acc-scale=1.006,0.992,1.008"]
@@ -250,6 +253,17 @@ def test_silence_and_spoilt_bytes() -> None:
             order(control, fault={"silence_s": 30.0})
             with pytest.raises(DeviceSilent, match="went silent for 0.5 s"):
                 list(imu.blocks(0.5))
+
+
+def test_a_host_that_goes_leaves_nothing_to_the_next() -> None:
+    port = PtyPort()
+    for said in (b"first", b"second"):
+        host = os.open(port.address, os.O_RDWR | os.O_NOCTTY)
+        port.write(deque([said * 2]))
+        assert os.read(host, len(said)) == said  # and half of it is left unread
+        os.close(host)
+        port.write(deque([b"nobody hears this"]))
+    port.close()
 
 
 def test_nobody_there_on_udp() -> None:

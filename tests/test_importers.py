@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
 
 from fieldcal import recording as recordings
+from fieldcal import sample_files
 from fieldcal.cli import main
-from fieldcal.errors import InputError
+from fieldcal.errors import InputError, SessionError
+from fieldcal.importing import bring_in
 from fieldcal.intake import Judge
 from fieldcal.integrity import findings
 from fieldcal.recording import Wanted, open_recording
@@ -417,3 +419,38 @@ def test_a_log_whose_format_calls_a_number_a_text_is_refused(tmp_path: Path) -> 
 
 def test_every_format_is_tried() -> None:
     assert set(SMALL) | {"wire"} == set(recordings.formats())
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, bytes]:
+    """Samples of a session that was imported, and its file."""
+    folder = tmp_path_factory.mktemp("kept")
+    n = 5000
+    six = np.random.default_rng(3).normal(0, 0.02, (n, 6)) + [0, 0, 9.8, 0, 0, 0]
+    block = Block.of(np.arange(n) / 100, six[:, :3], six[:, 3:])
+    _parquet(folder / "x.parquet", block)
+    recording = open_recording(folder / "x.parquet", Wanted())
+    bring_in(recording, "0", folder / "s", {"format": 1}, 2.0)
+    return block, (folder / "s" / "samples.parquet").read_bytes()
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_changed_bytes_of_an_imported_session_invent_no_sample(
+    data: st.DataObject,
+    kept: tuple[Block, bytes],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    block, whole = kept[0], bytearray(kept[1])
+    near_end = data.draw(st.booleans())
+    at = data.draw(st.integers(len(whole) - 4000 if near_end else 0, len(whole) - 1))
+    whole[at] ^= data.draw(st.integers(1, 255))
+    path = tmp_path_factory.mktemp("changed") / "samples.parquet"
+    path.write_bytes(whole)
+    try:
+        found, _ = sample_files.read(path)
+    except SessionError as error:
+        assert str(error).startswith(f"{path}: ")
+        return
+    for name in ("t", "six"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(block, name))

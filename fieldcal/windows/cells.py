@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.samples import Array, Block
+from fieldcal.windows.sums import channels, finest, warmth
 from fieldcal.windows.trend import line
 
 CELL = 0.1
@@ -179,9 +180,8 @@ class Cells:
 
     def _add(self, block: Block) -> None:
         x = self._centred(block)
-        whole = bool(np.isfinite(x).all())
-        if not whole:
-            x[~np.isfinite(x)] = np.nan
+        if np.isinf(x).any():
+            x[np.isinf(x)] = np.nan
         if not self.n:
             self.start = float(block.t[0])
         self.n += len(block)
@@ -191,9 +191,9 @@ class Cells:
         index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
         first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
         sums = np.empty((len(first), 32))
-        sums[:, :24] = (_all if whole else _known)(x[:, 1:], step, first)
-        sums[:, 24:26] = _warmth(block.temperature, first)
-        sums[:, 26:] = _finest(step, first)
+        sums[:, :24] = channels(x[:, 1:], step, first).reshape(-1, 24)
+        sums[:, 24:26] = warmth(block.temperature, first)
+        sums[:, 26:] = finest(step, first)
         self._append(index[first], sums)
 
     def _centred(self, block: Block) -> Array:
@@ -245,45 +245,6 @@ def _resolution(finest: Array) -> Array:
     """Smallest change on any axis of the same sensor; 0 where there was none."""
     sensor = np.repeat(finest.reshape(2, 3).min(axis=1), 3)
     return np.where(np.isfinite(sensor), sensor, 0.0)
-
-
-def _all(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
-    """n, S, D, m of cells, (m, 24), of samples (6, n) of which no value is missing."""
-    number = np.diff(first, append=x.shape[1])[:, None]
-    sums = np.empty((len(first), 24))
-    sums[:, 0:6] = sums[:, 18:24] = number
-    sums[:, 6:12] = np.add.reduceat(x, first, axis=1).T
-    sums[:, 12:18] = np.add.reduceat(step**2, first, axis=1).T
-    return sums
-
-
-def _known(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
-    """n, S, D, m of cells, (m, 24), of the values of samples (6, n) that are there."""
-    known, moved = np.isfinite(x), np.isfinite(step)
-    squares = np.where(moved, step, 0.0) ** 2
-    rows = np.vstack([known, np.where(known, x, 0.0), squares, moved])
-    sums: Array = np.add.reduceat(rows, first, axis=1).T
-    return sums
-
-
-def _finest(step: Array, first: NDArray[np.int64]) -> Array:
-    """Smallest change but none in each cell, (m, 6), of changes (6, n)."""
-    size = np.abs(step)
-    changed = size > 0
-    if not changed.all():
-        size[~changed] = np.inf
-    finest: Array = np.minimum.reduceat(size, first, axis=1).T
-    return finest
-
-
-def _warmth(temperature: Array, first: NDArray[np.int64]) -> Array:
-    """Sum and number of the temperatures of cells, (m, 2)."""
-    warm = np.isfinite(temperature)
-    if not warm.any():
-        return np.zeros((len(first), 2))
-    rows = np.column_stack([np.where(warm, temperature, 0.0), warm])
-    sums: Array = np.add.reduceat(rows, first, axis=0)
-    return sums
 
 
 def _ratio(sums: Array, counts: Array) -> Array:

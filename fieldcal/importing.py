@@ -83,7 +83,8 @@ class Facts:
         if self.coldest is not None:
             says.append(f"{self.coldest:.1f} to {self.warmest:.1f} °C")
         if self.gaps:
-            says.append(f"{self.gaps} gaps of up to {self.longest_gap_s:.3g} s")
+            many = f"{self.gaps} gaps of up to" if self.gaps > 1 else "a gap of"
+            says.append(f"{many} {self.longest_gap_s:.3g} s")
         return ", ".join(says)
 
     def table(self) -> dict[str, Any]:

@@ -158,15 +158,21 @@ def _bring(
     err = sys.stderr.write
     err(
         f"{folder}: {stream}: {brought.facts.sentence()},"
-        f" {len(brought.stretches)} still stretches of {args.still:g} s or more\n"
+        f" {_many(len(brought.stretches), 'still stretch', 'es')}"
+        f" of {args.still:g} s or more\n"
     )
     for sentence in brought.says:
         err(f"{folder}: {sentence}\n")
     if brought.facts.left_out:
-        err(f"{folder}: {brought.facts.left_out} rows were left out\n")
+        err(f"{folder}: left out: {_many(brought.facts.left_out, 'row', 's')}\n")
     if not brought.stretches:
         err(
             "no still stretch was found: write the positions into session.toml, or try"
             " --still with a shorter time\n"
         )
     sys.stdout.write(f"{folder}\n")
+
+
+def _many(number: int, what: str, ending: str) -> str:
+    """So many of something."""
+    return f"{number} {what}{ending if number != 1 else ''}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -145,7 +146,9 @@ def bring_in(
         try:
             brought = _fill(part, recording, stream, about, still)
             part.chmod(0o755)
+            _settle(*part.iterdir(), part)
             part.replace(folder)
+            _settle(folder.parent)
         except BaseException:
             shutil.rmtree(part, ignore_errors=True)
             raise
@@ -154,6 +157,16 @@ def bring_in(
             f"{folder}: cannot be written: {disk_says(error)}"
         ) from error
     return Brought(folder, *brought)
+
+
+def _settle(*paths: Path) -> None:
+    """See files and folders onto the disk: a power cut must leave no empty ones."""
+    for path in paths if os.name == "posix" else ():
+        there = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(there)
+        finally:
+            os.close(there)
 
 
 def _fill(

@@ -89,7 +89,7 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
         finite = math.isfinite(sigma)
         size = Cell(
             f"{sigma:.0f} σ" if finite else "beyond doubt",
-            bar=math.sqrt(min(sigma, most) / most) if finite else 1.0,
+            bar=math.sqrt(np.clip(sigma / most, 0.0, 1.0)) if finite else 1.0,
         )
         span = dict.fromkeys(f"{real(m.get(k)):.1f}" for k in ("from_s", "to_s"))
         cells.append(

@@ -148,6 +148,37 @@ def test_can_logs(tmp_path: Path, ending: str) -> None:
     same(found.block, imu(1), atol=6e-4)
 
 
+def test_can_logs_of_several_buses_are_never_mixed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "imu.dbc").write_text(dbc())
+    lines: list[str] = []
+    for bus in (0, 1):
+        can_log(tmp_path / f"{bus}.log", imu(bus))
+        text = (tmp_path / f"{bus}.log").read_text()
+        lines += text.replace("can0", f"can{bus}").splitlines()
+    path = tmp_path / "both.log"
+    path.write_text("\n".join(sorted(lines)))
+    options = f"dbc={tmp_path / 'imu.dbc'}&map={CAN_MAP}"
+    assert main(["import", str(path), "--options", options]) == 2
+    assert "come from the buses can0, can1: choose one" in capsys.readouterr().err
+    for bus in (0, 1):
+        chosen = f"{options}&channel=can{bus}"
+        found = session(tmp_path / f"s{bus}", str(path), "--options", chosen)
+        same(found.block, imu(bus), atol=6e-4)
+    none = f"{options}&channel=can7"
+    assert main(["import", str(path), "--options", none]) == 2
+    assert "comes from can7, but from can0, can1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("time", ["", "(1718000000.000000)", "(2024-06-10 12:00:00.0)"])
+def test_what_candump_prints_is_named(tmp_path: Path, time: str) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text(f" {time}  can0  123   [6]  00 00 00 00 52 26\n" * 50)
+    with pytest.raises(InputError, match="record with candump -l"):
+        open_recording(path, Wanted()).streams()
+
+
 @pytest.mark.parametrize("ending", [".npz", ".npy", ".mat", ".h5"])
 def test_arrays_of_any_kind(tmp_path: Path, ending: str) -> None:
     arrays(tmp_path / f"log{ending}", imu(1))

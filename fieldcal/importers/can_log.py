@@ -27,6 +27,9 @@ WHAT = "log of a CAN bus"
 PIECE = 8192
 """Frames looked at together."""
 
+FEW = 256
+"""Messages held at once: of more, the interpreter looks for garbage among them."""
+
 
 class Kind(NamedTuple):
     """A kind of log: how it begins, and what python-can calls its reader."""
@@ -125,30 +128,39 @@ class File(Recording):
         """
         from fieldcal.drivers.can_frames import pack_message
 
-        messages, seen, buses = self._messages(), 0, set()
+        messages, seen = self._messages(), 0
+        buses: set[Any] = set()
+        rows: list[bytes] = []
         while some := self._some(messages, seen):
             seen += len(some)
-            buses |= {str(m.channel) for m in some if m.arbitration_id in wanted}
+            if {m.channel for m in some} - buses:
+                buses |= {m.channel for m in some if m.arbitration_id in wanted}
             if channel:
                 some = [m for m in some if str(m.channel) == channel]
             elif len(buses) > 1:
+                names = sorted(map(str, buses))
                 raise InputError(
                     f"{self.path}: frames of the map come from the buses"
-                    f" {', '.join(sorted(buses))}: choose one in --options, such as"
-                    f" channel={max(buses)}"
+                    f" {', '.join(names)}: choose one in --options, such as"
+                    f" channel={names[-1]}"
                 )
-            if some:
-                yield [pack_message(message) for message in some]
-        if channel and channel not in buses:
+            rows += [pack_message(message) for message in some]
+            if len(rows) >= PIECE:
+                yield rows
+                rows = []
+        names = sorted(map(str, buses))
+        if channel and channel not in names:
             raise InputError(
                 f"{self.path}: no frame of the map comes from {channel}, but from"
-                f" {', '.join(sorted(buses)) or 'no bus'}: mend channel in --options"
+                f" {', '.join(names) or 'no bus'}: mend channel in --options"
             )
+        if rows:
+            yield rows
 
     def _some(self, messages: Iterator[Any], seen: int) -> list[Any]:
         """The frames that follow those `seen`."""
         try:
-            return list(islice(messages, PIECE))
+            return list(islice(messages, FEW))
         except InputError:
             raise
         except Exception as error:

@@ -196,10 +196,12 @@ def read_parquet(path: Path) -> None:
     pyarrow.parquet.read_table(path)
 
 
-def write_all(
-    folder: Path, rows: int
-) -> dict[str, tuple[Path, Callable[[Path], None], Wanted]]:
-    """Files of every format, what merely reads them, and what the user says of them."""
+Log = tuple[Path, Callable[[Path], None], Wanted]
+"""A file, what merely reads it, and what the user says of it."""
+
+
+def write_tables(folder: Path, rows: int) -> dict[str, Log]:
+    """Files of the formats that libraries read fastest."""
     import h5py
     import pyarrow as pa
     import pyarrow.parquet
@@ -207,21 +209,33 @@ def write_all(
 
     block = samples(rows)
     table = np.column_stack([block.t, block.six])
-    (folder / "imu.dbc").write_text(DBC)
-    (folder / "x.ulg").write_bytes(ulog(block))
-    (folder / "x.bin").write_bytes(dataflash(block))
     (folder / "x.csv").write_bytes(text(block))
-    write_tlog(folder / "x.tlog", block)
-    write_can(folder / "x.log", block)
-    write_can(folder / "x.blf", block)
-    write_mcap(folder / "x.mcap", block)
     with h5py.File(folder / "x.h5", "w") as file:
         file["imu"] = table
     savemat(folder / "x.mat", {"imu": table})
     columns = dict(zip(COLUMNS, table.T, strict=True))
     pyarrow.parquet.write_table(pa.table(columns), folder / "x.parquet")
+    named = Wanted(COLUMNS)
+    return {
+        "csv, numpy": (folder / "x.csv", read_text, named),
+        "matlab, scipy": (folder / "x.mat", read_matlab, named),
+        "hdf5, h5py": (folder / "x.h5", read_hdf5, named),
+        "parquet, pyarrow": (folder / "x.parquet", read_parquet, named),
+    }
+
+
+def write_all(folder: Path, rows: int) -> dict[str, Log]:
+    """Files of every format."""
+    block = samples(rows)
+    (folder / "imu.dbc").write_text(DBC)
+    (folder / "x.ulg").write_bytes(ulog(block))
+    (folder / "x.bin").write_bytes(dataflash(block))
+    write_tlog(folder / "x.tlog", block)
+    write_can(folder / "x.log", block)
+    write_can(folder / "x.blf", block)
+    write_mcap(folder / "x.mcap", block)
     bus = Wanted(options=f"dbc={folder / 'imu.dbc'}&map=ax=ax,ay=ay,az=az")
-    none, named = Wanted(), Wanted(COLUMNS)
+    none = Wanted()
     return {
         "ulog, pyulog": (folder / "x.ulg", read_ulog, none),
         "dataflash, pymavlink": (folder / "x.bin", read_dataflash, none),
@@ -229,8 +243,5 @@ def write_all(
         "mcap, mcap-ros2-support": (folder / "x.mcap", read_mcap, none),
         "candump, python-can": (folder / "x.log", read_can, bus),
         "blf, python-can": (folder / "x.blf", read_can, bus),
-        "csv, numpy": (folder / "x.csv", read_text, named),
-        "matlab, scipy": (folder / "x.mat", read_matlab, named),
-        "hdf5, h5py": (folder / "x.h5", read_hdf5, named),
-        "parquet, pyarrow": (folder / "x.parquet", read_parquet, named),
+        **write_tables(folder, rows),
     }

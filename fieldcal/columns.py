@@ -58,9 +58,11 @@ class Samples:
         wanted = self._wanted
 
         def triad(kind: str, scale: float) -> Array:
-            unknown = np.full(n, np.nan)
-            axes = [columns.get(kind + axis, unknown) for axis in "xyz"]
-            return scale * np.column_stack(axes)
+            table = np.full((n, 3), np.nan)
+            for i, axis in enumerate("xyz"):
+                if (kind + axis) in columns:
+                    np.multiply(columns[kind + axis], scale, out=table[:, i])
+            return table
 
         if "t" in columns:
             t = columns["t"] * wanted.time_scale

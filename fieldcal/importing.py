@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -83,7 +84,8 @@ class Facts:
         if self.coldest is not None:
             says.append(f"{self.coldest:.1f} to {self.warmest:.1f} °C")
         if self.gaps:
-            says.append(f"{self.gaps} gaps of up to {self.longest_gap_s:.3g} s")
+            many = f"{self.gaps} gaps of up to" if self.gaps > 1 else "a gap of"
+            says.append(f"{many} {self.longest_gap_s:.3g} s")
         return ", ".join(says)
 
     def table(self) -> dict[str, Any]:
@@ -144,7 +146,9 @@ def bring_in(
         try:
             brought = _fill(part, recording, stream, about, still)
             part.chmod(0o755)
+            _settle(*part.iterdir(), part)
             part.replace(folder)
+            _settle(folder.parent)
         except BaseException:
             shutil.rmtree(part, ignore_errors=True)
             raise
@@ -153,6 +157,16 @@ def bring_in(
             f"{folder}: cannot be written: {disk_says(error)}"
         ) from error
     return Brought(folder, *brought)
+
+
+def _settle(*paths: Path) -> None:
+    """See files and folders onto the disk: a power cut must leave no empty ones."""
+    for path in paths if os.name == "posix" else ():
+        there = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(there)
+        finally:
+            os.close(there)
 
 
 def _fill(

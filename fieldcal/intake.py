@@ -18,8 +18,8 @@ from fieldcal.errors import InputError
 from fieldcal.recording import MOST
 from fieldcal.samples import CHANNELS, Array, Block, concat
 
-GROUP = 1 << 16
-"""Rows of a row group."""
+FEWEST, GROUP = 1 << 13, 1 << 15
+"""Rows that are worth a row group, and the most in one."""
 
 Rows = NDArray[np.bool_]
 
@@ -95,8 +95,9 @@ class Judge:
             yield "t", "is no time", timeless
         for names, triad in ((CHANNELS[:3], block.acc), (CHANNELS[3:], block.gyr)):
             infinite = np.isinf(triad)
-            for i in np.flatnonzero(infinite.any(axis=0)):
-                yield names[i], "is infinite", infinite[:, i]
+            if infinite.any():
+                for i in np.flatnonzero(infinite.any(axis=0)):
+                    yield names[i], "is infinite", infinite[:, i]
 
     def _backwards(self, t: Array, bad: Rows) -> Rows:
         """Rows that are not later than all good ones before them."""
@@ -180,6 +181,7 @@ class Written:
             use_dictionary=False,
             use_byte_stream_split=True,
             write_statistics=False,
+            write_page_checksum=True,
         )
         self._waiting: list[Block] = []
         self._many = 0
@@ -192,18 +194,18 @@ class Written:
         """Take in the block that follows."""
         self._waiting.append(block)
         self._many += len(block)
-        if self._many >= GROUP:
-            self._put(self._many - self._many % GROUP)
+        if self._many >= FEWEST:
+            self._put()
 
-    def _put(self, rows: int) -> None:
-        """Write so many of the rows that wait, in groups."""
+    def _put(self) -> None:
+        """Write the rows that wait, in groups."""
         from fieldcal.sample_files import to_batch
 
         one = len(self._waiting) == 1
         whole = self._waiting[0] if one else concat(self._waiting)
-        self._waiting, self._many = [whole[rows:]], len(whole) - rows
-        for first in range(0, rows, GROUP):
-            part = whole[first : min(first + GROUP, rows)]
+        self._waiting, self._many = [], 0
+        for first in range(0, len(whole), GROUP):
+            part = whole[first : first + GROUP]
             self._writer.write_batch(to_batch(part), row_group_size=GROUP)
             self._groups.append((float(part.t[0]), float(part.t[-1])))
             self.rows += len(part)
@@ -211,7 +213,7 @@ class Written:
     def close(self) -> None:
         """Write what waits, and end the file."""
         if self._many:
-            self._put(self._many)
+            self._put()
         self._writer.close()
 
     @property
@@ -220,13 +222,13 @@ class Written:
         return self._groups[0][0], self._groups[-1][1]
 
     def between(self, start: float, end: float) -> Iterator[Block]:
-        """Samples with start <= t < end, of a file that was closed."""
+        """Times and channels with start <= t < end, of a file that was closed."""
         for i, (first, last) in enumerate(self._groups):
             if first < end and last >= start:
                 yield self._group(i).between(start, end)
 
     def _group(self, i: int) -> Block:
-        """Samples of a group of rows; stretches that follow each other are in one."""
+        """One group of rows; stretches that follow each other are in one."""
         import pyarrow.parquet
 
         from fieldcal.sample_files import from_table
@@ -235,7 +237,7 @@ class Written:
             self._file = pyarrow.parquet.ParquetFile(self._path, pre_buffer=False)
         if self._read[0] != i:
             # one thread: each of several would keep memory of its own
-            group = self._file.read_row_group(i, use_threads=False)
+            group = self._file.read_row_group(i, ("t", *CHANNELS), use_threads=False)
             self._read = (i, from_table(group))
         return self._read[1]
 

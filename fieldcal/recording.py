@@ -29,7 +29,7 @@ HEAD = 4096
 PIECE = 1 << 20
 """Bytes that are looked at together."""
 
-ROWS = 1 << 16
+ROWS = 1 << 15
 """Rows that are looked at together."""
 
 MOST = 12

@@ -14,6 +14,7 @@ from fieldcal.gravity import G0
 from fieldcal.importers.csv_like import File
 from fieldcal.intake import Judge
 from fieldcal.recording import Wanted as Layout
+from fieldcal.recording import open_recording
 from fieldcal.samples import Block, concat
 from fieldcal.session import Session
 
@@ -66,6 +67,42 @@ def test_units_counts_and_skipped_columns(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.rad2deg(got.gyr[:, :2]), [[1, 0], [0, 2]])
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("last", ["3,5", "nan", ""])
+def test_decimal_commas_are_read_and_told(
+    tmp_path: Path, separator: str, last: str
+) -> None:
+    rows = [["x", "y", "z"], ["-1,25", "2,5e1", "3"], ["4", "0,5", last]]
+    path = file(tmp_path, "\n".join(separator.join(r) for r in rows))
+    recording = File(path, Layout(ACC, rate_hz=1))
+    got = concat(recording.blocks("0")).acc
+    third = 3.5 if last == "3,5" else np.nan
+    np.testing.assert_array_equal(got, [[-1.25, 25, 3], [4, 0.5, third]])
+    assert recording.says == ["its numbers have decimal commas"]
+
+
+@pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
+def test_a_mark_of_utf_8_costs_no_row(tmp_path: Path, ends: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(ends.join(["1,2,3", "4,5,6", ""]).encode("utf-8-sig"))
+    got = read(path, Layout(ACC, rate_hz=1))
+    np.testing.assert_array_equal(got.acc, [[1, 2, 3], [4, 5, 6]])
+
+
+def test_utf_16_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes("1,2,3\n4,5,6\n".encode("utf-16"))
+    with pytest.raises(InputError, match="UTF-16: save it as UTF-8"):
+        concat(open_recording(path, Layout(ACC, rate_hz=1)).blocks("0"))
+
+
+@pytest.mark.parametrize("cut", [2, 3, 4])
+def test_a_last_line_that_is_not_whole_is_named(tmp_path: Path, cut: int) -> None:
+    path = file(tmp_path, "1,2,3\n4,5,6\n7,8,9"[:-cut])
+    with pytest.raises(InputError, match="line 3: has [12] columns, not 3"):
+        read(path, Layout(ACC, rate_hz=1))
+
+
 def test_a_gz_is_read_as_such(tmp_path: Path) -> None:
     path = tmp_path / "log.gz"
     path.write_bytes(gzip.compress(b"1 2 3\n4 5 6\n"))
@@ -78,8 +115,8 @@ def test_a_gz_is_read_as_such(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "layout", "says"),
     [
-        ("", Layout(ACC, 1), "holds no row of numbers"),
-        ("one two three\n", Layout(ACC, 1), "holds no row of numbers"),
+        ("", Layout(ACC, 1), "no line has numbers"),
+        ("one two three\n", Layout(ACC, 1), "no line has numbers"),
         ("1,2\n", Layout(ACC, 1), "has 2 columns, 3 are named"),
         ("1,2,3\n1,x,3\n", Layout(ACC, 1), "'x'"),
         ("1,2,3\n", Layout(ACC), "give the rate"),

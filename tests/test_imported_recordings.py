@@ -161,7 +161,7 @@ def test_rows_never_filled_are_refused_or_left_out(
     facts = imported(tmp_path / "s")
     assert (facts["rows"], facts["left_out"]) == (6280, 720)
     assert "row 6281 to row 7000" in facts["repairs"][0]
-    assert "720 rows were left out" in capsys.readouterr().err
+    assert "left out: 720 rows" in capsys.readouterr().err
 
 
 def test_what_px4_had_installed_comes_along(tmp_path: Path) -> None:

@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
 
 from fieldcal import recording as recordings
+from fieldcal import sample_files
 from fieldcal.cli import main
-from fieldcal.errors import InputError
+from fieldcal.errors import InputError, SessionError
+from fieldcal.importing import bring_in
 from fieldcal.intake import Judge
 from fieldcal.integrity import findings
 from fieldcal.recording import Wanted, open_recording
@@ -144,6 +146,37 @@ def test_can_logs(tmp_path: Path, ending: str) -> None:
     options = f"dbc={tmp_path / 'imu.dbc'}&map={CAN_MAP}"
     found = session(tmp_path / "s", str(tmp_path / "drive.dat"), "--options", options)
     same(found.block, imu(1), atol=6e-4)
+
+
+def test_can_logs_of_several_buses_are_never_mixed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "imu.dbc").write_text(dbc())
+    lines: list[str] = []
+    for bus in (0, 1):
+        can_log(tmp_path / f"{bus}.log", imu(bus))
+        text = (tmp_path / f"{bus}.log").read_text()
+        lines += text.replace("can0", f"can{bus}").splitlines()
+    path = tmp_path / "both.log"
+    path.write_text("\n".join(sorted(lines)))
+    options = f"dbc={tmp_path / 'imu.dbc'}&map={CAN_MAP}"
+    assert main(["import", str(path), "--options", options]) == 2
+    assert "come from the buses can0, can1: choose one" in capsys.readouterr().err
+    for bus in (0, 1):
+        chosen = f"{options}&channel=can{bus}"
+        found = session(tmp_path / f"s{bus}", str(path), "--options", chosen)
+        same(found.block, imu(bus), atol=6e-4)
+    none = f"{options}&channel=can7"
+    assert main(["import", str(path), "--options", none]) == 2
+    assert "comes from can7, but from can0, can1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("time", ["", "(1718000000.000000)", "(2024-06-10 12:00:00.0)"])
+def test_what_candump_prints_is_named(tmp_path: Path, time: str) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text(f" {time}  can0  123   [6]  00 00 00 00 52 26\n" * 50)
+    with pytest.raises(InputError, match="record with candump -l"):
+        open_recording(path, Wanted()).streams()
 
 
 @pytest.mark.parametrize("ending", [".npz", ".npy", ".mat", ".h5"])
@@ -417,3 +450,38 @@ def test_a_log_whose_format_calls_a_number_a_text_is_refused(tmp_path: Path) -> 
 
 def test_every_format_is_tried() -> None:
     assert set(SMALL) | {"wire"} == set(recordings.formats())
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, bytes]:
+    """Samples of a session that was imported, and its file."""
+    folder = tmp_path_factory.mktemp("kept")
+    n = 5000
+    six = np.random.default_rng(3).normal(0, 0.02, (n, 6)) + [0, 0, 9.8, 0, 0, 0]
+    block = Block.of(np.arange(n) / 100, six[:, :3], six[:, 3:])
+    _parquet(folder / "x.parquet", block)
+    recording = open_recording(folder / "x.parquet", Wanted())
+    bring_in(recording, "0", folder / "s", {"format": 1}, 2.0)
+    return block, (folder / "s" / "samples.parquet").read_bytes()
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_changed_bytes_of_an_imported_session_invent_no_sample(
+    data: st.DataObject,
+    kept: tuple[Block, bytes],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    block, whole = kept[0], bytearray(kept[1])
+    near_end = data.draw(st.booleans())
+    at = data.draw(st.integers(len(whole) - 4000 if near_end else 0, len(whole) - 1))
+    whole[at] ^= data.draw(st.integers(1, 255))
+    path = tmp_path_factory.mktemp("changed") / "samples.parquet"
+    path.write_bytes(whole)
+    try:
+        found, _ = sample_files.read(path)
+    except SessionError as error:
+        assert str(error).startswith(f"{path}: ")
+        return
+    for name in ("t", "six"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(block, name))

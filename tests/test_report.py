@@ -339,5 +339,9 @@ def test_a_long_stretch_at_rest_shows_its_allan_deviation(tmp_path: Path) -> Non
     text = render(gather(tmp_path))
     assert "Allan deviation, accelerometers" in text
     # white noise of 0.01 at 100 Hz: 0.001 over 1 s
-    shown = re.findall(r">(0\.00\d+) m/s²<", text)
-    assert shown and float(shown[0]) == pytest.approx(0.001, rel=0.1)
+    shown = re.findall(r">(0\.00\d+) ± (0\.0000\d+) m/s²<", text)
+    assert shown
+    error, width = map(float, shown[0])
+    assert error == pytest.approx(0.001, rel=0.1)
+    # from the 119 differences of successive means, more as they overlap
+    assert 0.03 < width / error < 0.12

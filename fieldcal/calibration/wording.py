@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 TITLES = {
     "acc_bias": "acc bias",
@@ -50,3 +51,18 @@ def pretty(unit: str) -> str:
     """
     raised = unit.replace("^2", "²").replace("^3", "³").replace("sqrt(s)", "√s")
     return "" if raised == "1" else raised.replace("degC", "°C")
+
+
+def ranges(numbers: Iterable[int]) -> str:
+    """Numbers with runs of them shortened.
+
+    >>> ranges((0, 1, 2, 5, 7, 8))
+    '0–2, 5, 7–8'
+    """
+    parts: list[list[int]] = []
+    for n in sorted(numbers):
+        if parts and n == parts[-1][1] + 1:
+            parts[-1][1] = n
+        else:
+            parts.append([n, n])
+    return ", ".join(f"{a}–{b}" if b > a else f"{a}" for a, b in parts)

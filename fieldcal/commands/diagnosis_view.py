@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import IO, TYPE_CHECKING
 
+from fieldcal.calibration.wording import ranges
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.quality import UNITS
 from fieldcal.diagnosis.result import Found, Mismatch
 from fieldcal.diagnosis.words import said
+from fieldcal.samples import CHANNELS
+from fieldcal.samples import UNITS as CHANNEL_UNITS
 
 if TYPE_CHECKING:
     from fieldcal.twin import Rerun
@@ -21,6 +24,9 @@ STYLES = {
 
 WIDEST = 8
 """Cells of the bar that shows how significant a mismatch is."""
+
+BRIEF = 5.0
+"""Stretches shorter than this are told to a tenth of a second, s."""
 
 
 def show(
@@ -50,38 +56,41 @@ def _mismatch(mismatch: tuple[Mismatch, ...]) -> object:
     from rich.table import Table
 
     table = Table(title="Where the two part", title_justify="left", box=SIMPLE_HEAD)
-    for name in ("channel", "follows", "positions", "time s"):
-        table.add_column(name, no_wrap=name in ("channel", "time s"), min_width=7)
+    for name in ("channel", "follows", "positions", "time, s"):
+        table.add_column(name, no_wrap=name == "time, s", min_width=7)
     table.add_column("rms", justify="right", no_wrap=True)
     table.add_column("σ", no_wrap=True)
     most = max((m.sigma for m in mismatch if m.sigma < float("inf")), default=1.0)
-    for m in mismatch:
+    for names, m in _alike(mismatch):
         finite = m.sigma < float("inf")
         bar = "█" * max(1, round(WIDEST * (min(m.sigma, most) / most) ** 0.5))
+        digits = 0 if m.to_s - m.from_s >= BRIEF else 1
+        span = dict.fromkeys(f"{t:.{digits}f}" for t in (m.from_s, m.to_s))
         table.add_row(
-            m.channel,
+            " ".join(names),
             m.kind if m.covariate in (m.kind, "") else f"{m.kind}: {m.covariate}",
             ranges(m.positions),
-            f"{m.from_s:.0f}–{m.to_s:.0f}",
-            f"{m.rms:.3g}",
+            "–".join(span),
+            _rms(names, m.rms),
             f"{bar} {m.sigma:.0f}" if finite else bar,
         )
     return table
 
 
-def ranges(numbers: tuple[int, ...]) -> str:
-    """Numbers with runs of them shortened.
+def _alike(mismatch: tuple[Mismatch, ...]) -> list[tuple[list[str], Mismatch]]:
+    """What differs in the channel only, together."""
+    found: dict[object, tuple[list[str], Mismatch]] = {}
+    for m in mismatch:
+        place = (m.kind, m.positions, m.from_s, m.to_s, m.covariate)
+        names, _ = found.setdefault((*place, m.rms, m.sigma), ([], m))
+        names.append(m.channel)
+    return list(found.values())
 
-    >>> ranges((0, 1, 2, 5, 7, 8))
-    '0–2, 5, 7–8'
-    """
-    parts: list[list[int]] = []
-    for n in sorted(numbers):
-        if parts and n == parts[-1][1] + 1:
-            parts[-1][1] = n
-        else:
-            parts.append([n, n])
-    return ", ".join(f"{a}–{b}" if b > a else f"{a}" for a, b in parts)
+
+def _rms(names: list[str], rms: float) -> str:
+    """Size of a residual with its unit; sensors with different units have no common."""
+    units = {CHANNEL_UNITS[CHANNELS.index(n)] if n in CHANNELS else "" for n in names}
+    return f"{rms:.3g} {units.pop()}".strip() if len(units) == 1 else "–"
 
 
 def _heading(found: Found) -> str:

@@ -12,7 +12,7 @@ from fieldcal.commands.site import add_site, site_tables
 from fieldcal.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.recording import Recording, Wanted
+    from fieldcal.recording import Recording, Stream, Wanted
 
 EXAMPLE = """\
   fieldcal import log.csv --columns t,ax,ay,az,gx,gy,gz --acc-unit g --gyr-unit deg/s
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
         for stream in names:
             # what was said of one IMU of the file is no matter of another
             recording.says, recording.mended = list(says), list(mended)
-            inner = re.sub(r"[^\w.-]+", "_", stream).strip("_")
+            inner = re.sub(r"[^\w.-]+", "_", stream.name).strip("_")
             _bring(
                 args, recording, stream, folder / inner if len(names) > 1 else folder
             )
@@ -131,19 +131,19 @@ def _list(opened: list[Recording]) -> int:
     return 0
 
 
-def _chosen(recording: Recording, wanted: list[str]) -> list[str]:
-    """Names of the streams that are brought in."""
-    there = [stream.name for stream in recording.streams()]
+def _chosen(recording: Recording, wanted: list[str]) -> list[Stream]:
+    """Return the streams that are brought in."""
+    there = {stream.name: stream for stream in recording.streams()}
     for name in wanted:
         if name not in there:
             raise InputError(
                 f"{recording.path}: has no {name}; there are {', '.join(there)}"
             )
-    return wanted or there
+    return [there[name] for name in wanted or there]
 
 
 def _bring(
-    args: argparse.Namespace, recording: Recording, stream: str, folder: Path
+    args: argparse.Namespace, recording: Recording, stream: Stream, folder: Path
 ) -> None:
     from fieldcal.importing import bring_in
 
@@ -154,19 +154,25 @@ def _bring(
         about["units"] = kept
     if args.rate:
         about["sampling"] = {"rate_hz": args.rate}
-    brought = bring_in(recording, stream, folder, about, args.still)
+    brought = bring_in(recording, stream.name, folder, about, args.still)
     err = sys.stderr.write
     err(
-        f"{folder}: {stream}: {brought.facts.sentence()},"
-        f" {len(brought.stretches)} still stretches of {args.still:g} s or more\n"
+        f"{folder}: {stream.name}, {stream.says}: {brought.facts.sentence()},"
+        f" {_many(len(brought.stretches), 'still stretch', 'es')}"
+        f" of {args.still:g} s or more\n"
     )
     for sentence in brought.says:
         err(f"{folder}: {sentence}\n")
     if brought.facts.left_out:
-        err(f"{folder}: {brought.facts.left_out} rows were left out\n")
+        err(f"{folder}: left out: {_many(brought.facts.left_out, 'row', 's')}\n")
     if not brought.stretches:
         err(
             "no still stretch was found: write the positions into session.toml, or try"
             " --still with a shorter time\n"
         )
     sys.stdout.write(f"{folder}\n")
+
+
+def _many(number: int, what: str, ending: str) -> str:
+    """So many of something."""
+    return f"{number} {what}{ending if number != 1 else ''}"

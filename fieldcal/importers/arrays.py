@@ -24,6 +24,9 @@ WHAT = "arrays: MATLAB, HDF5, NumPy"
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 MATLAB = b"MATLAB 5.0 MAT-file"
+WIDEST = 64
+"""Columns of a table that are read together."""
+
 NPZ, NPY = b"PK\x03\x04", b"\x93NUMPY"
 
 
@@ -171,12 +174,34 @@ def _hdf5(path: Path, stack: ExitStack) -> dict[str, Table]:
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf":
-            table = _table(item.shape, lambda key: np.asarray(item[key]))
+            table = _table(item.shape, _slabs(item))
             if table and not name.startswith("#"):
                 found[name] = table
 
     file.visititems(visit)
     return found
+
+
+def _slabs(item: Any) -> Callable[[Any], Array]:
+    """Read all columns together, though they are asked for one by one.
+
+    They lie side by side in the file, and are often packed together.
+    """
+    held: dict[str, Any] = {"rows": None}
+
+    def get(key: Any) -> Array:
+        if len(item.shape) == 1 or min(item.shape) > WIDEST:
+            return np.asarray(item[key])
+        rows = next(part for part in key if isinstance(part, slice))
+        if held["rows"] != rows:
+            whole = tuple(rows if part == rows else slice(None) for part in key)
+            held.update(rows=rows, slab=np.asarray(item[whole]))
+        found: Array = held["slab"][
+            tuple(slice(None) if part == rows else part for part in key)
+        ]
+        return found
+
+    return get
 
 
 def _matlab(path: Path) -> dict[str, Table]:

@@ -2,7 +2,8 @@
 
 ``--options "dbc=imu.dbc&map=ax=Accel.X,…"`` says what is in the frames, as in a
 device's address, see `can_map`. Where the frames carry no time, that of the bus counts,
-as it was logged.
+as it was logged. A log of several buses, of which more than one has such frames, is of
+several IMUs: ``channel=can1`` says which is meant.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ WHAT = "log of a CAN bus"
 PIECE = 8192
 """Frames looked at together."""
 
+FEW = 256
+"""Messages held at once: of more, the interpreter looks for garbage among them."""
+
 
 class Kind(NamedTuple):
     """A kind of log: how it begins, and what python-can calls its reader."""
@@ -43,10 +47,13 @@ KINDS = (
     Kind("trc", re.compile(rb"\s*;(\$FILEVERSION|#+)"), "TRCReader"),
 )  # fmt: skip
 
+PRINTED = re.compile(rb"\s*(\([\d. :-]+\))?\s*\w+\s+[0-9A-Fa-f]+\s+\[\d+\]\s")
+"""A line as candump shows it on a terminal."""
+
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether a file begins like a log."""
-    return any(kind.begins.match(head) for kind in KINDS)
+    return any(p.match(head) for p in (*(kind.begins for kind in KINDS), PRINTED))
 
 
 class File(Recording):
@@ -58,6 +65,11 @@ class File(Recording):
 
     def streams(self) -> list[Stream]:
         """Return the one IMU that the map describes."""
+        with unpacked(self.path) as file:
+            if PRINTED.match(file.read(256)):
+                raise InputError(
+                    f"{self.path}: is what candump prints; record with candump -l"
+                )
         options = Options("options", self.wanted.options)
         names = [part.name for part in self._parts(options)]
         return [Stream("0", f"frames {', '.join(names)}, units of the dbc")]
@@ -78,14 +90,16 @@ class File(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, some frames at a time."""
-        from fieldcal.drivers.can_frames import FRAME
+        from fieldcal.drivers.can_frames import EXTENDED, FRAME
         from fieldcal.drivers.can_groups import CanHealth
         from fieldcal.drivers.can_stamped import Stamped
 
         options, health = Options("options", self.wanted.options), CanHealth()
-        samples = Stamped(self._parts(options), health, options)
+        parts, channel = self._parts(options), options.text("channel")
+        samples = Stamped(parts, health, options)
         options.finish()
-        for rows in self._rows():
+        wanted = {part.identifier & ~EXTENDED for part in parts}
+        for rows in self._rows(wanted, channel):
             frames = np.frombuffer(b"".join(rows), FRAME)
             block = samples.feed(frames, frames["t"])
             if block is not None:
@@ -95,34 +109,66 @@ class File(Recording):
                 f"{self.path}: not one whole sample is in it, of {health.strange} other"
                 " frames; check dbc, map and first"
             )
-        if health.incomplete or health.bad or health.errors:
-            self.says.append(
-                f"{health.incomplete} samples lack a frame, {health.bad} frames are "
-                f"too short or say that nothing was measured, {health.errors} are "
-                "error frames"
-            )
+        counts = {
+            "samples that lack a frame": health.incomplete,
+            "frames that are too short or say that nothing was measured": health.bad,
+            "error frames": health.errors,
+        }
+        if found := [f"{what} ({n})" for what, n in counts.items() if n]:
+            self.says.append(f"left out: {', '.join(found)}")
 
-    def _rows(self) -> Iterator[list[bytes]]:
-        """Frames as rows, many at a time."""
+    def _rows(self, wanted: set[int], channel: str) -> Iterator[list[bytes]]:
+        """Frames of one bus as rows, many at a time.
+
+        Raises
+        ------
+        InputError
+            If those `wanted` come from several buses, and none is chosen.
+
+        """
         from fieldcal.drivers.can_frames import pack_message
 
-        messages = self._messages()
-        seen = 0
-        while True:
-            try:
-                rows = [pack_message(message) for message in islice(messages, PIECE)]
-            except InputError:
-                raise
-            except Exception as error:
-                # the readers of the several formats raise what they like
+        messages, seen = self._messages(), 0
+        buses: set[Any] = set()
+        rows: list[bytes] = []
+        while some := self._some(messages, seen):
+            seen += len(some)
+            if {m.channel for m in some} - buses:
+                buses |= {m.channel for m in some if m.arbitration_id in wanted}
+            if channel:
+                some = [m for m in some if str(m.channel) == channel]
+            elif len(buses) > 1:
+                names = sorted(map(str, buses))
                 raise InputError(
-                    f"{self.path}: cannot be read behind frame {seen}: {error}; copy it"
-                    " again from where it came"
-                ) from error
-            if not rows:
-                return
-            seen += len(rows)
+                    f"{self.path}: frames of the map come from the buses"
+                    f" {', '.join(names)}: choose one in --options, such as"
+                    f" channel={names[-1]}"
+                )
+            rows += [pack_message(message) for message in some]
+            if len(rows) >= PIECE:
+                yield rows
+                rows = []
+        names = sorted(map(str, buses))
+        if channel and channel not in names:
+            raise InputError(
+                f"{self.path}: no frame of the map comes from {channel}, but from"
+                f" {', '.join(names) or 'no bus'}: mend channel in --options"
+            )
+        if rows:
             yield rows
+
+    def _some(self, messages: Iterator[Any], seen: int) -> list[Any]:
+        """The frames that follow those `seen`."""
+        try:
+            return list(islice(messages, FEW))
+        except InputError:
+            raise
+        except Exception as error:
+            # the readers of the several formats raise what they like
+            raise InputError(
+                f"{self.path}: cannot be read behind frame {seen}: {error}; copy it"
+                " again from where it came"
+            ) from error
 
     def _messages(self) -> Iterator[Any]:
         import can

@@ -20,12 +20,19 @@ import numpy as np
 from fieldcal import columns
 from fieldcal.arrow_stream import numbers
 from fieldcal.errors import InputError
-from fieldcal.recording import Recording, Stream, pieces
+from fieldcal.recording import HEAD, Recording, Stream, pieces
 from fieldcal.samples import Array, Block
 
 WHAT = "text with columns"
 
-SEPARATORS = (",", ";", "\t")
+SEPARATORS = (";", "\t", ",")
+"""Between columns; a comma in a line with one of the others is a decimal comma."""
+
+MARK = b"\xef\xbb\xbf"
+"""What some programs write before UTF-8."""
+
+WIDE = (b"\xff\xfe", b"\xfe\xff")
+"""What UTF-16 begins with."""
 
 TOP = 1000
 """Lines at the top among which the first of numbers is looked for."""
@@ -37,9 +44,14 @@ TEXT = 0.95
 def recognises(head: bytes, path: Path) -> bool:
     """Whether these are the first bytes of a text."""
     if b"\0" in head:
-        return False
+        return _is_wide(head)
     plain = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
     return plain >= TEXT * len(head)
+
+
+def _is_wide(head: bytes) -> bool:
+    """Whether this is UTF-16: every second byte of plain text is 0."""
+    return head.startswith(WIDE) and head.count(0) > len(head) / 3
 
 
 class File(Recording):
@@ -74,9 +86,10 @@ class File(Recording):
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != columns.SKIP]
         samples, separator, seen = columns.Samples(self.wanted), None, 0
-        begun, t0 = False, None
+        begun, t0, top = False, None, [""]
         for data in self._pieces():
             if not begun:
+                top = _top(data)[:2]
                 self._skip, begun = self._heading(_top(data), use), True
                 data = _behind(data, self._skip) if self._skip >= 0 else b""
                 if not data.strip():
@@ -84,6 +97,8 @@ class File(Recording):
                 first = _top(data)[0]
                 separator = self.wanted.separator or _separator(first)
                 self._check_width(first, separator)
+                if separator != "," and "," in first:
+                    self.says.append("its numbers have decimal commas")
             table = self._table(data, use, separator, seen)
             n = len(table[0])
             seen += n
@@ -96,13 +111,18 @@ class File(Recording):
             yield replace(block, t=block.t - t0)
         if not seen:
             raise InputError(
-                f"{self.path}: holds no row of numbers; is it a text file?"
+                f"{self.path}: no line has numbers in the columns"
+                f" {','.join(names)}; line {len(top)} is {top[-1][:60]!r}: name each"
+                " column in its order, _ for one that is not wanted"
             )
 
     def _pieces(self) -> Iterator[bytes]:
         """Whole lines of the file, many at a time."""
-        rest = b""
+        rest, mark = b"", MARK
         for data in pieces(self.path):
+            if mark and _is_wide(data[:HEAD]):
+                raise InputError(f"{self.path}: is text in UTF-16: save it as UTF-8")
+            data, mark = data.removeprefix(mark), b""
             whole, newline, rest = (rest + data).rpartition(b"\n")
             if newline and whole.strip():
                 yield whole
@@ -121,7 +141,8 @@ class File(Recording):
             cells = [c.strip() for c in line.split(separator)]
             wanted = [cells[j] for j in use if j < len(cells)]
             whole = separator is None or len(cells) == full or len(cells) == width
-            if whole and any(wanted) and all(_is_number(c) for c in wanted if c):
+            comma = separator != ","
+            if whole and any(wanted) and all(_is_number(c, comma) for c in wanted if c):
                 return i
         return -1
 
@@ -148,12 +169,17 @@ class File(Recording):
         how: dict[str, Any] = {"delimiter": separator, "ndmin": 2, "comments": None}
         if not every:
             how["usecols"] = use
+        if separator != ",":
+            lines = [line.replace(",", ".") for line in lines]
         try:
-            return list(np.loadtxt(lines, **how).T)
+            table = list(np.loadtxt(lines, **how).T)
         except ValueError:
+            table = []
+        if len(table) != len(use):
             rows = [self._row(n, line, separator) for n, line in enumerate(lines, seen)]
             whole = [row for row in rows if row]
-            return list(np.array(whole, dtype=float).reshape(-1, len(use)).T)
+            table = list(np.array(whole, dtype=float).reshape(-1, len(use)).T)
+        return table
 
     def _row(self, number: int, line: str, separator: str | None) -> list[float]:
         """Numbers of one line, the slow way; nothing of one that is left out."""
@@ -184,15 +210,19 @@ def _plain(
     import pyarrow as pa
     import pyarrow.csv
 
+    comma = separator != "," and b"," in data[: data.find(b"\n")]
     names = [str(i) for i in range(width)]
     wanted = [names[i] for i in use]
     try:
         table = pyarrow.csv.read_csv(
             pa.BufferReader(data),
-            pyarrow.csv.ReadOptions(use_threads=False, column_names=names),
+            pyarrow.csv.ReadOptions(
+                use_threads=False, column_names=names, block_size=len(data) + 1
+            ),
             pyarrow.csv.ParseOptions(delimiter=separator, quote_char=False),
             pyarrow.csv.ConvertOptions(
                 column_types=dict.fromkeys(wanted, pa.float64()),
+                decimal_point="," if comma else ".",
                 include_columns=wanted,
                 null_values=[""],
             ),
@@ -231,9 +261,10 @@ def _width(line: str, separator: str | None) -> int:
     return len(line.split(separator))
 
 
-def _is_number(cell: str) -> bool:
+def _is_number(cell: str, comma: bool) -> bool:
+    """Whether a cell is a number, where a comma is a decimal comma or no part of it."""
     try:
-        float(cell)
+        float(cell.replace(",", ".") if comma else cell)
     except ValueError:
         return False
     return True

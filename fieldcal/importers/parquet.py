@@ -68,7 +68,8 @@ class File(Recording):
                     opened = pyarrow.parquet.ParquetFile(file)
                     names = opened.schema_arrow.names
                     wanted = [n for n in self._named(names).values()]
-                    yield names, opened.iter_batches(ROWS, columns=wanted)
+                    one = {"columns": wanted, "use_threads": False}
+                    yield names, opened.iter_batches(ROWS, **one)
                 elif magic == FEATHER:
                     feather = pa.ipc.open_file(file)
                     many = range(feather.num_record_batches)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.calibration.wording import TITLES, number, pretty
+from fieldcal.calibration.wording import TITLES, number, pretty, ranges
 from fieldcal.report import evidence
 from fieldcal.report.blocks import (
     Block,
@@ -33,8 +33,16 @@ from fieldcal.report.blocks import (
 )
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
-from fieldcal.report.loose import Json, list_at, objects_at, real, shown, table_at
-from fieldcal.samples import CHANNELS
+from fieldcal.report.loose import (
+    Json,
+    alike,
+    list_at,
+    objects_at,
+    real,
+    shown,
+    table_at,
+)
+from fieldcal.samples import CHANNELS, UNITS
 
 MOST = 10
 """Rows of the mismatch that are shown; the rest can be opened."""
@@ -76,34 +84,41 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
     sigmas = [real(m.get("sigma")) for m in rows]
     most = max((s for s in sigmas if math.isfinite(s)), default=1.0) or 1.0
     cells: list[list[str | Cell]] = []
-    for m, sigma in zip(rows, sigmas, strict=True):
+    for names, m in alike(rows, "channel"):
+        sigma = real(m.get("sigma"))
         finite = math.isfinite(sigma)
         size = Cell(
             f"{sigma:.0f} σ" if finite else "beyond doubt",
-            bar=math.sqrt(min(sigma, most) / most) if finite else 1.0,
+            bar=math.sqrt(np.clip(sigma / most, 0.0, 1.0)) if finite else 1.0,
         )
-        span = f"{real(m.get('from_s')):.1f} – {real(m.get('to_s')):.1f}"
+        span = dict.fromkeys(f"{real(m.get(k)):.1f}" for k in ("from_s", "to_s"))
         cells.append(
             [
-                str(m.get("channel", "")),
+                " ".join(names),
                 str(m.get("kind", "")),
-                ", ".join(str(p) for p in list_at(m, "positions")),
-                span,
+                ranges(p for p in list_at(m, "positions") if isinstance(p, int)),
+                " – ".join(span),
                 str(m.get("covariate", "")),
-                f"{real(m.get('rms')):.3g}",
+                _rms(names, real(m.get("rms"))),
                 size,
             ]
         )
-    columns: tuple[str, ...] = (
+    columns = (
         "channel",
         "kind",
         "positions",
         "time, s",
         "follows",
         ">rms",
+        ">significance",
     )
-    columns += (">significance",)
     return folded("Where recording and simulation part", columns, cells, MOST)
+
+
+def _rms(names: Sequence[str], rms: float) -> str:
+    """Size of a residual with its unit; sensors with different units have no common."""
+    units = {pretty(UNITS[CHANNELS.index(n)]) if n in CHANNELS else "" for n in names}
+    return f"{rms:.3g} {units.pop()}".strip() if len(units) == 1 else "–"
 
 
 def _effects(effects: Sequence[Json]) -> Block:

@@ -109,7 +109,8 @@ def next_steps(found: Json) -> list[Block]:
     """What to do in the field now."""
     said = found.get("next")
     given = [said] if isinstance(said, str) else list_at(found, "next")
-    rows: list[list[str | Cell]] = [["", str(text)] for text in given if text]
+    once = dict.fromkeys(str(text) for text in given if text)
+    rows: list[list[str | Cell]] = [["", text] for text in once]
     rows += _cures(found)
     rows += [["to tell", text] for text in _decisions(found)] if not given else []
     return [table("What to do next", ("for", "do"), rows)] if rows else []

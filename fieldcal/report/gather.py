@@ -75,8 +75,9 @@ class Material:
         return f"device time − {self.epoch:.0f}" if self.epoch else "device time"
 
     def position_name(self, row: int) -> str:
-        """Name of a position with its number."""
-        return f"{row} · {self.session.positions[row].name}"
+        """Number of a position, and its name where it has one."""
+        name = self.session.positions[row].name
+        return f"{row}" if name == f"position {row}" else f"{row} · {name}"
 
 
 def gather(folder: Path | str, earlier: Iterable[Earlier] = ()) -> Material:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 Json = Mapping[str, Any]
@@ -24,6 +25,20 @@ def list_at(document: Json, key: str) -> list[Any]:
 def objects_at(document: Json, key: str) -> list[Json]:
     """The objects of the list under a key."""
     return [item for item in list_at(document, key) if isinstance(item, Mapping)]
+
+
+def alike(rows: Sequence[Json], but: str) -> list[tuple[list[str], Json]]:
+    """Objects that differ in one key only, together: all its values, and the first.
+
+    >>> alike([{"at": 1, "of": "x"}, {"at": 1, "of": "y"}, {"at": 2, "of": "x"}], "of")
+    [(['x', 'y'], {'at': 1, 'of': 'x'}), (['x'], {'at': 2, 'of': 'x'})]
+    """
+    found: dict[str, tuple[list[str], Json]] = {}
+    for row in rows:
+        rest = json.dumps({k: v for k, v in row.items() if k != but}, sort_keys=True)
+        values, _ = found.setdefault(rest, ([], row))
+        values.append(str(row.get(but, "")))
+    return list(found.values())
 
 
 def real(value: object) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.calibration.wording import number
 from fieldcal.errors import InputError
 from fieldcal.report.blocks import Block as Part
 from fieldcal.report.blocks import Figure, Section, Table, Text, table
@@ -96,19 +97,18 @@ def _chart(
 
 def _table(found: AllanDeviation) -> Table:
     rows = []
-    one = found.sigma_of_mean(1.0)
+    one, second = found.sigma_of_mean(1.0), int(np.argmin(np.abs(found.tau - 1.0)))
+    half = (found.high - found.low) / 2
     for i, name in enumerate(CHANNELS):
         if not np.isfinite(found.deviation[:, i]).any():
             continue
         unit = "m/s²" if i < 3 else "rad/s"
         k = int(np.nanargmin(found.deviation[:, i]))
-        least = found.deviation[k, i]
-        width = (found.high[k, i] - found.low[k, i]) / 2
         rows.append(
             [
                 name,
-                f"{one[i]:.2g} {unit}",
-                f"{least:.2g} ± {width:.1g} {unit}",
+                f"{' ± '.join(number(one[i], half[second, i]))} {unit}",
+                f"{' ± '.join(number(found.deviation[k, i], half[k, i]))} {unit}",
                 f"{found.tau[k]:.0f} s",
             ]
         )

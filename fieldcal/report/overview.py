@@ -28,6 +28,13 @@ WIDEST = 30.0
 """Change in standard uncertainties that fills its bar."""
 
 
+UNSTEADY = 0.2
+"""Part by which two ways to tell the rate differ if the times come in bursts."""
+
+GAP = 5.0
+"""Periods without a sample that are a gap."""
+
+
 @dataclass(frozen=True, slots=True)
 class Head:
     """What stands on top of the page."""
@@ -43,9 +50,10 @@ class Head:
 def head(material: Material) -> Head:
     """Name of the device, verdict and the facts one looks for first."""
     about, found = material.session.about, material.calibration
-    name = str(about.device.get("name") or material.session.folder.resolve().name)
+    folder = material.session.folder.resolve().name
+    name = str(about.device.get("name") or folder)
     serial = about.device.get("serial")
-    under = [material.session.folder.resolve().name]
+    under = [folder] if folder != name else []
     under += [f"serial {serial}"] if serial else []
     verdict, tone, says = _verdict(found)
     return Head(name, " · ".join(under), verdict, tone, says, _facts(material))
@@ -99,9 +107,21 @@ def _rate(t: Array) -> str:
     if len(t) < 2:
         return "a single sample"
     steps = np.diff(t)
-    gaps = int((steps > 5 * np.median(steps)).sum())
+    rate = 1 / float(np.median(steps))
+    usual = _in_a_second(t)
+    if abs(rate / usual - 1) > UNSTEADY:
+        # the times come in bursts: most steps are short, and tell nothing of the rate
+        rate = (len(t) - 1) / float(t[-1] - t[0])
+    gaps = int((steps > GAP / rate).sum())
     holes = f", {gaps} gap{'s' * (gaps > 1)}" if gaps else ", no gap"
-    return f"{1 / float(np.median(steps)):.4g} Hz{holes}"
+    return f"{rate:.4g} Hz{holes}"
+
+
+def _in_a_second(t: Array) -> float:
+    """Samples in a usual second, Hz; of a slow device, in the time of some samples."""
+    width = max(1.0, 20 * float(np.median(np.diff(t))))
+    counts = np.bincount(((t - t[0]) / width).astype(int))
+    return float(np.median(counts[:-1] if len(counts) > 1 else counts)) / width
 
 
 def calibration(material: Material) -> Section | None:

@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.samples import Array, Block
+from fieldcal.windows.sums import channels, finest, warmth
 from fieldcal.windows.trend import line
 
 CELL = 0.1
 """Length of a cell, s."""
 
-_CHUNK = 2048
+_CHUNK = 4096
 """Samples summed at a time, so that what is in hand stays in the processor's cache."""
 
 _COARSE = 0.6
@@ -153,7 +154,7 @@ class Cells:
         self.n = 0
         self.start = self.end = np.nan
         self._origin = np.full(6, np.nan)
-        self._last = np.full((1, 6), np.nan)
+        self._last = np.full(6, np.nan)
         self._size = 0
         self._index = np.zeros(64, dtype=np.int64)
         self._sums = np.zeros((64, 32))
@@ -178,35 +179,38 @@ class Cells:
             self._add(block[first : first + _CHUNK])
 
     def _add(self, block: Block) -> None:
-        six = block.six
-        whole = bool(np.isfinite(six).all())
-        x = self._centred(six if whole else np.where(np.isfinite(six), six, np.nan))
+        x = self._centred(block)
+        if np.isinf(x).any():
+            x[np.isinf(x)] = np.nan
         if not self.n:
             self.start = float(block.t[0])
         self.n += len(block)
         self.end = float(block.t[-1])
-        step = np.empty_like(x)
-        np.subtract(x[:1], self._last, out=step[:1])
-        np.subtract(x[1:], x[:-1], out=step[1:])
-        whole = whole and bool(np.isfinite(self._last).all())
-        self._last = x[-1:]
+        self._last = x[:, -1]
+        step = x[:, 1:] - x[:, :-1]
         index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
         first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
         sums = np.empty((len(first), 32))
-        sums[:, :24] = (_all if whole else _known)(x, step, first)
-        sums[:, 24:26] = _warmth(block.temperature, first)
-        size = np.abs(step)
-        finest = np.where(size > 0, size, np.inf)
-        np.minimum.reduceat(finest, first, axis=0, out=sums[:, 26:])
+        sums[:, :24] = channels(x[:, 1:], step, first).reshape(-1, 24)
+        sums[:, 24:26] = warmth(block.temperature, first)
+        sums[:, 26:] = finest(step, first)
         self._append(index[first], sums)
 
-    def _centred(self, six: Array) -> Array:
+    def _centred(self, block: Block) -> Array:
+        """Values less the origin behind the one before, (6, 1 + n).
+
+        A channel lies in one piece: sums over it take half the time.
+        """
         for channel in np.flatnonzero(np.isnan(self._origin)):
-            known = np.flatnonzero(~np.isnan(six[:, channel]))
+            triad = block.acc if channel < 3 else block.gyr
+            known = np.flatnonzero(np.isfinite(triad[:, channel % 3]))
             if known.size:
-                self._origin[channel] = six[known[0], channel]
-        centred: Array = six - self._origin
-        return centred
+                self._origin[channel] = triad[known[0], channel % 3]
+        x = np.empty((6, 1 + len(block)))
+        x[:, 0] = self._last
+        np.subtract(block.acc.T, self._origin[:3, None], out=x[:3, 1:])
+        np.subtract(block.gyr.T, self._origin[3:, None], out=x[3:, 1:])
+        return x
 
     def _append(self, index: NDArray[np.int64], sums: Array) -> None:
         if self._size and self._index[self._size - 1] == index[0]:
@@ -241,35 +245,6 @@ def _resolution(finest: Array) -> Array:
     """Smallest change on any axis of the same sensor; 0 where there was none."""
     sensor = np.repeat(finest.reshape(2, 3).min(axis=1), 3)
     return np.where(np.isfinite(sensor), sensor, 0.0)
-
-
-def _all(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
-    """n, S, D, m of cells, (m, 24), of samples of which no value is missing."""
-    number = np.diff(first, append=len(x))[:, None]
-    sums = np.empty((len(first), 24))
-    sums[:, 0:6] = sums[:, 18:24] = number
-    np.add.reduceat(x, first, axis=0, out=sums[:, 6:12])
-    np.add.reduceat(step**2, first, axis=0, out=sums[:, 12:18])
-    return sums
-
-
-def _known(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
-    """n, S, D, m of cells, (m, 24), of the values that are there."""
-    known, moved = np.isfinite(x), np.isfinite(step)
-    squares = np.where(moved, step, 0.0) ** 2
-    rows = np.hstack([known, np.where(known, x, 0.0), squares, moved])
-    sums: Array = np.add.reduceat(rows, first, axis=0)
-    return sums
-
-
-def _warmth(temperature: Array, first: NDArray[np.int64]) -> Array:
-    """Sum and number of the temperatures of cells, (m, 2)."""
-    warm = np.isfinite(temperature)
-    if not warm.any():
-        return np.zeros((len(first), 2))
-    rows = np.column_stack([np.where(warm, temperature, 0.0), warm])
-    sums: Array = np.add.reduceat(rows, first, axis=0)
-    return sums
 
 
 def _ratio(sums: Array, counts: Array) -> Array:

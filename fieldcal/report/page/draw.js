@@ -99,10 +99,15 @@ function frame(svg, plot, box, yAxis, range, last) {
   }
   el(svg, "rect", { class: "axis", x: box.x, y: box.y, width: box.w, height: box.h, fill: "none" });
   if (last) el(svg, "text", { x: box.x + box.w / 2, y: box.y + box.h + 36, "text-anchor": "middle" }, axisName(plot.spec.x, columns.factor));
-  for (const m of plot.spec.marks) {
+  // a name that would lie on another waits until one zooms in
+  let free = box.x + 70;
+  for (const m of [...plot.spec.marks].sort((a, b) => a.at - b.at)) {
     if (!inside(plot.u(m.at))) continue;
     el(svg, "line", { class: "mark", x1: px(plot.u(m.at)), x2: px(plot.u(m.at)), y1: box.y, y2: box.y + box.h });
-    if (box.first) el(svg, "text", { class: "mark-name", x: px(plot.u(m.at)) + 4, y: box.y + 12 }, m.label);
+    const x = px(plot.u(m.at)) + 4;
+    if (!box.first || x < free) continue;
+    el(svg, "text", { class: "mark-name", x, y: box.y + 12 }, m.label);
+    free = x + 7 * m.label.length;
   }
   return { px, py, factor: rows.factor };
 }

@@ -1,0 +1,66 @@
+"""Sums over the samples of each cell, for all cells of a stretch of samples at once.
+
+    n = number of values x                 S = sum of x about an origin
+    m = number of changes d between successive values      D = sum of d^2
+
+A channel lies in one piece, (c, n) of c channels, and `first` says with which sample
+each of the m cells begins. A nan is a missing value and enters no sum.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.samples import Array
+
+
+def channels(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
+    """n, S, D, m of cells, (m, 4, 6), of samples and their changes, (6, n) each."""
+    if np.isfinite(step).all():
+        return _all(x, step, first)
+    sums = np.zeros((len(first), 4, 6))
+    for sensor in (slice(0, 3), slice(3, 6)):
+        if np.isfinite(step[sensor]).all():
+            sums[..., sensor] = _all(x[sensor], step[sensor], first)
+        elif np.isfinite(x[sensor]).any():
+            sums[..., sensor] = _known(x[sensor], step[sensor], first)
+    return sums
+
+
+def _all(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
+    """n, S, D, m of cells, (m, 4, c), of c channels of which no value is missing."""
+    sums = np.empty((len(first), 4, len(x)))
+    sums[:, ::3] = np.diff(first, append=x.shape[1])[:, None, None]
+    sums[:, 1] = np.add.reduceat(x, first, axis=1).T
+    sums[:, 2] = np.add.reduceat(step**2, first, axis=1).T
+    return sums
+
+
+def _known(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
+    """n, S, D, m of cells, (m, 4, c), of the values of c channels that are there."""
+    known, moved = np.isfinite(x), np.isfinite(step)
+    squares = np.where(moved, step, 0.0) ** 2
+    rows = np.vstack([known, np.where(known, x, 0.0), squares, moved])
+    sums = np.add.reduceat(rows, first, axis=1).T
+    return sums.reshape(-1, 4, len(x))
+
+
+def finest(step: Array, first: NDArray[np.int64]) -> Array:
+    """Smallest change but none in each cell, (m, 6), of changes (6, n)."""
+    size = np.abs(step)
+    changed = size > 0
+    if not changed.all():
+        size[~changed] = np.inf
+    least: Array = np.minimum.reduceat(size, first, axis=1).T
+    return least
+
+
+def warmth(temperature: Array, first: NDArray[np.int64]) -> Array:
+    """Sum and number of the temperatures of cells, (m, 2)."""
+    warm = np.isfinite(temperature)
+    if not warm.any():
+        return np.zeros((len(first), 2))
+    rows = np.column_stack([np.where(warm, temperature, 0.0), warm])
+    sums: Array = np.add.reduceat(rows, first, axis=0)
+    return sums

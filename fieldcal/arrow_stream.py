@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 MARKER = b"\xff\xff\xff\xff"
 """What every message of a stream begins with; messages begin at multiples of 8."""
 
+OURS = {"crc32", "number", "row"}
+"""What a batch says of itself; a stream of another program says none of it."""
+
 END = MARKER + b"\0\0\0\0"
 """What a stream that was closed in order ends with."""
 
@@ -268,7 +271,7 @@ class _Decoder:
         return end
 
     def _take(self, batch: Any, said: dict[str, str]) -> None:
-        if "crc32" not in said:
+        if not OURS & said.keys() and not self._expected:
             self._checked = False
             self._batches.append(batch)
             return

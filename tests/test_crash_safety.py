@@ -117,6 +117,16 @@ def test_changed_bytes_cost_their_batch_and_invent_nothing(
         assert found.says
 
 
+@pytest.mark.parametrize("name", [b"crc32", b"number"])
+def test_a_batch_whose_checksum_lost_its_name_is_damaged(
+    name: bytes, session: Path
+) -> None:
+    whole = (session / "samples.arrows").read_bytes()
+    found = decode(whole.replace(name, b"x" + name[1:], 1), sample_files.schema())
+    assert len(found.batches) == BATCHES - 1
+    assert "is damaged and left out" in found.says[0]
+
+
 def test_what_stands_behind_a_damaged_batch_is_read(
     session: Path, sizes: list[int], tmp_path: Path
 ) -> None:

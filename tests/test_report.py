@@ -24,11 +24,20 @@ from fieldcal.report import Earlier, Material, gather, packing, render
 from fieldcal.report.agreement import correlations
 from fieldcal.report.blocks import Figure
 from fieldcal.report.cures import CURES
-from fieldcal.report.packing import Columns, pack, quantised, unquantised
+from fieldcal.report.packing import MISSING, PIECE, Columns, pack, quantised
 from fieldcal.report.residuals import reached, residuals
 from fieldcal.samples import Array
 
 HOSTILE = "</script><script>hacked=1</script><img src=x onerror=hacked=1>\"'&{{7*7}}"
+
+
+def unquantised(packed: dict[str, str]) -> Array:
+    """Values back from `quantised`, (n,), as the page reads them."""
+    q = np.frombuffer(base64.b64decode(packed["q"]), "<u2")
+    scale = np.frombuffer(base64.b64decode(packed["scale"]), "<f4").reshape(-1, 2)
+    piece = np.arange(len(q)) // PIECE
+    offset, step = scale.astype(float)[piece].T
+    return np.where(q == MISSING, np.nan, offset + step * q)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.model import Term
-from fieldcal.effects import Effect, Motion, Scatter, Sensor, catalogue
+from fieldcal.effects import Effect, Motion, Sensor, catalogue
 from fieldcal.samples import CHANNELS, Array
 
 TURNS = ("lever_arm", "time_delay")
@@ -142,8 +142,3 @@ def instants(bench: Bench) -> Array:
     t = bench.rows.x.t
     middle: Array = (t[1:] + t[:-1]) / 2
     return middle
-
-
-def scatters() -> tuple[Scatter, ...]:
-    """The random effects of the catalogue."""
-    return tuple(e for e in catalogue().values() if isinstance(e, Scatter))

@@ -55,12 +55,6 @@ class Errors:
     parts: tuple[Part, ...] = ()
     setting: float = 0.0
 
-    def sized(self, kind: str, channel: int) -> float:
-        """V of a part, zero where there is none."""
-        return sum(
-            p.size for p in self.parts if p.kind == kind and p.channel == channel
-        )
-
     def but(self, parts: tuple[Part, ...]) -> Errors:
         """The same with some parts put in place of those of their kind and channel."""
         new = {(p.kind, p.channel) for p in parts}

@@ -138,15 +138,6 @@ def quantised(values: Array) -> dict[str, str]:
     return {"q": _text(q.ravel()[:n]), "scale": _text(scale)}
 
 
-def unquantised(packed: dict[str, str]) -> Array:
-    """Values back from `quantised`, (n,), as the page reads them."""
-    q = np.frombuffer(base64.b64decode(packed["q"]), "<u2")
-    scale = np.frombuffer(base64.b64decode(packed["scale"]), "<f4").reshape(-1, 2)
-    piece = np.arange(len(q)) // PIECE
-    offset, step = scale.astype(float)[piece].T
-    return np.where(q == MISSING, np.nan, offset + step * q)
-
-
 def around(instants: Sequence[float], seconds: float) -> list[tuple[float, float]]:
     """Stretches of `seconds` about each instant."""
     return [(at - seconds / 2, at + seconds / 2) for at in instants]

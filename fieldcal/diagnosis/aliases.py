@@ -30,7 +30,7 @@ SEVERAL = 3
 SAME, PART = 2 * CLOSE, 0.1
 """Squares that a rival may leave more, at most this part of what is explained."""
 
-PLAUSIBLE = 3.0
+PLAUSIBLE = 10.0
 """Typical sizes that its values may have then."""
 
 TELLING = 5.0

@@ -28,8 +28,8 @@ from fieldcal.samples import CHANNELS, Array, Block
 STEADY = 0.65
 """Part of the energy that one amplitude and phase must take to be a line."""
 
-LASTS = 0.2
-"""Part of it that lies in either half of the windows at least."""
+LASTS, CHANCE = 0.2, 3.0
+"""Part of it in either half of the windows at least, but for so many sigmas."""
 
 EXTRA = 6.9
 """Of ln 1000: what a line has to be worth beyond the frequencies tried."""
@@ -129,7 +129,9 @@ def _lasts(pieces: Pieces, tone: Tone) -> bool:
         line = np.real(wave_of(t, tone.hz)[:, None] * one)
         fallen = (((2 * s - line) * line / pieces.noise**2)[:, clear]).sum(axis=1)
         taken += [part.sum() for part in np.array_split(fallen, 2)]
-    return bool(taken.min() > LASTS * taken.sum())
+    # half of E varies by 2 sqrt(E / 2)
+    chance = CHANCE * 2 * np.sqrt(max(float(taken.sum()), 0.0) / 2)
+    return bool(taken.min() + chance > LASTS * taken.sum())
 
 
 def _share(pieces: Pieces, tone: Tone, moments: _Moments) -> float:

@@ -127,7 +127,7 @@ class Bump(Chain):
             for a, b in disturbed(z, shortest):
                 if b - a > LONGEST_S * rate:
                     continue
-                if _steady(piece / noise, (int(a), int(b)), shortest, rate):
+                if _steady(piece / noise, usual(z), (int(a), int(b)), rate):
                     continue
                 out.append(_fault(recording, t, int(first), int(a), int(b), z, rate))
         return out
@@ -149,10 +149,10 @@ def _quick(piece: Array, rate: float) -> Array:
     return out
 
 
-def _steady(z: Array, stretch: tuple[int, int], shortest: int, rate: float) -> bool:
+def _steady(z: Array, spread: Array, stretch: tuple[int, int], rate: float) -> bool:
     """Whether the level only jumps there, or fades from the window's start.
 
-    `z` is (n, 6) in standard deviations.
+    `z` is (n, 6) in standard deviations, `spread` (6,) what is usual in the window.
     """
     a, b = stretch
     around = round(AROUND_S * rate)
@@ -160,8 +160,12 @@ def _steady(z: Array, stretch: tuple[int, int], shortest: int, rate: float) -> b
     courses = [_jump(near, around // 2)]
     if a < around:
         courses += [_fading(near, tau * rate) for tau in FADES_S]
-    rest = (near - c for c in courses if c is not None)
-    return any(len(disturbed(r, shortest)) == 0 for r in rest)
+    rest = [near - c for c in courses if c is not None]
+    shortest = max(2, round(0.1 * rate))
+    return any(
+        (usual(r) < SHAKEN * spread).all() and len(disturbed(r, shortest)) == 0
+        for r in rest
+    )
 
 
 def _jump(z: Array, margin: int) -> Array | None:

@@ -21,7 +21,9 @@ from fieldcal.frames import earth_rate_home, force_home
 from fieldcal.positions import angles
 from fieldcal.samples import CHANNELS, Array, Block
 
-MENDING = ("mounting", "decode_fault")
+MENDING = ("decode_fault", "mounting")
+"""In this order: a channel with wrong bytes looks like one of another axis."""
+
 MASKING = ("saturation", "stuck", "bump")
 NOTING = ("quantisation", "dropped", "clock_skew", "noise_level")
 

@@ -160,13 +160,12 @@ def _searched(
 
 def _jump(prepared: Prepared, search: Search, model: Model) -> float | None:
     """When the biases jumped, s, if they did."""
-    for hypothesis, term in model.chosen:
+    for term in model.fit.terms:
         if "at_s" in term.shape:
-            less = search.without(model, hypothesis.effect.id)
-            at, _ = jump_instant(
+            less = search.without(model, term.effect.id)
+            return jump_instant(
                 prepared.source, model.bench, less.fit, model.fit, term
-            )
-            return at
+            )[0]
     return None
 
 

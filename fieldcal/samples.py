@@ -16,6 +16,16 @@ CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 UNITS = ("m/s^2",) * 3 + ("rad/s",) * 3
 
 
+def common_unit(names: Iterable[str]) -> str | None:
+    """Unit that channels share, "" for what is no channel; None if they share none.
+
+    >>> common_unit(["ax", "az"]), common_unit(["t"]), common_unit(["ax", "gx"])
+    ('m/s^2', '', None)
+    """
+    units = {UNITS[CHANNELS.index(n)] if n in CHANNELS else "" for n in names}
+    return units.pop() if len(units) == 1 else None
+
+
 @dataclass(frozen=True, slots=True)
 class Block:
     """Consecutive samples of one IMU, uncalibrated; nan where a value is unknown.

@@ -9,8 +9,7 @@ from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.quality import UNITS
 from fieldcal.diagnosis.result import Found, Mismatch
 from fieldcal.diagnosis.words import said
-from fieldcal.samples import CHANNELS
-from fieldcal.samples import UNITS as CHANNEL_UNITS
+from fieldcal.samples import common_unit
 
 if TYPE_CHECKING:
     from fieldcal.twin import Rerun
@@ -89,8 +88,8 @@ def _alike(mismatch: tuple[Mismatch, ...]) -> list[tuple[list[str], Mismatch]]:
 
 def _rms(names: list[str], rms: float) -> str:
     """Size of a residual with its unit; sensors with different units have no common."""
-    units = {CHANNEL_UNITS[CHANNELS.index(n)] if n in CHANNELS else "" for n in names}
-    return f"{rms:.3g} {units.pop()}".strip() if len(units) == 1 else "–"
+    unit = common_unit(names)
+    return "–" if unit is None else f"{rms:.3g} {unit}".strip()
 
 
 def _heading(found: Found) -> str:

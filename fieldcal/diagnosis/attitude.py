@@ -90,6 +90,16 @@ def blur(t: Array, w: Array, each: int, noise: Array) -> float:
     return float(np.sqrt(max(apart - chance, 0.0)) / 3)
 
 
+def vee(matrix: Array) -> Array:
+    """Vectors v of the antisymmetric parts [v]x of matrices (..., 3, 3), (..., 3).
+
+    >>> vee(np.array([[0.0, -3.0, 2.0], [3.0, 0.0, -1.0], [-2.0, 1.0, 0.0]]))
+    array([1., 2., 3.])
+    """
+    part = (matrix - np.swapaxes(matrix, -1, -2)) / 2
+    return np.stack([part[..., 2, 1], part[..., 0, 2], part[..., 1, 0]], axis=-1)
+
+
 def accelerations(t: Array, w: Array) -> Array:
     """Angular acceleration at the edges, from means over `SMOOTH_S`."""
     step = float(t[1] - t[0])
@@ -125,11 +135,8 @@ def geometry(
     if x.oriented[[p, q]].all():
         known = x.mounting.T @ turn(x.alpha[[p, q]], x.beta[[p, q]])
         off = attitude[-1].T @ known[1] @ known[0].T  # I + [phi]x
-        vee = np.array(
-            [off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]]
-        )
         if (np.trace(off) - 1) / 2 > np.cos(ASTRAY):
-            return f, vee / 2, np.eye(3)
+            return f, vee(off), np.eye(3)
     up = x.f[p] / np.linalg.norm(x.f[p])
     seen = attitude[-1].T @ x.f[q]
     return f, np.cross(up, seen / np.linalg.norm(seen)), np.eye(3) - np.outer(up, up)

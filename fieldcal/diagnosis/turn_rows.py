@@ -29,8 +29,9 @@ from fieldcal.samples import Array
 STEP = 1.0
 """Of the differences that the design is made of, in standard deviations."""
 
-BUILT_UP, BUILDS_S = 0.5, 2.0
-"""How far what settles may be off on the way, in its size, and how smoothly, s."""
+BUILT_UP, AFTERWARDS, BUILDS_S = 0.5, 0.15, 2.0
+"""How far what settles may be off on the way and at its end, in its size, and how
+smoothly, s."""
 
 SHAPE_STEP = 0.1
 """And for a time constant at most this part of it."""
@@ -149,7 +150,7 @@ class TurnRows:
         rest = np.isfinite(turn.x.since_turn)
         k = int(np.argmax(rest)) if rest.any() else len(turn.t) - 1
         arrived = turn.t[k] - (turn.x.since_turn[k] if rest.any() else 0.0) - turn.t[0]
-        unsure = np.where(middle < arrived + ARRIVAL_S, BUILT_UP, BUILT_UP * ARRIVAL_S)
+        unsure = np.where(middle < arrived + ARRIVAL_S, BUILT_UP, AFTERWARDS)
         apart = np.subtract.outer(middle, middle) / BUILDS_S
         out: Array = np.outer(unsure, unsure) * np.exp(-(apart**2) / 2)
         return out

@@ -42,7 +42,7 @@ from fieldcal.report.loose import (
     shown,
     table_at,
 )
-from fieldcal.samples import CHANNELS, UNITS
+from fieldcal.samples import CHANNELS, common_unit
 
 MOST = 10
 """Rows of the mismatch that are shown; the rest can be opened."""
@@ -117,8 +117,8 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
 
 def _rms(names: Sequence[str], rms: float) -> str:
     """Size of a residual with its unit; sensors with different units have no common."""
-    units = {pretty(UNITS[CHANNELS.index(n)]) if n in CHANNELS else "" for n in names}
-    return f"{rms:.3g} {units.pop()}".strip() if len(units) == 1 else "–"
+    unit = common_unit(names)
+    return "–" if unit is None else f"{rms:.3g} {pretty(unit)}".strip()
 
 
 def _effects(effects: Sequence[Json]) -> Block:

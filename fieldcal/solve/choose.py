@@ -11,7 +11,7 @@ scale factor where the grade is navigation.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
@@ -78,14 +78,7 @@ def solve(
     >>> result.method, np.round(result.vector("acc_scale")[0], 4).tolist()
     ('two_position', [1.0, 1.0, 1.0])
     """
-    if method not in METHODS or tilt not in TILTS:
-        raise InputError(
-            f"method {method!r} with tilt {tilt!r} is unknown: methods are "
-            f"{join(METHODS)}, tilts are {join(TILTS)}"
-        )
-    for degrees in (level_sigma_deg, heading_sigma_deg, angle_sigma_deg):
-        if degrees is not None and not 0 <= degrees < 90:
-            raise InputError(f"an uncertainty of {degrees:g}° is none: give 0 to 90°")
+    _check(method, tilt, (level_sigma_deg, heading_sigma_deg, angle_sigma_deg))
     if angle_sigma_deg:
         observations = loosely_set(observations, angle_sigma_deg)
 
@@ -112,6 +105,18 @@ def solve(
             notes.append(f"the accelerometers are not calibrated: {error}")
     good = acc is None or acc.dof <= 0 or acc.chi2 / acc.dof < WRONG
     return combine(chosen, observations, acc, gyroscopes_by(acc), notes, good)
+
+
+def _check(method: str, tilt: str, sigmas_deg: Iterable[float | None]) -> None:
+    """Refuse arguments that are none."""
+    if method not in METHODS or tilt not in TILTS:
+        raise InputError(
+            f"method {method!r} with tilt {tilt!r} is unknown: methods are "
+            f"{join(METHODS)}, tilts are {join(TILTS)}"
+        )
+    for degrees in sigmas_deg:
+        if degrees is not None and not 0 <= degrees < 90:
+            raise InputError(f"an uncertainty of {degrees:g}° is none: give 0 to 90°")
 
 
 def _base(acc: Estimate | None, level_sigma_deg: float | None) -> Base:

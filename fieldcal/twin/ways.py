@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.diagnosis.attitude import vee
 from fieldcal.diagnosis.turns import Turn
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device.way import Way
@@ -42,7 +43,7 @@ class Apart:
 def way_of(turn: Turn, start: float) -> Way:
     """The way of a turn, in procedure axes and s since `start`."""
     steps = turn.attitude[1:] @ np.swapaxes(turn.attitude[:-1], 1, 2)
-    sine = -_vee(steps)
+    sine = -vee(steps)
     size = np.linalg.norm(sine, axis=1)
     longer = np.arcsin(np.minimum(size, 1.0)) / np.where(size > 0, size, 1.0)
     small = sine * np.where(size > 0, longer, 1.0)[:, None]
@@ -76,12 +77,6 @@ def trapezoid(values: Array, t: Array) -> Array:
     middle = (values[1:] + values[:-1]) / 2
     out: Array = np.diff(t) @ middle
     return out
-
-
-def _vee(m: Array) -> Array:
-    """Vectors (k, 3) of the antisymmetric parts of matrices (k, 3, 3)."""
-    pairs = [(2, 1), (0, 2), (1, 0)]
-    return np.stack([(m[:, i, j] - m[:, j, i]) / 2 for i, j in pairs], axis=1)
 
 
 def _rms(values: Array) -> float:

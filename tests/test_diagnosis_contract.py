@@ -119,6 +119,7 @@ def test_put_in_and_named(name: str) -> None:
     assert extra <= {"earth_rate"}, told.says
     assert told.verdict == ("ambiguous" if name == "gravity_error" else told.verdict)
     assert told.verdict in ("left_out", "ambiguous")
+    assert told.after.held_out_rms < told.before.held_out_rms
     truth = {"fraction": case.lost, **case.given}
     _check_numbers(told, name, truth)
 

@@ -106,8 +106,9 @@ class Bench:
             step[shape] = np.clip(step[shape], -0.5 * p[shape], p[shape])
             p = p + step
             state = self._unpack(state, p)
-            if step @ a @ step < CONVERGED**2:
-                break
+            if step @ a @ step < CONVERGED**2:  # so small that it is linear
+                seen = prediction + columns @ step, columns, jacobian
+                return self._result(state, names, prior, centre, shape, seen)
         return self._result(state, names, prior, centre, shape)
 
     def _result(
@@ -117,12 +118,16 @@ class Bench:
         prior: Array,
         centre: Array,
         shape: NDArray[np.bool_],
+        seen: tuple[Array, Array, Array] | None = None,
     ) -> Fit:
+        """The fit at a state; `seen`: prediction, derivative, the same whitened."""
         p = self._pack(state)
-        prediction, columns = self._linearise(state)
+        if seen is None:
+            prediction, columns = self._linearise(state)
+            seen = prediction, columns, self.whiten(columns)
+        prediction, columns, jacobian = seen
         residual = np.where(self.rows.used, self.rows.y - prediction, np.nan)
         white = self.whiten(self.rows.y - prediction)
-        jacobian = self.whiten(columns)
         flat = jacobian.reshape(-1, len(names))
         a = flat.T @ flat + np.diag(1 / prior**2)
         covariance = np.linalg.inv(a)

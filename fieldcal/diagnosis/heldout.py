@@ -19,7 +19,6 @@ from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.reduce import Rows
-from fieldcal.diagnosis.whiten import covariance
 from fieldcal.samples import Array
 
 FOLDS = 12
@@ -99,13 +98,18 @@ def _told(fit: Fit) -> set[str]:
 
 
 def _reached(bench: Bench, left: NDArray[np.bool_], apart: Array) -> Array:
-    """What random parts carry over from the rows that were seen."""
-    rows, out = bench.rows, np.zeros_like(apart)
-    for c in {p.channel for p in bench.errors.parts}:
-        seen = ~left & rows.used[:, c]
-        shared = covariance(rows, bench.errors, c)
-        own = shared[np.ix_(seen, seen)] + np.diag(rows.sd[seen, c] ** 2)
-        out[left, c] = shared[np.ix_(left, seen)] @ np.linalg.solve(own, apart[seen, c])
+    """What random parts carry over from the rows that were seen.
+
+    With K the covariance of all rows, what is left of a part p of them once the others
+    have told of it is (K^-1)_pp^-1 (K^-1 r)_p.
+    """
+    out = np.zeros_like(apart)
+    for c, root in bench.whiten.roots.items():
+        use = bench.rows.used[:, c]
+        at = np.flatnonzero(left & use)
+        own = root[:, left[use]]
+        alone = np.linalg.solve(own.T @ own, own.T @ (root @ apart[use, c]))
+        out[at, c] = apart[at, c] - alone
     return out
 
 

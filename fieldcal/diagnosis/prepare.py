@@ -15,9 +15,10 @@ from fieldcal.diagnosis.chain import Checked, check, checked_again
 from fieldcal.diagnosis.dwell import arrivals, beginnings, clamped
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.hand import rows_of
+from fieldcal.diagnosis.line import Remains, Tone
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.reduce import Rows, Source, recounted, spans
-from fieldcal.diagnosis.spectrum import Tone, tones, without
+from fieldcal.diagnosis.spectrum import tones, without
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Line, Scatter, catalogue
 from fieldcal.errors import InputError
@@ -40,6 +41,7 @@ class Prepared:
     bench : the rows
     known : effects that the simulation has already
     tones : lines found, and taken out of the samples
+    remains : what is left of each
     rest : (p,) ends of the motion before each window, s
 
     """
@@ -49,6 +51,7 @@ class Prepared:
     bench: Bench
     known: tuple[Term, ...]
     tones: tuple[Tone, ...]
+    remains: tuple[Remains, ...]
     rest: Array
 
     @property
@@ -74,7 +77,9 @@ def prepare(block: Block, about: Description) -> Prepared:
     warmth = Thermometer.of(checked.block)
     source = Source(checked.block, about, checked.usable, rest, warmth, checked.pace)
     rows = rows_of(source)
-    found = tuple(tones(source, rows))
+    lines = tones(source, rows)
+    found = tuple(tone for tone, _ in lines)
+    left = tuple(remains for _, remains in lines)
     if found:
         source = replace(source, block=without(source.block, source, rows, found))
         rows = _as_shaken(rows_of(source), rows)
@@ -87,7 +92,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     bench = bench_of(rows, about)
     source = _counted(source, bench, known)
     bench = _from(bench, source.arrived)
-    return Prepared(checked, source, bench, known, found, rest)
+    return Prepared(checked, source, bench, known, found, left, rest)
 
 
 def _as_shaken(calm: Rows, shaken: Rows) -> Rows:

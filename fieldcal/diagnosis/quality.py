@@ -1,7 +1,8 @@
 """How well recording and simulation agree, before and after.
 
 Residuals are averaged over parts of the windows before their rms is taken, so that it
-is the mismatch that counts and not the white noise of single samples.
+is the mismatch that counts and not the white noise of single samples. Lines do not show
+in such means: their squares, averaged over windows at their own frequency, are added.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ class Agreement:
     bench, fit : the model
     ahead : (n, 6) residuals of what was predicted
     rms, held_out : (6,) over parts of windows
+    lines, lines_ahead : (6,) mean squares at the lines' frequencies, and as predicted
 
     """
 
@@ -40,19 +42,27 @@ class Agreement:
     ahead: Array
     rms: Array
     held_out: Array
+    lines: Array
+    lines_ahead: Array
+
+    @property
+    def whole(self) -> Array:
+        """Root mean squares with what there is of lines, (6,)."""
+        return np.sqrt(self.rms**2 + self.lines)
 
     def quality(self, triad: int) -> Quality:
         """In the unit of one triad: 0 accelerometers, 1 gyroscopes."""
         part = slice(3 * triad, 3 * triad + 3)
+        held_out = np.sqrt(self.held_out**2 + self.lines_ahead)
         seen = {
             n: float(v)
-            for n, v in zip(CHANNELS, self.held_out, strict=True)
+            for n, v in zip(CHANNELS, held_out, strict=True)
             if np.isfinite(v)
         }
         return Quality(
-            rms=_mean(self.rms[part]),
+            rms=_mean(self.whole[part]),
             chi2_per_dof=self.fit.chi2 / max(self.fit.dof, 1),
-            held_out_rms=_mean(self.held_out[part]),
+            held_out_rms=_mean(held_out[part]),
             by_channel=seen,
         )
 
@@ -62,11 +72,11 @@ def _mean(values: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
-def agreement(bench: Bench, fit: Fit) -> Agreement:
+def agreement(bench: Bench, fit: Fit, lines: Array, lines_ahead: Array) -> Agreement:
     """Residuals of a fit, seen and predicted."""
     ahead = held_out(bench, fit.terms, fit)
-    seen = fit.residual
-    return Agreement(bench, fit, ahead, rms(bench.rows, seen), rms(bench.rows, ahead))
+    seen, unseen = rms(bench.rows, fit.residual), rms(bench.rows, ahead)
+    return Agreement(bench, fit, ahead, seen, unseen, lines, lines_ahead)
 
 
 def before(block: Block, explanation: Explanation) -> Agreement:
@@ -74,12 +84,16 @@ def before(block: Block, explanation: Explanation) -> Agreement:
     prepared = explanation.prepared
     bench = raw_bench(block, prepared)
     fit = explanation.base if bench is prepared.bench else bench.fit(explanation.always)
-    return agreement(bench, fit)
+    lines = sum((r.before for r in prepared.remains), np.zeros(6))
+    return agreement(bench, fit, lines, lines)
 
 
 def after(explanation: Explanation) -> Agreement:
     """The simulation with the effects found in the windows."""
-    return agreement(explanation.wide, explanation.fit)
+    remains = explanation.prepared.remains
+    lines = sum((r.after for r in remains), np.zeros(6))
+    ahead = sum((r.held_out for r in remains), np.zeros(6))
+    return agreement(explanation.wide, explanation.fit, lines, ahead)
 
 
 def raw_bench(block: Block, prepared: Prepared) -> Bench:
@@ -99,8 +113,9 @@ def parted(one: Agreement, other: Agreement) -> int:
     sizes = []
     for triad in (0, 1):
         part = slice(3 * triad, 3 * triad + 3)
-        floor = np.nanmax(np.nan_to_num(other.rms[part]), initial=0.0)
-        gain = np.nan_to_num(one.rms[part]) ** 2 - np.nan_to_num(other.rms[part]) ** 2
+        first, then = (np.nan_to_num(a.whole[part]) for a in (one, other))
+        floor = np.nanmax(then, initial=0.0)
+        gain = first**2 - then**2
         sizes.append(float(gain.max()) / max(float(floor) ** 2, 1e-300))
     known = [bool(np.isfinite(one.rms[3 * i : 3 * i + 3]).any()) for i in (0, 1)]
     if known[0] != known[1]:

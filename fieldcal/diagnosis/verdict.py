@@ -107,12 +107,13 @@ def _effects(
 ) -> list[Found]:
     prepared = explanation.prepared
     found = list(naming.of_samples(prepared.checked.faults))
-    for tone in prepared.tones:
+    for tone, left in zip(prepared.tones, prepared.remains, strict=True):
         values = {
             n: Quantity(v, tone.sigmas[n], tone.effect.unit(n))
             for n, v in tone.values.items()
         }
-        found.append(Found(tone.effect.id, values, evidence={"delta_chi2": tone.chi2}))
+        evidence = {"delta_chi2": tone.chi2, "held_out_gain": left.gain(tone.clear)}
+        found.append(Found(tone.effect.id, values, evidence=evidence))
     found += naming.of_windows(explanation, lost, then, others.ids)
     found += naming.of_chance(explanation, others.ids)
     found += naming.of_turns(explanation, others.ids)

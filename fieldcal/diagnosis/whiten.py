@@ -63,19 +63,26 @@ class Errors:
 
 
 class Whitener:
-    """L^-1 of the covariance L L^T, channel by channel."""
+    """L^-1 of the covariance L L^T, channel by channel.
+
+    Attributes
+    ----------
+    roots : by channel, L^-1 of its used rows, where these are not independent
+    log_det : ln det L L^T over all channels
+
+    """
 
     def __init__(self, rows: Rows, errors: Errors) -> None:
         self._used = rows.used
         self._weight = np.zeros(rows.y.shape)
         self._weight[self._used] = 1 / rows.sd[self._used]
-        self._inverse: dict[int, Array] = {}
+        self.roots: dict[int, Array] = {}
         self.log_det = -2.0 * float(np.log(self._weight[self._used]).sum())
         for c in sorted({p.channel for p in errors.parts}):
             use = self._used[:, c]
             if use.any():
                 inverse = _inverse_root(rows, errors, c)
-                self._inverse[c] = inverse
+                self.roots[c] = inverse
                 narrower = np.diag(inverse) / self._weight[use, c]
                 self.log_det -= 2 * float(np.log(narrower).sum())
 
@@ -84,7 +91,7 @@ class Whitener:
         deep = (slice(None), slice(None)) + (None,) * (values.ndim - 2)
         clean = np.where(self._used[deep], values, 0.0)
         out = clean * self._weight[deep]
-        for c, inverse in self._inverse.items():
+        for c, inverse in self.roots.items():
             use = self._used[:, c]
             out[use, c] = np.tensordot(inverse, clean[use, c], 1)
         return out
@@ -93,8 +100,8 @@ class Whitener:
         """Whiten (n, k) of one channel."""
         use = self._used[:, c]
         out = np.where(use[:, None], values, 0.0)
-        if c in self._inverse:
-            out[use] = self._inverse[c] @ out[use]
+        if c in self.roots:
+            out[use] = self.roots[c] @ out[use]
             return out
         return out * self._weight[:, c, None]
 

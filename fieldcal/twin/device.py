@@ -19,10 +19,10 @@ import numpy as np
 from fieldcal.description import Description
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.line import Tone
 from fieldcal.diagnosis.model import State
 from fieldcal.diagnosis.reduce import rate_of
 from fieldcal.diagnosis.result import Found
-from fieldcal.diagnosis.spectrum import Tone
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Effect, Scatter, catalogue
 from fieldcal.effects.recording import lsb_of

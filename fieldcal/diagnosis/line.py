@@ -1,0 +1,262 @@
+"""A line in the spectrum: its frequency, its causes, and what it foretells.
+
+The samples of a window, or of a stretch of one, are summed up as the amplitude of a
+wave,
+
+    A = 2/n sum_k s_k exp(-2 pi i hz t_k)
+
+which in white noise of sigma has the variance 4 sigma^2 / n. What causes c make of it
+is R c, with R of the effect; they follow by least squares, and hz is where they take
+most. What a line is worth on samples that it was not fitted to is held against the
+same amplitudes: a part of the windows is left out, causes and frequency are found from
+the rest, and |A - R c|^2 / 2 of the part left out is what remains of the mean square.
+Source: D. Rife, R. Boorstyn, Single-tone parameter estimation, 1974.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.diagnosis.heldout import FOLDS, STRETCHES
+from fieldcal.diagnosis.periodogram import Complex, Pieces, wave_of
+from fieldcal.effects import Line
+from fieldcal.samples import CHANNELS, Array
+
+PARTS = 15
+"""Parts of a window whose sums are kept, so that a frequency can be shifted."""
+
+SHOWS = 4.0
+"""Standard deviations from which a channel is said to have the line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tone:
+    """A line with its explanation.
+
+    Attributes
+    ----------
+    effect : hum, sway ...
+    hz : frequency
+    causes : (m,) complex amplitudes of the effect's causes
+    values, sigmas : by parameter name
+    channels : outputs in which it stands out
+    amplitude : (6,) mean amplitude in the outputs
+    chi2 : by how much the squares fall with it
+    gain : rise of ln Z, for a prior as wide as the causes are large
+
+    """
+
+    effect: Line
+    hz: float
+    causes: Complex
+    values: dict[str, float]
+    sigmas: dict[str, float]
+    channels: tuple[str, ...]
+    amplitude: Array
+    chi2: float
+    gain: float
+
+    @property
+    def clear(self) -> list[int]:
+        """Indices of the channels in which it stands out."""
+        return [CHANNELS.index(name) for name in self.channels]
+
+
+@dataclass(frozen=True, slots=True)
+class Remains:
+    """Mean squares of the outputs at the frequency of a line, (6,) each.
+
+    Attributes
+    ----------
+    before : as recorded
+    after : less the line
+    held_out : less what the rest of the recording foretells of it
+
+    """
+
+    before: Array
+    after: Array
+    held_out: Array
+
+    def gain(self, clear: list[int]) -> float:
+        """Part of the held-out rms that goes, in the channel where it is largest."""
+        most = clear[int(np.argmax(self.before[clear]))]
+        return float(1 - np.sqrt(self.held_out[most] / self.before[most]))
+
+
+@dataclass(frozen=True, slots=True)
+class Moments:
+    """Sums of the samples times a wave of frequency `near`, over parts of windows.
+
+    Attributes
+    ----------
+    near : Hz
+    sums : (k, 6)
+    middle : (k,) s, mean time of each part
+    apart : (k, g) which parts belong to which group: windows, or stretches of them
+    window : (g,) of each group
+    counts : (g,) samples
+
+    """
+
+    near: float
+    sums: Complex
+    middle: Array
+    apart: Array
+    window: NDArray[np.intp]
+    counts: Array
+
+    def seen(self, offset: float) -> Complex:
+        """Amplitudes (g, 6) of each group at a frequency a little off."""
+        turned = self.sums * np.exp(-2j * np.pi * offset * self.middle)[:, None]
+        amplitude: Complex = 2 / self.counts[:, None] * (self.apart.T @ turned)
+        return amplitude
+
+    def only(self, groups: NDArray[np.bool_]) -> Moments:
+        """Some of the groups."""
+        parts = self.apart[:, groups].any(axis=1)
+        return Moments(
+            self.near,
+            self.sums[parts],
+            self.middle[parts],
+            self.apart[parts][:, groups],
+            self.window[groups],
+            self.counts[groups],
+        )
+
+
+def moments_of(pieces: Pieces, near: float, stretches: int = 1) -> Moments:
+    """Sums over windows, each divided into stretches that are groups of their own."""
+    sums, middle, group = [], [], []
+    counts: list[float] = []
+    for samples, t in zip(pieces.samples, pieces.times, strict=True):
+        wave = np.conj(wave_of(t, near))
+        for stretch in np.array_split(np.arange(len(t)), stretches):
+            for part in np.array_split(stretch, PARTS):
+                sums.append(wave[part] @ samples[part])
+                middle.append(t[part].mean())
+                group.append(len(counts))
+            counts.append(float(len(stretch)))
+    apart = np.equal.outer(group, np.arange(len(counts))).astype(float)
+    window = np.repeat(np.arange(len(pieces.samples)), stretches)
+    return Moments(
+        near, np.array(sums), np.array(middle), apart, window, np.array(counts)
+    )
+
+
+def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
+    """The effect at the frequency, near that of the sums, at which it takes most."""
+    shortest = min(map(len, pieces.samples)) / pieces.rate
+    step = 0.2 / max(float(np.ptp(moments.middle)), shortest)
+    offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
+    return _at_best(pieces, effect, moments, offsets, step, 3)
+
+
+def remains(pieces: Pieces, tone: Tone) -> Remains:
+    """What is left of a line, fitted to it or foretold from the rest."""
+    many = len(pieces.samples) >= 3
+    moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES)
+    groups = np.arange(len(moments.counts))
+    fold = groups % (FOLDS if many else STRETCHES)
+    seen = moments.seen(0.0)
+    fitted = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[moments.window]
+    ahead = seen.copy()
+    span = max(float(np.ptp(moments.middle)), 1 / tone.hz)
+    for i in np.unique(fold):
+        rest = moments.only(fold != i)
+        step = 0.2 / span
+        near = _at_best(pieces, tone.effect, rest, np.array([-step, 0, step]), step, 2)
+        # amplitudes are those of the wave at tone.hz; one a little off turns against it
+        left = moments.only(fold == i)
+        told = (tone.effect.response(pieces.x, near.hz) @ near.causes)[left.window]
+        ahead[fold == i] -= told * _turning(left, near.hz - tone.hz)
+    squares = [_mean_square(a) for a in (seen, seen - fitted, ahead)]
+    return Remains(*squares)
+
+
+def _turning(moments: Moments, offset: float) -> Complex:
+    """Mean of exp(2 pi i offset t) over each group, (g, 1)."""
+    turned = np.exp(2j * np.pi * offset * moments.middle)
+    mean: Complex = (moments.apart.T @ turned) / moments.apart.sum(axis=0)
+    return mean[:, None]
+
+
+def _mean_square(amplitude: Complex) -> Array:
+    square: Array = (np.abs(amplitude) ** 2 / 2).mean(axis=0)
+    return square
+
+
+def _at_best(
+    pieces: Pieces,
+    effect: Line,
+    moments: Moments,
+    offsets: Array,
+    step: float,
+    rounds: int,
+) -> Tone:
+    for _ in range(rounds):
+        tones = [_fitted(pieces, effect, moments, o) for o in offsets]
+        at = int(np.argmax([tone.chi2 for tone in tones]))
+        offsets = offsets[at] + np.linspace(-step, step, 11)
+        step /= 5
+    return tones[at]
+
+
+def _fitted(pieces: Pieces, effect: Line, moments: Moments, offset: float) -> Tone:
+    """The effect at a frequency, whatever its causes."""
+    hz, seen, counts = moments.near + offset, moments.seen(offset), moments.counts
+    # a channel that never changes tells nothing
+    heard = np.nan_to_num(pieces.noise) > 0
+    weight = np.where(heard, 1 / np.where(heard, pieces.noise, 1.0) ** 2, 0.0)
+    response = effect.response(pieces.x, hz)[moments.window]
+    half = counts[:, None, None] / 2
+    weighted = np.conj(response) * weight[:, None] * half
+    normal = np.einsum("wcm,wcn->mn", weighted, response)
+    normal += 1e-12 * np.trace(normal).real * np.eye(len(normal))
+    causes = np.linalg.solve(normal, np.einsum("wcm,wc->m", weighted, seen))
+    sigma = np.sqrt(np.diag(np.linalg.inv(normal)).real)
+    if effect.kind == "sensor":  # outputs of their own: those without it have none
+        causes = np.where(np.abs(causes) > SHOWS * sigma, causes, 0.0)
+    left = seen - response @ causes
+    fallen = half[:, :, 0] * weight * (np.abs(seen) ** 2 - np.abs(left) ** 2)
+    chi2 = float(fallen.sum())
+    strength = np.abs(causes / sigma) ** 2
+    amplitude = np.sqrt((np.abs(response @ causes) ** 2).mean(axis=0))
+    error = pieces.noise * np.sqrt(2 / counts.sum())
+    clear = [
+        c for c, a, e in zip(CHANNELS, amplitude, error, strict=True) if a > SHOWS * e
+    ]
+    values, sigmas = _named(effect, causes, sigma)
+    values["hz"] = float(hz)
+    spread = float(np.concatenate(pieces.times).std())
+    sigmas["hz"] = float(1 / (2 * np.pi * spread * np.sqrt(max(chi2, 1.0))))
+    return Tone(
+        effect,
+        float(hz),
+        causes,
+        values,
+        sigmas,
+        tuple(clear),
+        amplitude,
+        chi2,
+        chi2 / 2 - float(np.log1p(strength / 2).sum()),
+    )
+
+
+def _named(
+    effect: Line, causes: Complex, sigma: Array
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Amplitudes by name: one for each cause, or one for all of them."""
+    names = [p.name for p in effect.params]
+    if len(names) == len(causes):
+        some = np.flatnonzero(causes)
+        return (
+            {names[i]: float(abs(causes[i])) for i in some},
+            {names[i]: float(sigma[i]) for i in some},
+        )
+    size = float(np.linalg.norm(causes))
+    share = np.abs(causes) / max(size, 1e-300)
+    return {names[0]: size}, {names[0]: float(np.linalg.norm(share * sigma))}

@@ -117,6 +117,111 @@ def test_windows_of_a_rate_table(
     assert said["verdict"] in ("consistent", "left_out", "ambiguous")
 
 
+UPRIGHT = {"x": (90.0, 0.0), "y": (0.0, 0.0), "z": (0.0, 90.0)}
+"""Angles at which an axis of the device is the table's."""
+
+
+def on_a_table(rates: tuple[float, ...] = (0.0, 60.0, -60.0, 120.0)) -> list[Table]:
+    axes = [a for a in UPRIGHT for _ in rates]
+    turned = [[r * (a == b) for b in "xyz"] for a in UPRIGHT for r in rates]
+    positions = places([UPRIGHT[a] for a in axes], 12.0)
+    return [p | {"rate_deg_s": w} for p, w in zip(positions, turned, strict=True)]
+
+
+def test_a_table_shows_the_lever_arm(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The accelerometers off its axis feel even turning, too."""
+    truth = {"x": 0.04, "z": -0.02}
+    device = replace(SAME, effects=(parse("lever_arm:x=0.04,z=-0.02"),))
+    table = on_a_table()
+    code, said = diagnosed(
+        write_session(tmp_path, recorded(device, table), table), capsys
+    )
+    assert code == 1
+    assert [e["id"] for e in said["effects"]] == ["lever_arm"]
+    for axis, found in said["effects"][0]["parameters"].items():
+        assert abs(found["value"] - truth.get(axis, 0.0)) < 4 * found["sigma"] < 2e-3
+    fit = said["fit"]
+    assert fit["after"]["held_out_rms"] < 0.1 * fit["before"]["held_out_rms"]
+
+
+def test_gravity_that_turns_hides_no_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A table with its axis level turns gravity round; gyroscopes have their hum."""
+    device = replace(SAME, effects=(parse("hum:gx=5e-4,hz=7"),))
+    rates = (30.0, -30.0, 90.0, -90.0)
+    table: list[Table] = [
+        p | {"rate_deg_s": [rate, 0.0, 0.0]}
+        for p, rate in zip(places([(0.0, 0.0)] * 4, 12.0), rates, strict=True)
+    ]
+    block = recorded(device, table)
+    acc = block.acc.copy()
+    for place, rate in zip(table, rates, strict=True):
+        at = (block.t >= place["start_s"]) & (block.t <= place["end_s"])
+        angle = np.deg2rad(rate) * (block.t[at] - place["start_s"])
+        acc[at, 1] += 9.81 * (1 - np.cos(angle))
+        acc[at, 2] += 9.81 * np.sin(angle)
+    code, said = diagnosed(
+        write_session(tmp_path, replace(block, acc=acc), table), capsys
+    )
+    assert code == 1
+    assert [e["id"] for e in said["effects"]] == ["hum"]
+    found = said["effects"][0]["parameters"]["gx"]
+    assert abs(found["value"] - 5e-4) < 4 * found["sigma"]
+
+
+def test_the_length_of_the_force_foretells_positions_not_seen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With orientations unknown, what is predicted is held against turns made anew."""
+    angles = [(0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90), (45, 30)]
+    angles += [(-45, -30), (135, 20), (-135, -40), (60, 60), (-120, 50), (30, -60)]
+    held = places([(float(a), float(b)) for a, b in angles], 12.0)
+    block = recorded(COUPLED, held)
+    unknown_angles = [{k: v for k, v in p.items() if "_deg" not in k} for p in held]
+    code, said = diagnosed(write_session(tmp_path, block, unknown_angles), capsys)
+    assert code == 1
+    there = {i for e in said["effects"] for i in (e["id"], *e["aliases"])}
+    assert "cross_coupling" in there
+    before, after = (
+        said["fit"][k]["held_out_by_channel"]["ax"] for k in ("before", "after")
+    )
+    assert after < 0.2 * before
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_a_walk_foretells_what_comes_soon(
+    seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    device = replace(SAME, effects=(parse("random_walk:gx=8e-5"),))
+    held: list[Table] = [
+        {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": 2.0, "end_s": 900.0}
+    ]
+    block = recorded(device, held, seed)
+    code, said = diagnosed(write_session(tmp_path, block, held), capsys)
+    assert (code, [e["id"] for e in said["effects"]]) == (1, ["random_walk"])
+    before, after = (
+        said["fit"][k]["held_out_by_channel"]["gx"] for k in ("before", "after")
+    )
+    assert after < 0.8 * before
+
+
+def test_a_recording_of_windows_alone_has_lost_nothing(
+    coupled: Block, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A recorder that pauses while the device is turned drops no samples."""
+    inside = np.zeros(len(coupled), dtype=bool)
+    for place in POSITIONS:
+        inside |= (coupled.t >= place["start_s"]) & (coupled.t <= place["end_s"])
+    columns = (coupled.acc, coupled.gyr, coupled.temperature)
+    block = Block.of(coupled.t[inside], *(c[inside] for c in columns))
+    code, said = diagnosed(write_session(tmp_path, block, POSITIONS), capsys)
+    assert code == 1
+    assert [e["id"] for e in said["effects"]] == ["cross_coupling"]
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_one_long_static_recording(
     known: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -17,10 +17,10 @@ from fieldcal.diagnosis.model import Term
 from fieldcal.effects import Effect, Motion, Sensor, catalogue
 from fieldcal.samples import CHANNELS, Array
 
-TURNS = ("lever_arm", "time_delay")
-"""Seen while the device turns only."""
+TURNS = ("time_delay",)
+"""Seen while the device turns only, and not in what a table does evenly."""
 
-RATED = ("gyro_cross_coupling", "gyro_products")
+RATED = ("gyro_cross_coupling", "gyro_products", "lever_arm")
 """Seen in windows only where a table turns the device."""
 
 CALIBRATION = ("gravity_error", "gyro_scale", "earth_rate")
@@ -83,7 +83,7 @@ def _shows(effect: Effect, bench: Bench, warming: bool, navigation: bool) -> boo
     if effect.id in (*TURNS, *CALIBRATION):
         return False
     if effect.id in RATED:
-        return bench.rated
+        return bench.rated and (effect.id != "lever_arm" or bool(x.oriented.any()))
     if effect.id == "settling" and not np.isfinite(x.since_turn).any():
         return False
     if effect.id == "heading_error":

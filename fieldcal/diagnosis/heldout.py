@@ -17,22 +17,32 @@ from numpy.typing import NDArray
 
 from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.model import Term
+from fieldcal.diagnosis.model import State, Term
 from fieldcal.diagnosis.reduce import Rows
 from fieldcal.samples import Array
 
 FOLDS = 12
-STRETCHES = 5
+FEW = 3
+"""Windows below which stretches of them are left out instead."""
+
+LONG, SHORT = 5, 24
+"""How many: what is random foretells for a short time only, causes for long."""
+
 CELLS = (0.0, 0.1, 0.25, 0.5, 1.0)
 """Parts of a window over which residuals are averaged before their rms is taken."""
 
+ANEW = 3
+"""Times that the orientation of a position left out is found anew."""
 
-def held_out(bench: Bench, terms: Sequence[Term], fit: Fit) -> Array:
+
+def held_out(
+    bench: Bench, terms: Sequence[Term], fit: Fit, stretches: int = LONG
+) -> Array:
     """Residuals of rows predicted from the others, (n, 6); nan where none can be."""
     by_position = _residuals(bench, terms, fit, _positions(bench.rows))
     if np.isfinite(by_position).any():
         return by_position
-    return _residuals(bench, terms, fit, _stretches(bench.rows))
+    return _residuals(bench, terms, fit, _stretches(bench.rows, stretches))
 
 
 def foretold(bench: Bench, terms: Sequence[Term], fit: Fit) -> float:
@@ -44,7 +54,7 @@ def foretold(bench: Bench, terms: Sequence[Term], fit: Fit) -> float:
     """
     rows = bench.rows
     fold = _positions(rows)
-    fold = fold if fold.max() else _stretches(rows)
+    fold = fold if fold.max() else _stretches(rows, LONG)
     total = 0.0
     for i in np.unique(fold):
         sd = np.where((fold == i)[:, None], np.nan, rows.sd)
@@ -55,17 +65,17 @@ def foretold(bench: Bench, terms: Sequence[Term], fit: Fit) -> float:
 
 def _positions(rows: Rows) -> NDArray[np.intp]:
     held, index = np.unique(rows.x.position, return_inverse=True)
-    if len(held) < 3:
+    if len(held) < FEW:
         return np.zeros(len(index), dtype=np.intp)
     fold: NDArray[np.intp] = (index % FOLDS).astype(np.intp)
     return fold
 
 
-def _stretches(rows: Rows) -> NDArray[np.intp]:
+def _stretches(rows: Rows, count: int) -> NDArray[np.intp]:
     out = np.zeros(len(rows.x), dtype=np.intp)
     for p in np.unique(rows.x.position):
         inside = np.flatnonzero(rows.x.position == p)
-        for i, part in enumerate(np.array_split(inside, STRETCHES)):
+        for i, part in enumerate(np.array_split(inside, count)):
             out[part] = i
     return out
 
@@ -85,9 +95,7 @@ def _residuals(
         seen = rest.fit(terms, fit)
         if told - _told(seen):
             continue
-        apart = rows.y - seen.state.predict(rows.x)
-        apart = apart - _reached(bench, left, apart)
-        out[left] = _turned_off(bench, seen, left, apart)[left]
+        out[left] = _apart(bench, _oriented(bench, fit, seen, left), left)[left]
     return np.where(rows.used, out, np.nan)
 
 
@@ -113,21 +121,36 @@ def _reached(bench: Bench, left: NDArray[np.bool_], apart: Array) -> Array:
     return out
 
 
-def _turned_off(bench: Bench, fit: Fit, left: NDArray[np.bool_], apart: Array) -> Array:
-    """Without what small turns of the positions left out make up for."""
+def _oriented(bench: Bench, fit: Fit, seen: Fit, left: NDArray[np.bool_]) -> State:
+    """A model of the rest, with the positions left out turned as they show it.
+
+    Unless orientations are known for sure, two small turns of each are its own; of one
+    left out in part, the rest shows them.
+    """
+    state = seen.state
     if not bench.free and not bench.errors.setting:
-        return apart
+        return state
+    rows = bench.rows
+    places = np.setdiff1d(rows.x.position[left], rows.x.position[~left])
     prior = 1.0 if bench.free else bench.errors.setting
-    turned, out = bench.aside(fit.state), apart.copy()
-    for p in np.unique(bench.rows.x.position[left]):
-        at = left & (bench.rows.x.position == p)
-        use = bench.rows.used & at[:, None]
-        columns = turned[:, :, 2 * p : 2 * p + 2]
-        a = columns[use] / bench.rows.sd[use][:, None]
-        z = apart[use] / bench.rows.sd[use]
-        turns = np.linalg.solve(a.T @ a + np.eye(2) / prior**2, a.T @ z)
-        out[at] -= (columns @ turns)[at]
-    return out
+    aside = state.aside.copy()
+    aside[places] = fit.state.aside[places]
+    for _ in range(ANEW if bench.free else 1):
+        state = replace(state, aside=aside.copy())
+        apart, turned = _apart(bench, state, left), bench.aside(state)
+        for p in places:
+            use = rows.used & (rows.x.position == p)[:, None]
+            a = turned[:, :, 2 * p : 2 * p + 2][use] / rows.sd[use][:, None]
+            z = apart[use] / rows.sd[use]
+            pull = a.T @ z - aside[p] / prior**2
+            aside[p] += np.linalg.solve(a.T @ a + np.eye(2) / prior**2, pull)
+    return replace(state, aside=aside)
+
+
+def _apart(bench: Bench, state: State, left: NDArray[np.bool_]) -> Array:
+    """Residuals of what was left out, less what random parts carry over."""
+    apart = bench.rows.y - state.predict(bench.rows.x)
+    return apart - _reached(bench, left, apart)
 
 
 def cells(
@@ -158,9 +181,14 @@ def cells(
     return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
 
 
-def rms(rows: Rows, residual: Array) -> Array:
-    """Root mean square of the cells' residuals, (6,); nan where there is none."""
-    mean, _, _ = cells(rows, residual)
+def rms(rows: Rows, residual: Array, stretches: int = LONG) -> Array:
+    """Root mean square of the cells' residuals, (6,); nan where there is none.
+
+    The cells of a few long windows are as short as the stretches left out.
+    """
+    few = len(np.unique(rows.x.position)) < FEW and stretches == SHORT
+    even = np.linspace(0.0, 1.0, stretches + 1).tolist()
+    mean, _, _ = cells(rows, residual, even if few else CELLS)
     count = np.isfinite(mean).sum(axis=0)
     squares = np.nansum(mean**2, axis=0)
     return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))

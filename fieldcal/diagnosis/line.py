@@ -20,13 +20,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.heldout import FOLDS, STRETCHES
+from fieldcal.diagnosis.heldout import FEW, FOLDS, LONG
 from fieldcal.diagnosis.periodogram import Complex, Pieces, wave_of
 from fieldcal.effects import Line
 from fieldcal.samples import CHANNELS, Array
 
-PARTS = 15
-"""Parts of a window whose sums are kept, so that a frequency can be shifted."""
+PARTS, LEAST = 15, 4
+"""Parts of a window whose sums are kept, so that a frequency can be shifted, and the
+fewest samples in one."""
 
 SHOWS = 4.0
 """Standard deviations from which a channel is said to have the line."""
@@ -135,7 +136,8 @@ def moments_of(pieces: Pieces, near: float, stretches: int = 1) -> Moments:
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
         wave = np.conj(wave_of(t, near))
         for stretch in np.array_split(np.arange(len(t)), stretches):
-            for part in np.array_split(stretch, PARTS):
+            count = min(PARTS, max(len(stretch) // LEAST, 1))
+            for part in np.array_split(stretch, count):
                 sums.append(wave[part] @ samples[part])
                 middle.append(t[part].mean())
                 group.append(len(counts))
@@ -157,10 +159,10 @@ def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
 
 def remains(pieces: Pieces, tone: Tone) -> Remains:
     """What is left of a line, fitted to it or foretold from the rest."""
-    many = len(pieces.samples) >= 3
-    moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES)
+    many = len(pieces.samples) >= FEW
+    moments = moments_of(pieces, tone.hz, 1 if many else LONG)
     groups = np.arange(len(moments.counts))
-    fold = groups % (FOLDS if many else STRETCHES)
+    fold = groups % (FOLDS if many else LONG)
     seen = moments.seen(0.0)
     fitted = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[moments.window]
     ahead = seen.copy()

@@ -64,14 +64,18 @@ class Pieces:
 
 
 def pieces_of(source: Source, rows: Rows) -> Pieces:
-    """Windows of a recording that are long enough."""
+    """Windows of a recording that are long enough.
+
+    Outputs of which rows say nothing, as of gravity on a table that turns, are zero.
+    """
     block = source.block
     first = {int(p): i for i, p in reversed(list(enumerate(rows.x.position)))}
     kept, samples, times = [], [], []
     for p, (a, b) in enumerate(spans(block, source.about)):
         if b - a >= 64 and p in first:
             kept.append(first[p])
-            six = np.where(source.usable[a:b], block[a:b].six, np.nan)
+            known = source.usable[a:b] & rows.used[first[p]]
+            six = np.where(known, block[a:b].six, np.nan)
             samples.append(_flat(block.t[a:b], six))
             times.append(block.t[a:b])
     x = rows.x

@@ -15,7 +15,7 @@ from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.hand import rows_of
-from fieldcal.diagnosis.heldout import held_out, rms
+from fieldcal.diagnosis.heldout import LONG, SHORT, held_out, rms
 from fieldcal.diagnosis.prepare import Prepared, bench_of
 from fieldcal.diagnosis.reduce import Source
 from fieldcal.diagnosis.result import Quality
@@ -72,10 +72,12 @@ def _mean(values: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
-def agreement(bench: Bench, fit: Fit, lines: Array, lines_ahead: Array) -> Agreement:
+def agreement(
+    bench: Bench, fit: Fit, stretches: int, lines: Array, lines_ahead: Array
+) -> Agreement:
     """Residuals of a fit, seen and predicted."""
-    ahead = held_out(bench, fit.terms, fit)
-    seen, unseen = rms(bench.rows, fit.residual), rms(bench.rows, ahead)
+    ahead = held_out(bench, fit.terms, fit, stretches)
+    seen, unseen = (rms(bench.rows, r, stretches) for r in (fit.residual, ahead))
     return Agreement(bench, fit, ahead, seen, unseen, lines, lines_ahead)
 
 
@@ -85,7 +87,7 @@ def before(block: Block, explanation: Explanation) -> Agreement:
     bench = raw_bench(block, prepared)
     fit = explanation.base if bench is prepared.bench else bench.fit(explanation.always)
     lines = sum((r.before for r in prepared.remains), np.zeros(6))
-    return agreement(bench, fit, lines, lines)
+    return agreement(bench, fit, _stretches(explanation), lines, lines)
 
 
 def after(explanation: Explanation) -> Agreement:
@@ -93,7 +95,14 @@ def after(explanation: Explanation) -> Agreement:
     remains = explanation.prepared.remains
     lines = sum((r.after for r in remains), np.zeros(6))
     ahead = sum((r.held_out for r in remains), np.zeros(6))
-    return agreement(explanation.wide, explanation.fit, lines, ahead)
+    bench, fit = explanation.wide, explanation.fit
+    return agreement(bench, fit, _stretches(explanation), lines, ahead)
+
+
+def _stretches(explanation: Explanation) -> int:
+    """Of few windows: long ones, unless nothing but chance could foretell them."""
+    only_chance = explanation.model.random and not explanation.terms
+    return SHORT if only_chance else LONG
 
 
 def raw_bench(block: Block, prepared: Prepared) -> Bench:
@@ -109,14 +118,18 @@ def raw_bench(block: Block, prepared: Prepared) -> Bench:
 
 
 def parted(one: Agreement, other: Agreement) -> int:
-    """The triad in which two models differ most: 0 or 1."""
+    """The triad in which two models differ most, in what they see or foretell: 0 or 1.
+
+    What is random takes nothing from the residuals, but foretells.
+    """
     sizes = []
     for triad in (0, 1):
-        part = slice(3 * triad, 3 * triad + 3)
-        first, then = (np.nan_to_num(a.whole[part]) for a in (one, other))
-        floor = np.nanmax(then, initial=0.0)
-        gain = first**2 - then**2
-        sizes.append(float(gain.max()) / max(float(floor) ** 2, 1e-300))
+        part, most = slice(3 * triad, 3 * triad + 3), 0.0
+        for seen in ("whole", "held_out"):
+            first, then = (np.nan_to_num(getattr(a, seen)[part]) for a in (one, other))
+            gain = float((first**2 - then**2).max())
+            most = max(most, gain / max(float(then.max()) ** 2, 1e-300))
+        sizes.append(most)
     known = [bool(np.isfinite(one.rms[3 * i : 3 * i + 3]).any()) for i in (0, 1)]
     if known[0] != known[1]:
         return int(known[1])

@@ -219,7 +219,7 @@ def averaged(
         mounting=about.mounting,
         latitude=about.latitude,
     )
-    sd[~_force_known(x), :3] = np.nan
+    sd[~x.force_known, :3] = np.nan
     length = np.diff(bound, axis=1)[:, 0] / rate_of(block)
     return Rows(x, y, sd, length, noise, span)
 
@@ -294,12 +294,3 @@ def _free_force(about: Description, position: NDArray[np.intp], y: Array) -> Arr
         mean = np.nanmean(np.nan_to_num(apart[position == p]), axis=0)
         out[position == p] = about.gravity * mean / max(np.linalg.norm(mean), 1e-12)
     return out
-
-
-def _force_known(x: Experience) -> NDArray[np.bool_]:
-    """Rows in which the turning of a rate table does not turn the force as well."""
-    speed = np.linalg.norm(x.rate, axis=1)
-    along = np.linalg.norm(np.cross(x.rate @ x.mounting, x.f), axis=1)
-    steady = along <= 1e-3 * speed * x.gravity
-    known: NDArray[np.bool_] = (speed == 0) | (x.oriented & steady)
-    return known

@@ -75,6 +75,11 @@ class Search:
             grown = self.rules.model(
                 grown.chosen, grown.bench, grown.fit, grown.random, grown.shaped
             )
+            if grown.objective < best.objective:  # not what its linear part promised
+                chance = max(wanders(best.bench, best.fit), key=lambda w: w.gain)
+                grown = self.with_random(best, chance)
+                if grown.objective < best.objective:
+                    break
             best = self._tidied(self._anew(grown))
             if best.parts in seen:  # what was let in went again, or the other way about
                 break

@@ -27,23 +27,27 @@ LASTS, CHANCE = 0.2, 3.0
 EXTRA = 6.9
 """Of ln 1000: what a line has to be worth beyond the frequencies tried."""
 
-MOST = 4
+MOST, LOOKS = 4, 3
+"""Lines looked for, and how often one that stands out may turn out to be none."""
 
 
 def tones(source: Source, rows: Rows) -> list[tuple[Tone, Remains]]:
     """Lines in a recording, the strongest first, with what is left of them."""
     pieces = pieces_of(source, rows)
     found: list[tuple[Tone, Remains]] = []
-    while pieces.samples and len(found) < MOST:
-        near = highest(pieces, [tone.hz for tone, _ in found])
-        tone = _explained(pieces, near) if near is not None else None
-        if tone is None:
+    looked: list[float] = []
+    while pieces.samples and len(found) < MOST and len(looked) < LOOKS + len(found):
+        near = highest(pieces, looked)
+        if near is None:
             break
+        looked.append(near)
+        if (tone := _explained(pieces, near)) is None:
+            continue  # something else has much power there, and may hide a line
         left = remains(pieces, tone)
-        if left.gain(tone.clear) <= 0:
-            break
-        found.append((tone, left))
-        pieces = _without(pieces, tone)
+        if left.gain(tone.clear) > 0:
+            found.append((tone, left))
+            looked[-1] = tone.hz
+            pieces = _without(pieces, tone)
     return found
 
 

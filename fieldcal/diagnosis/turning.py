@@ -144,8 +144,10 @@ class Turntable:
         self._known = whole
 
     def _pool(self) -> Iterator[Term]:
+        told = {"gyro_scale"} if self._bench.rated else set()
+        told |= {t.effect.id for t in self._fit.terms if t.effect.id == "lever_arm"}
         for name in CANDIDATES:
-            if name != "gyro_scale" or not self._bench.rated:
+            if name not in told:  # by windows on a table
                 effect = catalogue()[name]
                 yield Term(effect, tuple(range(len(effect.params))))
 

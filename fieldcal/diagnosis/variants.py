@@ -19,6 +19,7 @@ from fieldcal.diagnosis.contender import Model, Rules, charged
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.narrow import narrower
 from fieldcal.diagnosis.steps import step_gains
+from fieldcal.effects import Motion
 
 STEPS = 3
 """Instants of a jump that are fitted."""
@@ -35,7 +36,8 @@ def with_one(rules: Rules, model: Model, hypothesis: Hypothesis) -> Model:
         likely, more = _jumps(model, hypothesis)
         variants = tuple(likely)
         cost += more
-    tried = [_narrowed(_and(rules, model, (hypothesis, v), cost)) for v in variants]
+    wide = [_and(rules, model, (hypothesis, v), cost) for v in variants]
+    tried = [_narrowed(rules, m) for m in wide]
     best = max(tried, key=lambda m: m.objective)
     if jumps or len(tried) == 1:
         return best
@@ -84,8 +86,12 @@ def _jumps(model: Model, hypothesis: Hypothesis) -> tuple[Sequence[Term], float]
     return [replace(term, shape={"at_s": float(at[i])}) for i in best], cost
 
 
-def _narrowed(model: Model) -> Model:
-    """With the newest term on the axes, and of the size, that serve it best."""
+def _narrowed(rules: Rules, model: Model) -> Model:
+    """With the newest term on the axes, and of the size, that serve it best.
+
+    What moves the device multiplies with scale factors; where these are not known, the
+    linear estimate of what another size is worth may be far off, and does not count.
+    """
     hypothesis, term = model.chosen[-1]
     columns, tight, more, cost = narrower(model.bench, model.fit, term)
     new = replace(term, columns=columns, tight=tight)
@@ -94,4 +100,10 @@ def _narrowed(model: Model) -> Model:
         chosen=(*model.chosen[:-1], (hypothesis, new)),
         objective=model.objective + more,
     )
-    return charged(better, cost)
+    better = charged(better, cost)
+    if tight != 1.0 and isinstance(term.effect, Motion):
+        fitted = rules.model(
+            better.chosen, model.bench, model.fit, model.random, better.shaped
+        )
+        return fitted if fitted.objective > model.objective else model
+    return better

@@ -53,6 +53,22 @@ def missing(t: Array) -> NDArray[np.int_]:
     return lost
 
 
+def _paused(recording: Recording) -> NDArray[np.bool_]:
+    """Whether the recording paused after each sample but the last, (n - 1,).
+
+    A long time outside windows is a pause, and so is all the time between two windows.
+    """
+    still = recording.still
+    starts = np.zeros(len(still), dtype=bool)
+    starts[recording.windows[recording.windows[:, 0] < len(still), 0]] = True
+    outside = ~(still[:-1] & still[1:]) | starts[1:]
+    all_of_it = still[:-1] & starts[1:]
+    paused: NDArray[np.bool_] = all_of_it | (
+        outside & (np.diff(recording.block.t) > PAUSE_S)
+    )
+    return paused
+
+
 class Dropped(Chain):
     """Lost samples."""
 
@@ -73,8 +89,7 @@ class Dropped(Chain):
             if usual > 0:  # a counter that wraps goes back, and tells nothing there
                 counted = np.where(jumps > 0, np.round(jumps / usual) - 1, 0)
                 lost = np.maximum(lost, counted.astype(int))
-        outside = ~recording.still[:-1] & (np.diff(block.t) > PAUSE_S)
-        lost = np.where(outside, 0, lost)
+        lost = np.where(_paused(recording), 0, lost)
         total = int(lost.sum())
         if total < FEWEST:
             return []

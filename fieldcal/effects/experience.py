@@ -19,6 +19,9 @@ import numpy as np
 from fieldcal.frames import force_home, turn
 from fieldcal.samples import Array
 
+STEADY = 1e-3
+"""Sine of the angle between rate and force up to which a turn leaves the force."""
+
 
 @dataclass(frozen=True, slots=True)
 class Experience:
@@ -109,6 +112,17 @@ class Experience:
     def oriented(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Rows whose both angles are known, (n,)."""
         known: np.ndarray[Any, np.dtype[np.bool_]] = np.isfinite(self.alpha + self.beta)
+        return known
+
+    @property
+    def force_known(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Rows in which the turning of a rate table does not turn the force, (n,)."""
+        speed = np.linalg.norm(self.rate, axis=1)
+        across = np.linalg.norm(np.cross(self.rate @ self.mounting, self.f), axis=1)
+        steady = across <= STEADY * speed * self.gravity
+        known: np.ndarray[Any, np.dtype[np.bool_]] = (speed == 0) | (
+            self.oriented & steady
+        )
         return known
 
     def turned(self, **changes: Any) -> Self:

@@ -86,7 +86,8 @@ class Mounting(Chain):
     def find(self, recording: Recording) -> list[Fault]:
         """Axes or unit that are not the declared ones."""
         block, rows = recording.block, recording.windows
-        held = [i for i, (a, b) in enumerate(rows) if b > a]
+        known = recording.x.force_known
+        held = [i for i, (a, b) in enumerate(rows) if b > a and known[i]]
         mean = np.array([block.acc[a:b].mean(axis=0) for a, b in rows[held]])
         if not np.isfinite(mean).all() or not len(mean):
             return []

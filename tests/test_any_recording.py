@@ -191,6 +191,25 @@ def test_the_length_of_the_force_foretells_positions_not_seen(
     assert after < 0.2 * before
 
 
+def test_what_settles_shows_whatever_the_orientations(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The Earth turns each window by the same all through it, and hides no course."""
+    truth = {"ay": 0.04, "gx": 1e-3, "tau_s": 4.0}
+    device = replace(SAME, effects=(parse("settling:ay=0.04,gx=1e-3,tau_s=4"),))
+    angles = [(0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90), (45, 30)]
+    held = places([(float(a), float(b)) for a, b in angles], 12.0)
+    block = recorded(device, held)
+    bare_positions = [{k: v for k, v in p.items() if "_deg" not in k} for p in held]
+    code, said = diagnosed(write_session(tmp_path, block, bare_positions), capsys)
+    assert (code, [e["id"] for e in said["effects"]]) == (1, ["settling"])
+    found = said["effects"][0]["parameters"]
+    for name, value in truth.items():
+        assert abs(found[name]["value"] - value) < 4 * found[name]["sigma"], name
+        assert found[name]["sigma"] < 0.3 * value
+    assert said["fit"]["after"]["chi2_per_dof"] == pytest.approx(1.0, abs=0.15)
+
+
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_a_walk_foretells_what_comes_soon(
     seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -160,6 +160,7 @@ def telling_position(
     sd = np.nanmedian(rows.sd, axis=0) / np.sqrt(
         max(len(x) / max(x.position[-1], 1), 1)
     )
+    sd = np.hypot(sd, np.nanmedian(rows.common, axis=0))
     for alpha in REACH:
         for beta in REACH[:5]:
             place = _place(x, alpha, beta)

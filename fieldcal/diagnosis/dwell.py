@@ -73,6 +73,10 @@ def clamped(source: Source, bench: Bench, fit: Fit) -> Array:
     still = _dwelling(source, bench.rows.noise)
     if still is None:
         return source.arrived
+    # where orientations are not known, it is that of the window that counts
+    x = bench.rows.x
+    first = np.searchsorted(x.position, np.minimum(still.x.position, x.position[-1]))
+    still = replace(still, x=replace(still.x, f=x.f[first]))
     starts = beginnings(source)
     turned = np.isfinite(source.arrived)
     longest = float(np.max((starts - source.arrived)[turned], initial=0.0))

@@ -10,9 +10,12 @@ rate over T s is the angle between its ends: with a wander of the direction of a
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fieldcal.diagnosis.reduce import Rows, Source, averaged, rate_of, reduce, spans
+from fieldcal.samples import Array
 
 WANDERS = 6.0
 """Standard deviations of what the squares across the force have too many."""
@@ -28,8 +31,7 @@ def rows_of(source: Source) -> Rows:
     """Rows of a recording, one for each window of a device held by hand."""
     rows = reduce(source)
     held = np.unique(rows.x.position)
-    angle = wander(rows) if len(held) >= FEWEST else 0.0
-    if not angle:
+    if not (angle := wander(rows)):
         return rows
     samples = rows.length[:, None] * rate_of(source.block)
     level = [
@@ -41,26 +43,42 @@ def rows_of(source: Source) -> Rows:
     one = averaged(source, bound, held, np.array(level), rows.noise, np.array(shaken))
     unsteady = np.sqrt(2.0) * angle / one.length
     one.sd[:, 3:] = np.hypot(one.sd[:, 3:], unsteady[:, None])
-    return one
+    first = np.searchsorted(rows.x.position, held)
+    return replace(one, common=rows.common[first])
 
 
 def wander(rows: Rows) -> float:
-    """Rms angle by which the force turns within windows, rad; 0 on a table."""
+    """Rms angle by which the force turns within windows, rad; 0 on a table.
+
+    A course that windows share is none of a hand: outputs settle like that.
+    """
     x, some = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
-    along, across, dof, angle = 0.0, 0.0, 0, []
-    for p in np.unique(x.position[some]):
-        at = some & (x.position == p)
-        if at.sum() < 2:
-            continue
-        off = rows.y[at, :3] - rows.y[at, :3].mean(axis=0)
+    held = [some & (x.position == p) for p in np.unique(x.position[some])]
+    held = [at for at in held if at.sum() > 1]
+    if len(held) < FEWEST:
+        return 0.0
+    offs = [rows.y[at, :3] - rows.y[at, :3].mean(axis=0) for at in held]
+    along, across, dof, angle = 0.0, 0.0, 0.0, []
+    for at, off in zip(held, _less_shared(offs), strict=True):
         up = x.f[at][0] / np.linalg.norm(x.f[at][0])
         sd = rows.sd[at, :3]
         part = np.outer(off @ up, up)
+        free = (len(off) - 1) * (1 - 1 / len(held))
         along += float(((part / sd) ** 2).sum())
         across += float((((off - part) / sd) ** 2).sum())
-        dof += int(at.sum()) - 1
+        dof += free
         length = np.linalg.norm(rows.y[at, :3].mean(axis=0))
-        angle.append(((off - part) ** 2).sum() / (2 * (at.sum() - 1)) / length**2)
-    if not dof or across / 2 < max(dof + WANDERS * np.sqrt(dof), MORE * along):
+        angle.append(((off - part) ** 2).sum() / (2 * free) / length**2)
+    if across / 2 < max(dof + WANDERS * np.sqrt(dof), MORE * along):
         return 0.0
     return float(np.sqrt(np.mean(angle)))
+
+
+def _less_shared(offs: list[Array]) -> list[Array]:
+    """Courses within windows, (n, 3) each, less their mean row by row."""
+    longest = max(map(len, offs))
+    whole = np.full((len(offs), longest, 3), np.nan)
+    for i, off in enumerate(offs):
+        whole[i, : len(off)] = off
+    shared = np.nanmean(whole, axis=0)
+    return [off - shared[: len(off)] for off in offs]

@@ -176,7 +176,7 @@ def cells(
             total = weight.sum(axis=0)
             some = np.where(total > 0, total, np.nan)
             means.append((weight * np.nan_to_num(residual[part])).sum(axis=0) / some)
-            sds.append(1 / np.sqrt(some))
+            sds.append(np.hypot(1 / np.sqrt(some), rows.common[part[0]]))
             position.append(p)
     return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
 

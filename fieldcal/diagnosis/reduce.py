@@ -46,6 +46,7 @@ class Rows:
     x : n rows
     y : (n, 6) means, m/s^2 and rad/s; nan where nothing was usable
     sd : (n, 6) standard deviation of each mean from white noise
+    common : (n, 6) standard deviation of an error that all rows of a window share
     length : (n,) s
     noise : (6,) standard deviation of one sample
     span : (n, 2) instants of the first and the last sample, s
@@ -55,6 +56,7 @@ class Rows:
     x: Experience
     y: Array
     sd: Array
+    common: Array
     length: Array
     noise: Array
     span: Array
@@ -164,8 +166,7 @@ def reduce(source: Source) -> Rows:
     free = ~out.x.oriented & (len(held) > 1)
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
-    same = np.sqrt(np.repeat(rows, rows))[:, None] * off  # all through a window
-    return replace(out, sd=np.hypot(out.sd, same))
+    return replace(out, common=off)
 
 
 def recounted(rows: Rows, arrived: Array) -> Rows:
@@ -221,7 +222,7 @@ def averaged(
     )
     sd[~x.force_known, :3] = np.nan
     length = np.diff(bound, axis=1)[:, 0] / rate_of(block)
-    return Rows(x, y, sd, length, noise, span)
+    return Rows(x, y, sd, np.zeros_like(sd), length, noise, span)
 
 
 def _cut(t: Array, first: int, last: int, rate: float, windows: int) -> Array:

@@ -118,8 +118,8 @@ def _share(bench: Bench, fit: Fit, part: Part) -> float:
     """Part of the residual's variance that the smooth function takes."""
     c = part.channel
     use = bench.rows.used[:, c]
-    f = factor(part.kind, bench.rows.x, c)[use] / bench.rows.sd[use, c][:, None]
-    z = fit.residual[use, c] / bench.rows.sd[use, c]
+    f = bench.whiten.channel(factor(part.kind, bench.rows.x, c), c)[use]
+    z = bench.whiten.channel(fit.residual[:, c, None], c)[use, 0]
     inner = f.T @ f + np.eye(f.shape[1]) / part.size**2
     taken = f @ np.linalg.solve(inner, f.T @ z)
     noise = float(use.sum())

@@ -1,8 +1,13 @@
-"""The covariance of the rows: white noise, and random parts beyond it.
+"""The covariance of the rows: white noise, what windows share, random parts beyond it.
 
-    cov(U_i) = diag(sd_i^2) + sum_parts v^2 F F^T
+    cov(U_i) = D^2 + sum_w c_w c_w^T + sum_parts v^2 F F^T,    D = diag(sd_i)
 
-Each part belongs to one channel. F of
+c_w is what is off by the same in all rows of a window. Without random parts,
+
+    L^-1 = prod_w (1 - (1 - 1 / sqrt(1 + s_w)) u_w u_w^T) D^-1,
+    s_w = |D^-1 c_w|^2,    u_w = D^-1 c_w / sqrt(s_w)
+
+Each random part belongs to one channel. F of
 
 - "walk": a random walk through the rows, per sqrt(s);
 - "offset": one value for each window;
@@ -67,7 +72,7 @@ class Whitener:
 
     Attributes
     ----------
-    roots : by channel, L^-1 of its used rows, where these are not independent
+    roots : by channel, L^-1 of its used rows, where it has random parts
     log_det : ln det L L^T over all channels
 
     """
@@ -77,6 +82,7 @@ class Whitener:
         self._weight = np.zeros(rows.y.shape)
         self._weight[self._used] = 1 / rows.sd[self._used]
         self.roots: dict[int, Array] = {}
+        self._shared: dict[int, Array] = {}
         self.log_det = -2.0 * float(np.log(self._weight[self._used]).sum())
         for c in sorted({p.channel for p in errors.parts}):
             use = self._used[:, c]
@@ -85,6 +91,20 @@ class Whitener:
                 self.roots[c] = inverse
                 narrower = np.diag(inverse) / self._weight[use, c]
                 self.log_det -= 2 * float(np.log(narrower).sum())
+        for c in np.flatnonzero(np.any(rows.common * self._used > 0, axis=0)).tolist():
+            if c not in self.roots:
+                self._shared[c], more = self._of_windows(rows, c)
+                self.log_det += more
+
+    def _of_windows(self, rows: Rows, c: int) -> tuple[Array, float]:
+        """U with L^-1 = (1 - U U^T) D^-1, and what it adds to ln det."""
+        use = self._used[:, c]
+        over = rows.common[use, c] * self._weight[use, c]
+        inside = _offset(rows.x, c)[use]
+        s = inside.T @ over**2
+        part = (1 - 1 / np.sqrt(1 + s)) / np.maximum(s, 1e-300)
+        u: Array = inside * over[:, None] * np.sqrt(part)
+        return u, float(np.log1p(s).sum())
 
     def __call__(self, values: Array) -> Array:
         """Whiten (n, 6) or (n, 6, k); rows that are not used become zero."""
@@ -94,6 +114,10 @@ class Whitener:
         for c, inverse in self.roots.items():
             use = self._used[:, c]
             out[use, c] = np.tensordot(inverse, clean[use, c], 1)
+        for c, u in self._shared.items():
+            use = self._used[:, c]
+            scaled = out[use, c]
+            out[use, c] = scaled - np.tensordot(u, np.tensordot(u.T, scaled, 1), 1)
         return out
 
     def channel(self, values: Array, c: int) -> Array:
@@ -103,7 +127,11 @@ class Whitener:
         if c in self.roots:
             out[use] = self.roots[c] @ out[use]
             return out
-        return out * self._weight[:, c, None]
+        out *= self._weight[:, c, None]
+        if c in self._shared:
+            u = self._shared[c]
+            out[use] -= u @ (u.T @ out[use])
+        return out
 
 
 def _inverse_root(rows: Rows, errors: Errors, channel: int) -> Array:
@@ -111,6 +139,8 @@ def _inverse_root(rows: Rows, errors: Errors, channel: int) -> Array:
     use = rows.used[:, channel]
     cov = covariance(rows, errors, channel)[np.ix_(use, use)]
     cov += np.diag(rows.sd[use, channel] ** 2)
+    common = rows.common[use, channel]
+    cov += np.outer(common, common) * np.equal.outer(*[rows.x.position[use]] * 2)
     if any(p.kind != "offset" for p in errors.parts if p.channel == channel):
         return np.linalg.inv(np.linalg.cholesky(cov))
     out, position = np.zeros_like(cov), rows.x.position[use]

@@ -158,17 +158,16 @@ def _run(explanation: Explanation, case: _Case) -> Run:
     block = replace(blocks[0], t=t)
     replayed = np.mean([_means(b, t, rows.span) for b in blocks], axis=0)
     off = np.where(rows.used, rows.y - replayed, np.nan)
-    squares = (bench.whiten(rows.y - replayed) ** 2).sum()
-    white = (off / rows.sd) ** 2
+    white = bench.whiten(rows.y - replayed) ** 2
     places, chi2 = [], []
     for p in np.unique(rows.x.position):
         at: NDArray[np.bool_] = rows.x.position == p
         places.append(_triads(rms(rows, np.where(at[:, None], off, np.nan))))
-        count = np.isfinite(white[at]).sum()
-        chi2.append(float(np.nansum(white[at]) / count) if count else np.nan)
+        count = rows.used[at].sum()
+        chi2.append(float(white[at].sum() / count) if count else np.nan)
     return Run(
         _triads(rms(rows, off)),
-        float(squares) / max(case.fit.dof, 1),
+        float(white.sum()) / max(case.fit.dof, 1),
         np.array(places),
         np.array(chi2),
         _lines(explanation, device, windows, rows),

@@ -210,6 +210,40 @@ def test_what_settles_shows_whatever_the_orientations(
     assert said["fit"]["after"]["chi2_per_dof"] == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.parametrize(
+    ("effect", "parameters"),
+    [
+        ("base_tilt", {"about_x_deg": 0.5}),
+        ("cross_coupling", {"k12": 0.004, "k31": -0.003}),
+        ("gyro_scale", {"s1": 0.02}),
+    ],
+)
+def test_positions_without_angles_among_those_that_have_them(
+    effect: str,
+    parameters: dict[str, float],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Angles that are known stay known."""
+    given = ",".join(f"{n}={v}" for n, v in parameters.items())
+    device = replace(SAME, effects=(parse(f"{effect}:{given}"),))
+    angles = [(0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90), (45, 30)]
+    angles += [(-45, -30), (135, 20), (-135, -40), (60, 60), (-120, 50)]
+    held = places([(float(a), float(b)) for a, b in angles], 12.0)
+    some = [
+        {k: v for k, v in p.items() if i % 3 != 2 or "_deg" not in k}
+        for i, p in enumerate(held)
+    ]
+    block = recorded(device, held)
+    code, said = diagnosed(write_session(tmp_path, block, some), capsys)
+    assert (code, [e["id"] for e in said["effects"]]) == (1, [effect])
+    for name, found in said["effects"][0]["parameters"].items():
+        off = found["value"] - parameters.get(name, 0.0)
+        assert abs(off) < 4 * found["sigma"], name
+    fit = said["fit"]
+    assert fit["after"]["held_out_rms"] < 0.3 * fit["before"]["held_out_rms"]
+
+
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_a_walk_foretells_what_comes_soon(
     seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]

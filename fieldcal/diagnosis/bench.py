@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.layout import Layout
 from fieldcal.diagnosis.model import State, Term
 from fieldcal.diagnosis.reduce import Rows
 from fieldcal.diagnosis.whiten import Errors, Whitener
@@ -55,9 +55,12 @@ class Bench:
     errors : what the rows' errors are made of
     relax : how much wider than typical the effects' priors are
 
-    """
+    Attributes
+    ----------
+    leeway : (p,) rad, prior of each position's own small turns: none where its angles
+        are known for sure
 
-    axes: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    """
 
     def __init__(
         self,
@@ -76,10 +79,15 @@ class Bench:
         self.places = int(x.position.max()) + 1
         self.windows = len(np.unique(x.position))
         self.free = bool((~x.oriented).any())
+        known = np.ones(self.places, dtype=bool)
+        known[x.position[~x.oriented]] = False
+        self.leeway = np.where(known, self.errors.setting, TURN)
+        self._loose = np.flatnonzero(self.leeway)
         self.rated = bool(x.rate.any())
         used: NDArray[np.bool_] = np.any(rows.used, axis=0)
         scaled = used & np.array([True] * 3 + [self.rated] * 3)
         self._base = np.concatenate([used, scaled])
+        self._layout = Layout(self._base, self._loose)
 
     def but(self, **changes: object) -> Bench:
         """The same bench with something changed: rows, errors, relax."""
@@ -94,7 +102,7 @@ class Bench:
         """
         state = self._start(tuple(terms), near)
         names, prior, centre, shape = self.about(state)
-        p = self._pack(state)
+        p = self._layout.pack(state)
         for _ in range(ITERATIONS):
             prediction, columns = self._linearise(state)
             white = self.whiten(self.rows.y - prediction)
@@ -105,7 +113,7 @@ class Bench:
             step = np.linalg.solve(a, flat.T @ white.ravel() - pull)
             step[shape] = np.clip(step[shape], -0.5 * p[shape], p[shape])
             p = p + step
-            state = self._unpack(state, p)
+            state = self._layout.unpack(state, p)
             if step @ a @ step < CONVERGED**2:  # so small that it is linear
                 seen = prediction + columns @ step, columns, jacobian
                 return self._result(state, names, prior, centre, shape, seen)
@@ -121,7 +129,7 @@ class Bench:
         seen: tuple[Array, Array, Array] | None = None,
     ) -> Fit:
         """The fit at a state; `seen`: prediction, derivative, the same whitened."""
-        p = self._pack(state)
+        p = self._layout.pack(state)
         if seen is None:
             prediction, columns = self._linearise(state)
             seen = prediction, columns, self.whiten(columns)
@@ -133,7 +141,11 @@ class Bench:
         covariance = np.linalg.inv(a)
         covariance = (covariance + covariance.T) / 2
         determined = np.diag(covariance) < DETERMINED * prior**2
-        scatter = np.array([n.startswith("aside") for n in names]) & (not self.free)
+        scatter = np.zeros(len(names), dtype=bool)
+        if len(self._loose):
+            scatter[-2 * len(self._loose) :] = np.repeat(
+                self.leeway[self._loose] < TURN, 2
+            )
         pull = np.where(shape, 0.0, (p - centre) / prior) ** 2
         chi2 = float((white**2).sum() + pull[scatter].sum())
         dof = int(self.rows.used.sum() - (determined & ~scatter).sum())
@@ -158,15 +170,15 @@ class Bench:
 
     def at(self, fit: Fit, values: Array) -> Fit:
         """The same model where its columns have other values, (k,)."""
-        state = self._unpack(fit.state, values)
+        state = self._layout.unpack(fit.state, values)
         return self._result(state, *self.about(state))
 
     def about(
         self, state: State
     ) -> tuple[tuple[str, ...], Array, Array, NDArray[np.bool_]]:
         """Names of the columns, their priors, and which are shapes."""
-        names, terms = self._names(state), state.terms
-        centre = self._pack(self._start(terms, None))
+        names, terms = self._layout.names(state.terms), state.terms
+        centre = self._layout.pack(self._start(terms, None))
         shape = np.array([n in _shape_names(terms) for n in names], dtype=bool)
         return names, self._prior(state), centre, shape
 
@@ -174,18 +186,14 @@ class Bench:
         """Where a fit would stand with one column changed."""
         p = fit.values.copy()
         p[column] += step
-        return self._unpack(fit.state, p)
+        return self._layout.unpack(fit.state, p)
 
     def prior_of(self, term: Term) -> Array:
         """Prior of a term's values, in outputs' units."""
         return self.relax * term.prior * self._unit(term)
 
-    @property
-    def _turns_aside(self) -> bool:
-        return self.free or self.errors.setting > 0
-
     def _start(self, terms: tuple[Term, ...], near: Fit | None) -> State:
-        aside: Array = np.zeros((self.places if self._turns_aside else 1, 2))
+        aside: Array = np.zeros((self.places if len(self._loose) else 1, 2))
         values = [np.zeros(len(t.names)) for t in terms]
         for t, v in zip(terms, values, strict=True):
             v[len(t.columns) :] = list(t.shape.values()) if t.free_shape else []
@@ -199,25 +207,12 @@ class Bench:
             aside = near.state.aside
         return State(near.state.bias, near.state.scale, terms, tuple(values), aside)
 
-    def _names(self, state: State) -> tuple[str, ...]:
-        groups = ("acc_bias", "gyr_bias", "acc_scale", "gyr_scale")
-        base = np.array([f"{group}.{axis}" for group in groups for axis in self.axes])
-        names = list(base[self._base])
-        for term in state.terms:
-            names += [f"{term.effect.id}.{name}" for name in term.names]
-        if self._turns_aside:
-            names += [f"aside.{p}.{j}" for p in range(self.places) for j in range(2)]
-        return tuple(names)
-
     def _prior(self, state: State) -> Array:
         gravity, acc = self.rows.x.gravity, np.abs(self.scale[:3])
         bias = np.concatenate([BIAS_G * gravity * acc, BIAS_G * np.abs(self.scale[3:])])
         base = np.concatenate([bias, SCALE * np.abs(self.scale)])[self._base]
         sizes: list[Array] = [self.prior_of(t) for t in state.terms]
-        aside = np.full(self.places * 2, self.errors.setting or TURN)
-        if self.free:
-            aside[:] = TURN
-        return np.concatenate([base, *sizes, aside if self._turns_aside else []])
+        return np.concatenate([base, *sizes, np.repeat(self.leeway[self._loose], 2)])
 
     def _unit(self, term: Term) -> Array:
         """Outputs per SI unit, for effects that add to outputs in counts or volts."""
@@ -226,22 +221,6 @@ class Bench:
             gyro = self.scale[3:].mean() if term.gyro else self.scale[:3].mean()
             out[: len(term.columns)] = abs(gyro)
         return out
-
-    def _pack(self, state: State) -> Array:
-        base = np.concatenate([state.bias, state.scale])[self._base]
-        aside = state.aside.ravel() if self._turns_aside else np.empty(0)
-        return np.concatenate([base, *state.values, aside])
-
-    def _unpack(self, state: State, p: Array) -> State:
-        base = np.concatenate([state.bias, state.scale])
-        k = int(self._base.sum())
-        base[self._base] = p[:k]
-        values = []
-        for v in state.values:
-            values.append(p[k : k + len(v)])
-            k += len(v)
-        aside = p[k:].reshape(-1, 2) if self._turns_aside else state.aside
-        return State(base[:6], base[6:], state.terms, tuple(values), aside)
 
     def _linearise(self, state: State) -> tuple[Array, Array]:
         """Prediction (n, 6) and its derivative by every column, (n, 6, k)."""
@@ -252,8 +231,9 @@ class Bench:
         parts: list[Array] = [both[:, :, self._base]]
         for i, term in enumerate(state.terms):
             parts.append(self._of_term(state, x, i, term))
-        if self._turns_aside:
-            parts.append(self.aside(state).reshape(len(x), 6, -1))
+        if len(self._loose):
+            aside = self.aside(state).reshape(len(x), 6, -1, 2)
+            parts.append(aside[:, :, self._loose].reshape(len(x), 6, -1))
         return state.output(x), np.concatenate(parts, axis=2)
 
     def _experienced(self, state: State) -> Experience:

@@ -128,11 +128,11 @@ def _oriented(bench: Bench, fit: Fit, seen: Fit, left: NDArray[np.bool_]) -> Sta
     left out in part, the rest shows them.
     """
     state = seen.state
-    if not bench.free and not bench.errors.setting:
+    if not bench.leeway.any():
         return state
     rows = bench.rows
     places = np.setdiff1d(rows.x.position[left], rows.x.position[~left])
-    prior = 1.0 if bench.free else bench.errors.setting
+    places = places[bench.leeway[places] > 0]
     aside = state.aside.copy()
     aside[places] = fit.state.aside[places]
     for _ in range(ANEW if bench.free else 1):
@@ -142,8 +142,10 @@ def _oriented(bench: Bench, fit: Fit, seen: Fit, left: NDArray[np.bool_]) -> Sta
             use = rows.used & (rows.x.position == p)[:, None]
             a = turned[:, :, 2 * p : 2 * p + 2][use] / rows.sd[use][:, None]
             z = apart[use] / rows.sd[use]
-            pull = a.T @ z - aside[p] / prior**2
-            aside[p] += np.linalg.solve(a.T @ a + np.eye(2) / prior**2, pull)
+            pull = a.T @ z - aside[p] / bench.leeway[p] ** 2
+            aside[p] += np.linalg.solve(
+                a.T @ a + np.eye(2) / bench.leeway[p] ** 2, pull
+            )
     return replace(state, aside=aside)
 
 

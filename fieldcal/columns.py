@@ -84,8 +84,9 @@ def units(wanted: Wanted) -> str:
     known = {c.partition("=")[0] for c in wanted.columns}
     says = []
     for channel, unit, lsb in (
-        ("ax", wanted.acc_unit, wanted.acc_lsb), ("gx", wanted.gyr_unit, wanted.gyr_lsb)
-    ):  # fmt: skip
+        ("ax", wanted.acc_unit or "m/s^2", wanted.acc_lsb),
+        ("gx", wanted.gyr_unit or "rad/s", wanted.gyr_lsb),
+    ):
         if channel in known:
             says.append(f"{lsb:g} counts/({unit})" if lsb != 1 else unit)
     return ", ".join(says) or "deg C"
@@ -94,9 +95,9 @@ def units(wanted: Wanted) -> str:
 def notes(wanted: Wanted) -> dict[str, object]:
     """What a session keeps of the units."""
     return {
-        "acc_unit": wanted.acc_unit,
+        "acc_unit": wanted.acc_unit or "m/s^2",
         "acc_lsb": wanted.acc_lsb,
-        "gyr_unit": wanted.gyr_unit,
+        "gyr_unit": wanted.gyr_unit or "rad/s",
         "gyr_lsb": wanted.gyr_lsb,
-        "time_unit": wanted.time_unit,
+        "time_unit": wanted.time_unit or "s",
     }

@@ -50,7 +50,7 @@ class Wanted:
     columns : what each column is, or ``t=name`` pairs for columns that have names
     rate_hz : where there is no time
     separator, skip : of text files
-    acc_unit, gyr_unit, time_unit : of the file
+    acc_unit, gyr_unit, time_unit : of the file; "" is not said, and SI
     acc_lsb, gyr_lsb : counts in one unit, for raw counts
     options : as in a device's address, ``name=value&name=value``
 
@@ -60,9 +60,9 @@ class Wanted:
     rate_hz: float | None = None
     separator: str | None = None
     skip: int | None = None
-    acc_unit: str = "m/s^2"
-    gyr_unit: str = "rad/s"
-    time_unit: str = "s"
+    acc_unit: str = ""
+    gyr_unit: str = ""
+    time_unit: str = ""
     acc_lsb: float = 1.0
     gyr_lsb: float = 1.0
     options: str = ""
@@ -70,17 +70,17 @@ class Wanted:
     @property
     def acc_scale(self) -> float:
         """SI units (or counts, volts) in one of the file's."""
-        return _unit(self.acc_unit, ACC_UNITS) / self.acc_lsb
+        return _unit(self.acc_unit or "m/s^2", ACC_UNITS) / self.acc_lsb
 
     @property
     def gyr_scale(self) -> float:
         """SI units (or counts, volts) in one of the file's."""
-        return _unit(self.gyr_unit, GYR_UNITS) / self.gyr_lsb
+        return _unit(self.gyr_unit or "rad/s", GYR_UNITS) / self.gyr_lsb
 
     @property
     def time_scale(self) -> float:
         """Seconds in one of the file's unit of time."""
-        return _unit(self.time_unit, TIME_UNITS)
+        return _unit(self.time_unit or "s", TIME_UNITS)
 
 
 def _unit(unit: str, known: dict[str, float]) -> float:

@@ -124,7 +124,8 @@ class Messages:
             for number, starts in found.items():
                 topic = self._ids[number]
                 rows = self._rows(data, base, np.array(starts), layouts[topic])
-                out[topic] = {name: rows[name] for name in rows.dtype.names or ()}
+                if len(rows):
+                    out[topic] = {name: rows[name] for name in rows.dtype.names or ()}
             yield out
 
     def _layout(self, name: str) -> np.dtype[Any]:

@@ -460,7 +460,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, bytes]:
     six = np.random.default_rng(3).normal(0, 0.02, (n, 6)) + [0, 0, 9.8, 0, 0, 0]
     block = Block.of(np.arange(n) / 100, six[:, :3], six[:, 3:])
     _parquet(folder / "x.parquet", block)
-    recording = open_recording(folder / "x.parquet", Wanted())
+    recording = open_recording(folder / "x.parquet", Wanted(tuple(COLUMNS.split(","))))
     bring_in(recording, "0", folder / "s", {"format": 1}, 2.0)
     return block, (folder / "s" / "samples.parquet").read_bytes()
 

@@ -1,8 +1,9 @@
 """Text files of numbers in columns: what each column is, is said by the user.
 
-Nothing is guessed in silence: columns, rate and units come from the command line; only
-the separator and lines of names at the top are found by themselves. Times are made from
-the rate where the file has none; otherwise they count from the first line.
+Nothing is guessed in silence: columns, rate and units come from the command line, or
+from a line of names that says all of it; the separator and lines at the top that are no
+numbers are found by themselves. Times are made from the rate where the file has none;
+otherwise they count from the first line.
 
 Arrow reads what is plain, a piece at a time; lines that it does not understand are read
 again one by one, so that each that is none can be named.
@@ -17,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal import columns
+from fieldcal import columns, headings
 from fieldcal.arrow_stream import numbers
 from fieldcal.errors import InputError
 from fieldcal.recording import HEAD, Recording, Stream, pieces
@@ -36,6 +37,9 @@ WIDE = (b"\xff\xfe", b"\xfe\xff")
 
 TOP = 1000
 """Lines at the top among which the first of numbers is looked for."""
+
+NAMED = 50
+"""Lines at the top among which the names of the columns are looked for."""
 
 TEXT = 0.95
 """Share of characters that a text has among its first bytes."""
@@ -61,11 +65,7 @@ class File(Recording):
 
     def streams(self) -> list[Stream]:
         """Return the one IMU."""
-        if not self.wanted.columns:
-            raise InputError(
-                f"{self.path}: say what its columns are, such as --columns "
-                f"t,ax,ay,az,gx,gy,gz; its first line is {self._first_line()!r}"
-            )
+        self._settle()
         columns.check(self.wanted)
         return [Stream("0", f"columns in {columns.units(self.wanted)}")]
 
@@ -77,11 +77,28 @@ class File(Recording):
         """Name a line; empty ones are not counted."""
         return f"line {self._skip + row + 1}"
 
-    def _first_line(self) -> str:
-        return next((line[:60] for data in self._pieces() for line in _top(data)), "")
+    def _settle(self) -> None:
+        """Take the columns from a line of names, where the user does not name them."""
+        if self.wanted.columns:
+            return
+        lines = next((_top(data)[:NAMED] for data in self._pieces()), [""])
+        found = (self._names(line) for line in lines)
+        self.wanted, says = headings.settle(
+            self.path,
+            self.wanted,
+            next((names for names in found if names), None),
+            f"{self.path}: say what its columns are, such as --columns "
+            f"t,ax,ay,az,gx,gy,gz; its first line is {lines[0][:60]!r}",
+        )
+        self.says.append(says)
+
+    def _names(self, line: str) -> headings.Found | None:
+        cells = line.lstrip("#% ").split(self._parted(line))
+        return headings.read([headings.Column("", c) for c in cells], columns.SKIP)
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, a piece of the file at a time."""
+        self._settle()
         columns.check(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != columns.SKIP]

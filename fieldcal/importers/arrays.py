@@ -17,7 +17,8 @@ import numpy as np
 
 from fieldcal import columns, headings
 from fieldcal.errors import InputError
-from fieldcal.recording import HEAD, ROWS, Recording, Stream, on_disk, pieces
+from fieldcal.packed import head, on_disk
+from fieldcal.recording import ROWS, Recording, Stream
 from fieldcal.samples import Array, Block
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
@@ -60,8 +61,7 @@ class File(Recording):
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
-        head = next(pieces(self.path, HEAD))
-        return (("h5py",) if _is_hdf5(head) else ()), "hdf5"
+        return (("h5py",) if _is_hdf5(head(self.path)) else ()), "hdf5"
 
     def streams(self) -> list[Stream]:
         """Return the one IMU."""
@@ -146,13 +146,13 @@ class File(Recording):
     def _opened(self) -> Iterator[dict[str, Table]]:
         """Every array of numbers in the file."""
         with ExitStack() as stack:
-            path = stack.enter_context(on_disk(self.path))
+            path = stack.enter_context(on_disk(self.path, self.cut_off))
             with path.open("rb") as file:
-                head = file.read(520)
+                first = file.read(520)
             try:
-                if _is_hdf5(head):
+                if _is_hdf5(first):
                     tables = _hdf5(path, stack)
-                elif head.startswith(MATLAB):
+                elif first.startswith(MATLAB):
                     tables = _matlab(path)
                 else:
                     tables = _numpy(path)

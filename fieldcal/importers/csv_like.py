@@ -21,7 +21,8 @@ import numpy as np
 from fieldcal import columns, headings
 from fieldcal.arrow_stream import numbers
 from fieldcal.errors import InputError
-from fieldcal.recording import HEAD, Recording, Stream, pieces
+from fieldcal.packed import HEAD
+from fieldcal.recording import Recording, Stream
 from fieldcal.samples import Array, Block
 
 WHAT = "text with columns"
@@ -136,14 +137,15 @@ class File(Recording):
     def _pieces(self) -> Iterator[bytes]:
         """Whole lines of the file, many at a time."""
         rest, mark = b"", MARK
-        for data in pieces(self.path):
+        for data in self.pieces():
             if mark and _is_wide(data[:HEAD]):
                 raise InputError(f"{self.path}: is text in UTF-16: save it as UTF-8")
             data, mark = data.removeprefix(mark), b""
             whole, newline, rest = (rest + data).rpartition(b"\n")
             if newline and whole.strip():
                 yield whole
-        if rest.strip():
+        # a number that was cut off is another number
+        if rest.strip() and not self.ends_early:
             # a file without a line feed may have the other kind of ends of lines
             yield rest.replace(b"\r", b"\n")
 

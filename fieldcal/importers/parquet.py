@@ -10,7 +10,8 @@ from typing import Any
 from fieldcal import columns, headings
 from fieldcal.arrow_stream import numbers
 from fieldcal.errors import InputError
-from fieldcal.recording import ROWS, Recording, Stream, on_disk
+from fieldcal.packed import on_disk
+from fieldcal.recording import ROWS, Recording, Stream
 from fieldcal.samples import Array, Block
 
 WHAT = "Parquet and Arrow"
@@ -59,7 +60,7 @@ class File(Recording):
         import pyarrow as pa
         import pyarrow.parquet
 
-        with on_disk(self.path) as path, path.open("rb") as file:
+        with on_disk(self.path, self.cut_off) as path, path.open("rb") as file:
             magic = file.read(6)
             file.seek(0)
             try:

@@ -19,6 +19,14 @@ MOST = 0xFFFF
 """Buses that are told apart."""
 
 
+class _Numbers(dict[Any, int]):
+    """Number of each bus, in the order in which they turn up."""
+
+    def __missing__(self, channel: Any) -> int:
+        self[channel] = number = min(len(self), MOST)
+        return number
+
+
 class Buses:
     """Packs the messages of a log, and keeps those of one bus.
 
@@ -33,15 +41,15 @@ class Buses:
     def __init__(self, place: str, identifiers: Iterable[int], channel: str) -> None:
         self._place, self._channel = place, channel
         self._identifiers = sorted(identifiers)
-        self._numbers: dict[Any, int] = {}
+        self._numbers = _Numbers()
         self._with_samples: set[int] = set()
 
     def rows(self, messages: Iterable[Any], rows: list[bytes]) -> None:
         """Pack messages behind `rows`, up to one that cannot be read."""
-        numbers = self._numbers
+        # a log has a hundred million of them
+        numbers, append, pack = self._numbers, rows.append, pack_message
         for message in messages:
-            bus = numbers.setdefault(message.channel, min(len(numbers), MOST))
-            rows.append(pack_message(message, bus))
+            append(pack(message, numbers[message.channel]))
 
     def frames(self, rows: Iterable[bytes]) -> Frames:
         """Frames of the bus that is meant.

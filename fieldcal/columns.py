@@ -58,10 +58,12 @@ class Samples:
         wanted = self._wanted
 
         def triad(kind: str, scale: float) -> Array:
-            table = np.full((n, 3), np.nan)
-            for i, axis in enumerate("xyz"):
-                if (kind + axis) in columns:
-                    np.multiply(columns[kind + axis], scale, out=table[:, i])
+            there = [(i, columns.get(kind + axis)) for i, axis in enumerate("xyz")]
+            whole = all(column is not None for _, column in there)
+            table = np.empty((n, 3)) if whole else np.full((n, 3), np.nan)
+            for i, column in there:
+                if column is not None:
+                    np.multiply(column, scale, out=table[:, i])
             return table
 
         if "t" in columns:

@@ -107,12 +107,11 @@ class File(Recording):
         begun, t0, top = False, None, [""]
         for data in self._pieces():
             if not begun:
-                top = _top(data)[:2]
-                self._skip, begun = self._heading(_top(data), use), True
-                data = _behind(data, self._skip) if self._skip >= 0 else b""
-                if not data.strip():
+                top = _top(data)
+                self._skip, begun = self._heading(top, use), True
+                if not 0 <= self._skip < len(top):
                     break
-                first = _top(data)[0]
+                data, first = _behind(data, self._skip), top[self._skip]
                 separator = self.wanted.separator or _separator(first)
                 self._check_width(first, separator)
                 if separator != "," and "," in first:
@@ -128,10 +127,11 @@ class File(Recording):
             t0 = block.t[0] if t0 is None else t0
             yield replace(block, t=block.t - t0)
         if not seen:
+            number, line = list(enumerate(top[:2], 1))[-1]
             raise InputError(
-                f"{self.path}: no line has numbers in the columns"
-                f" {','.join(names)}; line {len(top)} is {top[-1][:60]!r}: name each"
-                " column in its order, _ for one that is not wanted"
+                f"{self.path}: no line has numbers in the columns {','.join(names)};"
+                f" line {number} is {line[:60]!r}: name each column in its order, _ for"
+                " one that is not wanted"
             )
 
     def _pieces(self) -> Iterator[bytes]:
@@ -141,8 +141,13 @@ class File(Recording):
             if mark and _is_wide(data[:HEAD]):
                 raise InputError(f"{self.path}: is text in UTF-16: save it as UTF-8")
             data, mark = data.removeprefix(mark), b""
-            whole, newline, rest = (rest + data).rpartition(b"\n")
-            if newline and whole.strip():
+            end = data.rfind(b"\n") + 1
+            if not end:
+                rest += data
+                continue
+            # one copy: there may be gigabytes of them
+            whole, rest = b"".join((rest, memoryview(data)[:end])), data[end:]
+            if not whole.isspace():
                 yield whole
         # a number that was cut off is another number
         if rest.strip() and not self.ends_early:

@@ -10,6 +10,7 @@ each row is looked at, summed up for the still stretches, written with checksums
 the file is hashed.
 """
 
+import gc
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -61,6 +62,9 @@ def importing(folder: Path, logs: dict[str, Log], rows: int) -> None:
     print(f"{'':38}{'write':>8}{'':18}  read + write")
     block = samples(rows)
     for name, (path, read, wanted) in logs.items():
+        # what the libraries of other formats left behind is no matter of this one
+        gc.collect()
+        gc.freeze()
         pairs = []
         for run in range(RUNS + 1):
             theirs = timed(read, path)

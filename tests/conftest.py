@@ -13,6 +13,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from processes import Recalibrated, recalibrate
 
+from fieldcal.driver import Driver
+
 # as the commands do: threads for small matrices only wait for each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -40,6 +42,12 @@ def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def recalibrated(tmp_path_factory: pytest.TempPathFactory) -> Recalibrated:
     """A run of five positions on a tilted base."""
     return recalibrate(tmp_path_factory.mktemp("run") / "session")
+
+
+@pytest.fixture
+def soon_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drivers in this process call a device silent after half of the usual time."""
+    monkeypatch.setattr(Driver.blocks, "__defaults__", (1.5,))
 
 
 SHARED = Path(__file__).parent.parent.parent / "shared"

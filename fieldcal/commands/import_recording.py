@@ -37,7 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="only this IMU, as --list names it (default: each into its own folder)",
     )
-    add("--repair", action="store_true", help="leave out bad rows, and say which")
+    add(
+        "--repair",
+        action="store_true",
+        help="leave out bad rows and what is damaged or cut off, and say which",
+    )
     add("--join", action="store_true", help="FILEs hold channels of one IMU, same rows")
     add("--options", default="", metavar="QUERY", help="as in a device's address")
     _add_columns(parser)

@@ -13,8 +13,6 @@ import pytest
 from hypothesis import HealthCheck, settings
 from processes import Recalibrated, recalibrate
 
-from fieldcal.driver import Driver
-
 # as the commands do: threads for small matrices only wait for each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -47,6 +45,9 @@ def recalibrated(tmp_path_factory: pytest.TempPathFactory) -> Recalibrated:
 @pytest.fixture
 def soon_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drivers in this process call a device silent after half of the usual time."""
+    # not above: numpy reads at its import how many threads it may have
+    from fieldcal.driver import Driver
+
     monkeypatch.setattr(Driver.blocks, "__defaults__", (1.5,))
 
 

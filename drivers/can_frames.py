@@ -17,13 +17,14 @@ LONGEST = 64
 
 FRAME = np.dtype(
     {
-        "names": ["t", "id", "size", "data"],
-        "formats": ["<f8", "<u4", "u1", ("u1", LONGEST)],
-        "offsets": [0, 8, 12, 16],
+        "names": ["t", "id", "size", "bus", "data"],
+        "formats": ["<f8", "<u4", "u1", "<u2", ("u1", LONGEST)],
+        "offsets": [0, 8, 12, 14, 16],
         "itemsize": 16 + LONGEST,
     }
 )
-"""Time stamp of the bus, s; identifier; bytes that came; these bytes, then zeros."""
+"""Time stamp of the bus, s; identifier; bytes that came; number of the bus in a log of
+several; the bytes, then zeros."""
 
 EXTENDED = 1 << 31
 """Added to an identifier of 29 bits."""
@@ -33,7 +34,7 @@ ERROR = 1 << 29
 
 Frames = NDArray[np.void]
 
-_ROW = struct.Struct(f"<dIB3x{LONGEST}s")
+_ROW = struct.Struct(f"<dIBxH{LONGEST}s")
 
 
 def pack(t: float, identifier: int, extended: bool, data: bytes) -> bytes:
@@ -42,20 +43,21 @@ def pack(t: float, identifier: int, extended: bool, data: bytes) -> bytes:
     >>> np.frombuffer(pack(1.5, 0x123, False, bytes([7, 8])), FRAME)["size"].tolist()
     [2]
     """
-    return _ROW.pack(t, identifier | EXTENDED * extended, len(data), data)
+    return _ROW.pack(t, identifier | EXTENDED * extended, len(data), 0, data)
 
 
-def pack_message(message: Any) -> bytes:
+def pack_message(message: Any, bus: int = 0) -> bytes:
     """Pack a ``can.Message``; nothing of a remote frame, which has no data.
 
     Whether it was received or sent is not looked at: for peers on one machine both are
     called sent.
     """
     if message.is_error_frame:
-        return pack(message.timestamp, ERROR, False, b"")
+        return _ROW.pack(message.timestamp, ERROR, 0, bus, b"")
     if message.is_remote_frame:
         return b""
     identifier = message.arbitration_id
     if message.is_extended_id:
         identifier |= EXTENDED
-    return _ROW.pack(message.timestamp, identifier, len(message.data), message.data)
+    data = message.data
+    return _ROW.pack(message.timestamp, identifier, len(data), bus, data)

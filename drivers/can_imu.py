@@ -5,7 +5,8 @@ Options: ``interface`` (any of python-can's; socketcan), ``bitrate``, ``data_bit
 adapter needs after its port is opened, s), ``reconnect`` as for a serial port; ``dbc``,
 ``map`` and the units as in `can_map`; ``first``, ``within`` and ``rate`` as in
 `can_samples`. A log (.log, .asc, .blf) in place of the channel is played, with
-``speed`` as device time against the clock, or ``max``.
+``speed`` as device time against the clock, or ``max``, and ``channel`` where the frames
+are on several buses of it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from time import monotonic
 import numpy as np
 
 from fieldcal.driver import Driver, Health
+from fieldcal.drivers.can_buses import Buses
 from fieldcal.drivers.can_frames import EXTENDED, FRAME, Frames
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_log import Log, is_log
@@ -58,8 +60,11 @@ class Imu(Driver):
         self._log: Log | None = None
         self._reader: Reader | None = None
         if is_log(channel):
-            self._log = Log(Path(channel), speed(options))
+            wanted = (part.identifier for part in self._parts)
+            buses = Buses(channel, wanted, options.text("channel"))
+            pace = speed(options)
             options.finish()
+            self._log = Log(Path(channel), buses, pace)
             return
         told = settings(options)
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)

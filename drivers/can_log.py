@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.drivers.can_frames import FRAME, Frames, pack_message
+from fieldcal.drivers.can_buses import Buses
+from fieldcal.drivers.can_frames import FRAME, Frames
 from fieldcal.drivers.pace import Pace
 from fieldcal.errors import DeviceError, InputError
 
@@ -45,22 +46,24 @@ class Log:
     Parameters
     ----------
     path : the file
+    buses : keeps the frames of the bus that is meant
     speed : time of the log against the clock; inf for as fast as it is read
 
     Raises
     ------
     InputError
-        If there is no such file, or it is no log.
+        If there is no such file, it is no log, or of several buses.
 
     """
 
-    def __init__(self, path: Path, speed: float) -> None:
+    def __init__(self, path: Path, buses: Buses, speed: float) -> None:
         if not path.is_file():
             raise InputError(f"{path}: there is no such log")
-        self._path = path
+        self._path, self._buses = path, buses
         self._pieces = self._read()
         self._piece: Frames = next(self._pieces, np.empty(0, FRAME))
         if not len(self._piece):
+            buses.finish()
             raise InputError(f"{path}: holds no frame; check that it is a CAN log")
         self._first = self.now = float(self._piece["t"][0])
         self._pace = Pace(self._first, speed)
@@ -72,11 +75,15 @@ class Log:
         ------
         DeviceError
             At the end of the log.
+        InputError
+            If frames of another bus turn up that might as well be meant, or none of
+            the one that is.
 
         """
         if not len(self._piece):
             self._piece = next(self._pieces, self._piece)
         if not len(self._piece):
+            self._buses.finish()
             raise DeviceError(
                 f"{self._path} has ended after {self.now - self._first:.3f} s"
             )
@@ -90,9 +97,15 @@ class Log:
 
     def _read(self) -> Generator[Frames]:
         try:
-            messages = _messages(self._path)
-            while rows := [pack_message(m) for m in islice(messages, PIECE)]:
-                yield np.frombuffer(b"".join(rows), FRAME)
+            messages, more = _messages(self._path), True
+            while more:
+                rows: list[bytes] = []
+                self._buses.rows(islice(messages, PIECE), rows)
+                more = len(rows) == PIECE
+                if len(frames := self._buses.frames(rows)):
+                    yield frames
+        except InputError:
+            raise
         except (OSError, EOFError) as fault:
             raise InputError(f"{self._path}: cannot be read: {fault}") from fault
         except Exception as fault:

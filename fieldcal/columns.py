@@ -58,10 +58,12 @@ class Samples:
         wanted = self._wanted
 
         def triad(kind: str, scale: float) -> Array:
-            table = np.full((n, 3), np.nan)
-            for i, axis in enumerate("xyz"):
-                if (kind + axis) in columns:
-                    np.multiply(columns[kind + axis], scale, out=table[:, i])
+            there = [(i, columns.get(kind + axis)) for i, axis in enumerate("xyz")]
+            whole = all(column is not None for _, column in there)
+            table = np.empty((n, 3)) if whole else np.full((n, 3), np.nan)
+            for i, column in there:
+                if column is not None:
+                    np.multiply(column, scale, out=table[:, i])
             return table
 
         if "t" in columns:
@@ -84,8 +86,9 @@ def units(wanted: Wanted) -> str:
     known = {c.partition("=")[0] for c in wanted.columns}
     says = []
     for channel, unit, lsb in (
-        ("ax", wanted.acc_unit, wanted.acc_lsb), ("gx", wanted.gyr_unit, wanted.gyr_lsb)
-    ):  # fmt: skip
+        ("ax", wanted.acc_unit or "m/s^2", wanted.acc_lsb),
+        ("gx", wanted.gyr_unit or "rad/s", wanted.gyr_lsb),
+    ):
         if channel in known:
             says.append(f"{lsb:g} counts/({unit})" if lsb != 1 else unit)
     return ", ".join(says) or "deg C"
@@ -94,9 +97,9 @@ def units(wanted: Wanted) -> str:
 def notes(wanted: Wanted) -> dict[str, object]:
     """What a session keeps of the units."""
     return {
-        "acc_unit": wanted.acc_unit,
+        "acc_unit": wanted.acc_unit or "m/s^2",
         "acc_lsb": wanted.acc_lsb,
-        "gyr_unit": wanted.gyr_unit,
+        "gyr_unit": wanted.gyr_unit or "rad/s",
         "gyr_lsb": wanted.gyr_lsb,
-        "time_unit": wanted.time_unit,
+        "time_unit": wanted.time_unit or "s",
     }

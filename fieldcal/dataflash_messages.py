@@ -8,13 +8,10 @@ rows. Source: ArduPilot's log format.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from fieldcal.recording import pieces
 
 MARK = b"\xa3\x95"
 FMT = 128
@@ -59,8 +56,8 @@ class Messages:
 
     Parameters
     ----------
-    path : also .gz
     damaged : told of a damaged place and what is wrong with it; may refuse it
+    pieces : gives its bytes from the beginning, each time anew
 
     Attributes
     ----------
@@ -68,8 +65,12 @@ class Messages:
 
     """
 
-    def __init__(self, path: Path, damaged: Callable[[str, str], None]) -> None:
-        self._path, self._damaged = path, damaged
+    def __init__(
+        self,
+        damaged: Callable[[str, str], None],
+        pieces: Callable[[], Iterator[bytes]],
+    ) -> None:
+        self._damaged, self._pieces = damaged, pieces
         self._formats: dict[int, Format] = {}
         self._by_name: dict[str, Format] = {}
         self.cut: int | None = None
@@ -88,7 +89,7 @@ class Messages:
 
         """
         rest, base = b"", 0
-        for piece in pieces(self._path):
+        for piece in self._pieces():
             data = rest + piece
             found, at = self._walk(data, base, scan)
             rest, base = data[at:], base + at

@@ -192,8 +192,9 @@ def _fill(
             raise InputError(f"{recording.path}: has no row that can be used")
         facts.left_out = judge.left_out
         written.close()
-        rows.add(summary(cells.table))
-        stretches = still_in(rows, written.between, still)
+        rest = cells.table
+        rows.add(summary(rest))
+        stretches = still_in(rows, rest.origin, written.between, still)
     repairs = [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
     text = tomlkit.dumps({**about, "position": positions})

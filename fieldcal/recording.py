@@ -6,28 +6,19 @@ come piece by piece, so that a log may be as long as it likes.
 
 from __future__ import annotations
 
-import gzip
-import shutil
-import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import IO, Any, cast
+from typing import Any
 
 from fieldcal.description import ACC_UNITS, GYR_UNITS
-from fieldcal.errors import InputError, disk_says
+from fieldcal.errors import InputError
+from fieldcal.packed import PIECE, head, pieces
 from fieldcal.samples import Block
-
-HEAD = 4096
-"""First bytes by which a format is known."""
-
-PIECE = 1 << 20
-"""Bytes that are looked at together."""
 
 ROWS = 1 << 15
 """Rows that are looked at together."""
@@ -50,7 +41,7 @@ class Wanted:
     columns : what each column is, or ``t=name`` pairs for columns that have names
     rate_hz : where there is no time
     separator, skip : of text files
-    acc_unit, gyr_unit, time_unit : of the file
+    acc_unit, gyr_unit, time_unit : of the file; "" is not said, and SI
     acc_lsb, gyr_lsb : counts in one unit, for raw counts
     options : as in a device's address, ``name=value&name=value``
 
@@ -60,9 +51,9 @@ class Wanted:
     rate_hz: float | None = None
     separator: str | None = None
     skip: int | None = None
-    acc_unit: str = "m/s^2"
-    gyr_unit: str = "rad/s"
-    time_unit: str = "s"
+    acc_unit: str = ""
+    gyr_unit: str = ""
+    time_unit: str = ""
     acc_lsb: float = 1.0
     gyr_lsb: float = 1.0
     options: str = ""
@@ -70,17 +61,17 @@ class Wanted:
     @property
     def acc_scale(self) -> float:
         """SI units (or counts, volts) in one of the file's."""
-        return _unit(self.acc_unit, ACC_UNITS) / self.acc_lsb
+        return _unit(self.acc_unit or "m/s^2", ACC_UNITS) / self.acc_lsb
 
     @property
     def gyr_scale(self) -> float:
         """SI units (or counts, volts) in one of the file's."""
-        return _unit(self.gyr_unit, GYR_UNITS) / self.gyr_lsb
+        return _unit(self.gyr_unit or "rad/s", GYR_UNITS) / self.gyr_lsb
 
     @property
     def time_scale(self) -> float:
         """Seconds in one of the file's unit of time."""
-        return _unit(self.time_unit, TIME_UNITS)
+        return _unit(self.time_unit or "s", TIME_UNITS)
 
 
 def _unit(unit: str, known: dict[str, float]) -> float:
@@ -111,8 +102,11 @@ class Recording(ABC):
     ----------
     says : what the user must know, one sentence each; grows while it is read
     mended : what was left out because it was damaged, grows likewise
+    ends_early : whether it was cut off, as far as it was read
 
     """
+
+    ends_early = False
 
     def __init__(self, path: Path, wanted: Wanted, repair: bool = False) -> None:
         self.path, self.wanted, self.repair = path, wanted, repair
@@ -146,6 +140,29 @@ class Recording(ABC):
         """Name a sample, counted from 0, as its file does."""
         return f"row {row + 1}"
 
+    def pieces(self, size: int = PIECE) -> Iterator[bytes]:
+        """Bytes of the file, unpacked, up to where it was cut off."""
+        return pieces(self.path, size, self.cut_off)
+
+    def cut_off(self, where: str, what: str) -> None:
+        """Refuse a file that ends too early, or be content with what comes before.
+
+        Raises
+        ------
+        InputError
+            Where the user did not ask for a repair.
+
+        """
+        if not self.repair:
+            raise InputError(
+                f"{self.path}: {where}: {what}; copy the file again, or take what is"
+                " whole before that with --repair"
+            )
+        self.ends_early = True
+        sentence = f"{where}: {what}; what was whole before that is taken"
+        if sentence not in self.mended:
+            self.mended.insert(0, sentence)
+
     def damaged(self, where: str, what: str) -> None:
         """Refuse a damaged place, or take note that it was left out.
 
@@ -166,81 +183,6 @@ class Recording(ABC):
             return
         self._more += 1
         self.mended[MOST:] = [f"{self._more} more damaged places, left out"]
-
-
-def unpacked(path: Path) -> IO[bytes]:
-    """Open a file for reading, also .gz.
-
-    Raises
-    ------
-    InputError
-        If it cannot be opened.
-
-    """
-    try:
-        file = path.open("rb")
-        magic = file.read(2)
-        file.seek(0)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    if magic != b"\x1f\x8b":
-        return file
-    file.close()
-    return cast(IO[bytes], gzip.open(path, "rb"))
-
-
-def pieces(path: Path, size: int = PIECE) -> Iterator[bytes]:
-    """Bytes of a file, unpacked, piece by piece.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or unpacked.
-
-    """
-    with unpacked(path) as file:
-        at = 0
-        while True:
-            try:
-                data = file.read(size)
-            except (OSError, EOFError, ValueError) as error:
-                raise InputError(
-                    f"{path}: cannot be read behind byte {at}: {error}"
-                ) from error
-            except Exception as error:
-                # zlib has an error of its own, of no common kind
-                raise InputError(
-                    f"{path}: cannot be unpacked behind byte {at}: {error}"
-                ) from error
-            if not data:
-                return
-            at += len(data)
-            yield data
-
-
-@contextmanager
-def on_disk(path: Path) -> Iterator[Path]:
-    """Give a file that can be searched, unpacked where it was not."""
-    with path.open("rb") as file:
-        packed = file.read(2) == b"\x1f\x8b"
-    if not packed:
-        yield path
-        return
-    folder = Path(tempfile.mkdtemp(prefix="fieldcal."))
-    try:
-        whole = folder / path.stem
-        try:
-            with whole.open("wb") as out:
-                for data in pieces(path):
-                    out.write(data)
-        except OSError as error:
-            raise InputError(
-                f"{path}: cannot be unpacked into {folder.parent}: {disk_says(error)},"
-                " by the environment's TMPDIR"
-            ) from error
-        yield whole
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def formats() -> list[str]:
@@ -271,22 +213,15 @@ def open_recording(
     """
     if name and name not in formats():
         raise InputError(f"no format {name!r}: there are {', '.join(formats())}")
-    head = b"".join(pieces_of_head(path))
-    if not head:
+    first = head(path)
+    if not first:
         raise InputError(f"{path}: is empty; copy it again from where it came")
     for some in [name] if name else formats():
         module = import_module(f"fieldcal.importers.{some}")
-        if name or module.recognises(head, path):
+        if name or module.recognises(first, path):
             opened: Recording = module.File(path, wanted, repair)
             return opened
     raise InputError(
         f"{path}: is of no format that is known by its content: name one with --format"
         f" {'|'.join(formats())}"
     )
-
-
-def pieces_of_head(path: Path) -> Iterator[bytes]:
-    """First bytes of a file, unpacked."""
-    for data in pieces(path, HEAD):
-        yield data
-        return

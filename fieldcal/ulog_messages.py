@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.errors import InputError
-from fieldcal.recording import pieces
 from fieldcal.samples import Array
 
 HEADER = 16
@@ -55,8 +54,9 @@ class Messages:
 
     Parameters
     ----------
-    path : also .gz
+    path : for errors
     damaged : told of a damaged place and what is wrong with it; may refuse it
+    bytes_of : gives its bytes from the beginning, each time anew
 
     Attributes
     ----------
@@ -73,8 +73,13 @@ class Messages:
 
     """
 
-    def __init__(self, path: Path, damaged: Callable[[str, str], None]) -> None:
-        self._path, self._damaged = path, damaged
+    def __init__(
+        self,
+        path: Path,
+        damaged: Callable[[str, str], None],
+        bytes_of: Callable[[], Iterator[bytes]],
+    ) -> None:
+        self._path, self._damaged, self._bytes = path, damaged, bytes_of
         self._head = b""
         self._ids: dict[int, Topic] = {}
         self._seen = [0] * 65536
@@ -124,7 +129,8 @@ class Messages:
             for number, starts in found.items():
                 topic = self._ids[number]
                 rows = self._rows(data, base, np.array(starts), layouts[topic])
-                out[topic] = {name: rows[name] for name in rows.dtype.names or ()}
+                if len(rows):
+                    out[topic] = {name: rows[name] for name in rows.dtype.names or ()}
             yield out
 
     def _layout(self, name: str) -> np.dtype[Any]:
@@ -159,7 +165,7 @@ class Messages:
     ) -> Iterator[tuple[bytes, int, dict[int, list[int]]]]:
         """Pieces of the log: bytes, their place, where messages begin by number."""
         rest, base, begun = b"", 0, False
-        for piece in pieces(self._path):
+        for piece in self._bytes():
             data = rest + piece
             at = 0
             if not begun:

@@ -42,6 +42,15 @@ def recalibrated(tmp_path_factory: pytest.TempPathFactory) -> Recalibrated:
     return recalibrate(tmp_path_factory.mktemp("run") / "session")
 
 
+@pytest.fixture
+def soon_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drivers in this process call a device silent after half of the usual time."""
+    # not above: numpy reads at its import how many threads it may have
+    from fieldcal.driver import Driver
+
+    monkeypatch.setattr(Driver.blocks, "__defaults__", (1.5,))
+
+
 SHARED = Path(__file__).parent.parent.parent / "shared"
 
 

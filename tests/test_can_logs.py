@@ -8,7 +8,7 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from can_wires import DBC, KEYED, numbers, stream, until_the_end
+from can_wires import DBC, KEYED, numbers, sample, stream, until_the_end
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -101,6 +101,37 @@ def test_a_log_is_played_as_the_bus_was(tmp_path: Path) -> None:
         for name in (path, packed):
             with open_driver(f"can:{name}?{query}") as imu:
                 assert numbers(until_the_end(imu)) == list(range(200)), name
+
+
+@pytest.mark.parametrize("scheme", ["can", "replay"])
+def test_a_log_of_two_buses_with_the_same_frames_is_asked_about_and_never_mixed(
+    tmp_path: Path, scheme: str
+) -> None:
+    (tmp_path / "imu.dbc").write_text(DBC)
+    path = tmp_path / "both.log"
+    lines = []
+    for i in range(5000):
+        for bus, number in ((0, i), (1, i + 3000)) if i >= 4000 else ((0, i),):
+            for row in np.frombuffer(b"".join(sample(number, seq=False)), FRAME):
+                data = row["data"][: row["size"]].tobytes().hex()
+                at = i / 100 + row["t"] % 0.01 + bus * 1e-6
+                lines.append(f"({at:.6f}) can{bus} {row['id']:03X}#{data}\n")
+        lines.append(f"({i / 100 + 0.005:.6f}) can2 7FF#00\n")
+    path.write_text("".join(lines))
+    known = KEYED.replace(",seq=seq", "")
+    address = f"{scheme}:{path}?dbc={tmp_path / 'imu.dbc'}&map={known}&rate=100"
+    address += "&speed=max"
+    with pytest.raises(InputError, match="from the buses can0, can1: choose one, such"):
+        with open_driver(address) as imu:
+            until_the_end(imu)
+    with open_driver(f"{address}&channel=can0") as imu:
+        assert numbers(until_the_end(imu)) == list(range(5000))
+    with open_driver(f"{address}&channel=can1") as imu:
+        assert numbers(until_the_end(imu)) == list(range(7000, 8000))
+    for name in ("can2", "can7"):
+        with pytest.raises(InputError, match=f"comes from {name}, but from can0, can1"):
+            with open_driver(f"{address}&channel={name}") as imu:
+                until_the_end(imu)
 
 
 def test_a_log_takes_its_time(tmp_path: Path) -> None:

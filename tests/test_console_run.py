@@ -37,7 +37,7 @@ class Console:
         self.device, self.folder = device, folder
         url = f"serial:{device.port}?format=witmotion"
         call = ["-m", "fieldcal", "run", "five_position", "--device", url]
-        call += ["--seconds", "20", "--latitude", "50.45", "--height", "170"]
+        call += ["--seconds", "14", "--latitude", "50.45", "--height", "170"]
         call += ["-o", str(folder), *more]
         self.child = pexpect.spawn(
             sys.executable, call, dimensions=(24, 80), encoding="utf-8", timeout=60
@@ -181,7 +181,7 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     console.child.send("r")
     console.wait("[·")
     take(console, 2, 22.5, 0.0)
-    device.ask(fault={"hangup_s": 4.0 * SPEED})
+    device.ask(fault={"hangup_s": 2.5 * SPEED})
     console.wait("no samples come from", "goes on by itself")
     console.wait("the window starts again")
     asked(console, 3)

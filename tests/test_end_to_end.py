@@ -70,7 +70,7 @@ def test_solving_the_recorded_session_gives_the_same_numbers(
 
 def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
     done = run(
-        *("two_position", "--headless", "--virtual", "--speed", "max", "--json"),
+        *("two_position", "--headless", "--virtual", "--speed", "60", "--json"),
         *("--no-report", "-o", str(tmp_path / "s"), "--level=0.01"),
     )
     assert done.returncode == 0, done.stderr
@@ -87,7 +87,7 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     """Unsaid it is NO-GO, and said it is in the uncertainty, without a second turn."""
     done = run(
         *("two_position", "--headless", "--virtual=--base-tilt=0.5,-0.3", "--json"),
-        *("--speed", "max", "--no-report", "-o", str(tmp_path / "s")),
+        *("--speed", "60", "--no-report", "-o", str(tmp_path / "s")),
     )
     assert done.returncode == 1, done.stderr
     told = [json.loads(line) for line in done.stderr.splitlines()]
@@ -128,7 +128,7 @@ def test_killed_at_any_moment_the_session_holds_all_but_the_last_moment(
             stderr=subprocess.DEVNULL,
         )
         wait_for_samples(folder, process, 5000)
-        late = _slept(rng.uniform(0.5, 3.0))
+        late = _slept(rng.uniform(0.3, 1.8), folder / "samples.arrows")
         killed = time()
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -138,16 +138,19 @@ def test_killed_at_any_moment_the_session_holds_all_but_the_last_moment(
         assert (np.diff(block.t) > 0).all()
         # what waited in the reader at the kill had not reached the recorder yet, and
         # on a busy machine each of device, reader and recorder waits for its turn
-        assert killed - block.t_host[-1] < 1.0 + 4 * late
+        assert killed - block.t_host[-1] < 1.0 + 4 * late, "more than is usual is lost"
         assert main(["solve", str(folder)]) in (1, 2), "two windows are never GO"
 
 
-def _slept(seconds: float) -> float:
-    """Sleep, and tell by how much the machine was late with it at worst, s."""
+def _slept(seconds: float, file: Path) -> float:
+    """Sleep; the longest that this process or the file had to wait for its turn, s."""
     end, late = monotonic() + seconds, 0.0
+    size, grew = file.stat().st_size, monotonic()
     while (now := monotonic()) < end:
         sleep(0.02)
-        late = max(late, monotonic() - now - 0.02)
+        if file.stat().st_size > size:
+            size, grew = file.stat().st_size, monotonic()
+        late = max(late, monotonic() - now - 0.02, monotonic() - grew)
     return late
 
 
@@ -190,6 +193,7 @@ def test_a_port_that_is_not_there(
     assert not (tmp_path / "s").exists()
 
 
+@pytest.mark.usefixtures("soon_silent")
 def test_a_port_that_says_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -199,6 +203,7 @@ def test_a_port_that_says_nothing(
     assert (tmp_path / "s" / "session.toml").exists()
 
 
+@pytest.mark.usefixtures("soon_silent")
 def test_a_port_that_says_nothing_sensible(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -207,6 +212,7 @@ def test_a_port_that_says_nothing_sensible(
     assert code == 3 and ("format" in said or "baud" in said)
 
 
+@pytest.mark.usefixtures("soon_silent")
 def test_a_device_that_goes_silent_keeps_what_it_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

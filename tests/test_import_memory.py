@@ -52,13 +52,13 @@ def peak(folder: Path, hours: float) -> tuple[int, int]:
         tracemalloc.stop()
 
 
-def test_twelve_hours_take_no_more_memory_than_three(tmp_path: Path) -> None:
+def test_eight_hours_take_no_more_memory_than_two(tmp_path: Path) -> None:
     peak(tmp_path, 0.5)
-    short, few = peak(tmp_path, 3.0)
-    long, many = peak(tmp_path, 12.0)
-    assert (few, many) == (36, 144)
-    # what twelve hours of cells would take by themselves
-    assert 13 * 8 * 12 * 36_000 > 10 * IN_MEMORY
+    short, few = peak(tmp_path, 2.0)
+    long, many = peak(tmp_path, 8.0)
+    assert (few, many) == (24, 96)
+    # what eight hours of cells would take by themselves
+    assert 35 * 8 * 8 * 36_000 > 10 * IN_MEMORY
     assert long < 1.1 * short
 
 

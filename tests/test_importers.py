@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
+from small_files import SMALL, Small, whole
 
 from fieldcal import recording as recordings
 from fieldcal import sample_files
@@ -90,7 +90,7 @@ def test_a_px4_log_in_small_pieces_is_the_same(
     path = tmp_path / "log.ulg"
     path.write_bytes(ulog({0: imu(1)}, SLOT, late=0.004))
     whole = concat(open_recording(path, WANTED).blocks("sensor_accel.0"))
-    monkeypatch.setattr(recordings.pieces, "__defaults__", (997,))
+    monkeypatch.setattr(recordings.Recording.pieces, "__defaults__", (997,))
     parts = list(open_recording(path, WANTED).blocks("sensor_accel.0"))
     assert len(parts) > 3
     same(concat(parts), whole)
@@ -105,7 +105,7 @@ def test_ardupilot_sensors_and_what_is_installed(
     units = {0: imu(1), 1: imu(2)}
     path = tmp_path / "00000001.bin"
     path.write_bytes(dataflash(units, INSTALLED))
-    monkeypatch.setattr(recordings.pieces, "__defaults__", (1009,))
+    monkeypatch.setattr(recordings.Recording.pieces, "__defaults__", (1009,))
     out = tmp_path / "out"
     assert main(["import", str(path), "-o", str(out)]) == 0
     reader = DFReader_binary(str(path))
@@ -299,7 +299,7 @@ def test_what_is_in_a_file_is_listed_and_chosen(
         (b"SQLite format 3\0" + bytes(100), "ros2 bag convert"),
         (bytes(range(256)) * 9, "--format"),
         (b"1,2,3\n", "say what its columns are"),
-        (b"\x1f\x8b\x08\x00garbage", "cannot be read behind byte 0"),
+        (b"\x1f\x8b\x08\x00garbage", "behind byte 0, unpacked"),
     ],
 )
 def test_what_cannot_be_told_is_refused_with_the_remedy(
@@ -327,90 +327,11 @@ def test_a_library_that_is_missing_is_named_with_its_extra(
             open_recording(tmp_path / "file", WANTED)
 
 
-def _mcap(path: Path, block: Block) -> None:
-    from fieldcal.calibration import Calibration, Nominal
-    from fieldcal.exporters import Source, mcap
-    from fieldcal.recorder import Recorder
-
-    with Recorder(path.parent / "made", {"format": 1}) as recorder:
-        recorder.append(block)
-    none = np.empty(0)
-    unit = Calibration("joint", (), none, np.empty((0, 0)), (), 0.0, 0, 0.0)
-    mcap.write(Source(unit, Nominal(), Session.open(path.parent / "made")), path)
-
-
-def _hdf5(path: Path, block: Block) -> None:
-    arrays(path.with_suffix(".h5"), block)
-    path.with_suffix(".h5").rename(path)
-
-
-def _candump(path: Path, block: Block) -> None:
-    can_log(path.with_suffix(".log"), block)
-    path.with_suffix(".log").rename(path)
-
-
-def _parquet(path: Path, block: Block) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet
-
-    columns = dict(zip(COLUMNS.split(","), table(block).T, strict=True))
-    pyarrow.parquet.write_table(pa.table(columns), path)
-
-
-SMALL: dict[str, Callable[[Path, Block], object]] = {
-    "ulog": lambda path, block: path.write_bytes(ulog({0: block}, {})),
-    "dataflash": lambda path, block: path.write_bytes(dataflash({0: block}, {})),
-    "tlog": lambda path, block: path.write_bytes(tlog({0: block}, {})),
-    "mcap": _mcap,
-    "arrays": _hdf5,
-    "can_log": _candump,
-    "parquet": _parquet,
-    "csv_like": lambda path, block: np.savetxt(path, table(block), delimiter=","),
-}
-
-
-class Small:
-    """A small file of a format, and what is in it."""
-
-    def __init__(self, name: str, path: Path) -> None:
-        self.name, self.path = name, path
-        SMALL[name](path, imu(1, 40))
-        (path.parent / "imu.dbc").write_text(dbc())
-        options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
-        options = options if name == "can_log" else ""
-        self.wanted = Wanted(WANTED.columns, options=options)
-        if name == "mcap":
-            self.wanted = Wanted()
-        self.content = path.read_bytes()
-        self.expected = whole(path, self.wanted)
-
-    def __repr__(self) -> str:
-        return self.name
-
-    def knows(self, found: Block) -> bool:
-        """Whether every triad of values is one of those written."""
-        for kind in ("acc", "gyr"):
-            rows = getattr(self.expected, kind).round(9).tolist()
-            known = {tuple(row) for row in rows}
-            for row in getattr(found, kind).round(9).tolist():
-                if not np.isnan(row).all() and tuple(row) not in known:
-                    return False
-        return True
-
-
 @pytest.fixture(scope="module", params=sorted(SMALL))
 def small(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Small:
     return Small(request.param, tmp_path_factory.mktemp(request.param) / "file")
-
-
-def whole(path: Path, wanted: Wanted, name: str = "", repair: bool = False) -> Block:
-    opened = open_recording(path, wanted, name, repair)
-    stream = opened.streams()[0].name
-    opened.notes(stream)
-    judge = Judge(str(path), opened.place, repair)
-    return concat(judge.good(block) for block in opened.blocks(stream))
 
 
 @settings(
@@ -459,8 +380,8 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, bytes]:
     n = 5000
     six = np.random.default_rng(3).normal(0, 0.02, (n, 6)) + [0, 0, 9.8, 0, 0, 0]
     block = Block.of(np.arange(n) / 100, six[:, :3], six[:, 3:])
-    _parquet(folder / "x.parquet", block)
-    recording = open_recording(folder / "x.parquet", Wanted())
+    SMALL["parquet"](folder / "x.parquet", block)
+    recording = open_recording(folder / "x.parquet", Wanted(tuple(COLUMNS.split(","))))
     bring_in(recording, "0", folder / "s", {"format": 1}, 2.0)
     return block, (folder / "s" / "samples.parquet").read_bytes()
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import subprocess
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from time import sleep
 from typing import Any
@@ -74,11 +77,44 @@ class Run:
         return [m for m in Session.open(self.folder).marks() if m["event"] == event]
 
 
-@every_link
-def test_a_link_that_stumbles_costs_nothing_but_time(link: str, tmp_path: Path) -> None:
-    run = Run(tmp_path, link)
+Ended = tuple[Run, int, Any, str]
+"""A run, its exit code, its result, and the last line of what it said."""
+
+
+def stumbles(folder: Path, link: str) -> Ended:
+    run = Run(folder, link)
     run.fault(*SURVIVED)
-    code, result, said = run.end()
+    return run, *run.end()
+
+
+@pytest.fixture(scope="module")
+def several(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[dict[str, Future[Any]]]:
+    """All runs that tests of this module ask for, by name: mostly they wait."""
+    wanted = {item.name for item in request.session.items}
+    work: dict[str, Callable[[Path], Any]] = {
+        f"test_a_link_that_stumbles_costs_nothing_but_time[{link}]": partial(
+            stumbles, link=link
+        )
+        for link in LINKS
+    }
+    for link, fault, _ in ENDS:
+        name = f"test_what_ends_a_run_is_one_sentence[{link}-{fault}]"
+        work[name] = partial(ended, link=link, fault=fault)
+    with ThreadPoolExecutor(3) as pool:
+        yield {
+            name: pool.submit(do, tmp_path_factory.mktemp("run"))
+            for name, do in work.items()
+            if name in wanted
+        }
+
+
+@every_link
+def test_a_link_that_stumbles_costs_nothing_but_time(
+    several: dict[str, Future[Ended]], request: pytest.FixtureRequest, link: str
+) -> None:
+    run, code, result, said = several[request.node.name].result()
     # the numbers are right, and a link like this is no link to launch with
     assert code == 1 and result["verdict"] == "good", said
     failed = [c["name"] for c in result["decision"]["checks"] if c["ok"] is False]
@@ -142,24 +178,36 @@ SILENT = "went silent for 3 s: not a byte came; check"
 GONE = "hung up: check cable and power, then start again"
 
 
-@pytest.mark.parametrize(
-    ("link", "fault", "says"),
-    [
-        ("serial", "silence_s", SILENT),
-        ("can", "silence_s", "went silent for 3 s: not a frame came; check"),
-        ("mavlink", "silence_s", "went silent for 3 s: an autopilot is there, but"),
-        ("mavlink", "reboot_s", "went silent for 3 s: an autopilot is there, but"),
-        ("serial", "hangup_s", GONE),
-        ("can", "hangup_s", GONE),
-        ("mavlink", "hangup_s", GONE),
-    ],
-)
-def test_what_ends_a_run_is_one_sentence(
-    link: str, fault: str, says: str, tmp_path: Path
-) -> None:
-    options = [*LINKS[link].format(tmp_path).split(), "--speed", "20"]
+ENDS = [
+    ("serial", "silence_s", SILENT),
+    ("can", "silence_s", "went silent for 3 s: not a frame came; check"),
+    ("mavlink", "silence_s", "went silent for 3 s: an autopilot is there, but"),
+    ("mavlink", "reboot_s", "went silent for 3 s: an autopilot is there, but"),
+    ("serial", "hangup_s", GONE),
+    ("can", "hangup_s", GONE),
+    ("mavlink", "hangup_s", GONE),
+]
+
+
+def ended(folder: Path, link: str, fault: str) -> tuple[Path, int, str]:
+    """Session, exit code and last line of a run that a fault ends."""
+    options = [*LINKS[link].format(folder).split(), "--speed", "20"]
     with VirtualDevice(options) as device:
         url = address(options, device.port) + "&reconnect=0"
-        code, said = failed(device, url, tmp_path / "s", {fault: 1e6})
+        code, said = failed(device, url, folder / "s", {fault: 1e6})
+    return folder / "s", code, said
+
+
+@pytest.mark.parametrize(
+    ("link", "fault", "says"), ENDS, ids=[f"{link}-{fault}" for link, fault, _ in ENDS]
+)
+def test_what_ends_a_run_is_one_sentence(
+    several: dict[str, Future[tuple[Path, int, str]]],
+    request: pytest.FixtureRequest,
+    link: str,
+    fault: str,
+    says: str,
+) -> None:
+    session, code, said = several[request.node.name].result()
     assert code == 3 and says in said, said
-    kept(tmp_path / "s", said)
+    kept(session, said)

@@ -58,7 +58,7 @@ def opened(url: str) -> Imu:
 
 @pytest.mark.parametrize("place", ["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0", "pty"])
 def test_same_truth_over_udp_tcp_and_a_serial_port(place: str) -> None:
-    with autopilot(place, "--speed", "5", "--seed", "3", *CONCEALED) as (where, _):
+    with autopilot(place, "--speed", "15", "--seed", "3", *CONCEALED) as (where, _):
         for message, within in (("HIGHRES_IMU", 2e-3), ("RAW_IMU", 6e-3)):
             with opened(f"mavlink:{where}?message={message}&rate=100") as imu:
                 block = taken(imu, 5.0)

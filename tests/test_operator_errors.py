@@ -36,6 +36,7 @@ def failed(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     return said
 
 
+@pytest.mark.usefixtures("soon_silent")
 def test_the_wrong_baud_rate(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -49,6 +50,7 @@ def test_the_wrong_baud_rate(
     assert "?format=mip&baud=921600" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("soon_silent")
 def test_the_wrong_format(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with VirtualDevice(["--serial", "xsens"]) as device:
         said = failed(f"serial:{device.port}?format=mip", tmp_path / "s", capsys)

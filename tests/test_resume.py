@@ -7,8 +7,10 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from time import sleep
+from typing import Any
 
 import numpy as np
 import pytest
@@ -124,21 +126,40 @@ def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
     assert description.read(tmp_path / "s" / "session.toml").positions
 
 
-@pytest.mark.parametrize(("kind", "runs"), [("killed", 3), ("pulled", 3)])
-def test_runs_that_are_broken_end_with_right_numbers(kind: str, runs: int) -> None:
-    """A few of what benchmarks/kills.py does by the hundred."""
+RUNS = 3
+
+
+@pytest.fixture(scope="module")
+def series() -> Iterator[dict[str, subprocess.Popen[str]]]:
+    """Runs that are broken in both ways, side by side: mostly they wait."""
     code = (
-        "import json; from benchmarks.kills import series\n"
-        f"found = series({kind!r}, {runs}, seed=11, most=1)\n"
+        "import json, sys; from benchmarks.kills import series\n"
+        f"found = series(sys.argv[1], {RUNS}, seed=11, most=1)\n"
         "print(json.dumps([[o.broken, o.lost, o.pulls, o.says] for o in found]))"
     )
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, env=env, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    outcomes = json.loads(done.stdout)
-    assert sum(broken for broken, *_ in outcomes) >= runs / 2
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    begun = {
+        kind: subprocess.Popen(
+            [sys.executable, "-c", code, kind], cwd=ROOT, env=env, text=True, **pipes
+        )
+        for kind in ("killed", "pulled")
+    }
+    yield begun
+    for process in begun.values():
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("kind", ["killed", "pulled"])
+def test_runs_that_are_broken_end_with_right_numbers(
+    series: dict[str, subprocess.Popen[str]], kind: str
+) -> None:
+    """A few of what benchmarks/kills.py does by the hundred."""
+    said, wrong = series[kind].communicate(timeout=120)
+    assert series[kind].returncode == 0, wrong
+    outcomes = json.loads(said)
+    assert sum(broken for broken, *_ in outcomes) >= RUNS / 2
     for _, lost, pulls, says in outcomes:
         assert lost == 0 and says == ""
         assert len(pulls) >= 11 and np.abs(pulls).max() < 4.5

@@ -19,6 +19,7 @@ from fieldcal.cli import main
 from fieldcal.errors import InputError, NotObservable
 from fieldcal.positions import FIVE, TWO, Position
 from fieldcal.samples import Array, Block, concat
+from fieldcal.session import Session
 from fieldcal.solve import Observations, rotation, solve
 from fieldcal.solve.estimate import Estimate
 from fieldcal.solve.rotation import exponential, integrate
@@ -375,6 +376,12 @@ def test_compare_and_apply(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     still = (rows["t"] > 3) & (rows["t"] < 63)
     down = np.mean(rows["ay"][still])
     assert down == pytest.approx(-result.info["conditions"]["gravity"], abs=1e-3)
+    # a table says its units, and is imported without being asked about
+    table = tmp_path / "calibrated.parquet"
+    assert main(["apply", str(second), str(table)]) == 0
+    assert main(["import", str(table), "-o", str(tmp_path / "again")]) == 0
+    imported = Session.open(tmp_path / "again").block
+    np.testing.assert_allclose(imported.acc[:, 1], rows["ay"], rtol=1e-12)
 
 
 def test_compare_and_apply_say_what_is_wrong(

@@ -25,11 +25,13 @@ def number(value: float, sigma: float) -> tuple[str, str]:
     ('0.1235', '0.0023')
     >>> number(123.4, 56.0)
     ('123', '56')
+    >>> number(-1e-5, 0.0014)
+    ('0.0000', '0.0014')
     """
     if not math.isfinite(sigma) or sigma <= 0:
         return f"{value:.6g}", "?"
     digits = max(0, 1 - math.floor(math.log10(sigma)))
-    return f"{value:.{digits}f}", f"{sigma:.{digits}f}"
+    return f"{value:z.{digits}f}", f"{sigma:.{digits}f}"
 
 
 def title(name: str) -> str:

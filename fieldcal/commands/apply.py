@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from fieldcal.samples import Block
 
 EXAMPLE = """\
@@ -52,6 +54,20 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _with_units(table: pa.Table) -> pa.Table:
+    """Say the unit of each column, so that nobody has to guess it."""
+    import pyarrow as pa
+
+    from fieldcal.samples import CHANNELS, UNITS
+
+    units = {"t": "s", **dict(zip(CHANNELS, UNITS, strict=True)), "temperature": "degC"}
+    fields = [
+        field.with_metadata({"unit": units[field.name]} if field.name in units else {})
+        for field in table.schema
+    ]
+    return pa.Table.from_arrays(table.columns, schema=pa.schema(fields))
+
+
 def _write(path: Path, block: Block) -> None:
     """Write samples in the columns of a session.
 
@@ -76,7 +92,7 @@ def _write(path: Path, block: Block) -> None:
             with pa.CompressedOutputStream(part, "gzip") as stream:
                 csv.write_csv(table, stream)
         elif path.name.endswith(".parquet"):
-            parquet.write_table(table, part)
+            parquet.write_table(_with_units(table), part)
         else:
             raise InputError(
                 f"{path.name}: samples are written as .csv, .csv.gz or .parquet"

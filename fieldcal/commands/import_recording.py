@@ -37,7 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="only this IMU, as --list names it (default: each into its own folder)",
     )
-    add("--repair", action="store_true", help="leave out bad rows, and say which")
+    add(
+        "--repair",
+        action="store_true",
+        help="leave out bad rows and what is damaged or cut off, and say which",
+    )
     add("--join", action="store_true", help="FILEs hold channels of one IMU, same rows")
     add("--options", default="", metavar="QUERY", help="as in a device's address")
     _add_columns(parser)
@@ -66,9 +70,9 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
     add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
     add("--separator", help="between columns (default: found)")
     add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
-    add("--acc-unit", default="m/s^2", help="m/s^2 (default), g, mg, V, count")
-    add("--gyr-unit", default="rad/s", help="rad/s (default), deg/s, mrad/s, V, count")
-    add("--time-unit", default="s", help="s (default), ms, us, ns")
+    add("--acc-unit", default="", help="m/s^2 (default), g, mg, V, count")
+    add("--gyr-unit", default="", help="rad/s (default), deg/s, mrad/s, V, count")
+    add("--time-unit", default="", help="s (default), ms, us, ns")
     add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
 

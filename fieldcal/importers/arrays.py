@@ -15,9 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fieldcal import columns
+from fieldcal import columns, headings
 from fieldcal.errors import InputError
-from fieldcal.recording import HEAD, ROWS, Recording, Stream, on_disk, pieces
+from fieldcal.packed import head, on_disk
+from fieldcal.recording import ROWS, Recording, Stream
 from fieldcal.samples import Array, Block
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
@@ -46,11 +47,13 @@ class Table(NamedTuple):
     ----------
     shape : (rows, columns)
     read : gives some rows of a column
+    unit : as an attribute of it says, or nothing
 
     """
 
     shape: tuple[int, int]
     read: Callable[[int, slice], Array]
+    unit: str = ""
 
 
 class File(Recording):
@@ -58,8 +61,7 @@ class File(Recording):
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
-        head = next(pieces(self.path, HEAD))
-        return (("h5py",) if _is_hdf5(head) else ()), "hdf5"
+        return (("h5py",) if _is_hdf5(head(self.path)) else ()), "hdf5"
 
     def streams(self) -> list[Stream]:
         """Return the one IMU."""
@@ -96,12 +98,16 @@ class File(Recording):
 
     def _named(self, tables: Mapping[str, Table]) -> dict[str, tuple[str, int]]:
         """Array and its column, by column of a session."""
-        given = self.wanted.columns
-        if not given:
-            raise InputError(
+        if not self.wanted.columns:
+            self.wanted, says = headings.settle(
+                self.path,
+                self.wanted,
+                headings.read(_columns(tables)),
                 f"{self.path}: say which arrays are the channels, such as --columns "
-                f"t=time,ax=acc.0,ay=acc.1; there are {_listed(tables)}"
+                f"t=time,ax=acc.0,ay=acc.1; there are {_listed(tables)}",
             )
+            self.says.append(says)
+        given = self.wanted.columns
         if not any("=" in column for column in given):
             return self._of_one(tables, given)
         named = {}
@@ -140,13 +146,13 @@ class File(Recording):
     def _opened(self) -> Iterator[dict[str, Table]]:
         """Every array of numbers in the file."""
         with ExitStack() as stack:
-            path = stack.enter_context(on_disk(self.path))
+            path = stack.enter_context(on_disk(self.path, self.cut_off))
             with path.open("rb") as file:
-                head = file.read(520)
+                first = file.read(520)
             try:
-                if _is_hdf5(head):
+                if _is_hdf5(first):
                     tables = _hdf5(path, stack)
-                elif head.startswith(MATLAB):
+                elif first.startswith(MATLAB):
                     tables = _matlab(path)
                 else:
                     tables = _numpy(path)
@@ -159,6 +165,21 @@ class File(Recording):
                     " it again from where it came"
                 ) from error
             yield tables
+
+
+def _columns(tables: Mapping[str, Table]) -> list[headings.Column]:
+    """Columns of the arrays; those of a table of three are axes."""
+    found = []
+    for name, table in tables.items():
+        bare, many = name.rpartition("/")[2], table.shape[1]
+        if many == 1:
+            found.append(headings.Column(name, bare, table.unit))
+        elif many == len("xyz"):
+            found += [
+                headings.Column(f"{name}.{i}", f"{bare}_{axis}", table.unit)
+                for i, axis in enumerate("xyz")
+            ]
+    return found
 
 
 def _listed(tables: Mapping[str, Table]) -> str:
@@ -176,7 +197,9 @@ def _hdf5(path: Path, stack: ExitStack) -> dict[str, Table]:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf":
             table = _table(item.shape, _slabs(item))
             if table and not name.startswith("#"):
-                found[name] = table
+                said = item.attrs.get("units", item.attrs.get("unit", ""))
+                text = said.decode() if isinstance(said, bytes) else str(said)
+                found[name] = table._replace(unit=text)
 
     file.visititems(visit)
     return found

@@ -13,22 +13,21 @@ import re
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, TextIO, cast
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO, cast
 
 from fieldcal.drivers.options import Options
 from fieldcal.errors import InputError
-from fieldcal.recording import Recording, Stream, unpacked
+from fieldcal.packed import head, unpacked
+from fieldcal.recording import Recording, Stream
 from fieldcal.samples import Block
+
+if TYPE_CHECKING:
+    from fieldcal.drivers.can_buses import Buses
 
 WHAT = "log of a CAN bus"
 
 PIECE = 8192
 """Frames looked at together."""
-
-FEW = 256
-"""Messages held at once: of more, the interpreter looks for garbage among them."""
 
 
 class Kind(NamedTuple):
@@ -65,11 +64,10 @@ class File(Recording):
 
     def streams(self) -> list[Stream]:
         """Return the one IMU that the map describes."""
-        with unpacked(self.path) as file:
-            if PRINTED.match(file.read(256)):
-                raise InputError(
-                    f"{self.path}: is what candump prints; record with candump -l"
-                )
+        if PRINTED.match(head(self.path)):
+            raise InputError(
+                f"{self.path}: is what candump prints; record with candump -l"
+            )
         options = Options("options", self.wanted.options)
         names = [part.name for part in self._parts(options)]
         return [Stream("0", f"frames {', '.join(names)}, units of the dbc")]
@@ -90,20 +88,22 @@ class File(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, some frames at a time."""
-        from fieldcal.drivers.can_frames import EXTENDED, FRAME
+        from fieldcal.drivers.can_buses import Buses
         from fieldcal.drivers.can_groups import CanHealth
         from fieldcal.drivers.can_stamped import Stamped
 
         options, health = Options("options", self.wanted.options), CanHealth()
-        parts, channel = self._parts(options), options.text("channel")
+        parts = self._parts(options)
+        wanted = (part.identifier for part in parts)
+        buses = Buses(str(self.path), wanted, options.text("channel"))
         samples = Stamped(parts, health, options)
         options.finish()
-        wanted = {part.identifier & ~EXTENDED for part in parts}
-        for rows in self._rows(wanted, channel):
-            frames = np.frombuffer(b"".join(rows), FRAME)
+        for rows in self._rows(buses):
+            frames = buses.frames(rows)
             block = samples.feed(frames, frames["t"])
             if block is not None:
                 yield block
+        buses.finish()
         if not health.samples:
             raise InputError(
                 f"{self.path}: not one whole sample is in it, of {health.strange} other"
@@ -117,66 +117,30 @@ class File(Recording):
         if found := [f"{what} ({n})" for what, n in counts.items() if n]:
             self.says.append(f"left out: {', '.join(found)}")
 
-    def _rows(self, wanted: set[int], channel: str) -> Iterator[list[bytes]]:
-        """Frames of one bus as rows, many at a time.
-
-        Raises
-        ------
-        InputError
-            If those `wanted` come from several buses, and none is chosen.
-
-        """
-        from fieldcal.drivers.can_frames import pack_message
-
+    def _rows(self, buses: Buses) -> Iterator[list[bytes]]:
+        """Frames as rows, many at a time."""
         messages, seen = self._messages(), 0
-        buses: set[Any] = set()
-        rows: list[bytes] = []
-        while some := self._some(messages, seen):
-            seen += len(some)
-            if {m.channel for m in some} - buses:
-                buses |= {m.channel for m in some if m.arbitration_id in wanted}
-            if channel:
-                some = [m for m in some if str(m.channel) == channel]
-            elif len(buses) > 1:
-                names = sorted(map(str, buses))
-                raise InputError(
-                    f"{self.path}: frames of the map come from the buses"
-                    f" {', '.join(names)}: choose one in --options, such as"
-                    f" channel={names[-1]}"
-                )
-            rows += [pack_message(message) for message in some]
-            if len(rows) >= PIECE:
-                yield rows
-                rows = []
-        names = sorted(map(str, buses))
-        if channel and channel not in names:
-            raise InputError(
-                f"{self.path}: no frame of the map comes from {channel}, but from"
-                f" {', '.join(names) or 'no bus'}: mend channel in --options"
-            )
-        if rows:
+        while True:
+            rows: list[bytes] = []
+            try:
+                buses.rows(islice(messages, PIECE), rows)
+            except InputError:
+                raise
+            except Exception as error:
+                # the readers of the several formats raise what they like
+                where = f"behind frame {seen + len(rows)}"
+                self.cut_off(where, f"cannot be read: {error}")
+            seen += len(rows)
             yield rows
-
-    def _some(self, messages: Iterator[Any], seen: int) -> list[Any]:
-        """The frames that follow those `seen`."""
-        try:
-            return list(islice(messages, FEW))
-        except InputError:
-            raise
-        except Exception as error:
-            # the readers of the several formats raise what they like
-            raise InputError(
-                f"{self.path}: cannot be read behind frame {seen}: {error}; copy it"
-                " again from where it came"
-            ) from error
+            if len(rows) < PIECE:
+                return
 
     def _messages(self) -> Iterator[Any]:
         import can
 
-        with unpacked(self.path) as file:
-            head = file.read(256)
-            kind = next(k for k in KINDS if k.begins.match(head))
-            file.seek(0)
+        first = head(self.path)
+        kind = next(k for k in KINDS if k.begins.match(first))
+        with unpacked(self.path, self.cut_off) as file:
             if kind.name == "blf":
                 with can.BLFReader(cast(BinaryIO, file)) as reader:
                     yield from reader
@@ -193,7 +157,7 @@ def _candump(recording: File, text: io.TextIOWrapper) -> Iterator[Any]:
     """Frames of a candump log; a line that is none is named."""
     import can
 
-    lines = _Lines(text)
+    lines = _Lines(text, recording)
     while True:
         with can.CanutilsLogReader(cast(TextIO, lines)) as reader:
             try:
@@ -204,15 +168,16 @@ def _candump(recording: File, text: io.TextIOWrapper) -> Iterator[Any]:
 
 
 class _Lines:
-    """Lines of a text that are counted."""
+    """Lines of a text that are counted, without one that was cut off."""
 
-    def __init__(self, text: io.TextIOWrapper) -> None:
-        self._text, self.number = text, 0
+    def __init__(self, text: io.TextIOWrapper, recording: File) -> None:
+        self._text, self._recording, self.number = text, recording, 0
 
     def __iter__(self) -> Iterator[str]:
         while line := self._text.readline():
             self.number += 1
-            yield line
+            if line.endswith("\n") or not self._recording.ends_early:
+                yield line
 
     def read(self, size: int = -1) -> str:
         """Give a part of the text."""

@@ -1,8 +1,9 @@
 """Text files of numbers in columns: what each column is, is said by the user.
 
-Nothing is guessed in silence: columns, rate and units come from the command line; only
-the separator and lines of names at the top are found by themselves. Times are made from
-the rate where the file has none; otherwise they count from the first line.
+Nothing is guessed in silence: columns, rate and units come from the command line, or
+from a line of names that says all of it; the separator and lines at the top that are no
+numbers are found by themselves. Times are made from the rate where the file has none;
+otherwise they count from the first line.
 
 Arrow reads what is plain, a piece at a time; lines that it does not understand are read
 again one by one, so that each that is none can be named.
@@ -17,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal import columns
+from fieldcal import columns, headings
 from fieldcal.arrow_stream import numbers
 from fieldcal.errors import InputError
-from fieldcal.recording import HEAD, Recording, Stream, pieces
+from fieldcal.packed import HEAD
+from fieldcal.recording import Recording, Stream
 from fieldcal.samples import Array, Block
 
 WHAT = "text with columns"
@@ -36,6 +38,9 @@ WIDE = (b"\xff\xfe", b"\xfe\xff")
 
 TOP = 1000
 """Lines at the top among which the first of numbers is looked for."""
+
+NAMED = 50
+"""Lines at the top among which the names of the columns are looked for."""
 
 TEXT = 0.95
 """Share of characters that a text has among its first bytes."""
@@ -61,11 +66,7 @@ class File(Recording):
 
     def streams(self) -> list[Stream]:
         """Return the one IMU."""
-        if not self.wanted.columns:
-            raise InputError(
-                f"{self.path}: say what its columns are, such as --columns "
-                f"t,ax,ay,az,gx,gy,gz; its first line is {self._first_line()!r}"
-            )
+        self._settle()
         columns.check(self.wanted)
         return [Stream("0", f"columns in {columns.units(self.wanted)}")]
 
@@ -77,11 +78,28 @@ class File(Recording):
         """Name a line; empty ones are not counted."""
         return f"line {self._skip + row + 1}"
 
-    def _first_line(self) -> str:
-        return next((line[:60] for data in self._pieces() for line in _top(data)), "")
+    def _settle(self) -> None:
+        """Take the columns from a line of names, where the user does not name them."""
+        if self.wanted.columns:
+            return
+        lines = next((_top(data)[:NAMED] for data in self._pieces()), [""])
+        found = (self._names(line) for line in lines)
+        self.wanted, says = headings.settle(
+            self.path,
+            self.wanted,
+            next((names for names in found if names), None),
+            f"{self.path}: say what its columns are, such as --columns "
+            f"t,ax,ay,az,gx,gy,gz; its first line is {lines[0][:60]!r}",
+        )
+        self.says.append(says)
+
+    def _names(self, line: str) -> headings.Found | None:
+        cells = line.lstrip("#% ").split(self._parted(line))
+        return headings.read([headings.Column("", c) for c in cells], columns.SKIP)
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, a piece of the file at a time."""
+        self._settle()
         columns.check(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != columns.SKIP]
@@ -89,12 +107,11 @@ class File(Recording):
         begun, t0, top = False, None, [""]
         for data in self._pieces():
             if not begun:
-                top = _top(data)[:2]
-                self._skip, begun = self._heading(_top(data), use), True
-                data = _behind(data, self._skip) if self._skip >= 0 else b""
-                if not data.strip():
+                top = _top(data)
+                self._skip, begun = self._heading(top, use), True
+                if not 0 <= self._skip < len(top):
                     break
-                first = _top(data)[0]
+                data, first = _behind(data, self._skip), top[self._skip]
                 separator = self.wanted.separator or _separator(first)
                 self._check_width(first, separator)
                 if separator != "," and "," in first:
@@ -110,23 +127,30 @@ class File(Recording):
             t0 = block.t[0] if t0 is None else t0
             yield replace(block, t=block.t - t0)
         if not seen:
+            number, line = list(enumerate(top[:2], 1))[-1]
             raise InputError(
-                f"{self.path}: no line has numbers in the columns"
-                f" {','.join(names)}; line {len(top)} is {top[-1][:60]!r}: name each"
-                " column in its order, _ for one that is not wanted"
+                f"{self.path}: no line has numbers in the columns {','.join(names)};"
+                f" line {number} is {line[:60]!r}: name each column in its order, _ for"
+                " one that is not wanted"
             )
 
     def _pieces(self) -> Iterator[bytes]:
         """Whole lines of the file, many at a time."""
         rest, mark = b"", MARK
-        for data in pieces(self.path):
+        for data in self.pieces():
             if mark and _is_wide(data[:HEAD]):
                 raise InputError(f"{self.path}: is text in UTF-16: save it as UTF-8")
             data, mark = data.removeprefix(mark), b""
-            whole, newline, rest = (rest + data).rpartition(b"\n")
-            if newline and whole.strip():
+            end = data.rfind(b"\n") + 1
+            if not end:
+                rest += data
+                continue
+            # one copy: there may be gigabytes of them
+            whole, rest = b"".join((rest, memoryview(data)[:end])), data[end:]
+            if not whole.isspace():
                 yield whole
-        if rest.strip():
+        # a number that was cut off is another number
+        if rest.strip() and not self.ends_early:
             # a file without a line feed may have the other kind of ends of lines
             yield rest.replace(b"\r", b"\n")
 

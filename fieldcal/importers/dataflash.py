@@ -151,7 +151,7 @@ class File(Recording):
         """Walk through the log once: which sensors it has, and the parameters."""
         if self._scanned:
             return
-        self._log = Messages(self.path, self.damaged)
+        self._log = Messages(self.damaged, self.pieces)
         self._sensors: set[int] = set()
         self._sampled: dict[int, tuple[float, float]] = {}
         self._params: dict[str, float] = {}

@@ -8,6 +8,7 @@ bags (sqlite3) become MCAP with ``ros2 bag convert``.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from fieldcal.errors import InputError
-from fieldcal.recording import Recording, Stream, on_disk, unpacked
+from fieldcal.mcap_messages import Decoders, messages
+from fieldcal.packed import head, on_disk
+from fieldcal.recording import Recording, Stream
 from fieldcal.samples import Block
 
 WHAT = "MCAP with sensor_msgs/Imu"
@@ -57,26 +60,30 @@ class File(Recording):
 
     def _topics(self) -> dict[str, str]:
         """Kind of the messages of each topic."""
+        if head(self.path).startswith(SQLITE):
+            raise InputError(
+                f"{self.path}: is a bag of the sqlite3 kind; make an MCAP file of it"
+                " with ros2 bag convert"
+            )
+        with on_disk(self.path, self.cut_off) as path:
+            if self.repair:
+                said = messages(path, self.damaged, self.cut_off)
+                return {one.channel.topic: one.kind for one in said}
+            return self._summary(path)
+
+    def _summary(self, path: Path) -> dict[str, str]:
         from mcap.exceptions import McapError
         from mcap.reader import make_reader
 
-        with unpacked(self.path) as packed:
-            if packed.read(len(SQLITE)) == SQLITE:
-                raise InputError(
-                    f"{self.path}: is a bag of the sqlite3 kind; make an MCAP file of"
-                    " it with ros2 bag convert"
-                )
-        with on_disk(self.path) as path, path.open("rb") as file:
+        with path.open("rb") as file:
             try:
                 summary = make_reader(file).get_summary()
-            except (McapError, ValueError, EOFError, OSError) as error:
-                raise InputError(
-                    f"{self.path}: has no summary at its end: {error or 'cut off'}; "
-                    "mend it with mcap recover"
-                ) from error
+            except (McapError, ValueError, EOFError, OSError):
+                summary = None
         if summary is None:
             raise InputError(
-                f"{self.path}: has no summary at its end; mend it with mcap recover"
+                f"{self.path}: has no summary at its end, as if cut off;"
+                f" {_whole(path)}, or copy it again from where it came"
             )
         kinds = {n: schema.name for n, schema in summary.schemas.items()}
         return {
@@ -86,40 +93,83 @@ class File(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of a topic, many at a time."""
-        from mcap.exceptions import McapError
+        degrees = {t for t, kind in self._topics().items() if kind == TEMPERATURE}
+        rows: list[tuple[float, ...]] = []
+        warm = dict[str, float]()
+        with on_disk(self.path, self.cut_off) as path:
+            found = self._streamed if self.repair else self._indexed
+            for topic, logged, said in found(path, stream, degrees):
+                if topic != stream:
+                    warm[said.header.frame_id] = said.temperature
+                    continue
+                degrees_now = warm.get(said.header.frame_id, np.nan)
+                rows.append(_row(said, degrees_now, logged))
+                if len(rows) == MANY:
+                    yield _block(rows)
+                    rows = []
+        if rows:
+            yield _block(rows)
+
+    def _indexed(
+        self, path: Path, stream: str, degrees: set[str]
+    ) -> Iterator[tuple[str, int, Any]]:
+        """Topic, time of logging, ns, and contents of messages, in order of time."""
         from mcap.reader import make_reader
         from mcap_ros2.decoder import DecoderFactory
 
-        degrees = [t for t, kind in self._topics().items() if kind == TEMPERATURE]
-        rows: list[tuple[float, ...]] = []
-        with on_disk(self.path) as path, path.open("rb") as file:
-            reader = make_reader(
-                file, validate_crcs=True, decoder_factories=[DecoderFactory()]
-            )
-            seen, warm = 0, dict[str, float]()
+        seen = 0
+        with path.open("rb") as file:
+            decoders = [DecoderFactory()]
+            reader = make_reader(file, validate_crcs=True, decoder_factories=decoders)
             try:
                 for _, channel, message, said in reader.iter_decoded_messages(
                     topics=[stream, *degrees]
                 ):
-                    if channel.topic != stream:
-                        warm[said.header.frame_id] = said.temperature
-                        continue
-                    degrees_now = warm.get(said.header.frame_id, np.nan)
-                    rows.append(_row(said, degrees_now, message.log_time))
-                    seen += 1
-                    if len(rows) == MANY:
-                        yield _block(rows)
-                        rows = []
-            except InputError:
-                raise
-            except (McapError, Exception) as error:
+                    yield channel.topic, message.log_time, said
+                    seen += channel.topic == stream
+            except Exception as error:
                 # decoders are made of what the file says, and raise what they like
                 raise InputError(
                     f"{self.path}: cannot be read behind message {seen} of {stream}: "
-                    f"{error or type(error).__name__}; mend it with mcap recover"
+                    f"{error or type(error).__name__}; copy it again, or leave out what"
+                    " is damaged with --repair"
                 ) from error
-        if rows:
-            yield _block(rows)
+
+    def _streamed(
+        self, path: Path, stream: str, degrees: set[str]
+    ) -> Iterator[tuple[str, int, Any]]:
+        """The same in the order of the file, without those that are damaged."""
+        decoders, seen = Decoders(), 0
+        for one in messages(path, self.damaged, self.cut_off):
+            if one.channel.topic not in {stream, *degrees}:
+                continue
+            seen += one.channel.topic == stream
+            try:
+                said = decoders.read(one)
+            except Exception as error:
+                # decoders are made of what the file says, and raise what they like
+                where = f"message {seen} of {one.channel.topic}"
+                self.damaged(where, f"cannot be read ({error})")
+                continue
+            if one.kind in (IMU, TEMPERATURE) and said is not None:
+                yield one.channel.topic, one.message.log_time, said
+
+
+def _whole(path: Path) -> str:
+    """Say what is whole in a file without a summary, and how to take it."""
+
+    def pass_over(where: str, what: str) -> None:
+        pass
+
+    found = Counter(
+        one.channel.topic
+        for one in messages(path, pass_over, pass_over)
+        if one.kind == IMU
+    )
+    if not found:
+        return "no message of an IMU in it is whole"
+    many = ", ".join(f"{n} messages of {topic}" for topic, n in sorted(found.items()))
+    return f"{many} are whole: take them with --repair"
 
 
 def _row(said: Any, degrees: float, logged: int) -> tuple[float, ...]:

@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fieldcal import columns
+from fieldcal import columns, headings
 from fieldcal.arrow_stream import numbers
 from fieldcal.errors import InputError
-from fieldcal.recording import ROWS, Recording, Stream, on_disk
-from fieldcal.sample_files import COLUMNS
+from fieldcal.packed import on_disk
+from fieldcal.recording import ROWS, Recording, Stream
 from fieldcal.samples import Array, Block
 
 WHAT = "Parquet and Arrow"
@@ -29,8 +29,8 @@ class File(Recording):
 
     def streams(self) -> list[Stream]:
         """Return the one IMU."""
-        with self._batches() as (names, _):
-            self._named(names)
+        with self._batches() as (schema, _):
+            self._named(schema)
         return [Stream("0", f"columns in {columns.units(self.wanted)}")]
 
     def notes(self, stream: str) -> dict[str, Any]:
@@ -43,8 +43,8 @@ class File(Recording):
 
         samples = columns.Samples(self.wanted)
         try:
-            with self._batches() as (names, batches):
-                named = self._named(names)
+            with self._batches() as (schema, batches):
+                named = self._named(schema)
                 for batch in batches:
                     batch.validate(full=True)
                     table = {c: self._numbers(batch, n) for c, n in named.items()}
@@ -55,47 +55,53 @@ class File(Recording):
             ) from error
 
     @contextmanager
-    def _batches(self) -> Iterator[tuple[list[str], Iterator[Any]]]:
-        """Names of its columns, and its batches."""
+    def _batches(self) -> Iterator[tuple[Any, Iterator[Any]]]:
+        """Schema of its columns, and its batches."""
         import pyarrow as pa
         import pyarrow.parquet
 
-        with on_disk(self.path) as path, path.open("rb") as file:
+        with on_disk(self.path, self.cut_off) as path, path.open("rb") as file:
             magic = file.read(6)
             file.seek(0)
             try:
                 if magic.startswith(PARQUET):
                     opened = pyarrow.parquet.ParquetFile(file)
-                    names = opened.schema_arrow.names
-                    wanted = [n for n in self._named(names).values()]
+                    schema = opened.schema_arrow
+                    wanted = [n for n in self._named(schema).values()]
                     one = {"columns": wanted, "use_threads": False}
-                    yield names, opened.iter_batches(ROWS, **one)
+                    yield schema, opened.iter_batches(ROWS, **one)
                 elif magic == FEATHER:
                     feather = pa.ipc.open_file(file)
                     many = range(feather.num_record_batches)
-                    yield feather.schema.names, (feather.get_batch(i) for i in many)
+                    yield feather.schema, (feather.get_batch(i) for i in many)
                 else:
                     stream = pa.ipc.open_stream(file)
-                    yield stream.schema.names, iter(stream)
+                    yield stream.schema, iter(stream)
             except (pa.ArrowException, OSError) as error:
                 raise InputError(
                     f"{self.path}: is not whole: {error}; copy it again from where it"
                     " came"
                 ) from error
 
-    def _named(self, names: list[str]) -> dict[str, str]:
+    def _named(self, schema: Any) -> dict[str, str]:
         """Names in the file by column."""
+        names = schema.names
+        ask = (
+            f"say which are the channels with --columns t=…,ax=…: there are"
+            f" {', '.join(names[:30])}"
+        )
+        if not self.wanted.columns:
+            said = [headings.Column(f.name, f.name, _unit(f)) for f in schema]
+            found = headings.read(said)
+            self.wanted, says = headings.settle(
+                self.path, self.wanted, found, f"{self.path}: {ask}"
+            )
+            self.says.append(says)
         pairs = [c.partition("=") for c in self.wanted.columns]
         named = {column: name or column for column, _, name in pairs}
-        if not named:
-            named = {c: c for c in COLUMNS if c in names}
         missing = [name for name in named.values() if name not in names]
-        if missing or not {"ax", "gx", "temperature"} & set(named):
-            what = f"no column {missing[0]}" if missing else "no column ax or gx"
-            raise InputError(
-                f"{self.path}: has {what}; say which are the channels with --columns "
-                f"t=…,ax=…: there are {', '.join(names[:30])}"
-            )
+        if missing:
+            raise InputError(f"{self.path}: has no column {missing[0]}; {ask}")
         columns.check(self._with(tuple(named)))
         return named
 
@@ -117,3 +123,10 @@ class File(Recording):
                 " with --columns"
             )
         return numbers(column.cast(pa.float64(), safe=False))
+
+
+def _unit(field: Any) -> str:
+    """What a column says of its unit."""
+    said = field.metadata or {}
+    text: bytes = said.get(b"unit", said.get(b"units", b""))
+    return text.decode(errors="replace")

@@ -21,7 +21,7 @@ from fieldcal.drivers.mavlink_log import STAMP, cut, split
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.errors import DeviceError, InputError
-from fieldcal.recording import Recording, Stream, pieces
+from fieldcal.recording import Recording, Stream
 from fieldcal.samples import Block
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class File(Recording):
     def _chunks(self) -> Iterator[list[Chunk]]:
         """Packets with their arrivals, a piece of the log at a time."""
         rest = b""
-        for piece in pieces(self.path, CUT):
+        for piece in self.pieces(CUT):
             data = rest + piece
             chunks, at = cut(data)
             rest = data[at:]

@@ -203,7 +203,7 @@ class File(Recording):
     def _log(self) -> Messages:
         """The log, walked through once."""
         if self._read is None:
-            self._read = Messages(self.path, self.damaged)
+            self._read = Messages(self.path, self.damaged, self.pieces)
             if self._read.cut is not None:
                 self.says.append(
                     f"the log ends within a message, at byte {self._read.cut}"

@@ -13,7 +13,7 @@ from typing import Any
 from fieldcal.drivers.codec import Codec, open_codec, recognise
 from fieldcal.drivers.options import Options
 from fieldcal.errors import FieldcalError, InputError
-from fieldcal.recording import Recording, Stream, pieces
+from fieldcal.recording import Recording, Stream
 from fieldcal.samples import Block
 
 WHAT = "bytes of a serial port"
@@ -49,8 +49,8 @@ class File(Recording):
         options = Options("options", self.wanted.options)
         self._name = options.text("format")
         if not self._name:
-            head = next(pieces(self.path, CUT), b"")
-            fits = recognise(head, SECONDS)
+            first = next(self.pieces(CUT), b"")
+            fits = recognise(first, SECONDS)
             if fits is None:
                 raise InputError(
                     f"{self.path}: say what bytes these are, such as --options "
@@ -68,13 +68,13 @@ class File(Recording):
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, some bytes at a time."""
         codec = self._opened()
-        try:
-            for data in pieces(self.path, CUT):
+        for data in self.pieces(CUT):
+            try:
                 block = codec.feed(data)
-                if block is not None:
-                    yield block
-        except FieldcalError as error:
-            raise InputError(f"{self.path}: {error}") from error
+            except FieldcalError as error:
+                raise InputError(f"{self.path}: {error}") from error
+            if block is not None:
+                yield block
         health = codec.health
         if not health.samples:
             raise InputError(

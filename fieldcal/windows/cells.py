@@ -43,8 +43,9 @@ class Table:
     Attributes
     ----------
     times : (m,) start of each cell, s of device time
-    sums : (m, 32) n, S, D, m of the six channels, sum and number of the temperatures,
-        and the smallest change from one value to the next but none
+    sums : (m, 34) n, S, D, m of the six channels, sum and number of the temperatures,
+        the smallest change from one value to the next but none, and the first and the
+        last instant, this negative
     origin : (6,) what the sums are taken about: the first value of each channel
 
     """
@@ -135,6 +136,19 @@ class Table:
         return self.sums[:, 26:32]
 
     @property
+    def span(self) -> tuple[float, float]:
+        """First and last instant, s of device time."""
+        return float(self.sums[0, 32]), float(-self.sums[-1, 33])
+
+    @property
+    def on_edge(self) -> bool:
+        """Whether its first sample lies where its first cell begins.
+
+        Then cells that are summed from that sample on are the same.
+        """
+        return bool(abs(self.span[0] - self.times[0]) < _GRACE * CELL / 2)
+
+    @property
     def rounding(self) -> Array:
         """Resolution where the noise does not hide it, (6,); 0 elsewhere."""
         return rounding(self.noise, self.finest.min(axis=0, initial=np.inf))
@@ -157,7 +171,7 @@ class Cells:
         self._last = np.full(6, np.nan)
         self._size = 0
         self._index = np.zeros(64, dtype=np.int64)
-        self._sums = np.zeros((64, 32))
+        self._sums = np.zeros((64, 34))
 
     @property
     def table(self) -> Table:
@@ -190,10 +204,12 @@ class Cells:
         step = x[:, 1:] - x[:, :-1]
         index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
         first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
-        sums = np.empty((len(first), 32))
+        sums = np.empty((len(first), 34))
         sums[:, :24] = channels(x[:, 1:], step, first).reshape(-1, 24)
         sums[:, 24:26] = warmth(block.temperature, first)
-        sums[:, 26:] = finest(step, first)
+        sums[:, 26:32] = finest(step, first)
+        sums[:, 32] = block.t[first]
+        sums[:, 33] = -block.t[np.append(first[1:], len(block)) - 1]
         self._append(index[first], sums)
 
     def _centred(self, block: Block) -> Array:

@@ -26,6 +26,9 @@ _SPAN = 10
 _LEAST, _MOST = 4.0, 64.0
 """Bounds on the valley, in multiples of the quietest: a recording may have no turn."""
 
+_CLEARLY = 0.98
+"""Ratio of departure to what is allowed that the sums of a recording must keep."""
+
 _OWN = 4.0
 """Spread, in multiples of what is usual in a stretch, that still belongs to it."""
 
@@ -54,7 +57,7 @@ class Rows(Protocol):
         """Count the cells."""
 
     def __getitem__(self, some: slice, /) -> Array:
-        """Give some of them, (k, 13)."""
+        """Give some of them, (k, 35)."""
 
 
 class _Run(NamedTuple):
@@ -79,22 +82,24 @@ def still_stretches(
 
     cells = Cells()
     cells.add(block)
-    return still_in(summary(cells.table), between, min_seconds)
+    table = cells.table
+    return still_in(summary(table), table.origin, between, min_seconds)
 
 
 def summary(cells: Table) -> Array:
-    """Start of each cell, s, its counts and means less the origin: (m, 13)."""
-    return np.column_stack([cells.times, cells.counts, cells.means])
+    """Start of each cell, s, and its sums: (m, 35)."""
+    return np.column_stack([cells.times, cells.sums])
 
 
 def still_in(
-    rows: Rows, between: Between, min_seconds: float
+    rows: Rows, origin: Array, between: Between, min_seconds: float
 ) -> list[tuple[float, float]]:
     """`still_stretches` of a recording that does not fit into memory.
 
     Parameters
     ----------
     rows : of all of it
+    origin : (6,) what their sums are taken about
     between : gives the samples of a stretch of it
     min_seconds : as in `still_stretches`
 
@@ -104,15 +109,32 @@ def still_in(
     shortest = max(1.0, min_seconds)
     found: list[tuple[float, float]] = []
     for run in _at_rest(rows, Limits().noise):
-        start, end = (_time(rows, span) for span in (run.first, run.last - 1))
-        found += _passing(between, start, end, shortest)
+        first, last = run.first + _SPAN // 2, run.last - 1 + _SPAN // 2
+        cells = _table(rows[first : last + 1], origin)
+        if clear := _clear(_table(rows[first:last], origin), shortest):
+            found.append(clear)
+        else:
+            start, end = float(cells.times[0]), float(cells.times[-1])
+            found += _passing(between, start, end, shortest)
     return found
 
 
-def _time(rows: Rows, span: int) -> float:
-    """Middle of a span, s."""
-    middle = span + _SPAN // 2
-    return float(rows[middle : middle + 1][0, 0])
+def _table(rows: Array, origin: Array) -> Table:
+    """Cells of rows of `summary`."""
+    return Table(rows[:, 0], rows[:, 1:], origin)
+
+
+def _clear(cells: Table, shortest: float) -> tuple[float, float] | None:
+    """Take a stretch by the sums of the recording, if its own would be the same.
+
+    They are but for the step into its first sample; so it must pass clearly.
+    """
+    if not len(cells) or not cells.on_edge:
+        return None
+    first, last = cells.span
+    if last - first < shortest or judge(cells, Limits()).worst.ratio > _CLEARLY:
+        return None
+    return first, float(np.nextafter(last, np.inf))
 
 
 def _spans(rows: Rows, usual: Array) -> Iterator[tuple[int, Array, Array]]:
@@ -125,8 +147,8 @@ def _spans(rows: Rows, usual: Array) -> Iterator[tuple[int, Array, Array]]:
     before: Array = np.zeros((1, 6))
     for first in range(0, len(rows) - _SPAN + 1, _PART):
         part = rows[first : first + _PART + _SPAN - 1]
-        counts = part[:, 1:7]
-        means = held(np.where(counts < usual / 2, np.nan, part[:, 7:13]), before)
+        cells = _table(part, np.zeros(6))
+        means = held(np.where(cells.counts < usual / 2, np.nan, cells.means), before)
         before = means[_PART - 1 : _PART]
         view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
         yield first, view.std(axis=-1), view.mean(axis=-1)

@@ -1,0 +1,95 @@
+"""A small file of every format, and what is in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
+
+from fieldcal.intake import Judge
+from fieldcal.recording import Wanted, open_recording
+from fieldcal.samples import Block, concat
+from fieldcal.session import Session
+
+COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
+
+
+def _mcap(path: Path, block: Block) -> None:
+    from fieldcal.calibration import Calibration, Nominal
+    from fieldcal.exporters import Source, mcap
+    from fieldcal.recorder import Recorder
+
+    with Recorder(path.parent / "made", {"format": 1}) as recorder:
+        recorder.append(block)
+    none = np.empty(0)
+    unit = Calibration("joint", (), none, np.empty((0, 0)), (), 0.0, 0, 0.0)
+    mcap.write(Source(unit, Nominal(), Session.open(path.parent / "made")), path)
+
+
+def _hdf5(path: Path, block: Block) -> None:
+    arrays(path.with_suffix(".h5"), block)
+    path.with_suffix(".h5").rename(path)
+
+
+def _candump(path: Path, block: Block) -> None:
+    can_log(path.with_suffix(".log"), block)
+    path.with_suffix(".log").rename(path)
+
+
+def _parquet(path: Path, block: Block) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    columns = dict(zip(COLUMNS, table(block).T, strict=True))
+    pyarrow.parquet.write_table(pa.table(columns), path)
+
+
+SMALL: dict[str, Callable[[Path, Block], object]] = {
+    "ulog": lambda path, block: path.write_bytes(ulog({0: block}, {})),
+    "dataflash": lambda path, block: path.write_bytes(dataflash({0: block}, {})),
+    "tlog": lambda path, block: path.write_bytes(tlog({0: block}, {})),
+    "mcap": _mcap,
+    "arrays": _hdf5,
+    "can_log": _candump,
+    "parquet": _parquet,
+    "csv_like": lambda path, block: np.savetxt(path, table(block), delimiter=","),
+}
+
+
+class Small:
+    """A small file of a format, and what is in it."""
+
+    def __init__(self, name: str, path: Path) -> None:
+        self.name, self.path = name, path
+        SMALL[name](path, imu(1, 40))
+        (path.parent / "imu.dbc").write_text(dbc())
+        options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
+        options = options if name == "can_log" else ""
+        self.wanted = Wanted(COLUMNS, options=options)
+        if name == "mcap":
+            self.wanted = Wanted()
+        self.content = path.read_bytes()
+        self.expected = whole(path, self.wanted)
+
+    def __repr__(self) -> str:
+        return self.name
+
+    def knows(self, found: Block) -> bool:
+        """Whether every triad of values is one of those written."""
+        for kind in ("acc", "gyr"):
+            rows = getattr(self.expected, kind).round(9).tolist()
+            known = {tuple(row) for row in rows}
+            for row in getattr(found, kind).round(9).tolist():
+                if not np.isnan(row).all() and tuple(row) not in known:
+                    return False
+        return True
+
+
+def whole(path: Path, wanted: Wanted, name: str = "", repair: bool = False) -> Block:
+    opened = open_recording(path, wanted, name, repair)
+    stream = opened.streams()[0].name
+    opened.notes(stream)
+    judge = Judge(str(path), opened.place, repair)
+    return concat(judge.good(block) for block in opened.blocks(stream))

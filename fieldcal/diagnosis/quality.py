@@ -17,7 +17,7 @@ from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.heldout import LONG, SHORT, held_out, rms
 from fieldcal.diagnosis.prepare import Prepared, bench_of
-from fieldcal.diagnosis.reduce import Source
+from fieldcal.diagnosis.reduce import Source, reduce
 from fieldcal.diagnosis.result import Quality
 from fieldcal.samples import CHANNELS, Array, Block
 
@@ -114,7 +114,9 @@ def raw_bench(block: Block, prepared: Prepared) -> Bench:
         block=block,
         usable=np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)]),
     )
-    return bench_of(rows_of(source), source.about)
+    # a device that was touched is not held by hand for that: rows of the same kind
+    one_each = len(prepared.bench.rows.x) == prepared.bench.windows
+    return bench_of((rows_of if one_each else reduce)(source), source.about)
 
 
 def parted(one: Agreement, other: Agreement) -> int:

@@ -72,9 +72,7 @@ class Search:
         best = self.rules.model((), self.bench)
         seen = {best.parts}
         while (grown := self._grow(best)) is not None:
-            grown = self.rules.model(
-                grown.chosen, grown.bench, grown.fit, grown.random, grown.shaped
-            )
+            grown = self._refitted(grown)
             if grown.objective < best.objective:  # not what its linear part promised
                 chance = max(wanders(best.bench, best.fit), key=lambda w: w.gain)
                 grown = self.with_random(best, chance)
@@ -93,6 +91,7 @@ class Search:
         chance = max(wanders(model.bench, model.fit), key=lambda w: w.gain)
         first = [*self.larger(model), *self._instead(model)]
         best = max(first, key=lambda m: m.objective, default=model)
+        best = self._refitted(best)
         gain = best.objective - model.objective
         if max(gain, chance.gain - self.price) <= 0:
             return None
@@ -100,7 +99,7 @@ class Search:
         random = self.with_random(model, chance)
         by_chance = random.objective - model.objective
         if by_chance > gain - MARGIN or not best.leaves_nothing:
-            best = self._followed(model, first)
+            best = self._refitted(self._followed(model, first))
             gain = best.objective - model.objective
         if by_chance > 0 and gain > 0 and abs(by_chance - gain) < TIE:
             nameless = chance.name.partition(":")[0] in SMOOTH
@@ -123,7 +122,7 @@ class Search:
         before a function that no effect makes.
         """
         ranked = sorted(first, key=lambda m: -m.objective)[:BEAM]
-        causes = [m for m in ranked if m.objective > model.objective and m is not best]
+        causes = [self._refitted(m) for m in ranked if m.objective > model.objective]
         cause = max([best, *causes], key=foretells)
         more = foretells(cause) - foretells(random)
         if more > MARGIN:
@@ -133,6 +132,12 @@ class Search:
         if more < -(MARGIN + UNKNOWN * nameless):
             return best if known and likelier else random
         return best if known or likelier else random
+
+    def _refitted(self, model: Model) -> Model:
+        """The model fitted with the axes and sizes that were chosen for its terms."""
+        return self.rules.model(
+            model.chosen, model.bench, model.fit, model.random, model.shaped
+        )
 
     def _instead(self, model: Model) -> list[Model]:
         """With the likeliest causes, and the random parts as small as these leave them.

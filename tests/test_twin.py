@@ -17,6 +17,7 @@ from fieldcal.cli import main
 from fieldcal.samples import Block
 from fieldcal.sim_device import profile_file
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
+from fieldcal.sim_device.replay import Window, simulate
 from fieldcal.sim_device.vocabulary import parse
 
 QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
@@ -70,6 +71,33 @@ def test_the_replay_with_what_was_found_agrees_with_the_recording(
     assert twin.one(concealed.partition(":")[0]) is not None
     assert "the twin is" in said["says"] and replays["device"].endswith("twin.toml")
     assert [p["position"] for p in replays["positions"]] == list(range(9))
+
+
+def test_windows_that_were_calm_are_calm_in_the_replay(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What an engine shook for a while is shaken then, and then alone."""
+    device = replace(DEVICE, effects=(parse("vibration_rectification:x=0.08,y=-0.09"),))
+    positions = places(seconds=25.0)
+    windows = [
+        Window(
+            float(np.deg2rad(p["alpha_deg"])),
+            float(np.deg2rad(p["beta_deg"])),
+            p["start_s"],
+            p["end_s"],
+            vibration=1.5 if i % 3 == 1 else 0.0,
+        )
+        for i, p in enumerate(positions)
+    ]
+    folder = write_session(tmp_path / "s", simulate(device, windows, seed=2), positions)
+    code, said, _ = diagnosed(folder, capsys)
+    assert code == 1
+    assert [e["id"] for e in said["effects"]] == ["vibration_rectification"]
+    replays = said["twin"]
+    assert 0.8 < replays["twin"]["chi2_per_dof"] < 1.2
+    assert replays["twin"]["chi2_per_dof"] < replays["refitted"]["chi2_per_dof"]
+    calm = [p for i, p in enumerate(replays["positions"]) if i % 3 != 1]
+    assert all(p["twin"]["rms_acceleration"] < 0.02 for p in calm)
 
 
 def test_the_device_file_has_the_device_as_it_is(

@@ -72,7 +72,7 @@ def windows(
                 end,
                 tuple(x.rate[row].tolist()),
                 (moves, rest) if rest > moves else None,
-                float(shaken[p]) if shaken[p] > 0 else None,
+                float(shaken[p]),
                 way,
             )
         )

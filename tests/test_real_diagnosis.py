@@ -137,6 +137,32 @@ def test_the_bias_of_six_faces_is_the_peer_s(
     assert (np.abs(apart) < 3 * np.array(ours["sigma"]) + 0.01).all()
 
 
+@pytest.mark.parametrize(
+    ("message", "left_out"), [("RAW_IMU.0", ["quantisation"]), ("HIGHRES_IMU.0", [])]
+)
+def test_whole_milligravities_are_coarse_steps_and_no_bumps(
+    message: str,
+    left_out: list[str],
+    shared: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The same flight as integers and as floats."""
+    path = shared / "real" / "autopilot_streams" / "autopilot_12_positions.tlog.gz"
+    if not path.is_file():
+        pytest.skip(f"the recording is not here: {path}")
+    monkeypatch.chdir(tmp_path)
+    assert main(["import", str(path)]) == 0
+    capsys.readouterr()
+    said = diagnosed(tmp_path / "autopilot_12_positions" / message, capsys)
+    assert list(named(said)) == left_out
+    steps = {"acc": 1e-3 * G0, "gyr": 1e-3}  # mg, mrad/s
+    for effect in said["effects"]:
+        for name, found in effect["parameters"].items():
+            assert abs(found["value"] - steps[name]) < 3 * found["sigma"]
+
+
 def test_an_autopilot_on_the_bench_warms_up(
     shared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

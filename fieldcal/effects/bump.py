@@ -31,6 +31,9 @@ LARGE = 4.0
 MEAN = 6.0
 """The mean of a short stretch, in standard deviations."""
 
+NEXT = 2.02
+"""One step of an output, in half steps."""
+
 SHAKEN, TAILS = 1.5, 1.6
 """Spread beyond the noise that a machine or a hand makes, and how far its tails go."""
 
@@ -113,14 +116,16 @@ class Bump(Chain):
         """Disturbed stretches of every window."""
         t, out = recording.block.t, []
         rate = 1 / float(np.median(np.diff(t)))
-        steps = [lsb_of(recording.channel(c)) for c in range(6)]
-        noise = np.maximum(recording.noise, 0.5 * np.array(steps))
+        steps = 0.5 * np.array([lsb_of(recording.channel(c)) for c in range(6)])
+        noise = np.maximum(recording.noise, steps)
         for p, (first, last) in enumerate(recording.windows):
             if last - first < 20:
                 continue
             piece = recording.block[first:last].six
             z = _quick(piece, rate) / noise
             z = np.nan_to_num(z)
+            # what goes to the next step and back is rounded, not touched
+            z[(steps >= noise) & (np.abs(z) <= NEXT)] = 0.0
             if recording.x.rate[p].any():
                 z[:, :3] = 0.0  # the force goes round with the table
             shortest = max(2, round(0.1 * rate))

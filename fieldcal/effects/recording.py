@@ -107,6 +107,9 @@ def runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
 def lsb_of(values: Array) -> float:
     """Step of the grid that values lie on, 0 where they lie on none.
 
+    Zero is not looked at: half a step added outward to what was cut off towards zero
+    leaves it where it is.
+
     >>> round(lsb_of(np.array([0.5, 1.25, -0.25, 1.0])), 12)
     0.25
     """
@@ -114,7 +117,7 @@ def lsb_of(values: Array) -> float:
     some = some[np.isfinite(some)]
     if len(some) < min(ENOUGH, len(values)):
         some = values[np.isfinite(values)][:ENOUGH]
-    distinct = np.unique(some)
+    distinct = np.unique(some[some != 0.0])
     gaps = np.diff(distinct)
     gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]
     if len(gaps) < 2:

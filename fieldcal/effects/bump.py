@@ -31,8 +31,8 @@ LARGE = 4.0
 MEAN = 6.0
 """The mean of a short stretch, in standard deviations."""
 
-NEXT = 2.02
-"""One step of an output, in half steps."""
+NEXT = 4.02
+"""Two steps of an output, in half steps: to the next one, off a course between two."""
 
 SHAKEN, TAILS = 1.5, 1.6
 """Spread beyond the noise that a machine or a hand makes, and how far its tails go."""

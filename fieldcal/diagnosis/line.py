@@ -75,16 +75,18 @@ class Remains:
     before : as recorded
     after : less the line
     held_out : less what the rest of the recording foretells of it
+    foretold : by how much the squares of the samples, whitened, fall with that
 
     """
 
     before: Array
     after: Array
     held_out: Array
+    foretold: Array
 
     def gain(self, clear: list[int]) -> float:
-        """Part of the held-out rms that goes, in the channel where it is largest."""
-        most = clear[int(np.argmax(self.before[clear]))]
+        """Part of the held-out rms that goes, in the channel that shows it best."""
+        most = clear[int(np.argmax(self.foretold[clear]))]
         return float(1 - np.sqrt(self.held_out[most] / self.before[most]))
 
 
@@ -175,8 +177,14 @@ def remains(pieces: Pieces, tone: Tone) -> Remains:
         left = moments.only(fold == i)
         told = (tone.effect.response(pieces.x, near.hz) @ near.causes)[left.window]
         ahead[fold == i] -= told * _turning(left, near.hz - tone.hz)
-    squares = [_mean_square(a) for a in (seen, seen - fitted, ahead)]
-    return Remains(*squares)
+    noise = np.where(np.nan_to_num(pieces.noise) > 0, pieces.noise, np.inf)
+    fallen = np.abs(seen) ** 2 - np.abs(ahead) ** 2
+    return Remains(
+        _mean_square(seen),
+        _mean_square(seen - fitted),
+        _mean_square(ahead),
+        moments.counts / 2 @ fallen / noise**2,
+    )
 
 
 def _turning(moments: Moments, offset: float) -> Complex:

@@ -44,7 +44,7 @@ def tones(source: Source, rows: Rows) -> list[tuple[Tone, Remains]]:
         if (tone := _explained(pieces, near)) is None:
             continue  # something else has much power there, and may hide a line
         left = remains(pieces, tone)
-        if left.gain(tone.clear) > 0:
+        if left.foretold[tone.clear].sum() > 0:
             found.append((tone, left))
             looked[-1] = tone.hz
             pieces = _without(pieces, tone)

@@ -212,13 +212,18 @@ def test_a_port_that_says_nothing_sensible(
     assert code == 3 and ("format" in said or "baud" in said)
 
 
-@pytest.mark.usefixtures("soon_silent")
+def silenced(device: VirtualDevice, folder: Path) -> None:
+    """Silence a device once some of what it said is recorded."""
+    wait_for_samples(folder, None, 60_000)
+    device.ask(fault={"silence_s": 1e6})
+
+
 def test_a_device_that_goes_silent_keeps_what_it_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "s"
     with VirtualDevice(["--serial", "witmotion", "--speed", "20"]) as device:
-        threading.Timer(1.5, lambda: device.ask(fault={"silence_s": 1e6})).start()
+        threading.Thread(target=silenced, args=(device, folder), daemon=True).start()
         code, said = device_error(f"{device.port}?format=witmotion", folder, capsys)
     assert code == 3 and "silent" in said
     assert len(Session.open(folder).block) > 500

@@ -153,15 +153,19 @@ class Recording(ABC):
             Where the user did not ask for a repair.
 
         """
-        if not self.repair:
-            raise InputError(
-                f"{self.path}: {where}: {what}; copy the file again, or take what is"
-                " whole before that with --repair"
-            )
+        self._refuse(where, what, "take what is whole before that")
         self.ends_early = True
         sentence = f"{where}: {what}; what was whole before that is taken"
         if sentence not in self.mended:
             self.mended.insert(0, sentence)
+
+    def _refuse(self, where: str, what: str, mend: str) -> None:
+        """Raise, unless the user asked for a repair."""
+        if not self.repair:
+            raise InputError(
+                f"{self.path}: {where}: {what}; copy the file again, or {mend} with"
+                " --repair"
+            )
 
     def damaged(self, where: str, what: str) -> None:
         """Refuse a damaged place, or take note that it was left out.
@@ -172,11 +176,7 @@ class Recording(ABC):
             Where the user did not ask for a repair.
 
         """
-        if not self.repair:
-            raise InputError(
-                f"{self.path}: {where}: {what}; copy the file again, or leave such"
-                " places out with --repair"
-            )
+        self._refuse(where, what, "leave such places out")
         if len(self.mended) < MOST:
             self.mended.append(f"{where}: {what}, left out")
             self._more = 0

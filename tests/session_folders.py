@@ -57,7 +57,12 @@ def recorded(
     profile: Profile, positions: Sequence[dict[str, Any]], seed: int = 1
 ) -> Block:
     """What a virtual device puts out while it is held in some positions."""
-    windows = [
+    return simulate(profile, windows_of(positions), seed=seed)
+
+
+def windows_of(positions: Sequence[dict[str, Any]]) -> list[Window]:
+    """The same positions for the virtual device."""
+    return [
         Window(
             float(np.deg2rad(p.get("alpha_deg", 0.0))),
             float(np.deg2rad(p.get("beta_deg", 0.0))),
@@ -67,4 +72,3 @@ def recorded(
         )
         for p in positions
     ]
-    return simulate(profile, windows, seed=seed)

@@ -21,6 +21,12 @@ QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
 SAME = Profile(noise=QUIET, sampling=Sampling(50.0))
 COUPLED = replace(SAME, effects=(parse("cross_coupling:k12=0.02,k31=-0.02"),))
 POSITIONS = places(seconds=12.0)
+AROUND = [
+    *((0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)),
+    *((45.0, 30.0), (-45.0, -30.0), (135.0, 20.0), (-135.0, -40.0), (60.0, 60.0)),
+    *((-120.0, 50.0), (30.0, -60.0)),
+]
+"""Every way up, and some between."""
 
 Table = dict[str, Any]
 
@@ -39,6 +45,17 @@ def diagnosed(
         ["diagnose", str(folder), "--json", "--twin", str(folder / "twin.toml")]
     )
     return code, json.loads(capsys.readouterr().out)
+
+
+def foretold(said: dict[str, Any], channel: str) -> list[float]:
+    """Held-out rms of a channel before and after."""
+    return [said["fit"][k]["held_out_by_channel"][channel] for k in ("before", "after")]
+
+
+def unsaid(positions: list[Table]) -> list[Table]:
+    """Positions of which nobody knows the angles."""
+    angles = ("alpha_deg", "beta_deg")
+    return [{k: v for k, v in p.items() if k not in angles} for p in positions]
 
 
 def unknown(values: Array) -> Array:
@@ -111,9 +128,7 @@ def test_windows_of_a_rate_table(
     found = said["effects"][0]["parameters"]["s12"]
     assert abs(found["value"] - 0.01) < 4 * found["sigma"]
     assert said["calibration"]["gyr_scale"]["value"][1] == pytest.approx(1.0, abs=1e-3)
-    no_angles = [{k: v for k, v in p.items() if "_deg" not in k or "rate" in k}
-                 for p in table]  # fmt: skip
-    code, said = diagnosed(write_session(tmp_path / "b", block, no_angles), capsys)
+    code, said = diagnosed(write_session(tmp_path / "b", block, unsaid(table)), capsys)
     assert said["verdict"] in ("consistent", "left_out", "ambiguous")
 
 
@@ -176,18 +191,13 @@ def test_the_length_of_the_force_foretells_positions_not_seen(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """With orientations unknown, what is predicted is held against turns made anew."""
-    angles = [(0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90), (45, 30)]
-    angles += [(-45, -30), (135, 20), (-135, -40), (60, 60), (-120, 50), (30, -60)]
-    held = places([(float(a), float(b)) for a, b in angles], 12.0)
+    held = places(AROUND, 12.0)
     block = recorded(COUPLED, held)
-    unknown_angles = [{k: v for k, v in p.items() if "_deg" not in k} for p in held]
-    code, said = diagnosed(write_session(tmp_path, block, unknown_angles), capsys)
+    code, said = diagnosed(write_session(tmp_path, block, unsaid(held)), capsys)
     assert code == 1
     there = {i for e in said["effects"] for i in (e["id"], *e["aliases"])}
     assert "cross_coupling" in there
-    before, after = (
-        said["fit"][k]["held_out_by_channel"]["ax"] for k in ("before", "after")
-    )
+    before, after = foretold(said, "ax")
     assert after < 0.2 * before
 
 
@@ -197,11 +207,9 @@ def test_what_settles_shows_whatever_the_orientations(
     """The Earth turns each window by the same all through it, and hides no course."""
     truth = {"ay": 0.04, "gx": 1e-3, "tau_s": 4.0}
     device = replace(SAME, effects=(parse("settling:ay=0.04,gx=1e-3,tau_s=4"),))
-    angles = [(0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90), (45, 30)]
-    held = places([(float(a), float(b)) for a, b in angles], 12.0)
+    held = places(AROUND[:7], 12.0)
     block = recorded(device, held)
-    bare_positions = [{k: v for k, v in p.items() if "_deg" not in k} for p in held]
-    code, said = diagnosed(write_session(tmp_path, block, bare_positions), capsys)
+    code, said = diagnosed(write_session(tmp_path, block, unsaid(held)), capsys)
     assert (code, [e["id"] for e in said["effects"]]) == (1, ["settling"])
     found = said["effects"][0]["parameters"]
     for name, value in truth.items():
@@ -227,13 +235,9 @@ def test_positions_without_angles_among_those_that_have_them(
     """Angles that are known stay known."""
     given = ",".join(f"{n}={v}" for n, v in parameters.items())
     device = replace(SAME, effects=(parse(f"{effect}:{given}"),))
-    angles = [(0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90), (45, 30)]
-    angles += [(-45, -30), (135, 20), (-135, -40), (60, 60), (-120, 50)]
-    held = places([(float(a), float(b)) for a, b in angles], 12.0)
-    some = [
-        {k: v for k, v in p.items() if i % 3 != 2 or "_deg" not in k}
-        for i, p in enumerate(held)
-    ]
+    held = places(AROUND[:12], 12.0)
+    some = [bare if i % 3 == 2 else p for i, (p, bare) in
+            enumerate(zip(held, unsaid(held), strict=True))]  # fmt: skip
     block = recorded(device, held)
     code, said = diagnosed(write_session(tmp_path, block, some), capsys)
     assert (code, [e["id"] for e in said["effects"]]) == (1, [effect])
@@ -255,9 +259,7 @@ def test_a_walk_foretells_what_comes_soon(
     block = recorded(device, held, seed)
     code, said = diagnosed(write_session(tmp_path, block, held), capsys)
     assert (code, [e["id"] for e in said["effects"]]) == (1, ["random_walk"])
-    before, after = (
-        said["fit"][k]["held_out_by_channel"]["gx"] for k in ("before", "after")
-    )
+    before, after = foretold(said, "gx")
     assert after < 0.8 * before
 
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 from processes import Recalibrated
-from session_folders import SITE, places, recorded, write_session
+from session_folders import SITE, places, recorded, windows_of, write_session
 
 from fieldcal.cli import main
 from fieldcal.samples import Block
 from fieldcal.sim_device import profile_file
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
-from fieldcal.sim_device.replay import Window, simulate
+from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import parse
 
 QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
@@ -80,14 +80,8 @@ def test_windows_that_were_calm_are_calm_in_the_replay(
     device = replace(DEVICE, effects=(parse("vibration_rectification:x=0.08,y=-0.09"),))
     positions = places(seconds=25.0)
     windows = [
-        Window(
-            float(np.deg2rad(p["alpha_deg"])),
-            float(np.deg2rad(p["beta_deg"])),
-            p["start_s"],
-            p["end_s"],
-            vibration=1.5 if i % 3 == 1 else 0.0,
-        )
-        for i, p in enumerate(positions)
+        replace(w, vibration=1.5 if i % 3 == 1 else 0.0)
+        for i, w in enumerate(windows_of(positions))
     ]
     folder = write_session(tmp_path / "s", simulate(device, windows, seed=2), positions)
     code, said, _ = diagnosed(folder, capsys)

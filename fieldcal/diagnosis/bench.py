@@ -82,12 +82,11 @@ class Bench:
         known = np.ones(self.places, dtype=bool)
         known[x.position[~x.oriented]] = False
         self.leeway = np.where(known, self.errors.setting, TURN)
-        self._loose = np.flatnonzero(self.leeway)
         self.rated = bool(x.rate.any())
         used: NDArray[np.bool_] = np.any(rows.used, axis=0)
         scaled = used & np.array([True] * 3 + [self.rated] * 3)
-        self._base = np.concatenate([used, scaled])
-        self._layout = Layout(self._base, self._loose)
+        base = np.concatenate([used, scaled])
+        self._layout = Layout(base, np.flatnonzero(self.leeway))
 
     def but(self, **changes: object) -> Bench:
         """The same bench with something changed: rows, errors, relax."""
@@ -141,11 +140,8 @@ class Bench:
         covariance = np.linalg.inv(a)
         covariance = (covariance + covariance.T) / 2
         determined = np.diag(covariance) < DETERMINED * prior**2
-        scatter = np.zeros(len(names), dtype=bool)
-        if len(self._loose):
-            scatter[-2 * len(self._loose) :] = np.repeat(
-                self.leeway[self._loose] < TURN, 2
-            )
+        aside = np.repeat(self._aside < TURN, 2)
+        scatter = np.pad(aside, (len(names) - len(aside), 0))
         pull = np.where(shape, 0.0, (p - centre) / prior) ** 2
         chi2 = float((white**2).sum() + pull[scatter].sum())
         dof = int(self.rows.used.sum() - (determined & ~scatter).sum())
@@ -188,12 +184,17 @@ class Bench:
         p[column] += step
         return self._layout.unpack(fit.state, p)
 
+    @property
+    def _aside(self) -> Array:
+        """Priors of the turns that are in the fit, one for each position."""
+        return self.leeway[self._layout.loose]
+
     def prior_of(self, term: Term) -> Array:
         """Prior of a term's values, in outputs' units."""
         return self.relax * term.prior * self._unit(term)
 
     def _start(self, terms: tuple[Term, ...], near: Fit | None) -> State:
-        aside: Array = np.zeros((self.places if len(self._loose) else 1, 2))
+        aside: Array = np.zeros((self.places if self.leeway.any() else 1, 2))
         values = [np.zeros(len(t.names)) for t in terms]
         for t, v in zip(terms, values, strict=True):
             v[len(t.columns) :] = list(t.shape.values()) if t.free_shape else []
@@ -210,9 +211,9 @@ class Bench:
     def _prior(self, state: State) -> Array:
         gravity, acc = self.rows.x.gravity, np.abs(self.scale[:3])
         bias = np.concatenate([BIAS_G * gravity * acc, BIAS_G * np.abs(self.scale[3:])])
-        base = np.concatenate([bias, SCALE * np.abs(self.scale)])[self._base]
+        base = np.concatenate([bias, SCALE * np.abs(self.scale)])[self._layout.base]
         sizes: list[Array] = [self.prior_of(t) for t in state.terms]
-        return np.concatenate([base, *sizes, np.repeat(self.leeway[self._loose], 2)])
+        return np.concatenate([base, *sizes, np.repeat(self._aside, 2)])
 
     def _unit(self, term: Term) -> Array:
         """Outputs per SI unit, for effects that add to outputs in counts or volts."""
@@ -228,12 +229,12 @@ class Bench:
         bias = np.broadcast_to(np.eye(6), (len(x), 6, 6))
         scale = np.eye(6) * np.hstack([x.f, x.w])[:, None, :]
         both = np.concatenate([bias, scale], axis=2)
-        parts: list[Array] = [both[:, :, self._base]]
+        parts: list[Array] = [both[:, :, self._layout.base]]
         for i, term in enumerate(state.terms):
             parts.append(self._of_term(state, x, i, term))
-        if len(self._loose):
+        if self.leeway.any():
             aside = self.aside(state).reshape(len(x), 6, -1, 2)
-            parts.append(aside[:, :, self._loose].reshape(len(x), 6, -1))
+            parts.append(aside[:, :, self._layout.loose].reshape(len(x), 6, -1))
         return state.output(x), np.concatenate(parts, axis=2)
 
     def _experienced(self, state: State) -> Experience:

@@ -82,8 +82,8 @@ def _shows(effect: Effect, bench: Bench, warming: bool, navigation: bool) -> boo
     x = bench.rows.x
     if effect.id in (*TURNS, *CALIBRATION):
         return False
-    if effect.id in RATED:
-        return bench.rated and (effect.id != "lever_arm" or bool(x.oriented.any()))
+    if effect.id in RATED and not bench.rated:
+        return False
     if effect.id == "settling" and not np.isfinite(x.since_turn).any():
         return False
     if effect.id == "heading_error":

@@ -57,8 +57,7 @@ def foretold(bench: Bench, terms: Sequence[Term], fit: Fit) -> float:
     fold = fold if fold.max() else _stretches(rows, LONG)
     total = 0.0
     for i in np.unique(fold):
-        sd = np.where((fold == i)[:, None], np.nan, rows.sd)
-        rest = bench.but(rows=replace(rows, sd=sd)).fit(terms, fit)
+        rest = bench.but(rows=rows.without(fold == i)).fit(terms, fit)
         total += fit.score - rest.score
     return total
 
@@ -89,10 +88,7 @@ def _residuals(
     told = _told(fit)
     for i in np.unique(fold):
         left = fold == i
-        rest = bench.but(
-            rows=replace(rows, sd=np.where(left[:, None], np.nan, rows.sd))
-        )
-        seen = rest.fit(terms, fit)
+        seen = bench.but(rows=rows.without(left)).fit(terms, fit)
         if told - _told(seen):
             continue
         out[left] = _apart(bench, _oriented(bench, fit, seen, left), left)[left]

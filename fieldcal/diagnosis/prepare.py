@@ -216,8 +216,7 @@ def divided(prepared: Prepared, at: float) -> Prepared:
     """Without the row in the midst of which something changed, at an instant, s."""
     rows = prepared.bench.rows
     across = (rows.span[:, 0] < at) & (at <= rows.span[:, 1])
-    sd = np.where(across[:, None], np.nan, rows.sd)
-    return replace(prepared, bench=prepared.bench.but(rows=replace(rows, sd=sd)))
+    return replace(prepared, bench=prepared.bench.but(rows=rows.without(across)))
 
 
 def refined(prepared: Prepared, fit: Fit) -> Prepared:

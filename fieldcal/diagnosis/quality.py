@@ -126,12 +126,12 @@ def parted(one: Agreement, other: Agreement) -> int:
     """
     sizes = []
     for triad in (0, 1):
-        part, most = slice(3 * triad, 3 * triad + 3), 0.0
-        for seen in ("whole", "held_out"):
-            first, then = (np.nan_to_num(getattr(a, seen)[part]) for a in (one, other))
+        part, gains = slice(3 * triad, 3 * triad + 3), [0.0]
+        for pair in ((one.whole, other.whole), (one.held_out, other.held_out)):
+            first, then = (np.nan_to_num(rms[part]) for rms in pair)
             gain = float((first**2 - then**2).max())
-            most = max(most, gain / max(float(then.max()) ** 2, 1e-300))
-        sizes.append(most)
+            gains.append(gain / max(float(then.max()) ** 2, 1e-300))
+        sizes.append(max(gains))
     known = [bool(np.isfinite(one.rms[3 * i : 3 * i + 3]).any()) for i in (0, 1)]
     if known[0] != known[1]:
         return int(known[1])

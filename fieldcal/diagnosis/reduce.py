@@ -66,6 +66,10 @@ class Rows:
         """Means that can be used, (n, 6)."""
         return np.isfinite(self.y) & np.isfinite(self.sd)
 
+    def without(self, left: NDArray[np.bool_]) -> Rows:
+        """The rows, some of which (n,) are not to be used."""
+        return replace(self, sd=np.where(left[:, None], np.nan, self.sd))
+
 
 def rate_of(block: Block) -> float:
     """Samples a second, from the times."""

@@ -72,12 +72,6 @@ class Search:
         best = self.rules.model((), self.bench)
         seen = {best.parts}
         while (grown := self._grow(best)) is not None:
-            grown = self._refitted(grown)
-            if grown.objective < best.objective:  # not what its linear part promised
-                chance = max(wanders(best.bench, best.fit), key=lambda w: w.gain)
-                grown = self.with_random(best, chance)
-                if grown.objective < best.objective:
-                    break
             best = self._tidied(self._anew(grown))
             if best.parts in seen:  # what was let in went again, or the other way about
                 break
@@ -122,7 +116,8 @@ class Search:
         before a function that no effect makes.
         """
         ranked = sorted(first, key=lambda m: -m.objective)[:BEAM]
-        causes = [self._refitted(m) for m in ranked if m.objective > model.objective]
+        others = [self._refitted(m) for m in ranked if m.parts != best.parts]
+        causes = [m for m in others if m.objective > model.objective]
         cause = max([best, *causes], key=foretells)
         more = foretells(cause) - foretells(random)
         if more > MARGIN:

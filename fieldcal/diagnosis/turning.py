@@ -117,7 +117,8 @@ class Turntable:
         self._z = np.concatenate([z for z, _, _ in blocks])
         self._a = np.vstack([a for _, a, _ in blocks])
         self._names, self._known = list(fit.names), np.linalg.inv(fit.covariance)
-        if bench.free and any(t.effect.id == "cross_coupling" for t in fit.terms):
+        coupled = any(t.effect.id == "cross_coupling" for t in fit.terms)
+        if bench.free and coupled and self.pool[0].effect.id == CANDIDATES[0]:
             self._turn_triads(len(fit.names))
         self.closing = np.concatenate([c for _, _, c in blocks])
         self.turn = np.repeat(np.arange(len(made)), [len(z) for z, _, _ in blocks])
@@ -144,8 +145,8 @@ class Turntable:
         self._known = whole
 
     def _pool(self) -> Iterator[Term]:
-        told = {"gyro_scale"} if self._bench.rated else set()
-        told |= {t.effect.id for t in self._fit.terms if t.effect.id == "lever_arm"}
+        told = {t.effect.id for t in self._fit.terms if t.columns}
+        told |= {"gyro_scale"} if self._bench.rated else set()
         for name in CANDIDATES:
             if name not in told:  # by windows on a table
                 effect = catalogue()[name]

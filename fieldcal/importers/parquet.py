@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -39,20 +40,13 @@ class File(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, a batch at a time."""
-        import pyarrow as pa
-
         samples = columns.Samples(self.wanted)
-        try:
-            with self._batches() as (schema, batches):
-                named = self._named(schema)
-                for batch in batches:
-                    batch.validate(full=True)
-                    table = {c: self._numbers(batch, n) for c, n in named.items()}
-                    yield samples.block(table, batch.num_rows)
-        except (pa.ArrowException, OSError) as error:
-            raise InputError(
-                f"{self.path}: is not whole: {error}; copy it again from where it came"
-            ) from error
+        with self._batches() as (schema, batches):
+            named = self._named(schema)
+            for batch in batches:
+                batch.validate(full=True)
+                table = {c: self._numbers(batch, n) for c, n in named.items()}
+                yield samples.block(table, batch.num_rows)
 
     @contextmanager
     def _batches(self) -> Iterator[tuple[Any, Iterator[Any]]]:
@@ -102,13 +96,8 @@ class File(Recording):
         missing = [name for name in named.values() if name not in names]
         if missing:
             raise InputError(f"{self.path}: has no column {missing[0]}; {ask}")
-        columns.check(self._with(tuple(named)))
+        columns.check(replace(self.wanted, columns=tuple(named)))
         return named
-
-    def _with(self, names: tuple[str, ...]) -> Any:
-        from dataclasses import replace
-
-        return replace(self.wanted, columns=names)
 
     def _numbers(self, batch: Any, name: str) -> Array:
         import pyarrow as pa

@@ -21,7 +21,7 @@ bench: .venv/.peers
 	$(BIN)/python -m benchmarks
 
 docs: .venv/.docs
-	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_site
+	$(BIN)/sphinx-build -q -E -W --keep-going -b html docs docs/_site
 	@echo "docs/_site/index.html"
 
 setup: $(READY)

@@ -35,6 +35,8 @@ numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
 html_theme = "furo"
+html_static_path = ["style"]
+html_css_files = ["site.css"]
 html_title = f"fieldcal {version}"
 html_copy_source = False
 html_show_sphinx = False
@@ -43,5 +45,4 @@ html_math_renderer = "mathml"
 
 def setup(app):  # noqa: D103, ANN001, ANN201
     pages.make(HERE / "made")
-    app.connect("source-read", pages.add_unlisted)
     mathematics.setup(app)

@@ -98,6 +98,24 @@ def test_drawings_of_positions_turn_the_axes_as_the_frames_say() -> None:
 
 
 @pytest.mark.usefixtures("drawn")
+def test_the_screens_that_are_shown_are_those_of_a_run_that_ends_in_go() -> None:
+    screens = import_module("drawn.screens").screens()
+    said = {
+        name: " ".join(
+            " ".join(ElementTree.fromstring(svg).itertext())
+            .replace("\xa0", " ")
+            .split()
+        )
+        for name, svg in screens.items()
+    }
+    assert "T U R N T O α = 22.5°, β = 0°" in said["turning"]
+    assert "H O L D S T I L L" in said["averaging"]
+    assert "base tilt about x" in said["result"] and "GO: within" in said["result"]
+    # a site that needs no network
+    assert not any(re.search(r"url\(\W*http|href", svg) for svg in screens.values())
+
+
+@pytest.mark.usefixtures("drawn")
 def test_the_picture_of_each_effect_is_one_the_virtual_device_can_make() -> None:
     pytest.importorskip("matplotlib")
     effects = import_module("drawn.effects")

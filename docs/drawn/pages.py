@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import inspect
-import re
 from pathlib import Path
-from typing import Any
 
 from drawn.effects import given, picture
 from drawn.positions import drawings
+from drawn.screens import screens
 from fieldcal.effects import Effect, catalogue
 from fieldcal.positions import SETS
 from fieldcal.report.cures import CURES
@@ -22,23 +21,15 @@ KINDS = {
 
 def make(folder: Path) -> None:
     """Write all of it; what has not changed is left as it is."""
-    (folder / "effects").mkdir(parents=True, exist_ok=True)
+    for part in ("effects", "screens"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
     for name, positions in SETS.items():
         _write(folder / f"positions_{name}.html", drawings(positions))
     for effect in catalogue().values():
         _write(folder / "effects" / f"{effect.id}.svg", picture(effect))
+    for name, shown in screens().items():
+        _write(folder / "screens" / f"{name}.svg", shown)
     _write(folder / "effects.md", _page())
-
-
-def add_unlisted(app: Any, name: str, source: list[str]) -> None:
-    """List on the front page what it does not name, so that no page gets lost."""
-    if name != "index":
-        return
-    listed = set(re.findall(r"^[\w/-]+$", source[0], re.MULTILINE)) | {"index"}
-    more = sorted(n for n in app.env.found_docs if "/" not in n and n not in listed)
-    if more:
-        lines = "\n".join(more)
-        source[0] += f"\n```{{toctree}}\n:caption: More\n\n{lines}\n```\n"
 
 
 def _write(path: Path, text: str) -> None:

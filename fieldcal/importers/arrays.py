@@ -59,6 +59,9 @@ class Table(NamedTuple):
 class File(Recording):
     """Arrays with names, with one IMU in them."""
 
+    _loaded: dict[str, Table] | None = None
+    """Of a format whose reader gives all arrays at once, so that it does so once."""
+
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
         return (("h5py",) if _is_hdf5(head(self.path)) else ()), "hdf5"
@@ -145,6 +148,9 @@ class File(Recording):
     @contextmanager
     def _opened(self) -> Iterator[dict[str, Table]]:
         """Every array of numbers in the file."""
+        if self._loaded is not None:
+            yield self._loaded
+            return
         with ExitStack() as stack:
             path = stack.enter_context(on_disk(self.path, self.cut_off))
             with path.open("rb") as file:
@@ -152,10 +158,9 @@ class File(Recording):
             try:
                 if _is_hdf5(first):
                     tables = _hdf5(path, stack)
-                elif first.startswith(MATLAB):
-                    tables = _matlab(path)
                 else:
-                    tables = _numpy(path)
+                    read = _matlab if first.startswith(MATLAB) else _numpy
+                    tables = self._loaded = read(path)
             except InputError:
                 raise
             except Exception as error:

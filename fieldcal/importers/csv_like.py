@@ -42,16 +42,19 @@ TOP = 1000
 NAMED = 50
 """Lines at the top among which the names of the columns are looked for."""
 
+PLAIN = bytes([*range(32, 127), *b"\t\r\n"])
+"""Characters of a text."""
+
 TEXT = 0.95
-"""Share of characters that a text has among its first bytes."""
+"""Share of them that a text has among its first bytes."""
 
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether these are the first bytes of a text."""
     if b"\0" in head:
         return _is_wide(head)
-    plain = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
-    return plain >= TEXT * len(head)
+    strange = head.translate(None, delete=PLAIN)
+    return len(strange) <= (1 - TEXT) * len(head)
 
 
 def _is_wide(head: bytes) -> bool:

@@ -236,9 +236,9 @@ class Cells:
             index, sums = index[1:], sums[1:]
         end = self._size + len(index)
         if end > len(self._index):
-            more = max(end, 2 * len(self._index)) - len(self._index)
-            self._index = np.pad(self._index, (0, more))
-            self._sums = np.pad(self._sums, ((0, more), (0, 0)))
+            most = max(end, 2 * len(self._index))
+            self._index = np.resize(self._index, most)
+            self._sums = np.resize(self._sums, (most, 34))
         self._index[self._size : end] = index
         self._sums[self._size : end] = sums
         self._size = end

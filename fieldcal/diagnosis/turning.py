@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.bench import DETERMINED, Bench
+from fieldcal.diagnosis.course import NOTHING, Undo
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.step import ahead
 from fieldcal.diagnosis.turn_rows import TurnRows
-from fieldcal.diagnosis.turns import NOTHING, Turn, Undo
+from fieldcal.diagnosis.turns import Turn
 from fieldcal.effects import Motion, Sensor, catalogue, columns
 from fieldcal.samples import CHANNELS, Array
 

@@ -25,56 +25,19 @@ from numpy.typing import NDArray
 from fieldcal.diagnosis.attitude import (
     accelerations,
     astray,
-    between,
     blur,
-    carry,
     geometry,
-    small_turns,
     trapezoid_means,
 )
+from fieldcal.diagnosis.course import NOTHING, Leg, Undo, divided, integrated
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.motion import moving
 from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.effects import Experience
-from fieldcal.samples import Array, Block
-
-FINE_S = 0.02
-"""Step of the integration at high sampling rates."""
-
-PIECE_S = 0.15
-"""Means of the accelerometers on the way."""
-
-PIECES = 60
-"""Of one turn at most."""
+from fieldcal.samples import Array
 
 LEAST = np.deg2rad(1.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Undo:
-    """Gyroscope errors to be taken out before anything is integrated.
-
-    Attributes
-    ----------
-    matrix : (3, 3) dW = matrix w
-    delay : s by which the gyroscopes are late
-
-    """
-
-    matrix: Array
-    delay: float
-
-    def of(self, name: str) -> float:
-        """Value by a parameter's full name, zero for what is not undone."""
-        group, _, part = name.partition(".")
-        if group == "gyro_scale":
-            return float(self.matrix[int(part[1]) - 1, int(part[1]) - 1])
-        if group == "gyro_cross_coupling":
-            return float(self.matrix[int(part[1]) - 1, int(part[2]) - 1])
-        return self.delay if group == "time_delay" else 0.0
-
-
-NOTHING = Undo(np.zeros((3, 3)), 0.0)
+"""A smaller turn says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,9 +127,9 @@ def turns(source: Source, rows: Rows, fit: Fit, undo: Undo = NOTHING) -> list[Tu
         stretch = moving(source, rows, (p, q), int(windows[p, 1]), int(windows[q, 0]))
         if stretch is None:
             continue
-        about = _About(source, rows, fit, x, undo, (p, q), *stretch)
-        if (made := _turn(about, None)) is not None:
-            found.append(_turn(about, made) or made)
+        leg = Leg(source, rows, fit, x, undo, (p, q), *stretch)
+        if (made := _turn(leg, None)) is not None:
+            found.append(_turn(leg, made) or made)
     return found
 
 
@@ -176,91 +139,41 @@ def errors_of(fit: Fit, x: Experience) -> Array:
     return state.output(x)[:, 3:] - state.bias[3:] - state.scale[3:] * x.w
 
 
-@dataclass(frozen=True, slots=True)
-class _About:
-    """One turn to be followed, by the model of the windows."""
-
-    source: Source
-    rows: Rows
-    fit: Fit
-    x: Experience
-    undo: Undo
-    pair: tuple[int, int]
-    first: int
-    last: int
-
-
-def _turn(about: _About, before: Turn | None) -> Turn | None:
+def _turn(leg: Leg, before: Turn | None) -> Turn | None:
     """Follow a turn; the second time rid of what the model has wrong on the way."""
-    source, rows, x, pair = about.source, about.rows, about.x, about.pair
-    first, last = about.first, about.last
-    block, rate = source.block, rate_of(source.block)
-    each = max(1, round(FINE_S * rate))
-    count = (last - first - 1) // each
-    if count < 8:
+    source, rows, x, pair = leg.source, leg.rows, leg.x, leg.pair
+    steps = divided(leg)
+    if steps is None:
         return None
-    rows_p, rows_q = (x.position == p for p in pair)
-    t = block.t[first : first + count * each + 1]
-    edge = np.arange(count + 1) * each
-    part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
-    ends = [x.w[at].mean(axis=0) for at in (rows_p, rows_q)]
-    earth = (1 - part) * ends[0] + part * ends[1]
-    rid: Array = np.zeros((len(edge), 3))
+    rid: Array = np.zeros((len(steps.edge), 3))
     if before is not None:
-        rid = errors_of(about.fit, before.x)
+        rid = errors_of(leg.fit, before.x)
         if not rid.any():
             return before
-    inertial = _undone(block, about.fit, about.undo, t, _between(t, t[edge], rid))
-    for _ in range(2):  # the Earth's rate turns with the device, once it is known how
-        angle = small_turns(t, inertial - earth, edge) / source.pace
-        size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
-        attitude, done = carry(angle), size / size[-1]
-        there = between(attitude, done, *ends)
-        earth = _between(t, t[edge], there)
-    if np.arccos(np.clip((np.trace(attitude[-1]) - 1) / 2, -1, 1)) < LEAST:
+    way = integrated(leg, steps, rid)
+    if np.arccos(np.clip((np.trace(way.attitude[-1]) - 1) / 2, -1, 1)) < LEAST:
         return None
-    if astray(x, pair, attitude[-1]):
+    if astray(x, pair, way.attitude[-1]):
         return None
-    each_piece = max(1, round(PIECE_S * rate / each), -(-count // PIECES))
-    cut = np.append(np.arange(0, count - each_piece // 2, each_piece), count).astype(
-        np.intp
-    )
-    acc = trapezoid_means(t, block.acc[first : first + len(t)], edge[cut])
-    f, closure, across = geometry(x, pair, attitude, done)
+    t, edge, cut = steps.t, steps.edge, steps.cut
+    samples = slice(steps.first, steps.first + len(t))
+    f, closure, across = geometry(x, pair, way.attitude, way.done)
+    gyro_noise = rows.noise[3:] / abs(leg.fit.state.scale[3:])
     return Turn(
         pair,
-        _edges(source, x, t[edge], f, inertial[edge], pair[1]),
-        attitude,
-        done,
+        _edges(source, x, steps.at, f, way.rate[edge], pair[1]),
+        way.attitude,
+        way.done,
         cut,
-        acc,
+        trapezoid_means(t, source.block.acc[samples], edge[cut]),
         rows.noise[:3] / np.sqrt(np.diff(edge[cut]))[:, None],
         closure,
         across,
-        x.f[rows_p].mean(axis=0),
-        1 / rate,
-        blur(
-            t, inertial - earth, each, rows.noise[3:] / abs(about.fit.state.scale[3:])
-        ),
+        x.f[x.position == pair[0]].mean(axis=0),
+        1 / rate_of(source.block),
+        blur(t, way.rate - way.earth, steps.each, gyro_noise),
         rid,
     )
-
-
-def _between(t: Array, at: Array, values: Array) -> Array:
-    """Columns of values given at some instants, straight between them, (n, k)."""
-    return np.column_stack([np.interp(t, at, column) for column in values.T])
-
-
-def _undone(block: Block, fit: Fit, undo: Undo, t: Array, rid: Array) -> Array:
-    """Angular rate at some samples, (n, 3) rad/s."""
-    first, n = int(np.searchsorted(block.t, t[0])), len(t)
-    span = slice(max(first - n, 0), first + 2 * n)
-    late = t + undo.delay
-    seen = [np.interp(late, block.t[span], g) for g in block.gyr[span].T]
-    response = np.diag(fit.state.scale[3:]) + undo.matrix
-    rest = np.array(seen) - fit.state.bias[3:, None] - rid.T
-    rate: Array = np.linalg.solve(response, rest).T
-    return rate
 
 
 def _edges(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.course import NOTHING
 from fieldcal.diagnosis.estimate import RELAX
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.model import Term
@@ -15,7 +16,7 @@ from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.reduce import rate_of, spans
 from fieldcal.diagnosis.step import bends, moved
 from fieldcal.diagnosis.turning import Turning, Turntable
-from fieldcal.diagnosis.turns import NOTHING, Turn, turns
+from fieldcal.diagnosis.turns import Turn, turns
 
 ROUGH = 0.7
 """Part of the noise that rounding makes when it is most of it."""

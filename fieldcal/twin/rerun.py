@@ -24,11 +24,12 @@ from numpy.typing import NDArray
 
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.bench import Bench
+from fieldcal.diagnosis.course import NOTHING, Undo
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import rms
 from fieldcal.diagnosis.reduce import Rows
-from fieldcal.diagnosis.turns import NOTHING, Turn, Undo, turns
+from fieldcal.diagnosis.turns import Turn, turns
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import Window, simulate

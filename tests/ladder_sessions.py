@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from ladder import (
     HEIGHT_M,
@@ -22,29 +23,32 @@ from fieldcal.diagnosis.result import Diagnosis
 from fieldcal.session import Session
 
 
+def tables(device: Device) -> dict[str, Any]:
+    """What session.toml says of the ladder with a device on it."""
+    grade = "navigation" if device is NAVIGATION else "tactical"
+    return {
+        "site": {"latitude_deg": LATITUDE_DEG, "height_m": HEIGHT_M},
+        "device": {"name": "second", "grade": grade},
+        "nominal": {
+            "acc_bias": [b + 0.01 for b in device.acc_bias],
+            "acc_scale": list(device.acc_scale),
+            "gyr_bias": list(device.gyr_bias),
+            "gyr_scale": [1.0, 1.0, 1.0],
+        },
+        "position": [
+            {"alpha_deg": float(a), "beta_deg": float(b), "start_s": s, "end_s": e}
+            for (a, b), (s, e) in zip(LADDER, windows(), strict=True)
+        ],
+    }
+
+
 def diagnosed(
     folder: Path, device: Device, *faults: Fault, seed: int = 1, setting: float = 0.0
 ) -> Diagnosis:
-    ridden = ride(device, seed, setting)
-    positions = [
-        {"alpha_deg": float(a), "beta_deg": float(b), "start_s": s, "end_s": e}
-        for (a, b), (s, e) in zip(LADDER, windows(), strict=True)
-    ]
-    nominal = {
-        "acc_bias": [b + 0.01 for b in device.acc_bias],
-        "acc_scale": list(device.acc_scale),
-        "gyr_bias": list(device.gyr_bias),
-        "gyr_scale": [1.0, 1.0, 1.0],
-    }
-    grade = "navigation" if device is NAVIGATION else "tactical"
-    write_session(
-        folder,
-        record(device, ridden, faults),
-        positions,
-        site={"latitude_deg": LATITUDE_DEG, "height_m": HEIGHT_M},
-        device={"name": "second", "grade": grade},
-        nominal=nominal,
-    )
+    """Ride, record, write and read the session, and diagnose it."""
+    said = tables(device)
+    block = record(device, ride(device, seed, setting), faults)
+    write_session(folder, block, said.pop("position"), **said)
     session = Session.open(folder)
     return diagnose(session.block, session.about)
 

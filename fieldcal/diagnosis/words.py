@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,6 +17,12 @@ from fieldcal.samples import CHANNELS
 
 SHOWN = 3.0
 """Standard deviations from which a parameter is worth its words."""
+
+EACH = 3
+"""Times up to which an effect that happened again is told each time."""
+
+MOST = 6
+"""Places that are told."""
 
 
 def said(quantity: Quantity) -> str:
@@ -69,7 +76,7 @@ def paragraph(
 def _opening(
     verdict: Verdict, effects: Sequence[Found], mismatch: Sequence[Mismatch]
 ) -> str:
-    listed = " and ".join(named(f) for f in effects)
+    listed = _listed(effects)
     if verdict == "consistent":
         return (
             "Recording and simulation agree: bias and scale factor, refitted, leave"
@@ -79,12 +86,30 @@ def _opening(
         return f"The simulation leaves out {listed}."
     if verdict == "ambiguous":
         return f"Something is left out, and it may be {listed}."
-    where = "; ".join(sorted({f"{m.channel}, {_where(m)}" for m in mismatch}))
+    where = _places(mismatch)
     some = f" Besides, it leaves out {listed}." if listed else ""
     return (
         "Recording and simulation part, and no effect in the catalogue explains it"
         f" ({where}).{some}"
     )
+
+
+def _listed(effects: Sequence[Found]) -> str:
+    """The effects; one that happened often in a word."""
+    often = Counter(f.id for f in effects)
+    told = [
+        named(f) if often[f.id] <= EACH else f"{f.id} ({often[f.id]} times)"
+        for f in effects
+    ]
+    return " and ".join(dict.fromkeys(told))
+
+
+def _places(mismatch: Sequence[Mismatch]) -> str:
+    """Where they part, the clearest first."""
+    clearest = sorted(mismatch, key=lambda m: -m.sigma)
+    places = list(dict.fromkeys(f"{m.channel}, {_where(m)}" for m in clearest))
+    more = len(places) - MOST
+    return "; ".join(places[:MOST]) + (f"; {more} more places" if more > 0 else "")
 
 
 def _where(m: Mismatch) -> str:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from fieldcal.effects import Chain, Fault, Param, Recording
 from fieldcal.effects.recording import lsb_of
-from fieldcal.samples import CHANNELS
+from fieldcal.samples import CHANNELS, Array
 
 Counts = NDArray[np.int64]
 
@@ -39,6 +39,12 @@ WIDEST = 70_000
 
 FEWEST = 4
 """Jumps that have to go."""
+
+BYTE = 256
+"""Values of a byte."""
+
+NEARER = 10.0
+"""How many times nearer values of one byte come to what they ought to be."""
 
 
 def undone(counts: Counts) -> tuple[str, Counts]:
@@ -86,28 +92,68 @@ class DecodeFault(Chain):
 
     def find(self, recording: Recording) -> list[Fault]:
         """Channels that become smooth when a slip is undone."""
-        out, t = [], recording.block.t
-        for c, name in enumerate(CHANNELS):
-            values = recording.channel(c)
-            if not np.isfinite(values).all() or not (lsb := lsb_of(values)):
-                continue
-            if np.abs(values).max() > WIDEST * lsb:
-                continue
-            counts = np.round(values / lsb).astype(np.int64)
-            kind, mended = undone(counts)
-            if kind:
-                wrong = np.flatnonzero(mended != counts)
-                six = recording.block.six
-                six[:, c] = mended * lsb
-                out.append(
-                    Fault(
-                        channel=name,
-                        values={"channel": name, "kind": kind},
-                        sigmas={},
-                        from_s=float(t[wrong[0]]),
-                        to_s=float(t[wrong[-1]]),
-                        size=float(np.abs(mended - counts).max() * lsb),
-                        mended=six,
-                    )
-                )
-        return out
+        found = (_fault(recording, c) for c in range(len(CHANNELS)))
+        return [fault for fault in found if fault is not None]
+
+
+def _fault(recording: Recording, c: int) -> Fault | None:
+    """What happened to one channel."""
+    values, t = recording.channel(c), recording.block.t
+    if not np.isfinite(values).all() or not (lsb := lsb_of(values)):
+        return None
+    if np.abs(values).max() > WIDEST * lsb:
+        return None
+    counts = np.round(values / lsb).astype(np.int64)
+    kind, mended = undone(counts)
+    if np.abs(counts).max() <= BYTE // 2:
+        # whoever swaps counts of one byte gets multiples of 256, or one less
+        fine = _within(values, lsb)
+        swapped = np.round(values / fine).astype(np.int64)
+        other, whole = undone(swapped)
+        if other and _nearer(recording, c, whole * fine):
+            kind, mended, counts, lsb = other, whole, swapped, fine
+    if not kind:
+        return None
+    wrong = np.flatnonzero(mended != counts)
+    six = recording.block.six
+    six[:, c] = mended * lsb
+    return Fault(
+        channel=CHANNELS[c],
+        values={"channel": CHANNELS[c], "kind": kind},
+        sigmas={},
+        from_s=float(t[wrong[0]]),
+        to_s=float(t[wrong[-1]]),
+        size=float(np.abs(mended - counts).max() * lsb),
+        mended=six,
+    )
+
+
+def _within(values: Array, step: float) -> float:
+    """Step of a grid 256 times finer, of values near a coarse one."""
+    gaps = np.diff(np.unique(values))
+    gaps = gaps[gaps < 1.5 * step]
+    return float(gaps.sum() / np.round(BYTE * gaps / step).sum())
+
+
+def _nearer(recording: Recording, c: int, mended: Array) -> bool:
+    """Whether outputs come much nearer to what the nominal calibration foretells.
+
+    Where a force is not known, it is no larger than gravity.
+    """
+    x = recording.x
+    expected = np.hstack([x.f, x.w])[:, c]
+    foretold = recording.bias[c] + recording.scale[c] * np.nan_to_num(expected)
+    known = np.isfinite(expected) | (c >= 3)
+    slack = np.where(known, 0.0, x.gravity * recording.scale[c])
+
+    def off(values: Array) -> float:
+        """Largest of the windows' rms distances, less what is not known."""
+        largest = 0.0
+        held = zip(recording.windows, foretold, slack, strict=True)
+        for (first, last), one, some in held:
+            apart = np.square(values[first:last] - one)
+            if len(apart):
+                largest = max(largest, float(np.sqrt(apart.mean()) - some))
+        return largest
+
+    return bool(off(mended) < off(recording.channel(c)) / NEARER)

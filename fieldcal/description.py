@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -254,8 +254,10 @@ def _position(
         position = Position.deg(alpha, beta, label)
     else:
         position = Position(label or name)
-    position = Position(position.name, position.alpha, position.beta, rate)
-    return position, _window(name, table)
+    if rate is not None and any(rate) and not label:
+        turning = " ".join(f"{r:g}" for r in np.rad2deg(rate).round(6))
+        position = replace(position, name=f"{position.name}, {turning} °/s")
+    return replace(position, rate=rate), _window(name, table)
 
 
 def _window(name: str, table: Mapping[str, Any]) -> tuple[float, float] | None:

@@ -10,13 +10,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from fieldcal import __version__
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.description import Description
 from fieldcal.errors import FieldcalError, Moved, SessionError
-from fieldcal.samples import Block, Grain
+from fieldcal.samples import Array, Block, Grain
 from fieldcal.session import Session
 from fieldcal.solve.observations import Observations
+from fieldcal.solve.turntable import going_round
 from fieldcal.windows import Average, Noise, Window, average
 
 SHORTEST = 5.0
@@ -82,6 +85,19 @@ class Rests:
     averages: tuple[Average, ...]
     warnings: tuple[str, ...]
 
+    def at_rest(self, session: Session) -> Rests:
+        """Return those in which no table turned."""
+        held = [
+            i
+            for i, row in enumerate(self.rows)
+            if not table_rate(session.about, row).any()
+        ]
+        return replace(
+            self,
+            rows=tuple(self.rows[i] for i in held),
+            averages=tuple(self.averages[i] for i in held),
+        )
+
 
 def rests(session: Session) -> Rests:
     """Average the windows of a recorded session.
@@ -102,8 +118,12 @@ def rests(session: Session) -> Rests:
     noise: Noise | None = None
     grain = grain_of(session)
     for i, window in enumerate(session.windows):
+        rate = table_rate(session.about, i)
         try:
-            found, noise, said = _take(block, window, noise, grain)
+            if rate.any():
+                found, said = _on_a_table(block, window, rate, grain)
+            else:
+                found, noise, said = _take(block, window, noise, grain)
         except FieldcalError as error:
             warnings.append(f"position {i + 1} is left out: {error}")
             continue
@@ -131,6 +151,9 @@ def with_turns_between(
     """
     from fieldcal.solve import turns
 
+    still = still.at_rest(session)
+    if not still.rows:
+        return calibration
     seen = observations(session.about, still.averages, still.rows)
     if not seen.has_gyr:
         return calibration
@@ -176,6 +199,46 @@ def _take(
             raise
         said = f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
         return calm, noise, f"{said} is used"
+
+
+def table_rate(about: Description, row: int) -> Array:
+    """Rate of the table in a position by its number, in device axes, (3,) rad/s."""
+    rate = np.array(about.positions[row].rate or (0.0, 0.0, 0.0))
+    turned: Array = rate @ about.mounting
+    return turned
+
+
+def steadied(block: Block, rate: Array) -> tuple[Block, Array]:
+    """A window without what goes round with a rate table, and what that leaves open.
+
+    Gravity goes round, so nothing is asked of the accelerometers; what of the Earth's
+    rate goes round is taken out. The covariance (3, 3) is that of the gyroscopes' mean.
+
+    Parameters
+    ----------
+    block : samples of one window
+    rate : (3,) of the table in device axes, rad/s
+
+    """
+    blind = replace(block, acc=np.full_like(block.acc, np.nan))
+    if len(block) < 2 or not np.isfinite(block.gyr).any(axis=0).all():
+        return blind, np.zeros((3, 3))
+    noise = np.nanstd(np.diff(block.gyr, axis=0), axis=0) / np.sqrt(2)
+    sd = np.broadcast_to(np.where(noise > 0, noise, np.nan), block.gyr.shape)
+    found = going_round(block.t, rate, block.gyr, sd, np.ones(3), 0.0)
+    return replace(blind, gyr=block.gyr - found.values), found.covariance
+
+
+def _on_a_table(
+    block: Block, span: tuple[float, float] | None, rate: Array, grain: Grain
+) -> tuple[Average, str]:
+    """Average while a table turns at some rate, (3,) rad/s in device axes."""
+    if span is not None:
+        block, left = steadied(block.between(*span), rate)
+    one, _, said = _take(block, span, None, grain)
+    covariance = one.covariance.copy()
+    covariance[3:, 3:] += left
+    return replace(one, covariance=covariance), said
 
 
 def _calm(

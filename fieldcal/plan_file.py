@@ -182,6 +182,13 @@ def _check_positions(about: Description, name: str) -> None:
     import numpy as np
 
     positions = about.positions
+    turning = [i for i, p in enumerate(positions, 1) if p.rate and any(p.rate)]
+    if turning:
+        raise PlanError(
+            f"{name}: [[position]] number {turning[0]} has rate_deg_s, and a run holds"
+            " the device at rest: record the rate table by itself, and solve it with"
+            " its windows in session.toml"
+        )
     if len(positions) < 2 or not all(p.oriented for p in positions):
         raise PlanError(
             f"{name}: {len(positions)} positions with known angles are not enough: a"

@@ -49,6 +49,18 @@ def test_two_positions_give_back_what_was_put_in() -> None:
     np.testing.assert_allclose(found.values, [*BIAS, *SCALE], rtol=1e-12)
 
 
+@pytest.mark.parametrize("places", [TWO, FIVE])
+def test_an_axis_the_other_way_round_does_not_pass(
+    places: tuple[Position, ...],
+) -> None:
+    u = outputs(places)
+    assert solve(observe(places, u)).good
+    u[:, 1] *= -1
+    found = solve(observe(places, u))
+    assert not found.good
+    assert "acc_scale.y" in found.warnings[0] and "other way" in found.warnings[0]
+
+
 def test_the_printed_solution_follows_from_the_turns_and_not_from_the_print() -> None:
     # (11)-(14) with the signs of (3), solved symbolically from U = U0 + k f
     a, b, g, k, u0 = sympy.symbols("a b g k u0")

@@ -28,6 +28,7 @@ from fieldcal.movers import Command, VirtualDevice
 from fieldcal.positions import FIVE, Position
 
 POSITIONS = [{"alpha_deg": 0.0, "beta_deg": 0.0}, {"alpha_deg": 45.0, "beta_deg": 5.0}]
+TABLE = {"alpha_deg": 0.0, "beta_deg": 0.0, "rate_deg_s": [20.0, 0.0, 0.0]}
 
 
 def plan(**run: Any) -> dict[str, Any]:
@@ -96,6 +97,10 @@ def test_a_whole_plan_is_taken() -> None:
         ),
         ({"run": {}, "position": POSITIONS[:1] * 3}, "are the same"),
         ({"run": {}}, "are not enough"),
+        (
+            {"run": {}, "position": [*POSITIONS, TABLE]},
+            "number 3 has rate_deg_s, and a run holds",
+        ),
         (
             {**plan(), "verification": {"alpha_deg": 1}},
             "[verification] beta_deg is miss",

@@ -98,7 +98,10 @@ def _fit(calibration: Calibration) -> str:
     method = f"method: {calibration.method}"
     if not math.isfinite(calibration.chi2):
         return method
+    rms = f"{calibration.rms:.2g} m/s²"
+    if not math.isfinite(calibration.rms):
+        rms = f"{calibration.info['gyroscopes']['rms']:.2g} rad/s"
     return (
         f"{method}; χ² = {calibration.chi2:.1f} with {calibration.dof} degrees of"
-        f" freedom; rms residual {calibration.rms:.2g} m/s²"
+        f" freedom; rms residual {rms}"
     )

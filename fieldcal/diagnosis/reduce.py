@@ -21,6 +21,7 @@ from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.positions import angles
 from fieldcal.samples import Array, Block
+from fieldcal.solve.turntable import going_round
 
 ROWS = 360
 """Rows aimed at, over all windows."""
@@ -226,7 +227,18 @@ def averaged(
     )
     sd[~x.force_known, :3] = np.nan
     length = np.diff(bound, axis=1)[:, 0] / rate_of(block)
+    _without_round(x, y[:, 3:], sd[:, 3:], length, about.nominal["gyr_scale"])
     return Rows(x, y, sd, np.zeros_like(sd), length, noise, span)
+
+
+def _without_round(
+    x: Experience, gyr: Array, sd: Array, length: Array, scale: Array
+) -> None:
+    """Take out of the gyroscopes' means (n, 3) what goes round with a rate table."""
+    for p in np.unique(x.position[x.rate.any(axis=1)]):
+        at = np.flatnonzero(x.position == p)
+        rate = x.rate[at[0]] @ x.mounting
+        gyr[at] -= going_round(x.t[at], rate, gyr[at], sd[at], scale, length[at]).values
 
 
 def _cut(t: Array, first: int, last: int, rate: float, windows: int) -> Array:

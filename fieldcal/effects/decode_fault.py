@@ -46,6 +46,9 @@ BYTE = 256
 NEARER = 10.0
 """How many times nearer values of one byte come to what they ought to be."""
 
+UNLIKELY = (5.0, 0.5)
+"""Departure that no sensor at rest has, m/s^2 and rad/s."""
+
 
 def undone(counts: Counts) -> tuple[str, Counts]:
     """What happened to counts and what they were; "" where nothing did."""
@@ -156,4 +159,5 @@ def _nearer(recording: Recording, c: int, mended: Array) -> bool:
                 largest = max(largest, float(np.sqrt(apart.mean()) - some))
         return largest
 
-    return bool(off(mended) < off(recording.channel(c)) / NEARER)
+    before = off(recording.channel(c))
+    return before > UNLIKELY[c // 3] and off(mended) < before / NEARER

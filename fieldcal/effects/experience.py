@@ -5,7 +5,8 @@
 
 A is the turn (3), P the mounting (procedure = P device), f_base = (0, -g, 0) on a level
 base, w_base the Earth's rate where the gyroscopes see it, `rate` what a rate table
-adds. f and w are in device axes, f_base, w_base and rate in procedure axes. Source:
+adds; of the Earth's rate, what lies across that goes round with the table and averages
+out. f and w are in device axes, f_base, w_base and rate in procedure axes. Source:
 Avrutov and Pozniak 2023, (3), (4), (39); signs as in `fieldcal.frames`.
 """
 
@@ -135,5 +136,16 @@ class Experience:
         to_device = new.mounting.T @ turn(new.alpha[known], new.beta[known])
         f, w = new.f.copy(), new.w.copy()
         f[known] = to_device @ new.base_force
-        w[known] = to_device @ new.base_rate + new.rate[known] @ new.mounting
+        table = new.rate[known] @ new.mounting
+        w[known] = table + _lasting(to_device @ new.base_rate, table)
         return replace(new, f=f, w=w)
+
+
+def _lasting(earth: Array, table: Array) -> Array:
+    """What of the Earth's rate is left once a table has turned round, (n, 3)."""
+    square = np.sum(table**2, axis=1, keepdims=True)
+    along = np.sum(earth * table, axis=1, keepdims=True)
+    turning = square > 0
+    axis = np.divide(along, square, out=np.zeros_like(square), where=turning) * table
+    out: Array = np.where(turning, axis, earth)
+    return out

@@ -20,6 +20,7 @@ from fieldcal.frames import EARTH_RATE, angles_of, earth_rate_home, turn
 from fieldcal.observing import observations
 from fieldcal.report.gather import Material
 from fieldcal.samples import Array, Block
+from fieldcal.solve.earth import lasting
 from fieldcal.solve.observations import Observations
 
 
@@ -111,7 +112,9 @@ def _earth(seen: Observations, left: Array) -> Array:
         return np.zeros((len(seen), 3))
     away = np.zeros((len(seen), 3, 3))
     alpha, beta = seen.angles
-    away[known] = seen.mounting.T @ turn(alpha[known], beta[known])
+    away[known] = lasting(seen)[known] @ (
+        seen.mounting.T @ turn(alpha[known], beta[known])
+    )
     down = away[..., 1] * earth_rate_home(seen.latitude)[1]
     level = away[known][..., [0, 2]].reshape(-1, 2)
     # a prior of the size it can have keeps few windows from explaining anything with it

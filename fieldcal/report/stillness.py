@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.observing import Rests
+from fieldcal.observing import Rests, steadied, table_rate
 from fieldcal.report import blocks
 from fieldcal.report.blocks import Cell, Figure, Section, Tone, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
@@ -82,9 +82,11 @@ def _windows(material: Material, still: Rests) -> blocks.Table:
     rows: list[list[str | Cell]] = []
     for row, average in zip(still.rows, still.averages, strict=True):
         end = float(np.nextafter(average.end, np.inf))
-        worst = judge(
-            _cells(material.block.between(average.start, end)), Limits()
-        ).worst
+        window = material.block.between(average.start, end)
+        rate = table_rate(material.session.about, row)
+        if rate.any():
+            window, _ = steadied(window, rate)
+        worst = judge(_cells(window), Limits()).worst
         tone: Tone = "bad" if worst.ratio > 1 else "warn" if worst.ratio > NEAR else ""
         share = Cell(f"{100 * worst.ratio:.0f} %", tone, min(1.0, worst.ratio))
         what = f"{worst.kind} on {CHANNELS[worst.channel]}"

@@ -282,12 +282,16 @@ def _gyroscopes(
     """Gyroscopes by what their windows hold."""
     if not observations.has_gyr:
         return None
-    if observations.rotating.any():
-        return least_squares.gyroscopes(observations)
     known = observations.oriented.all() and observations.latitude is not None
     heading = (
         None if heading_sigma_deg is None else float(np.deg2rad(heading_sigma_deg))
     )
+    if observations.rotating.any():
+        if observations.grade == "navigation" and known:
+            heading = heading or 0.0
+        return least_squares.gyroscopes(
+            observations, heading_sigma=heading, base=base, as_printed=as_printed
+        )
     if observations.grade == "navigation" and known and len(observations) > 1:
         return gyroscopes.bias_and_scale(observations, as_printed, base, heading or 0.0)
     found = gyroscopes.bias(observations, heading, as_printed, base)

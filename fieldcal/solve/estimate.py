@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.calibration import Calibration, Method
+from fieldcal.calibration import Calibration, Method, Nominal
 from fieldcal.errors import NotObservable
 from fieldcal.samples import Array
 from fieldcal.solve.linear import Mask
@@ -30,6 +30,9 @@ UNITS = {
 
 OFF_DIAGONAL = ("12", "13", "21", "23", "31", "32")
 """Components of a cross-coupling: first the channel, then the axis that reaches it."""
+
+LEAST, UNSEEN = 0.1, 5.0
+"""Share of the nominal scale factor, and standard deviations: less is none."""
 
 NO_DOF = "no degree of freedom: the residual says nothing; add a verification position"
 
@@ -106,6 +109,7 @@ def combine(
         raise NotObservable(
             "these positions determine nothing: " + "; ".join(notes or ["no sensor"])
         )
+    odd = [said for e in parts for said in _senseless(e, observations.nominal)]
     names = tuple(n for e in parts for n in e.names)
     fit = acc if acc is not None and acc.names else parts[0]
     return Calibration(
@@ -117,10 +121,33 @@ def combine(
         chi2=fit.chi2,
         dof=fit.dof,
         rms=fit.rms if fit is acc else np.nan,
-        warnings=tuple(dict.fromkeys(notes)),
-        good=good,
+        warnings=tuple(dict.fromkeys([*odd, *notes])),
+        good=good and not odd,
         info={"conditions": _conditions(observations), **_extra(acc, gyr)},
     )
+
+
+def _senseless(estimate: Estimate, nominal: Nominal) -> list[str]:
+    """Scale factors that no sensor in the declared axes can have, a sentence each."""
+    said = []
+    for i, name in enumerate(estimate.names):
+        group, _, axis = name.partition(".")
+        if group not in ("acc_scale", "gyr_scale"):
+            continue
+        usual = getattr(nominal, group)["xyz".index(axis)]
+        value, sigma = estimate.values[i], float(estimate.covariance[i, i] ** 0.5)
+        if abs(value) < min(UNSEEN * sigma, LEAST * abs(usual)):
+            said.append(
+                f"{name} is {value:.2g} ± {sigma:.2g}: the output does not follow at"
+                " all; was the device turned as session.toml says?"
+            )
+        elif value / usual < 0 and abs(value) > UNSEEN * sigma:
+            said.append(
+                f"{name} is {value:.3g}, nominal {usual:.3g}: the axis points"
+                " the other way; mend [frame] mounting, or the signs of the angles or"
+                " rates"
+            )
+    return said
 
 
 def _joined(parts: Sequence[Estimate], observations: Observations) -> Array:
@@ -132,7 +159,8 @@ def _joined(parts: Sequence[Estimate], observations: Observations) -> Array:
         whole[first : first + size, first : first + size] = e.covariance
         first += size
     if len(parts) == 2 and parts[0].gain is not None and parts[1].gain is not None:
-        shared = observations.covariance[:, ACC, GYR]
+        # where a table turns there is nothing of the accelerometers
+        shared = np.nan_to_num(observations.covariance[:, ACC, GYR])
         cross = np.einsum(
             "pnc,ncd,qnd->pq", parts[0].gain, shared, parts[1].gain, optimize=True
         )

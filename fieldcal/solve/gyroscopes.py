@@ -26,11 +26,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.frames import EARTH_RATE, earth_rate_home
 from fieldcal.samples import Array
 from fieldcal.solve import linear, scatter
+from fieldcal.solve.earth import earth_rate, printed_earth_rate
 from fieldcal.solve.estimate import Estimate, axes, not_determined
-from fieldcal.solve.observations import ACC, GYR, Observations
+from fieldcal.solve.observations import GYR, Observations
 from fieldcal.solve.tilt import LEVEL, Base
 
 NO_SCALE = (
@@ -62,12 +62,12 @@ def bias(
     known: Array = np.zeros((n, 3))
     unknown: Array = np.zeros((n, 3, 0))
     if not as_printed:
-        known, unknown = _earth(observations, heading_sigma, base)
+        known, unknown = earth_rate(observations, heading_sigma, base)
     y = observations.mean[:, GYR] - known
 
     def run(seen: Observations) -> Estimate:
         ones = np.broadcast_to(np.eye(3), (n, 3, 3))
-        fit = _with_nuisance(ones, y, seen.covariance[:, GYR, GYR], unknown)
+        fit = linear.fit_beside(ones, y, seen.covariance[:, GYR, GYR], unknown)
         return _estimate(axes("gyr_bias"), fit, n)
 
     return scatter.absorb(run, observations, GYR, "gyroscopes' means")
@@ -97,7 +97,7 @@ def bias_and_scale(
     w: Array = printed_earth_rate(observations) @ observations.mounting
     unknown: Array = np.zeros((len(w), 3, 0))
     if not as_printed:
-        w, unknown = _earth(observations, heading_sigma, base)
+        w, unknown = earth_rate(observations, heading_sigma, base)
     return scatter.absorb(
         lambda seen: _bias_and_scale(seen, w, unknown),
         observations,
@@ -111,7 +111,7 @@ def _bias_and_scale(observations: Observations, w: Array, unknown: Array) -> Est
     y = observations.mean[:, GYR]
     ones = np.broadcast_to(np.eye(3), (n, 3, 3))
     design = np.concatenate([ones, w[:, :, None] * np.eye(3)], axis=2)
-    fit = _with_nuisance(design, y, observations.covariance[:, GYR, GYR], unknown)
+    fit = linear.fit_beside(design, y, observations.covariance[:, GYR, GYR], unknown)
     names = (*axes("gyr_bias"), *axes("gyr_scale"))
     out = _estimate(names, fit, n)
     scale = np.array([name.startswith("gyr_scale") for name in out.names])
@@ -128,75 +128,6 @@ def _bias_and_scale(observations: Observations, w: Array, unknown: Array) -> Est
             "longer, or integrate turns between the positions"
         )
     return replace(out.only(~weak), warnings=tuple(notes))
-
-
-def printed_earth_rate(observations: Observations) -> Array:
-    """Reference (40), (41) as printed, in procedure axes, (n, 3) rad/s; not for use."""
-    a, b = observations.angles
-    up, north = (EARTH_RATE * f(observations.known_latitude) for f in (np.sin, np.cos))
-    third = -up * np.sin(a) * np.sin(b) + north * np.cos(b)  # (41), sin for cos alpha
-    third = np.where((a == 0) & (b == 0), -up, third)  # (40)
-    second = up * np.cos(a) * np.cos(b) + north * np.sin(b)
-    return np.stack([up * np.sin(a), second, third], axis=1)
-
-
-def _earth(
-    observations: Observations, heading_sigma: float | None, base: Base
-) -> tuple[Array, Array]:
-    """Part of the Earth's rate that is known, (n, 3), and the rest.
-
-    The rest is (n, 3, k): columns of unknown factors of mean 0 and variance 1.
-    """
-    phi = observations.latitude
-    if phi is None or not observations.oriented.all():
-        return _earth_unoriented(observations)
-    places, mounting = observations.positions, observations.mounting
-    east, _, north = (
-        base.seen(EARTH_RATE * np.cos(phi) * axis, places, mounting)[0]
-        for axis in np.eye(3)
-    )
-    if heading_sigma is None:
-        home: Array = earth_rate_home(phi) * [0.0, 1.0, 0.0]
-        level = [east * np.sqrt(0.5), north * np.sqrt(0.5)]
-    else:
-        home = earth_rate_home(phi)
-        level = [east * heading_sigma]
-    known, by_tilt = base.seen(home, places, mounting)
-    return known, np.concatenate([np.stack(level, axis=-1), by_tilt], axis=-1)
-
-
-def _earth_unoriented(observations: Observations) -> tuple[Array, Array]:
-    """Earth's rate where only up is known, from the accelerometers, or not even that.
-
-    Each position then has a heading of its own, independent of the others.
-    """
-    n = len(observations)
-    known = np.zeros((n, 3))
-    spread = np.broadcast_to(np.eye(3) * EARTH_RATE / np.sqrt(3), (n, 3, 3))
-    phi = observations.latitude
-    if phi is not None and observations.has_acc:
-        nominal = observations.nominal
-        up = (observations.mean[:, ACC] - nominal.acc_bias) / nominal.acc_scale
-        up /= np.linalg.norm(up, axis=1, keepdims=True)
-        known = EARTH_RATE * np.sin(phi) * up
-        level = np.eye(3) - up[:, :, None] * up[:, None, :]
-        spread = level * EARTH_RATE * np.cos(phi) * np.sqrt(0.5)
-    unknown = np.zeros((n, 3, n, 3))
-    unknown[np.arange(n), :, np.arange(n)] = spread
-    return known, unknown.reshape(n, 3, 3 * n)
-
-
-def _with_nuisance(
-    design: Array, y: Array, covariance: Array, unknown: Array
-) -> linear.LinearFit:
-    """Fit of y, (n, 3), with unknown factors folded into its covariance."""
-    n = len(y)
-    columns = unknown.reshape(3 * n, -1)
-    noise = columns @ columns.T
-    for i, block in enumerate(covariance):
-        noise[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += block
-    rows = design.reshape(1, 3 * n, -1)
-    return linear.fit(rows, y.reshape(1, -1), linear.whitener(noise)[None])
 
 
 def _estimate(names: tuple[str, ...], fit: linear.LinearFit, n: int) -> Estimate:

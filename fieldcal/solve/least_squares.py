@@ -8,7 +8,8 @@
 One row of the matrix G is (1, v) or (1, v, products), v = f or w, and the printed
 solution X = (G^T G)^-1 G^T U (1.3) (2.3) (3.3) (4.3) is computed from singular values
 instead, weighted by the windows' covariances. f in m/s^2, w in rad/s, B and M in device
-axes. The diagonal of M1 is the scale factor, the rest cross-coupling.
+axes. The diagonal of M1 is the scale factor, the rest cross-coupling. The Earth's rate
+is taken out of W as far as it is known, and part of its error otherwise (`earth`).
 Source: Avrutov, Sapegin, Stefanishin, Tsisarzh 2017.
 
 Rank and conditioning decide before any number is given: what the schedule does not
@@ -18,7 +19,7 @@ determine is named and left out, the rest is solved.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,11 +28,16 @@ from fieldcal.positions import Position, forces
 from fieldcal.samples import Array
 from fieldcal.solve import linear, scatter
 from fieldcal.solve.design import LADDER
+from fieldcal.solve.earth import earth_rate
 from fieldcal.solve.estimate import NO_DOF, Estimate, not_determined
 from fieldcal.solve.observations import ACC, GYR, Observations
+from fieldcal.solve.tilt import LEVEL, Base
 
 POORLY = 1e4
 """Condition number from which the answer is said to be sensitive."""
+
+NOTHING: Array = np.zeros((0, 3, 0))
+"""Beside the parameters, nothing is unknown."""
 
 Rows = Callable[[Sequence[Position]], Array]
 
@@ -136,13 +142,22 @@ def accelerometers(observations: Observations, products: bool = False) -> Estima
     )
 
 
-def gyroscopes(observations: Observations, products: bool = False) -> Estimate:
+def gyroscopes(
+    observations: Observations,
+    products: bool = False,
+    heading_sigma: float | None = None,
+    base: Base = LEVEL,
+    as_printed: bool = False,
+) -> Estimate:
     """Bias, scale factor, cross-coupling, (3.3); with `products` expanded, (4.3).
 
     Parameters
     ----------
     observations : n known rates; a position without one counts as at rest
     products : estimate the coefficients of the products of two axes as well
+    heading_sigma : how well z points north, rad; None where it points anywhere
+    base : how it is tilted
+    as_printed : leave the Earth's rate in the bias
 
     Raises
     ------
@@ -155,20 +170,33 @@ def gyroscopes(observations: Observations, products: bool = False) -> Estimate:
         rate = np.array([p.rate or (0.0, 0.0, 0.0) for p in places])
         return matrix(rate @ observations.mounting, products)
 
+    mean, beside = observations.mean.copy(), NOTHING
+    if not as_printed:
+        known, beside = earth_rate(observations, heading_sigma, base)
+        mean[:, GYR] -= known
     return scatter.absorb(
-        lambda seen: _solve(rows, seen, GYROSCOPES), observations, GYR, "rates"
+        lambda seen: _solve(rows, seen, GYROSCOPES, beside),
+        replace(observations, mean=mean),
+        GYR,
+        "rates",
     )
 
 
-def _solve(rows: Rows, observations: Observations, sensor: Sensor) -> Estimate:
-    """Solve the three channels together, each with the columns of G."""
+def _solve(
+    rows: Rows, observations: Observations, sensor: Sensor, beside: Array = NOTHING
+) -> Estimate:
+    """Solve the three channels together, each with the columns of G.
+
+    `beside` (n, 3, k) are columns of unknown factors of mean 0 and variance 1.
+    """
     g = rows(observations.positions)
     n, columns = g.shape
     y = observations.mean[:, sensor.channels]
     noise = observations.covariance[:, sensor.channels, sensor.channels]
     # unknowns in the order of G's columns, then the channel
     design = np.einsum("nk,cd->nckd", g, np.eye(3)).reshape(n, 3, 3 * columns)
-    fit = linear.fit(design, y, linear.whitener(noise))
+    unknown = beside if beside.size else np.zeros((n, 3, 0))
+    fit = linear.fit_beside(design, y, noise, unknown)
     table = sensor.names(columns)
     names = tuple(name for row in table for name in row)
     if not fit.determined.any():

@@ -136,6 +136,26 @@ def fit(design: Array, y: Array, white: Array) -> LinearFit:
     )
 
 
+def fit_beside(design: Array, y: Array, covariance: Array, unknown: Array) -> LinearFit:
+    """Fit of y beside unknown factors, which are folded into its covariance.
+
+    Parameters
+    ----------
+    design : (n, 3, p)
+    y : (n, 3)
+    covariance : (n, 3, 3) of y
+    unknown : (n, 3, k) columns of factors of mean 0 and variance 1
+
+    """
+    n = len(y)
+    columns = unknown.reshape(3 * n, -1)
+    noise = columns @ columns.T
+    for i, block in enumerate(covariance):
+        noise[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += block
+    rows = design.reshape(1, 3 * n, -1)
+    return fit(rows, y.reshape(1, -1), whitener(noise)[None])
+
+
 def remedy(
     rows: Callable[[Sequence[T]], Array],
     taken: Sequence[T],

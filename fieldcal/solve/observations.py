@@ -37,7 +37,8 @@ class Observations:
     Attributes
     ----------
     positions : n positions, angles in rad
-    mean : (n, 6) m/s^2 and rad/s, device axes; a sensor not measured is nan throughout
+    mean : (n, 6) m/s^2 and rad/s, device axes; a sensor not measured is nan
+        throughout, accelerometers may be where a table turns
     covariance : (n, 6, 6) of the means
     gravity : m/s^2
     temperature : (n,) deg C, nan where unknown
@@ -130,8 +131,9 @@ class Observations:
 
     @property
     def has_acc(self) -> bool:
-        """Whether the accelerometers were measured."""
-        return bool(np.isfinite(self.mean[:, ACC]).all())
+        """Whether the accelerometers were measured where the device was at rest."""
+        still = self.mean[~self.rotating, ACC]
+        return bool(len(still) and np.isfinite(still).all())
 
     @property
     def has_gyr(self) -> bool:
@@ -150,8 +152,9 @@ class Observations:
 
     @property
     def rotating(self) -> Mask:
-        """Whether a position turns at a known rate, (n,)."""
-        return np.array([p.rate is not None for p in self.positions], dtype=bool)
+        """Whether a table turns a position at a known rate, (n,)."""
+        turning: Mask = np.any(self.rates != 0.0, axis=1)
+        return turning
 
     @property
     def forces(self) -> Array:
@@ -199,12 +202,16 @@ class Observations:
             raise InputError("there is no position: mark at least two")
 
     def _check_numbers(self, sensor: str, three: slice) -> None:
-        mean, cov = self.mean[:, three], self.covariance[:, three, three]
+        # on a table that turns nothing is asked of the accelerometers
+        rows = np.flatnonzero(~self.rotating) if three == ACC else np.arange(len(self))
+        mean = self.mean[rows, three]
+        cov = self.covariance[rows, three, three]
         bad = ~np.isfinite(mean)
         if bad.all():
             return
         if bad.any():
-            row, axis = np.argwhere(bad)[0]
+            found, axis = np.argwhere(bad)[0]
+            row = int(rows[found])
             raise InputError(
                 f"position {row} ({self.positions[row].name}) has no mean of "
                 f"{CHANNELS[three][axis]}: take its window again or leave it out"

@@ -1,0 +1,102 @@
+"""What goes round in the gyroscopes while a rate table turns.
+
+With the table's rate v in device axes, |v| = v, and the Earth's rate w, what of w lies
+across v goes round in the device, and averages out over whole turns:
+
+    w_across(t) = a e_1(t) + b e_2(t),   e_i(t) = exp(-[v (t - t_0)]x) e_i(t_0)     (1)
+
+e_1, e_2 lie across v and each other. Where the table stood when its window began is not
+known, so a and b are found in the window, beside the mean, and taken out. Means over d
+seconds are less by sin(v d / 2) / (v d / 2). What is larger than the Earth makes is
+something else, and stays. rad/s, s, device axes. Source: rotation kinematics.
+
+Of less than a turn by an angle c the mean keeps at most 2 sin(c / 2) / c of it, in a
+direction that is not known:
+
+    cov = (I - v v^T / v^2) 2/3 Omega^2 min(1/2, 1 / c^2)                           (2)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.frames import EARTH_RATE
+from fieldcal.samples import Array
+
+TURNS = 1.0
+"""Whole turns of a window from which what goes round is told from the mean."""
+
+CLEARLY = 5.0
+"""Standard deviations by which something may seem larger than the Earth's rate."""
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """What goes round in one window.
+
+    Attributes
+    ----------
+    values : (k, 3) in each of the outputs, rad/s; none where it is not known
+    covariance : (3, 3) that the mean of the others is uncertain by for it
+
+    """
+
+    values: Array
+    covariance: Array
+
+
+def going_round(
+    t: Array, rate: Array, gyr: Array, sd: Array, scale: Array, length: Array | float
+) -> Round:
+    """Find what goes round in one window.
+
+    Parameters
+    ----------
+    t : (k,) instants of the outputs, s
+    rate : (3,) of the table, in device axes, rad/s
+    gyr, sd : (k, 3) outputs of the gyroscopes, rad/s, and their white noise
+    scale : (3,) scale factors of the gyroscopes
+    length : (k,) s that each output is a mean over; 0 for samples
+
+    """
+    speed = float(np.linalg.norm(rate))
+    turned = speed * float(np.ptp(t))
+    used = np.isfinite(gyr).all(axis=1) & np.isfinite(sd).all(axis=1)
+    none = Round(np.zeros_like(gyr), _unknown(rate / speed, turned))
+    if turned < 2 * np.pi * TURNS or used.sum() < 3:
+        return none
+    shape = scale[:, None] * _unit_vectors(rate / speed, speed * (t - t[0]))
+    shape *= np.broadcast_to(np.sinc(speed * length / (2 * np.pi)), t.shape)[
+        :, None, None
+    ]
+    weight = 1 / sd[used]
+    means = np.broadcast_to(np.eye(3), (int(used.sum()), 3, 3))
+    design = np.concatenate([means, shape[used]], axis=2) * weight[:, :, None]
+    design = design.reshape(-1, 5)
+    found, _, rank, _ = np.linalg.lstsq(design, (gyr[used] * weight).ravel(), 1e-6)
+    if rank < design.shape[1]:
+        return none
+    covariance = np.linalg.inv(design.T @ design)[3:, 3:]
+    sigma = float(np.sqrt(covariance.diagonal().max()))
+    if np.linalg.norm(found[3:]) > EARTH_RATE + CLEARLY * sigma:
+        return none
+    mean = shape[used].mean(axis=0)
+    return Round(shape @ found[3:], mean @ covariance @ mean.T)
+
+
+def _unknown(axis: Array, turned: float) -> Array:
+    """Covariance of the mean where nothing is taken out, (2)."""
+    size = 2 / 3 * EARTH_RATE**2 * min(0.5, 1 / max(turned, 1e-9) ** 2)
+    across: Array = size * (np.eye(3) - np.outer(axis, axis))
+    return across
+
+
+def _unit_vectors(axis: Array, angle: Array) -> Array:
+    """Unit vectors e_1 and e_2 of (1) at some angles, (k, 3, 2)."""
+    first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    first /= np.linalg.norm(first)
+    second = np.cross(axis, first)
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return np.stack([cos * first - sin * second, sin * first + cos * second], axis=2)

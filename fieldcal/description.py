@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.calibration import Gauge
 from fieldcal.errors import InputError, SessionError
 from fieldcal.frames import mounting_matrix
 from fieldcal.gravity import G0, gravity
@@ -35,11 +36,15 @@ GYR_UNITS = {
     "V": 1.0,
     "count": 1.0,
 }
-"""SI units in one of each; what has no such relation ("V", "count") stays as it is."""
+"""SI units in one of each; what has no such relation is divided by the gauge."""
+
+WORTHLESS = ("V", "count")
+"""Units that only the nominal scale factors say the worth of."""
 
 _UNITS = {"acceleration": ACC_UNITS, "angular_rate": GYR_UNITS}
 
 TRIADS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+NOMINAL_SCALES = ("acc_scale", "gyr_scale")
 NOMINAL = {"acc_bias": 0.0, "acc_scale": 1.0, "gyr_bias": 0.0, "gyr_scale": 1.0}
 
 
@@ -59,6 +64,7 @@ class Description:
         nobody said
     axes : the mounting, procedure axis x, y, z is device axis ...
     nominal : (3,) for each of `TRIADS`: the calibration a simulation starts from
+    gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
     model : parameters of the effects that the simulation includes, by id
     positions : in the order they were held
     windows : (start, end) of each position, s of device time; None where not yet known
@@ -76,6 +82,7 @@ class Description:
     level_deg: float | None
     axes: tuple[str, ...]
     nominal: Mapping[str, Array]
+    gauge: Gauge
     model: Mapping[str, Mapping[str, Any]]
     positions: tuple[Position, ...]
     windows: tuple[tuple[float, float] | None, ...]
@@ -144,18 +151,21 @@ def parse(raw: Mapping[str, Any]) -> Description:
     if not isinstance(axes, list) or not all(isinstance(a, str) for a in axes):
         raise InputError('[frame] mounting must be like ["+x", "+y", "+z"]')
     mounting_matrix(axes)
+    nominal = {name: _triad(_table(raw, "nominal"), name) for name in TRIADS}
+    gauge = _gauge(units, nominal)
     return Description(
         device=device,
         grade=_choice(raw, "device", "grade", GRADES, "tactical"),
         rate_hz=_positive(_table(raw, "sampling"), "sampling", "rate_hz"),
         units=units,
-        limits=_limits(_table(raw, "range"), units),
+        limits=_limits(_table(raw, "range"), units, gauge),
         latitude_deg=latitude,
         height_m=height,
         gravity=_positive(site, "site", "gravity") or gravity(latitude, height),
         level_deg=_level(site),
         axes=tuple(axes),
-        nominal={name: _triad(_table(raw, "nominal"), name) for name in TRIADS},
+        nominal={n: v / gauge.size[n.startswith("gyr")] for n, v in nominal.items()},
+        gauge=gauge,
         model=_model(_table(raw, "model")),
         positions=positions,
         windows=windows,
@@ -207,9 +217,25 @@ def _choice(
     return str(value)
 
 
-def _limits(table: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, float]:
+def _gauge(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
+    """By the nominal scale factors, where the unit itself is worth nothing known."""
+    size, named = [1.0, 1.0], ["m/s^2", "rad/s"]
+    for i, (kind, scale) in enumerate(zip(_UNITS, NOMINAL_SCALES, strict=True)):
+        if units[kind] in WORTHLESS:
+            size[i], named[i] = float(np.abs(nominal[scale]).mean()), units[kind]
+    if not all(size):
+        raise InputError("[nominal] a scale factor of 0 sees nothing: mend it")
+    return Gauge((size[0], size[1]), (named[0], named[1]))
+
+
+def _limits(
+    table: Mapping[str, Any], units: Mapping[str, str], gauge: Gauge
+) -> dict[str, float]:
     limits = {kind: _positive(table, "range", kind) for kind in _UNITS}
-    return {k: v * _UNITS[k][units[k]] for k, v in limits.items() if v is not None}
+    worth = {
+        k: _UNITS[k][units[k]] / c for k, c in zip(_UNITS, gauge.size, strict=True)
+    }
+    return {k: v * worth[k] for k, v in limits.items() if v is not None}
 
 
 def _triad(table: Mapping[str, Any], name: str) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 
 from fieldcal import __version__
 from fieldcal.calibration import Calibration, Nominal
+from fieldcal.calibration.gauge import SI
 from fieldcal.description import Description
 from fieldcal.errors import FieldcalError, Moved, SessionError
 from fieldcal.samples import Array, Block, Grain
@@ -53,6 +54,8 @@ def observations(
 def with_provenance(calibration: Calibration, about: Description) -> Calibration:
     """The calibration with the device it belongs to and the software that made it."""
     origin = {"device": dict(about.device), "software": f"fieldcal {__version__}"}
+    if not about.gauge.plain:
+        origin["gauge"] = about.gauge.table()
     return replace(calibration, info={**calibration.info, **origin})
 
 
@@ -132,8 +135,26 @@ def rests(session: Session) -> Rests:
         if said:
             warnings.append(f"position {i + 1}: {said}")
     if not rows:
-        raise SessionError(f"{session.folder}: no window can be used; {warnings[-1]}")
+        raise SessionError(
+            f"{session.folder}: no window can be used; {warnings[-1]}"
+            f"{_worth(session.about)}"
+        )
     return Rests(tuple(rows), tuple(averages), tuple(warnings))
+
+
+def _worth(about: Description) -> str:
+    """What to do where nobody said what a count is worth."""
+    missing = [
+        f"{group} (how many {unit} in one {si})"
+        for group, unit, si, size in zip(
+            ("acc_scale", "gyr_scale"), about.gauge.units, SI, about.gauge.size,
+            strict=True,
+        )
+        if unit != si and size == 1
+    ]  # fmt: skip
+    if not missing:
+        return ""
+    return f"; session.toml must say in [nominal] {' and '.join(missing)}"
 
 
 def with_turns_between(

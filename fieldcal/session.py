@@ -112,13 +112,13 @@ class Session:
 
     @cached_property
     def block(self) -> Block:
-        """All samples, in SI units (or as they stand, where the unit has no SI)."""
+        """All samples, in SI units; volts and counts by the nominal scale factors."""
         raw, cut = sample_files.read(sample_files.find(self.folder))
         self.warnings += cut
-        units = self.about.units
+        units, gauge = self.about.units, self.about.gauge.size
         for triad, unit in (
-            (raw.acc, ACC_UNITS[units["acceleration"]]),
-            (raw.gyr, GYR_UNITS[units["angular_rate"]]),
+            (raw.acc, ACC_UNITS[units["acceleration"]] / gauge[0]),
+            (raw.gyr, GYR_UNITS[units["angular_rate"]] / gauge[1]),
         ):
             if unit != 1.0:
                 np.multiply(triad, unit, out=triad)

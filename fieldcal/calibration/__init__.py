@@ -1,6 +1,7 @@
 """What a calibration is: parameters with their covariance, applied, compared, kept."""
 
 from fieldcal.calibration.comparison import Comparison, compare
+from fieldcal.calibration.gauge import Gauge
 from fieldcal.calibration.parameters import (
     COMPONENTS,
     Calibration,
@@ -8,4 +9,12 @@ from fieldcal.calibration.parameters import (
     Nominal,
 )
 
-__all__ = ["COMPONENTS", "Calibration", "Comparison", "Method", "Nominal", "compare"]
+__all__ = [
+    "COMPONENTS",
+    "Calibration",
+    "Comparison",
+    "Gauge",
+    "Method",
+    "Nominal",
+    "compare",
+]

@@ -14,6 +14,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from fieldcal.calibration.gauge import inward, outward
 from fieldcal.calibration.parameters import COMPONENTS, Calibration, Method
 from fieldcal.errors import InputError
 
@@ -29,7 +30,8 @@ def schema() -> dict[str, Any]:
 
 
 def to_json(calibration: Calibration) -> dict[str, Any]:
-    """Return the object; numbers that are not determined are null."""
+    """Return the object, in the unit of the samples; what is not determined is null."""
+    calibration = outward(calibration)
     return {
         "format": FORMAT,
         "method": calibration.method,
@@ -72,7 +74,7 @@ def from_json(document: Any) -> Calibration:
     matrix = _numbers(covariance.get("matrix"), "covariance.matrix", (len(names),) * 2)
     values, units = _parameters(_mapping(top.get("parameters"), "parameters"), names)
     fit = _mapping(top.get("fit"), "fit")
-    return Calibration(
+    found = Calibration(
         method=method,
         names=names,
         values=values,
@@ -85,6 +87,7 @@ def from_json(document: Any) -> Calibration:
         good=_verdict(top),
         info={k: v for k, v in top.items() if k not in KEYS},
     )
+    return inward(found)
 
 
 def _group(calibration: Calibration, group: str) -> dict[str, Any]:

@@ -180,7 +180,8 @@ def _quality(
 
 def _calibration(explanation: Explanation) -> dict[str, Group]:
     fit: Fit = explanation.fit
-    nominal = explanation.prepared.source.about.nominal
+    about = explanation.prepared.source.about
+    nominal, gauge = about.nominal, about.gauge
     out = {}
     for group, unit, absurd in zip(GROUPS, GROUP_UNITS, ABSURD, strict=True):
         value, sigma = np.full(3, np.nan), np.full(3, np.nan)
@@ -191,7 +192,9 @@ def _calibration(explanation: Explanation) -> dict[str, Group]:
                     value[i], sigma[i] = fit.values[at], fit.sigma[at]
         if np.isfinite(value).any():
             change = value - nominal[group]
-            out[group] = Group(tuple(value), tuple(sigma), tuple(change), unit)
+            size, unit = gauge.of(group) or (1.0, unit)
+            found = [tuple((size * part).tolist()) for part in (value, sigma, change)]
+            out[group] = Group(found[0], found[1], found[2], unit)
     return out
 
 

@@ -15,6 +15,7 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Protocol, cast
 
 from fieldcal.calibration import COMPONENTS
+from fieldcal.calibration.gauge import SI
 from fieldcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -61,7 +62,10 @@ class Source:
     @property
     def says(self) -> list[str]:
         """What the user must know whatever the format, one sentence each."""
-        says = []
+        says, gauge = [], self.session.about.gauge
+        for size, unit, si in zip(gauge.size, gauge.units, SI, strict=True):
+            if unit != si:
+                says.append(f"raw is in {si}: the samples' {unit} divided by {size:g}")
         if self.undetermined:
             names = ", ".join(self.undetermined)
             says.append(f"not determined, the nominal value is taken: {names}")

@@ -11,6 +11,7 @@ import csv
 import io
 from pathlib import Path
 
+from fieldcal.calibration.gauge import outward
 from fieldcal.exporters import Source
 from fieldcal.session import write_whole
 
@@ -23,11 +24,12 @@ def write(source: Source, path: Path) -> list[str]:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["name", "value", "sigma", "unit"])
-    found = source.calibration
+    found = outward(source.calibration)
     for name, value, sigma, unit in zip(
         found.names, found.values, found.sigma, found.units, strict=True
     ):
         table.writerow([name, f"{value:.12g}", f"{sigma:.6g}", unit])
     write_whole(path, text.getvalue())
     says = "raw = bias + M true, M = diag(scale) + cross-coupling, device axes"
-    return [*(s for s in source.says if "nominal" not in s), says]
+    others = ("nominal", "raw is in")  # none is filled in; raw is as the samples are
+    return [*(s for s in source.says if not any(o in s for o in others)), says]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.gauge import outward
 from fieldcal.calibration.wording import number, pretty, title
 from fieldcal.report.blocks import (
     Block,
@@ -141,13 +142,14 @@ def calibration(material: Material) -> Section | None:
 
 def _parameters(found: Calibration, nominal: Mapping[str, Array]) -> Table:
     rows: list[list[str | Cell]] = []
-    for name, value, sigma, unit in zip(
-        found.names, found.values, found.sigma, found.units, strict=True
+    shown = outward(found)
+    for i, (name, value, sigma, unit) in enumerate(
+        zip(shown.names, shown.values, shown.sigma, shown.units, strict=True)
     ):
         group, _, axis = name.partition(".")
         change: str | Cell = ""
         if group in nominal and sigma > 0:
-            z = (value - nominal[group]["xyz".index(axis)]) / sigma
+            z = (found.values[i] - nominal[group]["xyz".index(axis)]) / found.sigma[i]
             change = Cell(f"{z:+.1f} σ", bar=float(min(1.0, abs(z) / WIDEST)))
         rows.append([title(name), *number(value, sigma), pretty(unit), change])
     columns: tuple[str, ...] = ("parameter", ">value", ">± 1σ", "unit")

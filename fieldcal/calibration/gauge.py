@@ -1,0 +1,124 @@
+"""Outputs in volts or counts: what they are worth, and a calibration in their unit.
+
+A device may put out volts or counts U = b + M f. All is calculated with outputs u that
+are m/s^2 and rad/s but for what a calibration corrects,
+
+    u = U / c,   b_u = b / c,   M_u = M / c                                         (1)
+
+c being volts or counts in one m/s^2 or rad/s by the nominal scale factors. Files hold b
+and M of U, in the unit of the samples, and c beside them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration.parameters import Calibration
+from fieldcal.errors import InputError
+from fieldcal.samples import Array
+
+KEY = "gauge"
+"""Of `Calibration.info`, where outputs are volts or counts."""
+
+SI = ("m/s^2", "rad/s")
+
+GROUPS = {
+    "acc_bias": (0, 0, "m/s^2"),
+    "acc_scale": (0, 1, "1"),
+    "cross_coupling": (0, 1, "1"),
+    "pendulous_products": (0, 2, "1/(m/s^2)"),
+    "gyr_bias": (1, 0, "rad/s"),
+    "gyr_scale": (1, 1, "1"),
+    "gyro_cross_coupling": (1, 1, "1"),
+    "gyro_products": (1, 2, "s/rad"),
+}
+"""Sensor, power of the input that the output is over, and the unit in SI."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gauge:
+    """What one m/s^2 and one rad/s are in the outputs.
+
+    Attributes
+    ----------
+    size : c of (1), accelerometers and gyroscopes
+    units : of the outputs
+
+    """
+
+    size: tuple[float, float] = (1.0, 1.0)
+    units: tuple[str, str] = SI
+
+    @property
+    def plain(self) -> bool:
+        """Whether the outputs are m/s^2 and rad/s."""
+        return self.units == SI
+
+    def of(self, group: str) -> tuple[float, str] | None:
+        """Factor and unit of a group in the outputs' unit; None where it has none."""
+        if group not in GROUPS:
+            return None
+        sensor, power, _ = GROUPS[group]
+        size, unit, si = self.size[sensor], self.units[sensor], SI[sensor]
+        if unit == si:
+            return None
+        over = {0: "", 1: f"/({si})", 2: f"/({si})^2"}[power]
+        return size, unit + over
+
+    def table(self) -> dict[str, Any]:
+        """As `Calibration.info` and ``result.json`` keep it."""
+        return {"size": list(self.size), "units": list(self.units)}
+
+    @classmethod
+    def read(cls, table: Any) -> Gauge:
+        """From such a table.
+
+        Raises
+        ------
+        InputError
+            If it is none.
+
+        """
+        try:
+            sizes, units = map(float, table["size"]), map(str, table["units"])
+            acc, gyr = sizes
+            made = cls((acc, gyr), tuple(units))  # type: ignore[arg-type]
+            if len(made.units) == 2 and acc > 0 and gyr > 0:
+                return made
+        except (KeyError, TypeError, ValueError):
+            pass
+        raise InputError("result.json: gauge is not two sizes above 0 and two units")
+
+
+def outward(calibration: Calibration) -> Calibration:
+    """The calibration in the unit of the samples."""
+    return _changed(calibration, 1)
+
+
+def inward(calibration: Calibration) -> Calibration:
+    """The calibration for outputs in m/s^2 and rad/s, from one of the samples' unit."""
+    return _changed(calibration, -1)
+
+
+def _changed(calibration: Calibration, power: int) -> Calibration:
+    table: Mapping[str, Any] | None = calibration.info.get(KEY)
+    if table is None:
+        return calibration
+    gauge = Gauge.read(table)
+    factors: Array = np.ones(len(calibration.names))
+    units = list(calibration.units)
+    for i, name in enumerate(calibration.names):
+        group = name.partition(".")[0]
+        if (found := gauge.of(group)) is not None:
+            factors[i] = found[0] ** power
+            units[i] = found[1] if power > 0 else GROUPS[group][2]
+    return replace(
+        calibration,
+        values=calibration.values * factors,
+        covariance=calibration.covariance * np.outer(factors, factors),
+        units=tuple(units),
+    )

@@ -1,8 +1,7 @@
 """From a session's windows to what the estimators are given.
 
-A window that somebody else marked may hold a disturbance. Then the longest calm part of
-it is used, and that is said; a window with no calm part, or with no samples, is left
-out.
+A window with no calm part or no samples is left out, and so is a sensor that says
+nothing in any window; both are said.
 """
 
 from __future__ import annotations
@@ -13,18 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal import __version__
+from fieldcal.averaging import table_rate, take, take_on_a_table
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.gauge import SI
 from fieldcal.description import Description
-from fieldcal.errors import FieldcalError, Moved, SessionError
-from fieldcal.samples import Array, Block, Grain
+from fieldcal.errors import FieldcalError, SessionError
+from fieldcal.samples import CHANNELS, Grain
 from fieldcal.session import Session
-from fieldcal.solve.observations import Observations
-from fieldcal.solve.turntable import going_round
-from fieldcal.windows import Average, Noise, Window, average
-
-SHORTEST = 5.0
-"""Shortest calm part of a disturbed window that is worth using, s."""
+from fieldcal.solve.observations import ACC, GYR, Observations
+from fieldcal.windows import Average, Noise
 
 
 def observations(
@@ -124,22 +120,54 @@ def rests(session: Session) -> Rests:
         rate = table_rate(session.about, i)
         try:
             if rate.any():
-                found, said = _on_a_table(block, window, rate, grain)
+                found, said = take_on_a_table(block, window, rate, grain)
             else:
-                found, noise, said = _take(block, window, noise, grain)
+                found, noise, said = take(block, window, noise, grain)
         except FieldcalError as error:
-            warnings.append(f"position {i + 1} is left out: {error}")
+            warnings.append(f"{_named(session, i)} is left out: {error}")
             continue
         rows.append(i)
         averages.append(found)
         if said:
-            warnings.append(f"position {i + 1}: {said}")
+            warnings.append(f"{_named(session, i)}: {said}")
     if not rows:
         raise SessionError(
             f"{session.folder}: no window can be used; {warnings[-1]}"
             f"{_worth(session.about)}"
         )
-    return Rests(tuple(rows), tuple(averages), tuple(warnings))
+    averages, dead = _without_dead(averages)
+    return Rests(tuple(rows), tuple(averages), (*warnings, *dead))
+
+
+def _named(session: Session, row: int) -> str:
+    """A position by its number, from 0, and by its name if it has one."""
+    number, name = f"position {row}", session.positions[row].name
+    return number if name == number else f"{number} ({name})"
+
+
+def _without_dead(averages: list[Average]) -> tuple[list[Average], list[str]]:
+    """Averages without a sensor of which an axis says nothing in any window.
+
+    A device without gyroscopes may send zeros in their place.
+    """
+    said = []
+    for sensor, channels in (("accelerometers", ACC), ("gyroscopes", GYR)):
+        sigma = np.array([a.sigma[channels] for a in averages])
+        if not np.isfinite(sigma).any():
+            continue
+        dead = ~(sigma > 0).any(axis=0)
+        if not dead.any():
+            continue
+        names = " ".join(np.array(CHANNELS[channels])[dead])
+        said.append(f"the {sensor} are not used: {names} never changes, or is missing")
+        averages = [_without(a, channels) for a in averages]
+    return averages, said
+
+
+def _without(average: Average, channels: slice) -> Average:
+    mean, covariance = average.mean.copy(), average.covariance.copy()
+    mean[channels] = covariance[channels, :] = covariance[:, channels] = np.nan
+    return replace(average, mean=mean, covariance=covariance)
 
 
 def _worth(about: Description) -> str:
@@ -193,95 +221,3 @@ def grain_of(session: Session) -> Grain:
         return Grain()
     said = marks[-1]
     return Grain(float(said["acc"]), float(said["gyr"]), bool(said["cut"]))
-
-
-def _take(
-    block: Block,
-    span: tuple[float, float] | None,
-    noise: Noise | None,
-    grain: Grain,
-) -> tuple[Average, Noise | None, str]:
-    """Average of a window, what it taught about the noise, and what must be said."""
-    if span is None:
-        raise SessionError("its window was not taken before the recording ended")
-    part = block.between(*span)
-    if len(part) < 2:
-        raise SessionError(
-            f"no samples lie between {span[0]:g} and {span[1]:g} s; the recording"
-            f" spans {block.t[0]:g} to {block.t[-1]:g} s"
-        )
-    window = Window(noise=noise, grain=grain)
-    window.add(part)
-    try:
-        return window.average(), window.noise and window.noise.spectrum, ""
-    except Moved as moved:
-        calm = _calm(part, moved, noise, grain)
-        if calm is None:
-            raise
-        said = f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
-        return calm, noise, f"{said} is used"
-
-
-def table_rate(about: Description, row: int) -> Array:
-    """Rate of the table in a position by its number, in device axes, (3,) rad/s."""
-    rate = np.array(about.positions[row].rate or (0.0, 0.0, 0.0))
-    turned: Array = rate @ about.mounting
-    return turned
-
-
-def steadied(block: Block, rate: Array) -> tuple[Block, Array]:
-    """A window without what goes round with a rate table, and what that leaves open.
-
-    Gravity goes round, so nothing is asked of the accelerometers; what of the Earth's
-    rate goes round is taken out. The covariance (3, 3) is that of the gyroscopes' mean.
-
-    Parameters
-    ----------
-    block : samples of one window
-    rate : (3,) of the table in device axes, rad/s
-
-    """
-    blind = replace(block, acc=np.full_like(block.acc, np.nan))
-    if len(block) < 2 or not np.isfinite(block.gyr).any(axis=0).all():
-        return blind, np.zeros((3, 3))
-    noise = np.nanstd(np.diff(block.gyr, axis=0), axis=0) / np.sqrt(2)
-    sd = np.broadcast_to(np.where(noise > 0, noise, np.nan), block.gyr.shape)
-    found = going_round(block.t, rate, block.gyr, sd, np.ones(3), 0.0)
-    return replace(blind, gyr=block.gyr - found.values), found.covariance
-
-
-def _on_a_table(
-    block: Block, span: tuple[float, float] | None, rate: Array, grain: Grain
-) -> tuple[Average, str]:
-    """Average while a table turns at some rate, (3,) rad/s in device axes."""
-    if span is not None:
-        block, left = steadied(block.between(*span), rate)
-    one, _, said = _take(block, span, None, grain)
-    covariance = one.covariance.copy()
-    covariance[3:, 3:] += left
-    return replace(one, covariance=covariance), said
-
-
-def _calm(
-    block: Block, moved: Moved, noise: Noise | None, grain: Grain
-) -> Average | None:
-    """Average of the longest calm part, None if there is none worth it."""
-    sides = [
-        block.between(-float("inf"), moved.at),
-        block.between(moved.at, float("inf")),
-    ]
-    best: Average | None = None
-    for side in sorted(sides, key=len, reverse=True):
-        length = float(side.t[-1] - side.t[0]) if len(side) > 1 else 0.0
-        if length < SHORTEST or (best and length <= best.end - best.start):
-            continue
-        try:
-            found: Average | None = average(side, noise=noise, grain=grain)
-        except Moved as again:
-            inside = side.t[0] < again.at < side.t[-1]
-            # a disturbance lasts: what follows its first instant is disturbed as well
-            shifted = again.at if inside else side.t[0] + 1.0
-            found = _calm(side, Moved(str(again), shifted, again.axis), noise, grain)
-        if found and (best is None or found.end - found.start > best.end - best.start):
-            best = found
-    return best

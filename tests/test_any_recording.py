@@ -307,6 +307,8 @@ def moved(by: float) -> list[Table]:
     [
         (None, moved(1e5), {}, "check start_s and end_s"),
         (None, POSITIONS[::-1], {}, "in the order in which they were held"),
+        (None, [], {}, "the device is turned in this recording"),
+        (lambda b: replace(b, gyr=unknown(b.gyr)), [], {}, "let fieldcal import find"),
         (lambda b: replace(b, acc=0 * b.acc, gyr=0 * b.gyr), POSITIONS, {},
          "record them again"),
         (lambda b: replace(b, acc=unknown(b.acc), gyr=unknown(b.gyr)), POSITIONS, {},
@@ -333,3 +335,31 @@ def test_what_cannot_be_diagnosed_is_one_sentence(
     assert main(["diagnose", str(folder)]) == 2
     out, err = capsys.readouterr()
     assert says in err and err.count("\n") == 1 and not out
+
+
+@pytest.mark.parametrize(
+    ("made", "says", "left"),
+    [
+        (
+            lambda b: replace(b, gyr=0 * b.gyr),
+            "gyroscopes are not used: gx gy gz",
+            "acc",
+        ),
+        (lambda b: replace(b, gyr=b.gyr * [1, np.nan, 1]), "not used: gy", "acc"),
+        (lambda b: replace(b, acc=b.acc * [np.nan, 1, 1]), "not used: ax", "gyr"),
+    ],
+)
+def test_a_sensor_that_says_nothing_does_not_cost_the_other(
+    made: Callable[[Block], Block],
+    says: str,
+    left: str,
+    coupled: Block,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    folder = write_session(tmp_path, made(coupled), POSITIONS)
+    assert main(["solve", str(folder), "--cross", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert any(says in warning for warning in found["warnings"])
+    assert {name[:3] for name in found["parameters"]} & {"acc", "gyr"} == {left}
+    assert main(["report", str(folder)]) == 0

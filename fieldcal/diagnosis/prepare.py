@@ -29,6 +29,11 @@ SHORTEST = 20
 
 BETTER = 3.0
 
+TURNED = np.deg2rad(10.0)
+"""Angle from which a device was not held where it was, rad."""
+
+ACC, GYR = slice(0, 3), slice(3, 6)
+
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
@@ -77,6 +82,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     warmth = Thermometer.of(checked.block)
     source = Source(checked.block, about, checked.usable, rest, warmth, checked.pace)
     rows = rows_of(source)
+    _refuse_turning(rows, about)
     lines = tones(source, rows)
     found = tuple(tone for tone, _ in lines)
     left = tuple(remains for _, remains in lines)
@@ -141,6 +147,26 @@ def _refuse_disorder(about: Description) -> None:
                     " the order in which they were held, with windows apart"
                 )
             last = window[1]
+
+
+def _refuse_turning(rows: Rows, about: Description) -> None:
+    """A recording without positions is one window: the device must have been held.
+
+    Where there are gyroscopes they must tell of the turn as well: an output that leaps
+    turns nothing.
+    """
+    if about.positions or not rows.used[:, :3].all(axis=1).any():
+        return
+    acc, gyr = rows.y[:, ACC], np.nan_to_num(rows.y[:, GYR])
+    leant = np.linalg.norm(acc - np.nanmedian(acc, axis=0), axis=1) / about.gravity
+    rate = gyr - np.median(gyr, axis=0)
+    turned = np.abs(np.cumsum(rate * rows.length[:, None], axis=0))
+    if np.nanmax(leant) > TURNED and (turned.max() > TURNED or not gyr.any()):
+        raise InputError(
+            "the device is turned in this recording, and session.toml has no"
+            " [[position]]: write down when it was held, or let fieldcal import find"
+            " the still stretches"
+        )
 
 
 def known_terms(model: Mapping[str, Mapping[str, Any]]) -> tuple[Term, ...]:

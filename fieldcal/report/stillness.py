@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.observing import Rests, steadied, table_rate
+from fieldcal.averaging import steadied, table_rate
+from fieldcal.observing import Rests
 from fieldcal.report import blocks
 from fieldcal.report.blocks import Cell, Figure, Section, Tone, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series

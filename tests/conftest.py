@@ -22,6 +22,47 @@ settings.register_profile(
 settings.load_profile("any machine")
 
 
+WAITING = frozenset(
+    [
+        "test_beside",
+        "test_can_imu",
+        "test_codecs",
+        "test_console_run",
+        "test_crash_safety",
+        "test_end_to_end",
+        "test_full_disk",
+        "test_installing",
+        "test_link_contract",
+        "test_link_faults",
+        "test_mavlink_imu",
+        "test_mavlink_log",
+        "test_operator_errors",
+        "test_plan_file",
+        "test_ports",
+        "test_pulled_stick",
+        "test_pytest_plugin",
+        "test_reader",
+        "test_replay",
+        "test_resume",
+        "test_serial_imu",
+        "test_wires_meet",
+        "test_write",
+    ]
+)
+"""Modules whose tests wait for devices in processes of their own, or for the clock."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Two groups, for two processors: one waits for devices, the other calculates.
+
+    Tests that wait run one at a time, as on a machine with a single processor: a device
+    that gets no time runs late.
+    """
+    for item in items:
+        waits = item.path.stem in WAITING or item.path.parent.name == "sim_device"
+        item.add_marker(pytest.mark.xdist_group("waiting" if waits else "calculating"))
+
+
 collect_ignore = ["example_project"]
 """A project of its own, which test_pytest_plugin runs."""
 

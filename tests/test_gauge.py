@@ -163,3 +163,20 @@ def test_out_and_in_again(acc: float, gyr: float, units: tuple[str, str]) -> Non
 def test_a_gauge_that_is_none_is_refused(table: object) -> None:
     with pytest.raises(InputError, match="gauge is not two sizes"):
         Gauge.read(table)
+
+
+def test_an_import_of_counts_asks_what_they_are_worth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    block = recorded(Profile(), places([(0.0, 0.0)], 20.0))
+    rows = np.column_stack([block.t, np.round(block.six * np.repeat([ACC, GYR], 3))])
+    log = tmp_path / "log.csv"
+    np.savetxt(log, rows, delimiter=",")
+    command = ["import", str(log), "--columns", "t,ax,ay,az,gx,gy,gz"]
+    bare = ["--acc-unit", "count", "--gyr-unit", "count", "-o", str(tmp_path / "a")]
+    assert main([*command, *bare]) == 0
+    assert "nothing says what a count is worth" in capsys.readouterr().err
+    worth = ["--acc-unit", "m/s^2", "--acc-lsb", str(ACC), "--gyr-unit", "rad/s"]
+    worth += ["--gyr-lsb", str(GYR), "-o", str(tmp_path / "b")]
+    assert main([*command, *worth]) == 0
+    assert "1 still stretch" in capsys.readouterr().err

@@ -169,7 +169,14 @@ def _bring(
         err(f"{folder}: {sentence}\n")
     if brought.facts.left_out:
         err(f"{folder}: left out: {_many(brought.facts.left_out, 'row', 's')}\n")
-    if not brought.stretches:
+    if not brought.stretches and kept:
+        err(
+            f"nothing says what a {' or '.join(sorted(set(kept.values())))} is worth,"
+            " so no still stretch was found: say how many make a g or deg/s, such as"
+            " --acc-unit g --acc-lsb 2048 --gyr-unit deg/s --gyr-lsb 16.4, or write"
+            " [nominal] scale factors and the positions into session.toml\n"
+        )
+    elif not brought.stretches:
         err(
             "no still stretch was found: write the positions into session.toml, or try"
             " --still with a shorter time\n"

@@ -16,7 +16,7 @@ from fieldcal.averaging import table_rate, take, take_on_a_table
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.gauge import SI
 from fieldcal.description import Description
-from fieldcal.errors import FieldcalError, SessionError
+from fieldcal.errors import FieldcalError, NotObservable, SessionError
 from fieldcal.samples import CHANNELS, Grain
 from fieldcal.session import Session
 from fieldcal.solve.observations import ACC, GYR, Observations
@@ -197,11 +197,21 @@ def with_turns_between(
     still : its windows
     wanted : add it however uncertain; otherwise only where it is worth having
 
+    Raises
+    ------
+    NotObservable
+        If it is wanted, and no position was held at rest.
+
     """
     from fieldcal.solve import turns
 
     still = still.at_rest(session)
     if not still.rows:
+        if wanted:
+            raise NotObservable(
+                "no position was held at rest, so there is no turn between two; leave"
+                " out --turns"
+            )
         return calibration
     seen = observations(session.about, still.averages, still.rows)
     if not seen.has_gyr:

@@ -13,6 +13,7 @@ from session_folders import NINE, places, recorded, write_session
 
 from fieldcal.calibration import Calibration
 from fieldcal.diagnosis import diagnose
+from fieldcal.errors import NotObservable
 from fieldcal.observing import observe, rests, with_turns_between
 from fieldcal.samples import Block
 from fieldcal.session import Session
@@ -137,7 +138,9 @@ def test_windows_on_a_table_are_no_rests_between_turns(tmp_path: Path) -> None:
     still = rests(opened)
     assert not still.at_rest(opened).rows
     found = solve(observe(opened)[0])
-    assert with_turns_between(found, opened, still, wanted=True) is found
+    assert with_turns_between(found, opened, still) is found
+    with pytest.raises(NotObservable, match="no position was held at rest"):
+        with_turns_between(found, opened, still, wanted=True)
 
 
 @pytest.mark.parametrize(

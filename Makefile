@@ -9,7 +9,7 @@ demo: $(READY)
 	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
 
 test: $(READY)
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 2 --dist loadgroup
+	$(BIN)/python -m pytest -q
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -71,7 +71,7 @@ class Running:
         self._task, self._operator, self._recorder = task, operator, recorder
         self._opened, self._patience, self._give_up = opened, patience, give_up
         self._taken = {} if taken is None else taken
-        self._lost_at: float | None = None
+        self._lost: tuple[float, DeviceError] | None = None
         wait = float(task.run.get("warm_up_s", WARM_UP))
         self._warmth = Warmth(limits.temperature_rate_k_min, wait)
 
@@ -92,10 +92,12 @@ class Running:
                 raise
             except DeviceError as error:
                 if driver.health.samples:
-                    self._lost_at = monotonic()
-                if self._lost_at is None:
+                    self._lost = (monotonic(), error)
+                if self._lost is None:
                     raise  # it never said anything: nothing to wait for
-                driver = self._wait_for_device(error, self._lost_at + self._patience)
+                # what befalls a device that has not come back since is no news
+                since, first = self._lost
+                driver = self._wait_for_device(first, since + self._patience)
 
     def _with(self, driver: Driver) -> Calibration:
         recorder, task = self._recorder, self._task

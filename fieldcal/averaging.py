@@ -27,9 +27,24 @@ def take(
     noise: Noise | None,
     grain: Grain,
 ) -> tuple[Average, Noise | None, str]:
-    """Average of a window, what it taught about the noise, and what must be said."""
-    if span is None:
-        raise SessionError("its window was not taken before the recording ended")
+    """Average of a window, what it taught about the noise, and what must be said.
+
+    Parameters
+    ----------
+    block : the recording
+    span : start and end of the window, s of device time; None where it has none
+    noise : what windows before it taught
+    grain : what the device rounds to
+
+    Raises
+    ------
+    SessionError
+        If there are no samples of it.
+    Moved
+        If no part of it was calm.
+
+    """
+    span = _given(span)
     part = block.between(*span)
     if len(part) < 2:
         raise SessionError(
@@ -46,6 +61,12 @@ def take(
             raise
         said = f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
         return calm, noise, f"{said} is used"
+
+
+def _given(span: tuple[float, float] | None) -> tuple[float, float]:
+    if span is None:
+        raise SessionError("its window was not taken before the recording ended")
+    return span
 
 
 def table_rate(about: Description, row: int) -> Array:
@@ -79,10 +100,13 @@ def steadied(block: Block, rate: Array) -> tuple[Block, Array]:
 def take_on_a_table(
     block: Block, span: tuple[float, float] | None, rate: Array, grain: Grain
 ) -> tuple[Average, str]:
-    """Average while a table turns at some rate, (3,) rad/s in device axes."""
-    if span is not None:
-        block, left = steadied(block.between(*span), rate)
-    one, _, said = take(block, span, None, grain)
+    """Average while a table turns at some rate, (3,) rad/s in device axes.
+
+    Otherwise as `take`.
+    """
+    span = _given(span)
+    standing, left = steadied(block.between(*span), rate)
+    one, _, said = take(standing, span, None, grain)
     covariance = one.covariance.copy()
     covariance[3:, 3:] += left
     return replace(one, covariance=covariance), said

@@ -23,6 +23,7 @@ from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Line, Scatter, catalogue
 from fieldcal.errors import InputError
 from fieldcal.samples import Array, Block
+from fieldcal.solve.observations import ACC, GYR
 
 SHORTEST = 20
 """Samples of a window from which it can be used."""
@@ -31,8 +32,6 @@ BETTER = 3.0
 
 TURNED = np.deg2rad(10.0)
 """Angle from which a device was not held where it was, rad."""
-
-ACC, GYR = slice(0, 3), slice(3, 6)
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,12 +47,12 @@ SURVIVED: tuple[dict[str, float], ...] = (
 class Run:
     """A calibration of a virtual device in other processes, and what came of it."""
 
-    def __init__(self, folder: Path, link: str) -> None:
+    def __init__(self, folder: Path, link: str, seconds: int = 10) -> None:
         self.folder, self._control = folder / "session", folder / "control"
         name, _, conceals = link.partition(" ")
         virtual = f"{LINKS[name].format(folder)} {conceals} --control {self._control}"
         self._process = subprocess.Popen(
-            [*TWO_POSITION, "--seconds", "10", "--json", "--speed", "20"]
+            [*TWO_POSITION, "--seconds", str(seconds), "--json", "--speed", "20"]
             + [f"--virtual={virtual}", "-o", str(self.folder)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -82,7 +82,8 @@ Ended = tuple[Run, int, Any, str]
 
 
 def stumbles(folder: Path, link: str) -> Ended:
-    run = Run(folder, link)
+    # long enough for all faults on a machine that is slow to order them
+    run = Run(folder, link, 20)
     run.fault(*SURVIVED)
     return run, *run.end()
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from fieldcal.description import Description
 from fieldcal.errors import Moved, SessionError
+from fieldcal.positions import rates
 from fieldcal.samples import Array, Block, Grain
 from fieldcal.solve.turntable import going_round
 from fieldcal.windows import Average, Noise, Window, average
@@ -71,8 +72,7 @@ def _given(span: tuple[float, float] | None) -> tuple[float, float]:
 
 def table_rate(about: Description, row: int) -> Array:
     """Rate of the table in a position by its number, in device axes, (3,) rad/s."""
-    rate = np.array(about.positions[row].rate or (0.0, 0.0, 0.0))
-    turned: Array = rate @ about.mounting
+    turned: Array = rates(about.positions[row : row + 1])[0] @ about.mounting
     return turned
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Gauge
+from fieldcal.calibration.gauge import SI
 from fieldcal.errors import InputError, SessionError
 from fieldcal.frames import mounting_matrix
 from fieldcal.gravity import G0, gravity
@@ -219,7 +220,7 @@ def _choice(
 
 def _gauge(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
     """By the nominal scale factors, where the unit itself is worth nothing known."""
-    size, named = [1.0, 1.0], ["m/s^2", "rad/s"]
+    size, named = [1.0, 1.0], list(SI)
     for i, (kind, scale) in enumerate(zip(_UNITS, NOMINAL_SCALES, strict=True)):
         if units[kind] in WORTHLESS:
             size[i], named[i] = float(np.abs(nominal[scale]).mean()), units[kind]

@@ -63,6 +63,19 @@ def force(alpha: ArrayLike, beta: ArrayLike, gravity: float) -> Array:
     return at_rest
 
 
+def lasting(rates: Array) -> Array:
+    """What is left of another rate in the mean of whole turns, (n, 3, 3).
+
+    Of a device that turns at `rates` (n, 3), all that lies across goes round in it; one
+    at rest (0) keeps all of it.
+    """
+    speed = np.linalg.norm(rates, axis=1, keepdims=True)
+    axis = np.divide(rates, speed, out=np.zeros_like(rates), where=speed > 0)
+    left: Array = axis[:, :, None] * axis[:, None, :]
+    left[speed[:, 0] == 0] = np.eye(3)
+    return left
+
+
 def earth_rate_home(latitude: float) -> Array:
     """Earth's rate in base axes, (3,) rad/s; `latitude` in rad, (38)."""
     return EARTH_RATE * np.array([0.0, -np.sin(latitude), np.cos(latitude)])  # (38)

@@ -51,6 +51,11 @@ class Position:
         return alpha, beta
 
 
+def rates(positions: Sequence[Position]) -> Array:
+    """Rates of a rate table, (n, 3) rad/s about the procedure axes; 0 at rest."""
+    return np.array([p.rate or (0.0, 0.0, 0.0) for p in positions]).reshape(-1, 3)
+
+
 def angles(positions: Sequence[Position]) -> tuple[Array, Array]:
     """Alpha and beta of the positions, (n,) rad each, nan where unknown."""
     both = [(p.alpha, p.beta) for p in positions]

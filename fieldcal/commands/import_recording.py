@@ -149,12 +149,13 @@ def _chosen(recording: Recording, wanted: list[str]) -> list[Stream]:
 def _bring(
     args: argparse.Namespace, recording: Recording, stream: Stream, folder: Path
 ) -> None:
+    from fieldcal.description import WORTHLESS
     from fieldcal.importing import bring_in
 
     name = recording.path.name.split(".")[0]
     about: dict[str, Any] = {"format": 1, **site_tables(args, name)}
     units = {"acceleration": args.acc_unit, "angular_rate": args.gyr_unit}
-    if kept := {k: u for k, u in units.items() if u in ("V", "count")}:
+    if kept := {k: u for k, u in units.items() if u in WORTHLESS}:
         about["units"] = kept
     if args.rate:
         about["sampling"] = {"rate_hz": args.rate}

@@ -19,7 +19,7 @@ from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.diagnosis.vibration import shaking
 from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
-from fieldcal.positions import angles
+from fieldcal.positions import angles, rates
 from fieldcal.samples import Array, Block
 from fieldcal.solve.turntable import going_round
 
@@ -298,8 +298,7 @@ def table_rate(about: Description, position: NDArray[np.intp]) -> Array:
     """Rate that a table adds in some positions, (n, 3) rad/s about procedure axes."""
     if not about.positions:
         return np.zeros((len(position), 3))
-    rates = np.array([p.rate or (0.0, 0.0, 0.0) for p in about.positions])
-    out: Array = rates[position]
+    out: Array = rates(about.positions)[position]
     return out
 
 

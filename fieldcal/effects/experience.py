@@ -17,7 +17,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from fieldcal.frames import force_home, turn
+from fieldcal.frames import force_home, lasting, turn
 from fieldcal.samples import Array
 
 STEADY = 1e-3
@@ -137,15 +137,6 @@ class Experience:
         f, w = new.f.copy(), new.w.copy()
         f[known] = to_device @ new.base_force
         table = new.rate[known] @ new.mounting
-        w[known] = table + _lasting(to_device @ new.base_rate, table)
+        earth = to_device @ new.base_rate
+        w[known] = table + (lasting(table) @ earth[:, :, None])[:, :, 0]
         return replace(new, f=f, w=w)
-
-
-def _lasting(earth: Array, table: Array) -> Array:
-    """What of the Earth's rate is left once a table has turned round, (n, 3)."""
-    square = np.sum(table**2, axis=1, keepdims=True)
-    along = np.sum(earth * table, axis=1, keepdims=True)
-    turning = square > 0
-    axis = np.divide(along, square, out=np.zeros_like(square), where=turning) * table
-    out: Array = np.where(turning, axis, earth)
-    return out

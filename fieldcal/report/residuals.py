@@ -16,11 +16,11 @@ import numpy as np
 
 from fieldcal.calibration import COMPONENTS, Calibration, Nominal
 from fieldcal.effects import NO_SHAPE, Experience, Motion, Sensor, catalogue
-from fieldcal.frames import EARTH_RATE, angles_of, earth_rate_home, turn
+from fieldcal.frames import EARTH_RATE, angles_of, earth_rate_home, lasting, turn
 from fieldcal.observing import observations
+from fieldcal.positions import rates
 from fieldcal.report.gather import Material
 from fieldcal.samples import Array, Block
-from fieldcal.solve.earth import lasting
 from fieldcal.solve.observations import Observations
 
 
@@ -63,7 +63,7 @@ def residuals(material: Material) -> Residuals | None:
 def predicted(found: Calibration, seen: Observations) -> Array:
     """Outputs that the calibration predicts, (n, 6); nan where angles are unknown."""
     x = Experience.at_rest(
-        *seen.angles, seen.gravity, mounting=seen.mounting, rate=_table_rates(seen)
+        *seen.angles, seen.gravity, mounting=seen.mounting, rate=rates(seen.positions)
     )
     if seen.grade == "navigation" and seen.latitude is not None:
         x = x.turned(base_rate=earth_rate_home(seen.latitude))
@@ -100,11 +100,6 @@ def _full(found: Calibration, group: str, effect: Motion | Sensor) -> Array:
     return known
 
 
-def _table_rates(seen: Observations) -> Array:
-    rates: Array = np.array([p.rate or (0.0, 0.0, 0.0) for p in seen.positions])
-    return rates
-
-
 def _earth(seen: Observations, left: Array) -> Array:
     """The Earth's rate in the windows, (n, 3) rad/s, as far as it can be known."""
     known = seen.oriented & np.isfinite(left).all(axis=1)
@@ -112,7 +107,7 @@ def _earth(seen: Observations, left: Array) -> Array:
         return np.zeros((len(seen), 3))
     away = np.zeros((len(seen), 3, 3))
     alpha, beta = seen.angles
-    away[known] = lasting(seen)[known] @ (
+    away[known] = lasting(seen.rates[known]) @ (
         seen.mounting.T @ turn(alpha[known], beta[known])
     )
     down = away[..., 1] * earth_rate_home(seen.latitude)[1]

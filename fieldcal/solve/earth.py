@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.frames import EARTH_RATE, earth_rate_home
+from fieldcal.frames import EARTH_RATE, earth_rate_home, lasting
 from fieldcal.samples import Array
 from fieldcal.solve.observations import ACC, Observations
 from fieldcal.solve.tilt import Base
@@ -41,7 +41,7 @@ def earth_rate(
         known, unknown = _unoriented(observations)
     else:
         known, unknown = _oriented(observations, phi, heading_sigma, base)
-    left = lasting(observations)
+    left = lasting(observations.rates)  # (2)
     return (left @ known[..., None])[..., 0], left @ unknown
 
 
@@ -83,16 +83,6 @@ def _unoriented(observations: Observations) -> tuple[Array, Array]:
     unknown = np.zeros((n, 3, n, 3))
     unknown[np.arange(n), :, np.arange(n)] = spread
     return known, unknown.reshape(n, 3, 3 * n)
-
-
-def lasting(observations: Observations) -> Array:
-    """What is left of a rate in the mean of each window, (n, 3, 3); by (2)."""
-    rates = observations.rates
-    speed = np.linalg.norm(rates, axis=1, keepdims=True)
-    axis = np.divide(rates, speed, out=np.zeros_like(rates), where=speed > 0)
-    left: Array = axis[:, :, None] * axis[:, None, :]
-    left[speed[:, 0] == 0] = np.eye(3)
-    return left
 
 
 def printed_earth_rate(observations: Observations) -> Array:

@@ -9,23 +9,14 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Calibration, Method, Nominal
+from fieldcal.calibration.gauge import GROUPS
 from fieldcal.errors import NotObservable
 from fieldcal.samples import Array
 from fieldcal.solve.linear import Mask
 from fieldcal.solve.observations import ACC, GYR, Index, Observations
 
-UNITS = {
-    "acc_bias": "m/s^2",
-    "acc_scale": "1",
-    "cross_coupling": "1",
-    "pendulous_products": "1/(m/s^2)",
-    "angle_offset": "deg",
-    "base_tilt": "deg",
-    "gyr_bias": "rad/s",
-    "gyr_scale": "1",
-    "gyro_cross_coupling": "1",
-    "gyro_products": "s/rad",
-}
+UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
+UNITS |= {"angle_offset": "deg", "base_tilt": "deg"}
 """Unit of each group's components."""
 
 OFF_DIAGONAL = ("12", "13", "21", "23", "31", "32")

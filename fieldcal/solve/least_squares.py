@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.errors import NotObservable
-from fieldcal.positions import Position, forces
+from fieldcal.positions import Position, forces, rates
 from fieldcal.samples import Array
 from fieldcal.solve import linear, scatter
 from fieldcal.solve.design import LADDER
@@ -35,9 +35,6 @@ from fieldcal.solve.tilt import LEVEL, Base
 
 POORLY = 1e4
 """Condition number from which the answer is said to be sensitive."""
-
-NOTHING: Array = np.zeros((0, 3, 0))
-"""Beside the parameters, nothing is unknown."""
 
 Rows = Callable[[Sequence[Position]], Array]
 
@@ -167,10 +164,9 @@ def gyroscopes(
     """
 
     def rows(places: Sequence[Position]) -> Array:
-        rate = np.array([p.rate or (0.0, 0.0, 0.0) for p in places])
-        return matrix(rate @ observations.mounting, products)
+        return matrix(rates(places) @ observations.mounting, products)
 
-    mean, beside = observations.mean.copy(), NOTHING
+    mean, beside = observations.mean.copy(), None
     if not as_printed:
         known, beside = earth_rate(observations, heading_sigma, base)
         mean[:, GYR] -= known
@@ -183,7 +179,10 @@ def gyroscopes(
 
 
 def _solve(
-    rows: Rows, observations: Observations, sensor: Sensor, beside: Array = NOTHING
+    rows: Rows,
+    observations: Observations,
+    sensor: Sensor,
+    beside: Array | None = None,
 ) -> Estimate:
     """Solve the three channels together, each with the columns of G.
 
@@ -195,7 +194,7 @@ def _solve(
     noise = observations.covariance[:, sensor.channels, sensor.channels]
     # unknowns in the order of G's columns, then the channel
     design = np.einsum("nk,cd->nckd", g, np.eye(3)).reshape(n, 3, 3 * columns)
-    unknown = beside if beside.size else np.zeros((n, 3, 0))
+    unknown = np.zeros((n, 3, 0)) if beside is None else beside
     fit = linear.fit_beside(design, y, noise, unknown)
     table = sensor.names(columns)
     names = tuple(name for row in table for name in row)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fieldcal.calibration import Nominal
 from fieldcal.errors import InputError
 from fieldcal.frames import force
-from fieldcal.positions import Position, angles
+from fieldcal.positions import Position, angles, rates
 from fieldcal.samples import CHANNELS, UNITS, Array
 from fieldcal.solve.linear import Mask
 from fieldcal.windows import Average
@@ -182,8 +182,7 @@ class Observations:
     @property
     def rates(self) -> Array:
         """Known rates of a rate table in device axes, (n, 3) rad/s; 0 at rest."""
-        table = np.array([p.rate or (0.0, 0.0, 0.0) for p in self.positions])
-        seen: Array = table @ self.mounting
+        seen: Array = rates(self.positions) @ self.mounting
         return seen
 
     def _check_shapes(self, n: int) -> None:

@@ -60,11 +60,12 @@ class Samples:
         def triad(kind: str, scale: float) -> Array:
             there = [(i, columns.get(kind + axis)) for i, axis in enumerate("xyz")]
             whole = all(column is not None for _, column in there)
-            table = np.empty((n, 3)) if whole else np.full((n, 3), np.nan)
+            # a channel in one piece: all that follows goes through one channel at once
+            table = np.empty((3, n)) if whole else np.full((3, n), np.nan)
             for i, column in there:
                 if column is not None:
-                    np.multiply(column, scale, out=table[:, i])
-            return table
+                    np.multiply(column, scale, out=table[i])
+            return table.T
 
         if "t" in columns:
             t = columns["t"] * wanted.time_scale

@@ -57,11 +57,13 @@ class Facts:
             self.start_s = float(block.t[0])
             if len(block) > 1:
                 self._period = float((block.t[-1] - block.t[0]) / (len(block) - 1))
-        steps = np.diff(block.t, prepend=self.end_s if self.rows else block.t[0])
-        long = steps > LONG * self._period
-        self.gaps += int(long.sum())
-        if long.any():
-            self.longest_gap_s = max(self.longest_gap_s, float(steps.max()))
+        pause = float(block.t[0]) - self.end_s if self.rows else 0.0
+        steps = block.t[1:] - block.t[:-1]
+        for gaps in (np.array([pause]), steps):
+            many = np.count_nonzero(gaps > LONG * self._period)
+            self.gaps += int(many)
+            if many:
+                self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
         self.rows += len(block)
         self.end_s = float(block.t[-1])
         known = block.temperature[np.isfinite(block.temperature)]

@@ -101,13 +101,13 @@ class Judge:
 
     def _backwards(self, t: Array, bad: Rows) -> Rows:
         """Rows that are not later than all good ones before them."""
-        rest = np.flatnonzero(~bad)
-        times = t[rest]
+        times = t[~bad] if bad.any() else t
         if not len(times):
             return np.zeros(len(t), dtype=bool)
-        if times[0] > self._last and (np.diff(times) > 0).all():
+        if times[0] > self._last and (times[1:] > times[:-1]).all():
             self._last = float(times[-1])
             return np.zeros(len(t), dtype=bool)
+        rest = np.flatnonzero(~bad)
         # one time that leaps ahead is wrong itself, not all that come after it
         ahead = np.zeros(len(times), dtype=bool)
         before = np.concatenate([[self._last], times[:-1]])[:-1]
@@ -206,7 +206,7 @@ class Written:
         self._waiting, self._many = [], 0
         for first in range(0, len(whole), GROUP):
             part = whole[first : first + GROUP]
-            self._writer.write_batch(to_batch(part), row_group_size=GROUP)
+            self._writer.write_batch(to_batch(part, nulls=True), row_group_size=GROUP)
             self._groups.append((float(part.t[0]), float(part.t[-1])))
             self.rows += len(part)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -185,12 +186,13 @@ class Recording(ABC):
         self.mended[MOST:] = [f"{self._more} more damaged places, left out"]
 
 
-def formats() -> list[str]:
+@cache
+def formats() -> tuple[str, ...]:
     """Names of the formats there are, those with a mark of their own first."""
     from fieldcal import importers
 
     names = sorted(module.name for module in iter_modules(importers.__path__))
-    return [*(n for n in names if n not in LAST), *LAST]
+    return (*(n for n in names if n not in LAST), *LAST)
 
 
 def open_recording(

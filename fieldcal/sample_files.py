@@ -277,16 +277,29 @@ def schema() -> pa.Schema:
     return pa.schema([(name, pa.float64()) for name in COLUMNS])
 
 
-def to_batch(block: Block) -> pa.RecordBatch:
-    """The samples as an Arrow record batch with all of `COLUMNS`."""
+def to_batch(block: Block, *, nulls: bool = False) -> pa.RecordBatch:
+    """The samples as an Arrow record batch with all of `COLUMNS`.
+
+    With `nulls`, a column of which nothing is known is null: then it takes no room in
+    Parquet. In a stream it would, of bytes that no checksum covers.
+    """
     import pyarrow as pa
 
     columns = [block.t, *block.acc.T, *block.gyr.T]
     columns += [block.temperature, block.t_host, block.seq]
-    whole = [np.ascontiguousarray(c, dtype=float) for c in columns]
     # pa.array would look for pandas first, and load all of it where it is installed
     arrays = [
-        pa.Array.from_buffers(pa.float64(), len(block), [None, pa.py_buffer(c)])
-        for c in whole
+        pa.nulls(len(block), pa.float64())
+        if nulls and _unknown(c)
+        else pa.Array.from_buffers(
+            pa.float64(),
+            len(block),
+            [None, pa.py_buffer(np.ascontiguousarray(c, dtype=float))],
+        )
+        for c in columns
     ]
     return pa.RecordBatch.from_arrays(arrays, names=list(COLUMNS))
+
+
+def _unknown(column: Array) -> bool:
+    return bool(len(column) and np.isnan(column[0]) and np.isnan(column).all())

@@ -4,6 +4,7 @@ import gzip
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -42,8 +43,10 @@ def test_separators_are_found(tmp_path: Path, separator: str) -> None:
     assert np.isnan(got.gyr).all()
 
 
-def test_headings_are_left_out_however_many(tmp_path: Path) -> None:
-    heading = "Fs,100\nWaiting time,3\nStart,2,3\nax,ay,az\n"
+@pytest.mark.parametrize("more", [0, 60, 400])
+def test_headings_are_left_out_however_many(tmp_path: Path, more: int) -> None:
+    heading = "Fs,100\nWaiting time,3\n" + "\n# about it, 5\n" * more
+    heading += "Start,2,3\nax,ay,az\n"
     got = read(file(tmp_path, heading + "1,2,3\n4,5,6\n"), Layout(ACC, rate_hz=1))
     np.testing.assert_array_equal(got.acc, [[1, 2, 3], [4, 5, 6]])
     told = read(file(tmp_path, "9,9,9\n1,2,3\n"), Layout(ACC, rate_hz=1, skip=1))
@@ -174,3 +177,18 @@ def test_import_finds_the_standstills_and_never_overwrites(
     np.testing.assert_allclose(session.block.acc, acc, atol=1e-9)
     assert main(call) == 2
     assert "is not empty" in capsys.readouterr().err
+
+
+def test_temperatures_that_come_late_are_kept_and_none_is_none(tmp_path: Path) -> None:
+    n = 40_000
+    t = np.arange(n) / 100
+    warm = np.where(t < 300, np.nan, 20.0)
+    rows = [f"{a:.2f},0.1,0.2,9.8,{w:.1f}" for a, w in zip(t, warm, strict=True)]
+    path = file(tmp_path, "\n".join(rows) + "\n")
+    call = ["import", str(path), "--columns", "t,ax,ay,az,temperature"]
+    call += ["--acc-unit", "m/s^2", "-o", str(tmp_path / "s")]
+    assert main(call) == 0
+    np.testing.assert_array_equal(Session.open(tmp_path / "s").block.temperature, warm)
+    stored = pyarrow.parquet.read_table(tmp_path / "s" / "samples.parquet")
+    assert stored["gx"].null_count == stored["seq"].null_count == n
+    assert stored["temperature"].null_count < 30_000 == np.isnan(warm).sum()

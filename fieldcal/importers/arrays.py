@@ -18,7 +18,7 @@ import numpy as np
 from fieldcal import columns, headings
 from fieldcal.errors import InputError
 from fieldcal.packed import head, on_disk
-from fieldcal.recording import ROWS, Recording, Stream
+from fieldcal.recording import Recording, Stream
 from fieldcal.samples import Array, Block
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
@@ -27,6 +27,9 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 MATLAB = b"MATLAB 5.0 MAT-file"
 WIDEST = 64
 """Columns of a table that are read together."""
+
+ROWS = 1 << 14
+"""Rows read together: few enough to stay in the processor's cache."""
 
 NPZ, NPY = b"PK\x03\x04", b"\x93NUMPY"
 

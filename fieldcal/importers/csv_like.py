@@ -110,8 +110,7 @@ class File(Recording):
         begun, t0, top = False, None, [""]
         for data in self._pieces():
             if not begun:
-                top = _top(data)
-                self._skip, begun = self._heading(top, use), True
+                top, begun = self._begin(data, use), True
                 if not 0 <= self._skip < len(top):
                     break
                 data, first = _behind(data, self._skip), top[self._skip]
@@ -136,6 +135,16 @@ class File(Recording):
                 f" line {number} is {line[:60]!r}: name each column in its order, _ for"
                 " one that is not wanted"
             )
+
+    def _begin(self, data: bytes, use: Sequence[int]) -> list[str]:
+        """Lines at the top, as many as it takes to find the first of numbers."""
+        top = [""]
+        for many in (NAMED, TOP):
+            top = _top(data, many)
+            self._skip = self._heading(top, use)
+            if 0 <= self._skip < len(top):
+                break
+        return top
 
     def _pieces(self) -> Iterator[bytes]:
         """Whole lines of the file, many at a time."""
@@ -264,9 +273,9 @@ def _split(data: bytes) -> list[str]:
     return [line for line in lines if line.strip()]
 
 
-def _top(data: bytes) -> list[str]:
-    """First lines that are not empty."""
-    return _split(b"\n".join(data.split(b"\n", TOP)[:TOP]))
+def _top(data: bytes, many: int = TOP) -> list[str]:
+    """First lines, of so many those that are not empty."""
+    return _split(b"\n".join(data.split(b"\n", many)[:many]))
 
 
 def _behind(data: bytes, many: int) -> bytes:

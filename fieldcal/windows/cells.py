@@ -26,7 +26,7 @@ from fieldcal.windows.trend import line
 CELL = 0.1
 """Length of a cell, s."""
 
-_CHUNK = 4096
+_CHUNK = 8192
 """Samples summed at a time, so that what is in hand stays in the processor's cache."""
 
 _COARSE = 0.6
@@ -194,7 +194,8 @@ class Cells:
 
     def _add(self, block: Block) -> None:
         x = self._centred(block)
-        if np.isinf(x).any():
+        whole = bool(np.isfinite(x).all())
+        if not whole:
             x[np.isinf(x)] = np.nan
         if not self.n:
             self.start = float(block.t[0])
@@ -205,7 +206,7 @@ class Cells:
         index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
         first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
         sums = np.empty((len(first), 34))
-        sums[:, :24] = channels(x[:, 1:], step, first).reshape(-1, 24)
+        sums[:, :24] = channels(x[:, 1:], step, first, whole).reshape(-1, 24)
         sums[:, 24:26] = warmth(block.temperature, first)
         sums[:, 26:32] = finest(step, first)
         sums[:, 32] = block.t[first]

@@ -24,7 +24,6 @@ import numpy as np
 
 from fieldcal.samples import Array
 from fieldcal.windows.quiet import NORMAL, Quiet, running
-from fieldcal.windows.trend import line
 
 Kind = Literal["push", "step", "shake"]
 
@@ -59,12 +58,12 @@ class Statistic:
     z: Array
 
 
-def pushes(means: Array, noise: Quiet, least: Array) -> list[Statistic]:
-    """Deviations of cell means (m, c) from the line, (1).
+def pushes(about: Array, noise: Quiet, least: Array) -> list[Statistic]:
+    """Deviations of cell means from their line, `about` (m, c), (1).
 
     `least` (c,) is the least that a spread can be, SI.
     """
-    levels = zip(running(means - line(means)), noise.spread, strict=False)
+    levels = zip(running(about), noise.spread, strict=False)
     return [
         Statistic("push", 2**k, u, s, np.abs(u) / _no_less(s, least))
         for k, (u, s) in enumerate(levels)

@@ -46,6 +46,9 @@ _RATE = 0.02
 
 Runs = list[tuple[int, int]]
 
+Spans = tuple[int, Array, Array]
+"""First of some spans, the spread and the mean of each, (k, 6)."""
+
 Between = Callable[[float, float], Iterable[Block]]
 """Samples from a time up to another, s, in order, in blocks."""
 
@@ -137,7 +140,7 @@ def _clear(cells: Table, shortest: float) -> tuple[float, float] | None:
     return first, float(np.nextafter(last, np.inf))
 
 
-def _spans(rows: Rows, usual: Array) -> Iterator[tuple[int, Array, Array]]:
+def _spans(rows: Rows, usual: Array) -> Iterator[Spans]:
     """First span of a part, the spread and the mean of each of them, (k, 6).
 
     `usual` (6,) is the number of values in a cell. The mean of one with few is that of
@@ -172,17 +175,20 @@ def _at_rest(rows: Rows, bound: Array) -> list[_Run]:
     """
     usual = _usual(rows)
     every = -(-len(rows) // _SAMPLE)
+    # all spans of a long recording would not fit into memory: they are made twice
+    short = list(_spans(rows, usual)) if len(rows) <= _PART else []
     some = np.concatenate(
         [
             spread[-first % every :: every].copy()
-            for first, spread, _ in _spans(rows, usual)
+            for first, spread, _ in short or _spans(rows, usual)
         ]
     )
     quiet = np.quantile(some, 0.1, axis=0)
     scale = np.where(quiet > 0, quiet, np.inf)
     valley = np.clip(_valley((some / scale).max(axis=1)), _LEAST, _MOST)
     kept: list[_Run] = []
-    for first, spread, level in _calm(rows, usual, np.minimum(valley * scale, bound)):
+    spans = short or _spans(rows, usual)
+    for first, spread, level in _calm(spans, np.minimum(valley * scale, bound)):
         own = np.maximum(np.quantile(spread, 0.3, axis=0), quiet)
         own = np.where(own > 0, own, np.inf)
         for a, b in _runs((spread < _OWN * own).all(axis=1)):
@@ -196,14 +202,14 @@ def _at_rest(rows: Rows, bound: Array) -> list[_Run]:
     return [run for run, turns in zip(kept, turning, strict=True) if not turns]
 
 
-def _calm(rows: Rows, usual: Array, bound: Array) -> Iterator[tuple[int, Array, Array]]:
+def _calm(spans: Iterable[Spans], bound: Array) -> Iterator[Spans]:
     """Runs of spans whose spread is below `bound` (6,), `_LONGEST` at most.
 
     Gives the first span of each, with the spread and the mean of all, (k, 6).
     """
     waiting: list[tuple[Array, Array]] = []
     began = length = 0
-    for first, spread, level in _spans(rows, usual):
+    for first, spread, level in spans:
         for a, b in _runs((spread < bound).all(axis=1)):
             goes_on = began + length == first + a and length + b - a <= _LONGEST
             if waiting and not goes_on:

@@ -15,9 +15,14 @@ from numpy.typing import NDArray
 from fieldcal.samples import Array
 
 
-def channels(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
-    """n, S, D, m of cells, (m, 4, 6), of samples and their changes, (6, n) each."""
-    if np.isfinite(step).all():
+def channels(
+    x: Array, step: Array, first: NDArray[np.int64], whole: bool = False
+) -> Array:
+    """n, S, D, m of cells, (m, 4, 6), of samples and their changes, (6, n) each.
+
+    `whole` says that no value is missing, where that is known.
+    """
+    if whole or np.isfinite(step).all():
         return _all(x, step, first)
     sums = np.zeros((len(first), 4, 6))
     for sensor in (slice(0, 3), slice(3, 6)):

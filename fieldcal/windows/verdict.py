@@ -108,9 +108,10 @@ def judge(
     noise = quiet(means, before)
     allowed = THRESHOLD * (1 + (EARLY / (CELL * noise.cells)) ** 2)
     jumps = cells.rounding if shows is None else np.maximum(cells.rounding, shows)
-    tests = _tests(cells, means, noise, allowed, jumps)
+    laid = line(means)
+    tests = _tests(cells, means, laid, noise, jumps / allowed)
     worst = [_worst(cells, test, allowed) for test in tests] + _stuck(cells)
-    worst.append(_beyond_drift(cells, means, noise, limits))
+    worst.append(_beyond_drift(cells, laid, noise, limits))
     worst.append(_beyond_noise(cells, noise.spread[0], limits))
     recent = [test.z[-_PRESENT:].max() for test in tests if test.cells < _PRESENT]
     return Verdict(
@@ -121,12 +122,11 @@ def judge(
 
 
 def _tests(
-    cells: Table, means: Array, noise: Quiet, allowed: float, jumps: Array
+    cells: Table, means: Array, laid: Array, noise: Quiet, least: Array
 ) -> list[Statistic]:
     m = len(means)
-    least = jumps / allowed
     return [
-        *pushes(means, noise, least),
+        *pushes(means - laid, noise, least),
         *steps(means, noise, least),
         *shakes(np.nan_to_num(cells.short[:m]), cells.steps[:m], least),
     ]
@@ -166,11 +166,8 @@ def _worst(cells: Table, test: Statistic, allowed: float) -> Departure:
     )
 
 
-def _beyond_drift(
-    cells: Table, means: Array, noise: Quiet, limits: Limits
-) -> Departure:
-    """Change over the window, allowed for what noise can pretend."""
-    laid = line(means)
+def _beyond_drift(cells: Table, laid: Array, noise: Quiet, limits: Limits) -> Departure:
+    """Change over the window, by the line, allowed for what noise can pretend."""
     change = laid[-1] - laid[0]
     ratio = np.abs(change) / (limits.drift + THRESHOLD * noise.allan[-1])
     channel = int(np.argmax(ratio))

@@ -42,10 +42,29 @@ def turn(alpha: ArrayLike, beta: ArrayLike) -> Array:
     """
     alpha, beta = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(beta, float))
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
-    zero = np.zeros_like(ca)
-    rows = [[ca, sa, zero], [-sa * cb, ca * cb, sb], [sa * sb, -ca * sb, cb]]  # (3)
-    matrix: Array = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    rows = ((ca, sa, 0.0), (-sa * cb, ca * cb, sb), (sa * sb, -ca * sb, cb))  # (3)
+    matrix = np.empty((*ca.shape, 3, 3))
+    for i, row in enumerate(rows):
+        for j, element in enumerate(row):
+            matrix[..., i, j] = element
     return matrix
+
+
+def seen_after(alpha: Array, beta: Array, vector: Array) -> Array:
+    """A vector in base axes as procedure axes see it after the turns, (n, 3).
+
+    As `turn` times the vector, where only that is wanted.
+
+    >>> np.round(seen_after(np.zeros(1), np.array([np.pi / 2]), [0, -1, 0]), 12) + 0.0
+    array([[0., 0., 1.]])
+    """
+    x, y, z = vector
+    ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
+    out, on = np.empty((len(alpha), 3)), y * ca - x * sa
+    out[:, 0] = x * ca + y * sa  # (3)
+    out[:, 1] = on * cb + z * sb
+    out[:, 2] = z * cb - on * sb
+    return out
 
 
 def force_home(gravity: float) -> Array:

@@ -41,6 +41,8 @@ BIAS_G, SCALE = 10.0, 3.0
 TURN = 1.0
 """Prior of the turns of unknown orientations, rad."""
 
+OUTPUTS = np.arange(6)
+
 DETERMINED = 0.1
 """A parameter is determined when its variance is less than this part of the prior's."""
 
@@ -226,9 +228,9 @@ class Bench:
     def _linearise(self, state: State) -> tuple[Array, Array]:
         """Prediction (n, 6) and its derivative by every column, (n, 6, k)."""
         x = self._experienced(state)
-        bias = np.broadcast_to(np.eye(6), (len(x), 6, 6))
-        scale = np.eye(6) * np.hstack([x.f, x.w])[:, None, :]
-        both = np.concatenate([bias, scale], axis=2)
+        both = np.zeros((len(x), 6, 12))
+        both[:, OUTPUTS, OUTPUTS] = 1.0
+        both[:, OUTPUTS, OUTPUTS + 6] = np.hstack([x.f, x.w])
         parts: list[Array] = [both[:, :, self._layout.base]]
         for i, term in enumerate(state.terms):
             parts.append(self._of_term(state, x, i, term))

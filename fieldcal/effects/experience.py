@@ -17,7 +17,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from fieldcal.frames import force_home, lasting, turn
+from fieldcal.frames import force_home, lasting, seen_after
 from fieldcal.samples import Array
 
 STEADY = 1e-3
@@ -129,14 +129,20 @@ class Experience:
     def turned(self, **changes: Any) -> Self:
         """Make the changes and bring f and w of the oriented rows up to date.
 
-        `changes` are those of alpha, beta, base_force, base_rate.
+        `changes` are those of alpha, beta, base_force, base_rate, and of f elsewhere.
         """
-        new = replace(self, **changes)
-        known = new.oriented
-        to_device = new.mounting.T @ turn(new.alpha[known], new.beta[known])
-        f, w = new.f.copy(), new.w.copy()
-        f[known] = to_device @ new.base_force
-        table = new.rate[known] @ new.mounting
-        earth = to_device @ new.base_rate
-        w[known] = table + (lasting(table) @ earth[:, :, None])[:, :, 0]
-        return replace(new, f=f, w=w)
+        alpha, beta, base_force, base_rate = (
+            changes.get(name, getattr(self, name))
+            for name in ("alpha", "beta", "base_force", "base_rate")
+        )
+        force = seen_after(alpha, beta, base_force) @ self.mounting
+        earth = seen_after(alpha, beta, base_rate) @ self.mounting
+        if self.rate.any():
+            table = self.rate @ self.mounting
+            earth = table + (lasting(table) @ earth[:, :, None])[:, :, 0]
+        known = np.isfinite(alpha + beta)[:, None]
+        made = {
+            "f": np.where(known, force, changes.get("f", self.f)),
+            "w": np.where(known, earth, self.w),
+        }
+        return replace(self, **(changes | made))

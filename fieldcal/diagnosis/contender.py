@@ -86,7 +86,8 @@ class Rules:
         shaped: tuple[float, ...] = (),
     ) -> Model:
         """Fit some hypotheses."""
-        fit = bench.fit([*self.always, *(t for _, t in chosen)], near)
+        terms = [*self.always, *(t for _, t in chosen)]
+        fit = bench.fit(terms, near, rough=True)
         new = {h.effect.id for h, _ in chosen if not h.known}
         again = sum(not h.known for h, _ in chosen) - len(new)
         cost = self.price * (len(new) + len(random)) + AGAIN * again + sum(shaped)

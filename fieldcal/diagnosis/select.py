@@ -207,7 +207,8 @@ class Search:
     def rivals(self, model: Model) -> list[Model]:
         """Models with one hypothesis exchanged for another."""
         out = []
-        for cause in {h.effect.id for h, _ in model.chosen if not h.known}:
+        named = [h.effect.id for h, _ in model.chosen if not h.known]
+        for cause in dict.fromkeys(named):
             less = self.without(model, cause)
             parts = [h.part for h, _ in model.chosen if h.effect.id == cause]
             for one in self.larger(less):

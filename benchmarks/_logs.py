@@ -210,16 +210,21 @@ def write_tables(folder: Path, rows: int) -> dict[str, Log]:
     block = samples(rows)
     table = np.column_stack([block.t, block.six])
     (folder / "x.csv").write_bytes(text(block))
-    with h5py.File(folder / "x.h5", "w") as file:
-        file["imu"] = table
+    for name, packing in (("x.h5", None), ("packed.h5", "gzip")):
+        with h5py.File(folder / name, "w") as file:
+            file.create_dataset("imu", data=table, compression=packing)
     savemat(folder / "x.mat", {"imu": table})
+    # as MATLAB itself saves it
+    savemat(folder / "packed.mat", {"imu": table}, do_compression=True)
     columns = dict(zip(COLUMNS, table.T, strict=True))
     pyarrow.parquet.write_table(pa.table(columns), folder / "x.parquet")
     named = Wanted(COLUMNS)
     return {
         "csv, numpy": (folder / "x.csv", read_text, named),
         "matlab, scipy": (folder / "x.mat", read_matlab, named),
+        "matlab packed, scipy": (folder / "packed.mat", read_matlab, named),
         "hdf5, h5py": (folder / "x.h5", read_hdf5, named),
+        "hdf5 packed, h5py": (folder / "packed.h5", read_hdf5, named),
         "parquet, pyarrow": (folder / "x.parquet", read_parquet, named),
     }
 

@@ -8,7 +8,7 @@ version does not know are left alone, so that others may add theirs.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -67,8 +67,9 @@ class Description:
     nominal : (3,) for each of `TRIADS`: the calibration a simulation starts from
     gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
     model : parameters of the effects that the simulation includes, by id
-    positions : in the order they were held
+    positions : as session.toml lists them
     windows : (start, end) of each position, s of device time; None where not yet known
+    numbers : what session.toml counts each position as, from 0
 
     """
 
@@ -87,6 +88,7 @@ class Description:
     model: Mapping[str, Mapping[str, Any]]
     positions: tuple[Position, ...]
     windows: tuple[tuple[float, float] | None, ...]
+    numbers: tuple[int, ...]
     raw: Mapping[str, Any] = field(repr=False)
 
     @property
@@ -98,6 +100,25 @@ class Description:
     def latitude(self) -> float:
         """Latitude in rad."""
         return float(np.deg2rad(self.latitude_deg))
+
+    def in_time(self) -> Description:
+        """The same with the positions in the order in which they were held."""
+        begins = [w[0] for w in self.windows if w is not None]
+        if begins == sorted(begins):
+            return self
+        last = [np.inf if w is None else w[0] for w in self.windows]
+        order = sorted(range(len(last)), key=last.__getitem__)
+        return replace(
+            self,
+            positions=tuple(self.positions[i] for i in order),
+            windows=tuple(self.windows[i] for i in order),
+            numbers=tuple(self.numbers[i] for i in order),
+        )
+
+    def numbered(self, positions: Iterable[int]) -> tuple[int, ...]:
+        """What session.toml counts some of the positions here as, in its order."""
+        numbers = self.numbers or (0,)
+        return tuple(sorted(numbers[p] for p in positions))
 
 
 def read(path: Path) -> Description:
@@ -170,6 +191,7 @@ def parse(raw: Mapping[str, Any]) -> Description:
         model=_model(_table(raw, "model")),
         positions=positions,
         windows=windows,
+        numbers=tuple(range(len(positions))),
         raw=raw,
     )
 

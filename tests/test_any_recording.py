@@ -296,6 +296,29 @@ def test_one_long_static_recording(
     assert replays["twin"]["chi2_per_dof"] < 0.5 * replays["refitted"]["chi2_per_dof"]
 
 
+def test_positions_may_be_listed_in_any_order(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    touched = replace(
+        COUPLED, effects=(*COUPLED.effects, parse("bump:at_s=70,for_s=3"))
+    )
+    block, order = recorded(touched, POSITIONS), [4, 0, 7, 2, 8, 1, 6, 3, 5]
+    shuffled = [POSITIONS[i] for i in order]
+    said = []
+    for name, positions in (("held", POSITIONS), ("listed", shuffled)):
+        folder = write_session(tmp_path / name, block, positions)
+        said.append(diagnosed(folder, capsys)[1])
+    held, listed = said
+    assert {e["id"] for e in held["effects"]} == {"cross_coupling", "bump"}
+    for key in ("verdict", "effects", "fit", "calibration"):
+        assert listed[key] == held[key], key
+    for one, other in zip(held["mismatch"], listed["mismatch"], strict=True):
+        assert sorted(order[p] for p in other["positions"]) == one["positions"]
+    assert [order[p["position"]] for p in listed["twin"]["positions"]] == list(range(9))
+    for one, other in zip(held["curves"], listed["curves"], strict=True):
+        assert [order[p] for p in other["position"]] == one["position"]
+
+
 def moved(by: float) -> list[Table]:
     return [
         p | {"start_s": p["start_s"] + by, "end_s": p["end_s"] + by} for p in POSITIONS
@@ -306,7 +329,8 @@ def moved(by: float) -> list[Table]:
     ("made", "positions", "tables", "says"),
     [
         (None, moved(1e5), {}, "check start_s and end_s"),
-        (None, POSITIONS[::-1], {}, "in the order in which they were held"),
+        (None, [*POSITIONS, {"start_s": 30.0, "end_s": 40.0}], {},
+         "the device cannot be in both"),
         (None, [], {}, "the device is turned in this recording"),
         (lambda b: replace(b, gyr=unknown(b.gyr)), [], {}, "let fieldcal import find"),
         (lambda b: replace(b, acc=0 * b.acc, gyr=0 * b.gyr), POSITIONS, {},

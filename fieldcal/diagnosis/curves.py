@@ -65,7 +65,8 @@ def curves(
     then: Agreement,
 ) -> Iterator[Curve]:
     """One curve for each channel and covariate in which the windows part."""
-    start = explanation.prepared.source.warmth.start_c
+    source = explanation.prepared.source
+    start, numbers = source.warmth.start_c, np.array(source.about.numbers or (0,))
     done = set()
     for m in mismatch:
         name, unit = NAMES.get(m.kind, ("", ""))
@@ -76,7 +77,10 @@ def curves(
         rows = first.bench.rows
         before, sd, position = cells(rows, first.fit.residual)
         after = cells(then.bench.rows, then.fit.residual)[0]
+        position = numbers[position]
         x = _mean(rows, COVARIATES[name](rows)) + (start if unit == "°C" else 0.0)
+        if name == "position":
+            x = position.astype(float)
         yield Curve(
             m.channel, name, unit, x, position, before[:, c], after[:, c], sd[:, c]
         )

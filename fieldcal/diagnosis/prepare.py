@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,8 @@ def prepare(block: Block, about: Description) -> Prepared:
 
     """
     _refuse_empty(block, about)
-    _refuse_disorder(about)
+    about = about.in_time()
+    _refuse_overlap(about)
     known = known_terms(about.model)
     checked = check(block, about)
     rest = arrivals(checked.block, about, checked.noise)
@@ -134,18 +136,16 @@ def _refuse_empty(block: Block, about: Description) -> None:
         raise InputError("the samples hold no output of any sensor; record them again")
 
 
-def _refuse_disorder(about: Description) -> None:
+def _refuse_overlap(about: Description) -> None:
     """Windows are to follow each other, so that turns lie between them."""
-    last = -np.inf
-    for i, window in enumerate(about.windows):
-        if window is not None:
-            if window[0] < last:
-                raise InputError(
-                    f"position {i}: its window starts at {window[0]:g} s, before that"
-                    f" of the position above ends ({last:g} s); put the positions in"
-                    " the order in which they were held, with windows apart"
-                )
-            last = window[1]
+    held = [(w, n) for w, n in zip(about.windows, about.numbers, strict=True) if w]
+    for (window, number), (then, following) in pairwise(held):
+        if then[0] < window[1]:
+            raise InputError(
+                f"position {following}: its window starts at {then[0]:g} s, before that"
+                f" of position {number} ends ({window[1]:g} s): the device cannot be in"
+                " both; mend start_s and end_s"
+            )
 
 
 def _refuse_turning(rows: Rows, about: Description) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,7 +65,13 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     others = aliases(explanation)
     effects = _effects(explanation, lost, then, others)
     verdict = _verdict(effects, unknown, others)
-    mismatch = tuple(_mismatch(block, explanation, lost, unknown))
+    # so far positions were counted as they were held, from here on as they are listed
+    listed = explanation.prepared.source.about.numbered
+    mismatch = tuple(
+        replace(m, positions=listed(m.positions))
+        for m in _mismatch(block, explanation, lost, unknown)
+    )
+    unknown = [replace(u, positions=listed(u.positions)) for u in unknown]
     quality = _quality(explanation, first, then)
     words = paragraph(
         verdict,

@@ -113,10 +113,13 @@ def rests(session: Session) -> Rests:
             " position was held, or let fieldcal import find the still stretches"
         )
     block = session.block
-    rows, averages, warnings = [], [], list(session.warnings)
+    taken: dict[int, Average] = {}
+    warnings = list(session.warnings)
     noise: Noise | None = None
     grain = grain_of(session)
-    for i, window in enumerate(session.windows):
+    # as they were held, however they are listed: each tells the noise for the next
+    held = sorted(enumerate(session.windows), key=lambda pair: pair[1] or (np.inf,))
+    for i, window in held:
         rate = table_rate(session.about, i)
         try:
             if rate.any():
@@ -126,16 +129,16 @@ def rests(session: Session) -> Rests:
         except FieldcalError as error:
             warnings.append(f"{_named(session, i)} is left out: {error}")
             continue
-        rows.append(i)
-        averages.append(found)
+        taken[i] = found
         if said:
             warnings.append(f"{_named(session, i)}: {said}")
-    if not rows:
+    if not taken:
         raise SessionError(
             f"{session.folder}: no window can be used; {warnings[-1]}"
             f"{_worth(session.about)}"
         )
-    averages, dead = _without_dead(averages)
+    rows = sorted(taken)
+    averages, dead = _without_dead([taken[i] for i in rows])
     return Rests(tuple(rows), tuple(averages), (*warnings, *dead))
 
 

@@ -296,54 +296,6 @@ def test_one_long_static_recording(
     assert replays["twin"]["chi2_per_dof"] < 0.5 * replays["refitted"]["chi2_per_dof"]
 
 
-def test_positions_may_be_listed_in_any_order(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    touched = replace(
-        COUPLED, effects=(*COUPLED.effects, parse("bump:at_s=70,for_s=3"))
-    )
-    block, order = recorded(touched, POSITIONS), [4, 0, 7, 2, 8, 1, 6, 3, 5]
-    shuffled = [POSITIONS[i] for i in order]
-    said = []
-    for name, positions in (("held", POSITIONS), ("listed", shuffled)):
-        folder = write_session(tmp_path / name, block, positions)
-        said.append(diagnosed(folder, capsys)[1])
-    held, listed = said
-    assert {e["id"] for e in held["effects"]} == {"cross_coupling", "bump"}
-    for key in ("verdict", "effects", "fit", "calibration"):
-        assert listed[key] == held[key], key
-    for one, other in zip(held["mismatch"], listed["mismatch"], strict=True):
-        assert sorted(order[p] for p in other["positions"]) == one["positions"]
-    assert [order[p["position"]] for p in listed["twin"]["positions"]] == list(range(9))
-    for one, other in zip(held["curves"], listed["curves"], strict=True):
-        assert [order[p] for p in other["position"]] == one["position"]
-
-
-def test_a_solution_does_not_hang_on_the_order_of_the_list(
-    coupled: Block, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    never = {"alpha_deg": 90.0, "beta_deg": 0.0}
-    found = []
-    for i, order in enumerate((range(9), [4, 0, 7, 2, 8, 1, 6, 3, 5])):
-        positions = [POSITIONS[k] for k in order]
-        positions.insert(4, never)
-        folder = write_session(tmp_path / str(i), coupled, positions)
-        assert main(["solve", str(folder), "--json"]) == 1, "the coupling is in it"
-        out, err = capsys.readouterr()
-        assert "position 4" in err and "is left out" in err
-        found.append(json.loads(out))
-    held, listed = found
-    assert listed["parameters"].keys() == held["parameters"].keys()
-    for group, said in held["parameters"].items():
-        sigma = np.array(said["sigma"], dtype=float)
-        value = np.array(said["value"], dtype=float)
-        again = listed["parameters"][group]
-        np.testing.assert_allclose(
-            np.array(again["value"], dtype=float) / sigma, value / sigma, atol=1e-3
-        )
-        np.testing.assert_allclose(np.array(again["sigma"], float), sigma, rtol=1e-4)
-
-
 def moved(by: float) -> list[Table]:
     return [
         p | {"start_s": p["start_s"] + by, "end_s": p["end_s"] + by} for p in POSITIONS

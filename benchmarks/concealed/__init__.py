@@ -69,7 +69,7 @@ def drawn(count: int, only: str = "") -> Iterator[tuple[int, Session]]:
             yield seed, session
 
 
-SEED = 20_261_207
+SEED = 20_472_000
 
 
 def outcome(seed: int, session: Session) -> Outcome:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal import checked
 from fieldcal.calibration import Gauge
 from fieldcal.calibration.gauge import SI
 from fieldcal.errors import InputError, SessionError
@@ -161,34 +162,34 @@ def parse(raw: Mapping[str, Any]) -> Description:
             f"format = {raw['format']!r} is not {FORMAT}; this version reads format"
             f" {FORMAT} only"
         )
-    device, site = _table(raw, "device"), _table(raw, "site")
+    device, site = checked.table(raw, "device"), checked.table(raw, "site")
     units = {
-        kind: _choice(raw, "units", kind, known, next(iter(known)))
+        kind: checked.choice(raw, "units", kind, known, next(iter(known)))
         for kind, known in _UNITS.items()
     }
-    latitude = _number(site, "site", "latitude_deg", 45.0)
-    height = _number(site, "site", "height_m", 0.0)
+    latitude = checked.number(site, "site", "latitude_deg", 45.0)
+    height = checked.number(site, "site", "height_m", 0.0)
     positions, windows = _positions(raw)
-    axes = _table(raw, "frame").get("mounting", ["+x", "+y", "+z"])
+    axes = checked.table(raw, "frame").get("mounting", ["+x", "+y", "+z"])
     if not isinstance(axes, list) or not all(isinstance(a, str) for a in axes):
         raise InputError('[frame] mounting must be like ["+x", "+y", "+z"]')
     mounting_matrix(axes)
-    nominal = {name: _triad(_table(raw, "nominal"), name) for name in TRIADS}
+    nominal = {name: _triad(checked.table(raw, "nominal"), name) for name in TRIADS}
     gauge = _gauge(units, nominal)
     return Description(
         device=device,
-        grade=_choice(raw, "device", "grade", GRADES, "tactical"),
-        rate_hz=_positive(_table(raw, "sampling"), "sampling", "rate_hz"),
+        grade=checked.choice(raw, "device", "grade", GRADES, "tactical"),
+        rate_hz=checked.positive(checked.table(raw, "sampling"), "sampling", "rate_hz"),
         units=units,
-        limits=_limits(_table(raw, "range"), units, gauge),
+        limits=_limits(checked.table(raw, "range"), units, gauge),
         latitude_deg=latitude,
         height_m=height,
-        gravity=_positive(site, "site", "gravity") or gravity(latitude, height),
+        gravity=checked.positive(site, "site", "gravity") or gravity(latitude, height),
         level_deg=_level(site),
         axes=tuple(axes),
         nominal={n: v / gauge.size[n.startswith("gyr")] for n, v in nominal.items()},
         gauge=gauge,
-        model=_model(_table(raw, "model")),
+        model=_model(checked.table(raw, "model")),
         positions=positions,
         windows=windows,
         numbers=tuple(range(len(positions))),
@@ -196,48 +197,14 @@ def parse(raw: Mapping[str, Any]) -> Description:
     )
 
 
-def _table(raw: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    table = raw.get(name, {})
-    if not isinstance(table, Mapping):
-        raise InputError(f"{name} must be a table: write [{name}]")
-    return table
-
-
-def _number(table: Mapping[str, Any], name: str, key: str, default: float) -> float:
-    value = table.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"[{name}] {key} = {value!r} is not a number")
-    if not np.isfinite(value):
-        raise InputError(f"[{name}] {key} = {value} is not a finite number")
-    return float(value)
-
-
-def _positive(table: Mapping[str, Any], name: str, key: str) -> float | None:
-    if key not in table:
-        return None
-    value = _number(table, name, key, 0.0)
-    if value <= 0:
-        raise InputError(f"[{name}] {key} = {value:g} must be above 0; mend it")
-    return value
-
-
 def _level(site: Mapping[str, Any]) -> float | None:
-    level = _positive(site, "site", "level_deg")
+    level = checked.positive(site, "site", "level_deg")
     if level is not None and level > STEEPEST:
         raise InputError(
             f"[site] level_deg = {level:g} is no level base: give one sigma in degrees,"
             f" up to {STEEPEST:g}"
         )
     return level
-
-
-def _choice(
-    raw: Mapping[str, Any], name: str, key: str, known: Any, default: str
-) -> str:
-    value = _table(raw, name).get(key, default)
-    if value not in known:
-        raise InputError(f"[{name}] {key} = {value!r} is none of: {', '.join(known)}")
-    return str(value)
 
 
 def _gauge(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
@@ -254,7 +221,7 @@ def _gauge(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
 def _limits(
     table: Mapping[str, Any], units: Mapping[str, str], gauge: Gauge
 ) -> dict[str, float]:
-    limits = {kind: _positive(table, "range", kind) for kind in _UNITS}
+    limits = {kind: checked.positive(table, "range", kind) for kind in _UNITS}
     worth = {
         k: _UNITS[k][units[k]] / c for k, c in zip(_UNITS, gauge.size, strict=True)
     }
@@ -265,14 +232,14 @@ def _triad(table: Mapping[str, Any], name: str) -> Array:
     value = table.get(name, [NOMINAL[name]] * 3)
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(f"[nominal] {name} = {value!r} must be three numbers, x y z")
-    return np.array([_number({name: v}, "nominal", name, 0.0) for v in value])
+    return np.array([checked.number({name: v}, "nominal", name, 0.0) for v in value])
 
 
 def _model(table: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     ids = table.get("effects", [])
     if not isinstance(ids, list) or not all(isinstance(i, str) for i in ids):
         raise InputError('[model] effects must be a list of ids, like ["base_tilt"]')
-    return {i: _table(table, i) for i in ids}
+    return {i: checked.table(table, i) for i in ids}
 
 
 def _positions(
@@ -296,10 +263,14 @@ def _position(
     if rate is not None:
         if not isinstance(rate, list) or len(rate) != 3:
             raise InputError(f"{name}: rate_deg_s must be three numbers, deg/s")
-        rate = tuple(np.deg2rad([_number({"r": r}, name, "r", 0.0) for r in rate]))
+        rate = tuple(
+            np.deg2rad([checked.number({"r": r}, name, "r", 0.0) for r in rate])
+        )
     label = str(table.get("name", ""))
     if given:
-        alpha, beta = (_number(table, name, k, 0.0) for k in ("alpha_deg", "beta_deg"))
+        alpha, beta = (
+            checked.number(table, name, k, 0.0) for k in ("alpha_deg", "beta_deg")
+        )
         position = Position.deg(alpha, beta, label)
     else:
         position = Position(label or name)
@@ -315,7 +286,7 @@ def _window(name: str, table: Mapping[str, Any]) -> tuple[float, float] | None:
         return None
     if len(given) == 1:
         raise InputError(f"{name} has {given[0]} alone; give start_s and end_s")
-    start, end = (_number(table, name, key, 0.0) for key in ("start_s", "end_s"))
+    start, end = (checked.number(table, name, key, 0.0) for key in ("start_s", "end_s"))
     if start >= end:
         raise InputError(
             f"{name}: start_s = {start:g} must come before end_s = {end:g}"

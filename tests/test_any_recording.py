@@ -296,6 +296,31 @@ def test_one_long_static_recording(
     assert replays["twin"]["chi2_per_dof"] < 0.5 * replays["refitted"]["chi2_per_dof"]
 
 
+@pytest.mark.parametrize(
+    ("beta", "scale", "found"),
+    [
+        (0.6, (1.0030, 1.0033, 0.996), []),
+        (5.0, (1.0030, 1.0030, 0.996), []),
+        (5.0, (1.0030, 1.0030, 1.0030), ["gravity_error"]),
+    ],
+    ids=["the third hardly known", "the third another", "all three"],
+)
+def test_two_scale_factors_that_agree_are_no_gravity(
+    beta: float,
+    scale: tuple[float, float, float],
+    found: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    angles = [(a, b) for b in (0.0, beta, -beta) for a in (0.0, 45.0, -45.0)]
+    positions = places(angles, seconds=12.0)
+    device = replace(SAME, truth=replace(SAME.truth, acc_scale=scale))
+    folder = write_session(tmp_path, recorded(device, positions), positions)
+    assert main(["diagnose", str(folder), "--json"]) == (1 if found else 0)
+    said = json.loads(capsys.readouterr().out)
+    assert [e["id"] for e in said["effects"]] == found
+
+
 def moved(by: float) -> list[Table]:
     return [
         p | {"start_s": p["start_s"] + by, "end_s": p["end_s"] + by} for p in POSITIONS

@@ -1,9 +1,14 @@
 """A change that all three scale factors share: gravity or the device.
 
-Gravity g (1 + r) in place of g makes every scale factor look larger by 1 + r. If the
-three have changed from the nominal ones by the same factor within their uncertainty,
-and by more than that, a wrong gravity explains with one number what else takes three.
-The recording cannot decide between the two.
+Gravity g (1 + r) in place of g makes every scale factor look larger by 1 + r. Whether
+one number r explains the changes c of the three, of covariance C, or each changed by
+itself, is for the evidence to say,
+
+    ln N(c; 0, C + s^2 1 1^T) - ln N(c; 0, C + s^2 I)                            (1)
+
+with s the usual size of either. Axes that are hardly known say nothing in it, and two
+that agree by chance little. The recording cannot decide between gravity and a device
+whose scale factors did change alike.
 """
 
 from __future__ import annotations
@@ -12,15 +17,16 @@ import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import Found, Quantity
+from fieldcal.samples import Array
 
 CLEAR = 6.0
 """Standard deviations of the common change."""
 
-ALIKE = 6.0
-"""Squares (two degrees of freedom) that the three may differ by."""
+USUAL = 3e-3
+"""Relative change of gravity from a wrong site, and of a scale factor."""
 
-SHARP = 6.0
-"""Standard deviations of the common change in at least two axes by themselves."""
+RARE = 4.0
+"""By how much gravity must be likelier, ln: wrong sites are rare."""
 
 ANOMALY = 5e-5
 """Relative departure of gravity from the normal one that any site has."""
@@ -40,15 +46,14 @@ def common_scale(explanation: Explanation) -> Found | None:
     if not fit.determined[at].all():
         return None
     change = fit.values[at] / nominal - 1
-    weight = np.linalg.inv(fit.covariance[np.ix_(at, at)] / np.outer(nominal, nominal))
+    covariance = fit.covariance[np.ix_(at, at)] / np.outer(nominal, nominal)
+    weight = np.linalg.inv(covariance)
     one = np.ones(3)
     sigma = 1 / np.sqrt(one @ weight @ one)
     common = float(sigma**2 * (one @ weight @ change))
-    rest = change - common
-    alone = np.abs(change) * np.sqrt(1 / np.diag(np.linalg.inv(weight)))
     if not max(CLEAR * float(sigma), ANOMALY) <= abs(common) <= LARGEST:
         return None
-    if rest @ weight @ rest > ALIKE or (alone > SHARP).sum() < 2:
+    if _likelier(change, covariance) < RARE:
         return None
     return Found(
         "gravity_error",
@@ -56,3 +61,14 @@ def common_scale(explanation: Explanation) -> Found | None:
         aliases=("acc_scale",),
         evidence={"delta_chi2": (common / float(sigma)) ** 2},
     )
+
+
+def _likelier(change: Array, covariance: Array) -> float:
+    """By how much one change of all is likelier than one of each, (1)."""
+
+    def evidence(spread: Array) -> float:
+        total = covariance + USUAL**2 * spread
+        squares = float(change @ np.linalg.solve(total, change))
+        return -0.5 * (squares + float(np.linalg.slogdet(total)[1]))
+
+    return evidence(np.ones((3, 3))) - evidence(np.eye(3))  # (1)

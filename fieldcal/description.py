@@ -117,9 +117,9 @@ class Description:
         )
 
     def numbered(self, positions: Iterable[int]) -> tuple[int, ...]:
-        """What session.toml counts some of the positions here as, in its order."""
+        """Return what session.toml counts them as; a recording without any is 0."""
         numbers = self.numbers or (0,)
-        return tuple(sorted(numbers[p] for p in positions))
+        return tuple(numbers[p] for p in positions)
 
 
 def read(path: Path) -> Description:

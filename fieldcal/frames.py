@@ -41,17 +41,11 @@ def turn(alpha: ArrayLike, beta: ArrayLike) -> Array:
     array([0., 0., 1.])
     """
     alpha, beta = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(beta, float))
-    ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
-    rows = ((ca, sa, 0.0), (-sa * cb, ca * cb, sb), (sa * sb, -ca * sb, cb))  # (3)
-    matrix = np.empty((*ca.shape, 3, 3))
-    for i, row in enumerate(rows):
-        for j, element in enumerate(row):
-            matrix[..., i, j] = element
-    return matrix
+    return np.stack([seen_after(alpha, beta, axis) for axis in np.eye(3)], axis=-1)
 
 
 def seen_after(alpha: Array, beta: Array, vector: Array) -> Array:
-    """A vector in base axes as procedure axes see it after the turns, (n, 3).
+    """A vector (3,) in base axes as procedure axes see it after the turns, (..., 3).
 
     As `turn` times the vector, where only that is wanted.
 
@@ -60,10 +54,10 @@ def seen_after(alpha: Array, beta: Array, vector: Array) -> Array:
     """
     x, y, z = vector
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
-    out, on = np.empty((len(alpha), 3)), y * ca - x * sa
-    out[:, 0] = x * ca + y * sa  # (3)
-    out[:, 1] = on * cb + z * sb
-    out[:, 2] = z * cb - on * sb
+    out, on = np.empty((*ca.shape, 3)), y * ca - x * sa
+    out[..., 0] = x * ca + y * sa  # (3)
+    out[..., 1] = on * cb + z * sb
+    out[..., 2] = z * cb - on * sb
     return out
 
 

@@ -117,9 +117,9 @@ def rests(session: Session) -> Rests:
     warnings = list(session.warnings)
     noise: Noise | None = None
     grain = grain_of(session)
-    # as they were held, however they are listed: each tells the noise for the next
-    held = sorted(enumerate(session.windows), key=lambda pair: pair[1] or (np.inf,))
-    for i, window in held:
+    # each tells the noise for the next
+    held = session.about.in_time()
+    for i, window in zip(held.numbers, held.windows, strict=True):
         rate = table_rate(session.about, i)
         try:
             if rate.any():

@@ -66,7 +66,7 @@ def curves(
 ) -> Iterator[Curve]:
     """One curve for each channel and covariate in which the windows part."""
     source = explanation.prepared.source
-    start, numbers = source.warmth.start_c, np.array(source.about.numbers or (0,))
+    start = source.warmth.start_c
     done = set()
     for m in mismatch:
         name, unit = NAMES.get(m.kind, ("", ""))
@@ -77,7 +77,7 @@ def curves(
         rows = first.bench.rows
         before, sd, position = cells(rows, first.fit.residual)
         after = cells(then.bench.rows, then.fit.residual)[0]
-        position = numbers[position]
+        position = np.array(source.about.numbered(position))
         x = _mean(rows, COVARIATES[name](rows)) + (start if unit == "°C" else 0.0)
         if name == "position":
             x = position.astype(float)

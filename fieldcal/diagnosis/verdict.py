@@ -66,12 +66,14 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     effects = _effects(explanation, lost, then, others)
     verdict = _verdict(effects, unknown, others)
     # so far positions were counted as they were held, from here on as they are listed
-    listed = explanation.prepared.source.about.numbered
+    numbered = explanation.prepared.source.about.numbered
     mismatch = tuple(
-        replace(m, positions=listed(m.positions))
+        replace(m, positions=tuple(sorted(numbered(m.positions))))
         for m in _mismatch(block, explanation, lost, unknown)
     )
-    unknown = [replace(u, positions=listed(u.positions)) for u in unknown]
+    unknown = [
+        replace(u, positions=tuple(sorted(numbered(u.positions)))) for u in unknown
+    ]
     quality = _quality(explanation, first, then)
     words = paragraph(
         verdict,

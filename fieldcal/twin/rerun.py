@@ -73,13 +73,12 @@ def rerun(explanation: Explanation, found: Diagnosis, raw: Bench) -> Rerun:
         for name, case in cases.items()
     }
     held = np.unique(raw.rows.x.position)
-    numbers = explanation.prepared.source.about.numbers or (0,)
     old, new = runs["refitted"].rms ** 2, runs["twin"].rms ** 2
     gain = np.nan_to_num((old - new) / np.where(new > 0, new, np.inf), nan=-1.0)
     return Rerun(
         profile,
         runs,
-        tuple(numbers[p] for p in held),
+        explanation.prepared.source.about.numbered(held),
         np.array([_stretch(raw, p) for p in held]),
         tuple(e.id for e in profile.effects if e.id in RANDOM),
         int(np.argmax(gain)),

@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 from fieldcal.samples import Array
 
 
-def channels(
-    x: Array, step: Array, first: NDArray[np.int64], whole: bool = False
-) -> Array:
+def channels(x: Array, step: Array, first: NDArray[np.int64], whole: bool) -> Array:
     """n, S, D, m of cells, (m, 4, 6), of samples and their changes, (6, n) each.
 
-    `whole` says that no value is missing, where that is known.
+    `whole` says whether no change is missing, so none of the samples.
     """
-    if whole or np.isfinite(step).all():
+    if whole:
         return _all(x, step, first)
     sums = np.zeros((len(first), 4, 6))
     for sensor in (slice(0, 3), slice(3, 6)):

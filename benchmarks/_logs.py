@@ -189,6 +189,12 @@ def read_matlab(path: Path) -> None:
     loadmat(path)
 
 
+def read_npz(path: Path) -> None:
+    """Read by numpy."""
+    with np.load(path) as file:
+        _ = file["imu"]
+
+
 def read_parquet(path: Path) -> None:
     """Read by pyarrow."""
     import pyarrow.parquet
@@ -214,6 +220,7 @@ def write_tables(folder: Path, rows: int) -> dict[str, Log]:
         with h5py.File(folder / name, "w") as file:
             file.create_dataset("imu", data=table, compression=packing)
     savemat(folder / "x.mat", {"imu": table})
+    np.savez(folder / "x.npz", imu=table)
     # as MATLAB itself saves it
     savemat(folder / "packed.mat", {"imu": table}, do_compression=True)
     columns = dict(zip(COLUMNS, table.T, strict=True))
@@ -225,6 +232,7 @@ def write_tables(folder: Path, rows: int) -> dict[str, Log]:
         "matlab packed, scipy": (folder / "packed.mat", read_matlab, named),
         "hdf5, h5py": (folder / "x.h5", read_hdf5, named),
         "hdf5 packed, h5py": (folder / "packed.h5", read_hdf5, named),
+        "npz, numpy": (folder / "x.npz", read_npz, named),
         "parquet, pyarrow": (folder / "x.parquet", read_parquet, named),
     }
 
@@ -237,6 +245,7 @@ def write_all(folder: Path, rows: int) -> dict[str, Log]:
     (folder / "x.bin").write_bytes(dataflash(block))
     write_tlog(folder / "x.tlog", block)
     write_can(folder / "x.log", block)
+    write_can(folder / "x.asc", block)
     write_can(folder / "x.blf", block)
     write_mcap(folder / "x.mcap", block)
     bus = Wanted(options=f"dbc={folder / 'imu.dbc'}&map=ax=ax,ay=ay,az=az")
@@ -247,6 +256,7 @@ def write_all(folder: Path, rows: int) -> dict[str, Log]:
         "tlog, pymavlink": (folder / "x.tlog", read_tlog, none),
         "mcap, mcap-ros2-support": (folder / "x.mcap", read_mcap, none),
         "candump, python-can": (folder / "x.log", read_can, bus),
+        "asc, python-can": (folder / "x.asc", read_can, bus),
         "blf, python-can": (folder / "x.blf", read_can, bus),
         **write_tables(folder, rows),
     }

@@ -1,5 +1,6 @@
 """CAN frames into samples against python-can with cantools, as ratios in one run."""
 
+from collections import defaultdict
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from benchmarks._load import load_at_1_khz
 from fieldcal.driver import open_driver
-from fieldcal.drivers.can_frames import FRAME, Frames, pack_message
+from fieldcal.drivers.can_frames import FRAME, Frames, Packed
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import SHIPPED, load, read_map
 from fieldcal.drivers.can_samples import Samples
@@ -80,7 +81,9 @@ def samples(rows: Frames) -> int:
 
 def as_rows(received: list[can.Message]) -> Frames:
     """Pack what python-can hands over."""
-    return np.frombuffer(b"".join([pack_message(m) for m in received]), FRAME)
+    packed = Packed(len(received))
+    packed.fill(received, defaultdict(int))
+    return packed.frames
 
 
 def log_by_cantools(path: Path) -> int:

@@ -10,12 +10,13 @@ from __future__ import annotations
 import errno
 import logging
 import socket
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.drivers.can_frames import pack_message
+from fieldcal.drivers.can_frames import Packed
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
 from fieldcal.drivers.options import Options
@@ -24,7 +25,7 @@ from fieldcal.drivers.tcp import POLL
 from fieldcal.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
-    from can import BusABC
+    from can import BusABC, Message
 
 MOST = 2000
 """Frames taken at once."""
@@ -107,6 +108,10 @@ def connect(channel: str, told: Settings) -> BusABC:
         raise DeviceError(f"cannot open {at}: {why(interface, fault)}") from fault
 
 
+ONLY: Mapping[Any, int] = defaultdict(int)
+"""A live bus is one of one, whatever its channel is called."""
+
+
 class BusSource:
     """Frames of any bus that python-can knows."""
 
@@ -127,17 +132,18 @@ class BusSource:
         """
         import can
 
+        packed = Packed(MOST)
         try:
-            rows, until = [], monotonic() + LONGEST
-            message = self._bus.recv(POLL)
-            while message is not None:
-                rows.append(pack_message(message))
-                if len(rows) >= MOST or monotonic() > until:
-                    break
-                message = self._bus.recv(0)
+            packed.fill(self._waiting(), ONLY)
         except can.CanError as fault:
             raise OSError(str(fault)) from fault
-        return b"".join(rows)
+        return packed.frames.tobytes()
+
+    def _waiting(self) -> Iterator[Message]:
+        message, until = self._bus.recv(POLL), monotonic() + LONGEST
+        while message is not None:
+            yield message
+            message = self._bus.recv(0) if monotonic() < until else None
 
     def close(self) -> None:
         """Leave the bus."""

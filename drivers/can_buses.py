@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.drivers.can_frames import FRAME, Frames, pack_message
+from fieldcal.drivers.can_frames import Frames, Packed
 from fieldcal.errors import InputError
 
 MOST = 0xFFFF
@@ -44,14 +44,11 @@ class Buses:
         self._numbers = _Numbers()
         self._with_samples: set[int] = set()
 
-    def rows(self, messages: Iterable[Any], rows: list[bytes]) -> None:
-        """Pack messages behind `rows`, up to one that cannot be read."""
-        # a log has a hundred million of them
-        numbers, append, pack = self._numbers, rows.append, pack_message
-        for message in messages:
-            append(pack(message, numbers[message.channel]))
+    def fill(self, packed: Packed, messages: Iterable[Any]) -> None:
+        """Pack messages, up to one that cannot be read."""
+        packed.fill(messages, self._numbers)
 
-    def frames(self, rows: Iterable[bytes]) -> Frames:
+    def frames(self, packed: Packed) -> Frames:
         """Frames of the bus that is meant.
 
         Raises
@@ -60,7 +57,7 @@ class Buses:
             If frames that make samples come from several, and none is chosen.
 
         """
-        frames = np.frombuffer(b"".join(rows), FRAME)
+        frames = packed.frames
         bus = frames["bus"]
         if len(self._numbers) > 1 or not self._with_samples:
             known = np.isin(frames["id"], self._identifiers)

@@ -236,7 +236,7 @@ class ByTurns(Groups):
         rows = rows._replace(key=np.cumsum(rows.part == self._first))
         begun = rows.key > 0
         self._orphans(rows.part[~begun])
-        rows = rows.take(begun)
+        rows = rows if begun.all() else rows.take(begun)
         whole, firsts = self._whole(rows)
         turns = int(rows.key[-1]) if len(rows.key) else 0
         again = np.ones(len(rows.key), dtype=bool)

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import gzip
 from collections.abc import Generator, Iterator
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fieldcal.drivers.can_buses import Buses
-from fieldcal.drivers.can_frames import FRAME, Frames
+from fieldcal.drivers.can_frames import FRAME, Frames, Packed
 from fieldcal.drivers.pace import Pace
 from fieldcal.errors import DeviceError, InputError
 
@@ -99,10 +98,10 @@ class Log:
         try:
             messages, more = _messages(self._path), True
             while more:
-                rows: list[bytes] = []
-                self._buses.rows(islice(messages, PIECE), rows)
-                more = len(rows) == PIECE
-                if len(frames := self._buses.frames(rows)):
+                packed = Packed(PIECE)
+                self._buses.fill(packed, messages)
+                more = packed.full
+                if len(frames := self._buses.frames(packed)):
                     yield frames
         except InputError:
             raise

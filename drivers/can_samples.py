@@ -135,8 +135,9 @@ class Samples:
         rows, whole = self._groups.feed(self._read(frames, arrived))
         if not len(whole.key):
             return None
-        values = rows.values[whole.last]
-        for number, part in enumerate(self._needed):
+        values = np.take(rows.values.T, whole.last, axis=1).T
+        # of a single frame all is in the last
+        for number, part in enumerate(self._needed if len(self._needed) > 1 else ()):
             columns = [COLUMNS.index(column) for column in part.channels]
             values[:, columns] = rows.values[whole.rows[:, number, None], columns]
         return self._timed(values, rows.arrived[whole.last])
@@ -151,7 +152,7 @@ class Samples:
         if not new.any():
             return None
         self.health.samples += int(new.sum())
-        values = values[new]
+        values = np.compress(new, values.T, axis=1).T
         acc, gyr, temperature = values[:, :3], values[:, 3:6], values[:, TEMPERATURE]
         return Block.of(t[new], acc, gyr, temperature, values[:, COUNTER], arrived[new])
 
@@ -163,7 +164,8 @@ class Samples:
         known = 0
         part = np.full(len(frames), -1, np.int64)
         raw = np.zeros(len(frames), np.int64)
-        values = np.full((len(frames), len(COLUMNS)), np.nan)
+        # a channel in one piece: all that follows goes through one channel at once
+        values = np.full((len(COLUMNS), len(frames)), np.nan).T
         for identifier, parts in self._by_identifier.items():
             of = np.flatnonzero(identifiers == identifier)
             known += len(of)

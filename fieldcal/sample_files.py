@@ -302,4 +302,5 @@ def to_batch(block: Block, *, nulls: bool = False) -> pa.RecordBatch:
 
 
 def _unknown(column: Array) -> bool:
-    return bool(len(column) and np.isnan(column[0]) and np.isnan(column).all())
+    one = column[:1] if not any(column.strides) else column  # one number for all
+    return bool(len(column) and np.isnan(column[0]) and np.isnan(one).all())

@@ -16,6 +16,9 @@ CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 UNITS = ("m/s^2",) * 3 + ("rad/s",) * 3
 
 
+UNKNOWN = np.array(np.nan)
+
+
 def common_unit(names: Iterable[str]) -> str | None:
     """Unit that channels share, "" for what is no channel; None if they share none.
 
@@ -58,11 +61,13 @@ class Block:
         seq: Array | None = None,
         t_host: Array | None = None,
     ) -> Block:
-        """Build a block; what is not given is unknown."""
+        """Build a block; what is not given is unknown, and not to be written to."""
         n = len(t)
 
         def known(values: Array | None, shape: tuple[int, ...]) -> Array:
-            return np.full(shape, np.nan) if values is None else np.asarray(values)
+            if values is None:
+                return np.broadcast_to(UNKNOWN, shape)
+            return np.asarray(values, dtype=float)
 
         return cls(
             np.asarray(t, dtype=float),

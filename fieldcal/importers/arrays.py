@@ -7,7 +7,7 @@ arrays, counted from 0. A table lies on its side where it is wider than long.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -26,10 +26,12 @@ WHAT = "arrays: MATLAB, HDF5, NumPy"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 MATLAB = b"MATLAB 5.0 MAT-file"
 WIDEST = 64
-"""Columns of a table that are read together."""
+"""Columns of a table that are read together: they lie side by side in the file."""
 
 ROWS = 1 << 14
 """Rows read together: few enough to stay in the processor's cache."""
+
+DIMENSIONS = (1, 2)
 
 NPZ, NPY = b"PK\x03\x04", b"\x93NUMPY"
 
@@ -49,13 +51,13 @@ class Table(NamedTuple):
     Attributes
     ----------
     shape : (rows, columns)
-    read : gives some rows of a column
+    read : gives some rows (n,) of each of some columns
     unit : as an attribute of it says, or nothing
 
     """
 
     shape: tuple[int, int]
-    read: Callable[[int, slice], Array]
+    read: Callable[[slice, Sequence[int]], list[Array]]
     unit: str = ""
 
 
@@ -64,6 +66,8 @@ class File(Recording):
 
     _loaded: dict[str, Table] | None = None
     """Of a format whose reader gives all arrays at once, so that it does so once."""
+    _units: dict[str, str] | None = None
+    """Of the arrays of an HDF5 file, so that it is looked through once."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
@@ -88,13 +92,16 @@ class File(Recording):
             (rows,) = {tables[name].shape[0] for name, _ in named.values()}
             if not rows:
                 raise InputError(f"{self.path}: its arrays are empty")
+            wanted: dict[str, dict[str, int]] = {}
+            for column, (name, i) in named.items():
+                wanted.setdefault(name, {})[column] = i
             for first in range(0, rows, ROWS):
                 some = slice(first, min(first + ROWS, rows))
+                got: dict[str, Array] = {}
                 try:
-                    got = {
-                        column: tables[name].read(i, some)
-                        for column, (name, i) in named.items()
-                    }
+                    for name, its in wanted.items():
+                        read = tables[name].read(some, [*its.values()])
+                        got |= zip(its, read, strict=True)
                 except (OSError, ValueError, TypeError, RuntimeError) as error:
                     raise InputError(
                         f"{self.path}: rows {first + 1} to {some.stop} cannot be read:"
@@ -160,7 +167,7 @@ class File(Recording):
                 first = file.read(520)
             try:
                 if _is_hdf5(first):
-                    tables = _hdf5(path, stack)
+                    tables = self._hdf5(path, stack)
                 else:
                     read = _matlab if first.startswith(MATLAB) else _numpy
                     tables = self._loaded = read(path)
@@ -173,6 +180,14 @@ class File(Recording):
                     " it again from where it came"
                 ) from error
             yield tables
+
+    def _hdf5(self, path: Path, stack: ExitStack) -> dict[str, Table]:
+        import h5py
+
+        file = stack.enter_context(h5py.File(path, "r"))
+        if self._units is None:
+            self._units = _units(file)
+        return {name: _table(file[name], unit) for name, unit in self._units.items()}
 
 
 def _columns(tables: Mapping[str, Table]) -> list[headings.Column]:
@@ -195,44 +210,20 @@ def _listed(tables: Mapping[str, Table]) -> str:
     return ", ".join(shapes) or "no arrays of numbers"
 
 
-def _hdf5(path: Path, stack: ExitStack) -> dict[str, Table]:
+def _units(file: Any) -> dict[str, str]:
+    """Arrays of numbers in an HDF5 file and their units, where it says them."""
     import h5py
 
-    file = stack.enter_context(h5py.File(path, "r"))
-    found: dict[str, Table] = {}
+    found = {}
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf":
-            table = _table(item.shape, _slabs(item))
-            if table and not name.startswith("#"):
+            if item.ndim in DIMENSIONS and not name.startswith("#"):
                 said = item.attrs.get("units", item.attrs.get("unit", ""))
-                text = said.decode() if isinstance(said, bytes) else str(said)
-                found[name] = table._replace(unit=text)
+                found[name] = said.decode() if isinstance(said, bytes) else str(said)
 
     file.visititems(visit)
     return found
-
-
-def _slabs(item: Any) -> Callable[[Any], Array]:
-    """Read all columns together, though they are asked for one by one.
-
-    They lie side by side in the file, and are often packed together.
-    """
-    held: dict[str, Any] = {"rows": None}
-
-    def get(key: Any) -> Array:
-        if len(item.shape) == 1 or min(item.shape) > WIDEST:
-            return np.asarray(item[key])
-        rows = next(part for part in key if isinstance(part, slice))
-        if held["rows"] != rows:
-            whole = tuple(rows if part == rows else slice(None) for part in key)
-            held.update(rows=rows, slab=np.asarray(item[whole]))
-        found: Array = held["slab"][
-            tuple(slice(None) if part == rows else part for part in key)
-        ]
-        return found
-
-    return get
 
 
 def _matlab(path: Path) -> dict[str, Table]:
@@ -250,26 +241,30 @@ def _numpy(path: Path) -> dict[str, Table]:
 
 
 def _of_arrays(arrays: Mapping[str, Any]) -> dict[str, Table]:
-    found = {}
-    for name, array in arrays.items():
-        if isinstance(array, np.ndarray) and array.dtype.kind in "iuf":
-            table = _table(array.shape, array.__getitem__)
-            if table:
-                found[name] = table
-    return found
+    return {
+        name: _table(array)
+        for name, array in arrays.items()
+        if isinstance(array, np.ndarray)
+        and array.dtype.kind in "iuf"
+        and array.ndim in DIMENSIONS
+    }
 
 
-def _table(shape: tuple[int, ...], get: Callable[[Any], Array]) -> Table | None:
-    """Rows and columns of an array; None if it has no such."""
-    if len(shape) == 1:
-        return Table((shape[0], 1), lambda i, rows: np.asarray(get(rows), dtype=float))
-    if len(shape) != 2:
-        return None
-    if shape[0] >= shape[1]:
-        return Table(
-            (shape[0], shape[1]),
-            lambda i, rows: np.asarray(get((rows, i)), dtype=float),
-        )
-    return Table(
-        (shape[1], shape[0]), lambda i, rows: np.asarray(get((i, rows)), dtype=float)
-    )
+def _table(array: Any, unit: str = "") -> Table:
+    """Rows and columns of an array of one or two dimensions, in memory or in a file."""
+    if array.ndim == 1:
+        return Table((len(array), 1), lambda rows, _: [_floats(array[rows])], unit)
+    long, wide = max(array.shape), min(array.shape)
+    lies = array.shape[0] < long
+
+    def read(rows: slice, some: Sequence[int]) -> list[Array]:
+        if wide > WIDEST:
+            return [_floats(array[(i, rows) if lies else (rows, i)]) for i in some]
+        slab = array[:, rows] if lies else array[rows].T
+        return [_floats(slab[i]) for i in some]
+
+    return Table((long, wide), read, unit)
+
+
+def _floats(values: Any) -> Array:
+    return np.asarray(values, dtype=float)

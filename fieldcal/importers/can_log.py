@@ -11,7 +11,6 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO, cast
 
@@ -23,6 +22,7 @@ from fieldcal.samples import Block
 
 if TYPE_CHECKING:
     from fieldcal.drivers.can_buses import Buses
+    from fieldcal.drivers.can_frames import Packed
 
 WHAT = "log of a CAN bus"
 
@@ -98,8 +98,8 @@ class File(Recording):
         buses = Buses(str(self.path), wanted, options.text("channel"))
         samples = Stamped(parts, health, options)
         options.finish()
-        for rows in self._rows(buses):
-            frames = buses.frames(rows)
+        for packed in self._packed(buses):
+            frames = buses.frames(packed)
             block = samples.feed(frames, frames["t"])
             if block is not None:
                 yield block
@@ -117,23 +117,23 @@ class File(Recording):
         if found := [f"{what} ({n})" for what, n in counts.items() if n]:
             self.says.append(f"left out: {', '.join(found)}")
 
-    def _rows(self, buses: Buses) -> Iterator[list[bytes]]:
+    def _packed(self, buses: Buses) -> Iterator[Packed]:
         """Frames as rows, many at a time."""
-        messages, seen = self._messages(), 0
-        while True:
-            rows: list[bytes] = []
+        from fieldcal.drivers.can_frames import Packed
+
+        messages, seen, more = self._messages(), 0, True
+        while more:
+            packed = Packed(PIECE)
             try:
-                buses.rows(islice(messages, PIECE), rows)
+                buses.fill(packed, messages)
             except InputError:
                 raise
             except Exception as error:
                 # the readers of the several formats raise what they like
-                where = f"behind frame {seen + len(rows)}"
+                where = f"behind frame {seen + packed.seen}"
                 self.cut_off(where, f"cannot be read: {error}")
-            seen += len(rows)
-            yield rows
-            if len(rows) < PIECE:
-                return
+            seen, more = seen + packed.seen, packed.full
+            yield packed
 
     def _messages(self) -> Iterator[Any]:
         import can

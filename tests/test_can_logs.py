@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.driver import open_driver
-from fieldcal.drivers.can_frames import FRAME
+from fieldcal.drivers.can_frames import ERROR, EXTENDED, FRAME, Packed
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
 from fieldcal.errors import DeviceError, InputError
@@ -54,6 +54,47 @@ def test_mutated_lines_never_break_the_decoder(data: st.DataObject) -> None:
     whole = Lawicel(health).feed(bytes(text))
     rows = np.frombuffer(whole, FRAME)
     assert (rows["size"] <= 64).all() and len(rows) + health.bad <= text.count(13)
+
+
+FRAMES = st.tuples(
+    st.sampled_from(["data", "remote", "error"]),
+    st.integers(0, 0x7FF),
+    st.booleans(),
+    st.binary(max_size=8),
+    st.sampled_from(["can0", "can1"]),
+)
+
+
+@given(st.lists(FRAMES, max_size=20), st.integers(1, 8))
+def test_messages_of_any_kind_come_out_as_they_are_however_few_fit(
+    drawn: list[tuple[str, int, bool, bytes, str]], most: int
+) -> None:
+    messages = [
+        can.Message(
+            timestamp=t, arbitration_id=identifier, is_extended_id=extended,
+            data=b"" if kind == "remote" else data, channel=channel,
+            is_remote_frame=kind == "remote", is_error_frame=kind == "error",
+        )
+        for t, (kind, identifier, extended, data, channel) in enumerate(drawn)
+    ]  # fmt: skip
+    waiting, out, seen, more = iter(messages), [], 0, True
+    while more:
+        packed = Packed(most)
+        packed.fill(waiting, {"can0": 3, "can1": 4})
+        out += packed.frames.tolist()
+        seen, more = seen + packed.seen, packed.full
+    assert seen == len(messages)
+    for row, message in zip(
+        out, (m for m in messages if not m.is_remote_frame), strict=True
+    ):
+        t, identifier, size, bus, data = row
+        assert (t, bus) == (message.timestamp, {"can0": 3, "can1": 4}[message.channel])
+        if message.is_error_frame:
+            assert (identifier & ERROR, size) == (ERROR, 0)
+        else:
+            assert identifier & 0x1FFFFFFF == message.arbitration_id
+            assert bool(identifier & EXTENDED) == message.is_extended_id
+            assert data[:size].tobytes() == message.data and not data[size:].any()
 
 
 def test_a_log_of_somebody_else_says_which_frames_are_missing(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ outputs, or failing that what the effect's own entry in the catalogue says.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,7 +31,7 @@ SAME, PART = 2 * CLOSE, 0.1
 """Squares that a rival may leave more, at most this part of what is explained."""
 
 PLAUSIBLE = 10.0
-"""Typical sizes that its values may have then."""
+"""Times what is seen of an effect that its values may be then."""
 
 TELLING = 5.0
 """Difference in white noise of a window's mean that decides."""
@@ -93,18 +93,9 @@ def _alike(explanation: Explanation) -> Iterator[tuple[str, list[str]]]:
     }
     for rival in search.rivals(best):
         theirs, more = _causes(rival), rival.fit.chi2 - best.fit.chi2
-        for name in sorted(mine - theirs) if _plausible(rival) else ():
+        for name in sorted(mine - theirs) if rival.excess < PLAUSIBLE else ():
             if more < spare[name]:
                 yield name, sorted(theirs - mine)
-
-
-def _plausible(model: Model) -> bool:
-    """Whether no effect in it is far larger than is usual."""
-    pairs = zip(model.fit.state.terms, model.fit.state.values, strict=True)
-    return all(
-        (np.abs(v) < PLAUSIBLE * model.bench.prior_of(replace(t, tight=1.0))).all()
-        for t, v in pairs
-    )
 
 
 def _causes(model: Model) -> set[str]:

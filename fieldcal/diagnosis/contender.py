@@ -1,8 +1,10 @@
 """A model of a recording: hypotheses, a description of the random part, their price.
 
     objective = ln Z - m (ln N + EXTRA) - what the choice of variants cost
+                - RARE sum ln(largest value of an effect / what is seen of it)
 
-with m hypotheses in the model and N tried; ln Z is that of `fit`.
+with m hypotheses in the model and N tried; ln Z is that of `fit`. The last sum goes
+over effects that are larger than is seen.
 """
 
 from __future__ import annotations
@@ -17,9 +19,16 @@ from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import foretold
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.scatter import fees
+from fieldcal.samples import Array
 
 AGAIN = 3.0
 """What the second triad costs of an effect that the first has already, ln."""
+
+RARE = 4.0
+"""Devices that have an effect x times what is seen are as rare as x to the minus this.
+
+A function that no effect makes wanders by its size likewise, see `scatter.fees`.
+"""
 
 LEAVES = 4.0
 """Standard deviations of chi^2 from which a fit leaves something to explain."""
@@ -60,6 +69,11 @@ class Model:
         return self.names | {*self.random}
 
     @property
+    def excess(self) -> float:
+        """Largest value of an effect in it, in what is the most that is seen."""
+        return float(_excess(self.bench, self.fit).max())
+
+    @property
     def leaves_nothing(self) -> bool:
         """Whether its rows are no further off than white noise."""
         spread = np.sqrt(2 * max(self.fit.dof, 1))
@@ -92,7 +106,18 @@ class Rules:
         again = sum(not h.known for h, _ in chosen) - len(new)
         cost = self.price * (len(new) + len(random)) + AGAIN * again + sum(shaped)
         cost += fees(bench.errors)
+        cost += RARE * float(np.log(np.maximum(_excess(bench, fit), 1.0)).sum())
         return Model(chosen, bench, fit, fit.score - cost, random, shaped)
+
+
+def _excess(bench: Bench, fit: Fit) -> Array:
+    """Largest value of each effect, in what is the most that is seen of it, (m,)."""
+    out = [0.0]
+    for term, values in zip(fit.state.terms, fit.state.values, strict=True):
+        many = len(term.columns)
+        ratio = term.tight * np.abs(values[:many]) / bench.prior_of(term)[:many]
+        out.append(float(ratio.max(initial=0.0)))
+    return np.array(out)
 
 
 def foretells(model: Model) -> float:

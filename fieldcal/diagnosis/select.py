@@ -4,14 +4,15 @@ A model is a set of hypotheses and a description of the random part. Its objecti
 
     ln Z - m (ln N + EXTRA)
 
-with m hypotheses in it and N tried. By Markov's inequality a term that is not there
-raises Z by a factor exp(x) with a probability below exp(-x): with N tried and EXTRA on
-top, nothing enters a recording that has nothing more often than exp(-EXTRA). Models
-grow by one or two at a time, lose what has become idle, and swap. What is random (a
-walk, a scatter from window to window, angles set by hand), and a smooth function that
-no effect makes, compete on the same footing: a term has to beat them, not only white
-noise. Where evidence comes near to a tie between chance and a cause, whichever predicts
-positions left out better is taken.
+with m hypotheses in it and N tried, less what sizes cost that are larger than is seen,
+see `contender`. By Markov's inequality a term that is not there raises Z by a factor
+exp(x) with a probability below exp(-x): with N tried and EXTRA on top, nothing enters a
+recording that has nothing more often than exp(-EXTRA). Models grow by one or two at a
+time, lose what has become idle, and swap. What is random (a walk, a scatter from window
+to window, angles set by hand), and a smooth function that no effect makes, compete on
+the same footing: a term has to beat them, not only white noise. Where evidence comes
+near to a tie between chance and a cause, whichever predicts positions left out better
+is taken.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ MARGIN, WEAK = 3.0, 8.0
 
 TIE = 12.0
 """Difference in ln Z from which nothing is asked of positions left out."""
+
+SEEN = 3.0
+"""Times what is seen of an effect up to which nobody wonders at it."""
 
 OTHERS = 60
 """Random and smooth parts that are tried besides."""
@@ -123,7 +127,7 @@ class Search:
         if more > MARGIN:
             return cause
         likelier = best.objective >= random.objective
-        known = nameless and best.leaves_nothing
+        known = nameless and best.leaves_nothing and best.excess < SEEN
         if more < -(MARGIN + UNKNOWN * nameless):
             return best if known and likelier else random
         return best if known or likelier else random

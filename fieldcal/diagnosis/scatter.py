@@ -20,7 +20,7 @@ import numpy as np
 
 from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.whiten import SMOOTH, Errors, Part, factor
+from fieldcal.diagnosis.whiten import ALONE, SMOOTH, Errors, Part, factor
 from fieldcal.samples import CHANNELS, Array
 
 VARIANCE = 2.0
@@ -38,8 +38,14 @@ LONE = 3.0
 COMPARABLE = 0.15
 """Part of the largest that one of axes alike wanders by at least."""
 
+WHICH = 2.5
+"""What it costs, ln, to choose one window of a dozen."""
+
 ROUNDED = 1e-10
 """Part of a column's squares that arithmetic may leave of nothing."""
+
+FEW_ROWS = 8
+"""Rows of a channel below which nothing random is looked for in it."""
 
 FEWEST = 4
 """Windows from which their scatter can be told."""
@@ -73,6 +79,10 @@ def wanders(bench: Bench, fit: Fit) -> Iterator[Wander]:
                 continue
             if not any((kind, c) in there for c in channels):
                 yield _of(bench, fit, kind, triad, channels)
+        if bench.windows >= FEWEST:
+            kind = f"{ALONE} {_odd_one(bench, fit, channels)}"
+            if not any((kind, c) in there for c in channels):
+                yield _of(bench, fit, kind, triad, channels)
     for c, name in enumerate(CHANNELS):
         for kind in SMOOTH:
             if (kind, c) not in there and _known(bench, kind):
@@ -90,7 +100,7 @@ def cautious(bench: Bench, fit: Fit) -> Errors:
     errors = bench.errors
     if bench.windows < FEWEST:
         return errors
-    there = {p.channel for p in errors.parts}
+    there = {p.channel for p in errors.parts if not p.kind.startswith(ALONE)}
     parts = []
     for c in np.flatnonzero(bench.rows.used.any(axis=0)):
         if c not in there:
@@ -137,6 +147,19 @@ def _known(bench: Bench, kind: str) -> bool:
     return not kind.startswith("force") or bench.windows >= FEWEST
 
 
+def _odd_one(bench: Bench, fit: Fit, channels: tuple[int, ...]) -> int:
+    """The window that is off the most on these channels."""
+    held = np.unique(bench.rows.x.position)
+    off = np.zeros(len(held))
+    for c in channels:
+        white = bench.whiten.channel(factor("offset", bench.rows.x, c), c)
+        information, pull = projected_channel(fit, white, c)
+        strength = np.diag(information)
+        seen = strength > ROUNDED * np.maximum((white**2).sum(axis=0), 1e-300)
+        off[seen] += pull[seen] ** 2 / strength[seen]
+    return int(held[np.argmax(off)])
+
+
 def _of(
     bench: Bench,
     fit: Fit,
@@ -147,7 +170,7 @@ def _of(
     found, gain = [], 0.0
     for c in channels:
         use = bench.rows.used[:, c]
-        if use.sum() < 8:
+        if use.sum() < FEW_ROWS:
             continue
         white = bench.whiten.channel(factor(kind, bench.rows.x, c), c)
         size, more = raised(*projected_channel(fit, white, c))
@@ -165,6 +188,8 @@ def fees(errors: Errors) -> float:
     for first in (0, 3):
         parts = [p for p in errors.parts if first <= p.channel < first + 3]
         total += UNKNOWN * sum(p.kind in SMOOTH for p in parts)
+        alone = {p.kind for p in parts if p.kind.startswith(ALONE)}
+        total += (UNKNOWN + WHICH) * len(alone)
         total += UNKNOWN * (len(alike([p for p in parts if p.kind == "offset"])) == 1)
         total += LONE * (sum(p.kind == "walk" for p in parts) == 1)
         total += sum(_wonder(p) for p in parts)

@@ -27,7 +27,7 @@ from fieldcal.diagnosis.contender import Model, Rules, foretells
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.scatter import UNKNOWN, Wander, dropped, wanders
 from fieldcal.diagnosis.variants import with_one
-from fieldcal.diagnosis.whiten import SMOOTH
+from fieldcal.diagnosis.whiten import nameless
 
 EXTRA = 6.9
 """Of ln 1000."""
@@ -100,8 +100,8 @@ class Search:
             best = self._refitted(self._followed(model, first))
             gain = best.objective - model.objective
         if by_chance > 0 and gain > 0 and abs(by_chance - gain) < TIE:
-            nameless = chance.name.partition(":")[0] in SMOOTH
-            return self._foretelling(model, first, best, random, nameless)
+            strange = nameless(chance.name.partition(":")[0])
+            return self._foretelling(model, first, best, random, strange)
         if by_chance > gain or (0 < gain < WEAK and by_chance > gain - MARGIN):
             return random if by_chance > 0 else None
         return best if gain > 0 else None
@@ -112,7 +112,7 @@ class Search:
         first: Sequence[Model],
         best: Model,
         random: Model,
-        nameless: bool,
+        strange: bool,
     ) -> Model:
         """Chance or a cause: whichever predicts the positions left out better.
 
@@ -127,8 +127,8 @@ class Search:
         if more > MARGIN:
             return cause
         likelier = best.objective >= random.objective
-        known = nameless and best.leaves_nothing and best.excess < SEEN
-        if more < -(MARGIN + UNKNOWN * nameless):
+        known = strange and best.leaves_nothing and best.excess < SEEN
+        if more < -(MARGIN + UNKNOWN * strange):
             return best if known and likelier else random
         return best if known or likelier else random
 

@@ -17,8 +17,9 @@ from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.explain import Explanation, bare, wandering
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import cells
+from fieldcal.diagnosis.misplaced import Turned, misplaced
 from fieldcal.diagnosis.scatter import alike
-from fieldcal.diagnosis.whiten import SMOOTH, Part, factor
+from fieldcal.diagnosis.whiten import ALONE, Part, factor, nameless
 from fieldcal.effects import Experience
 from fieldcal.samples import Array
 
@@ -36,7 +37,7 @@ class Unknown:
 
     Attributes
     ----------
-    kind : random part: "alpha", "time", "offset" ...
+    kind : random part: "alpha", "time", "offset", "window 7" ...
     channel : index in `samples.CHANNELS`
     positions : where it stands out
     covariate : what it follows best
@@ -45,6 +46,7 @@ class Unknown:
     rms : of the residual
     sigma : significance
     squares : of the residual, whitened
+    turned : angles that would explain it, had a position been set at them
 
     """
 
@@ -57,12 +59,13 @@ class Unknown:
     rms: float
     sigma: float
     squares: float
+    turned: tuple[Turned, ...] = ()
 
 
 def unknowns(explanation: Explanation) -> list[Unknown]:
     """Every part of the model that is no effect of the catalogue."""
     parts = explanation.model.bench.errors.parts
-    out = [p for p in parts if p.kind in SMOOTH]
+    out = [p for p in parts if nameless(p.kind)]
     for first in (0, 3):
         scatter = _scatter(explanation, first)
         offsets = [p for p in scatter if p.kind == "offset"]
@@ -96,8 +99,13 @@ def _of(explanation: Explanation, part: Part) -> Unknown:
     z = np.nan_to_num(mean[:, c] / sd[:, c])
     squares = float((fit.white[:, c] ** 2).sum())
     excess = max(squares - float(bench.rows.used[:, c].sum()), 1.0)
+    turned: tuple[Turned, ...] = ()
     out = np.unique(position[np.abs(z) > STANDS])
-    if not len(out):
+    if part.kind.startswith(ALONE):
+        out = np.array([int(part.kind.removeprefix(ALONE))])
+        if c < len("xyz"):
+            turned = misplaced(explanation.wide, explanation.fit, int(out[0]))
+    elif not len(out):
         out = position[[int(np.argmax(np.abs(z)))]]
     covariate, correlation = _follows(bench.rows.x, fit.residual[:, c], part)
     inside = np.isin(position, out)
@@ -111,6 +119,7 @@ def _of(explanation: Explanation, part: Part) -> Unknown:
         rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
         sigma=float(np.sqrt(excess)),
         squares=excess,
+        turned=turned,
     )
 
 
@@ -131,7 +140,7 @@ def _share(bench: Bench, fit: Fit, part: Part) -> float:
 def _follows(x: Experience, residual: Array, part: Part) -> tuple[str, float]:
     """The simplest thing that the residual follows, and the correlation."""
     known = np.isfinite(residual)
-    if part.kind == "offset" or known.sum() < 3:
+    if part.kind.startswith(("offset", ALONE)) or known.sum() < 3:
         return "the position itself", np.nan
     found = {}
     for name, course in courses(x, part).items():

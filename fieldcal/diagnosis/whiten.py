@@ -11,6 +11,7 @@ Each random part belongs to one channel. F of
 
 - "walk": a random walk through the rows, per sqrt(s);
 - "offset": one value for each window;
+- "window 7": a value for that window alone;
 - "time", "faster time", "fast time", "alpha", "beta", "joints", "force", "force and
   time", "temperature", "since turn": a smooth function of that, nothing more being
   known of it (a short series with smaller and smaller terms).
@@ -30,6 +31,9 @@ from fieldcal.samples import Array
 KNOTS = 120
 EXACT = 500
 """Rows up to which a walk is taken as it is, not on KNOTS spans."""
+
+ALONE = "window"
+"""What the kind of a part of one window begins with."""
 
 HARMONICS = 4
 SLOW = 5
@@ -141,7 +145,8 @@ def _inverse_root(rows: Rows, errors: Errors, channel: int) -> Array:
     cov += np.diag(rows.sd[use, channel] ** 2)
     common = rows.common[use, channel]
     cov += np.outer(common, common) * np.equal.outer(*[rows.x.position[use]] * 2)
-    if any(p.kind != "offset" for p in errors.parts if p.channel == channel):
+    parts = [p for p in errors.parts if p.channel == channel]
+    if any(p.kind != "offset" and not p.kind.startswith(ALONE) for p in parts):
         return np.linalg.inv(np.linalg.cholesky(cov))
     out, position = np.zeros_like(cov), rows.x.position[use]
     for p in np.unique(position):
@@ -162,6 +167,9 @@ def covariance(rows: Rows, errors: Errors, channel: int) -> Array:
 
 def factor(kind: str, x: Experience, channel: int) -> Array:
     """F of a part, (n, m)."""
+    if kind.startswith(ALONE):
+        there: Array = np.equal(x.position, int(kind.removeprefix(ALONE))).astype(float)
+        return there[:, None]
     return _FACTORS[kind](x, channel)
 
 
@@ -265,3 +273,8 @@ _FACTORS: dict[str, Callable[[Experience, int], Array]] = {
 
 SMOOTH = tuple(_FACTORS)[2:]
 """Kinds that are a smooth function of something."""
+
+
+def nameless(kind: str) -> bool:
+    """Whether a part is no random process that devices have, but something unknown."""
+    return kind in SMOOTH or kind.startswith(ALONE)

@@ -69,7 +69,7 @@ def paragraph(
     for one in effects:
         for other in one.aliases:
             out.append(_deciding(explanation, one.id, other))
-    out += [_unexplained(u) for u in unknown]
+    out += dict.fromkeys(_unexplained(u, unknown) for u in unknown)
     return " ".join([*filter(None, out), *notes])
 
 
@@ -152,18 +152,31 @@ def _deciding(explanation: Explanation, one: str, other: str) -> str:
     )
 
 
-def _unexplained(unknown: Unknown) -> str:
-    channel = CHANNELS[unknown.channel]
-    if not np.isfinite(unknown.correlation):
-        places = ", ".join(map(str, unknown.positions))
+def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
+    """What is known of a mismatch; channels that are off in the same places in one."""
+    if np.isfinite(one.correlation):
         return (
-            f"{channel} is off in positions {places} by itself; take them again, and"
-            " look for what was different there."
+            f"{CHANNELS[one.channel]} follows {one.covariate} (correlation"
+            f" {one.correlation:+.2f}); a smooth function of {one.kind} takes"
+            f" {100 * one.share:.0f} % of its variance."
         )
+    alike = [u for u in all_ if (u.kind, u.positions) == (one.kind, one.positions)]
+    places = ", ".join(map(str, one.positions))
+    if one.turned:
+        angles = " and ".join(
+            f"{t.joint} had been off by {said(Quantity(t.degrees, t.sigma, '°'))}"
+            for t in one.turned
+        )
+        return (
+            f"Position {places} is off by itself, as if {angles} there: set it anew and"
+            " take it again."
+        )
+    channels = " and ".join(dict.fromkeys(CHANNELS[u.channel] for u in alike))
+    verb = "is" if len(alike) == 1 else "are"
+    where = "position" if len(one.positions) == 1 else "positions"
     return (
-        f"{channel} follows {unknown.covariate} (correlation"
-        f" {unknown.correlation:+.2f}); a smooth function of {unknown.kind} takes"
-        f" {100 * unknown.share:.0f} % of its variance."
+        f"{channels} {verb} off in {where} {places} by itself; take it again, and look"
+        " for what was different there."
     )
 
 

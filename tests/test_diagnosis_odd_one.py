@@ -1,0 +1,80 @@
+"""One position that is off by itself is found, and what it was set at instead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ladder
+import numpy as np
+import pytest
+from ladder import LADDER, TACTICAL, Array, Fault, Ride
+from ladder_sessions import diagnosed, named
+
+from fieldcal.diagnosis.result import Diagnosis
+
+AMID = (1, 5, 7)
+"""Positions amid the session; at its ends a step of the bias would do as well."""
+
+
+def off(window: int, axis: int, size: float) -> Fault:
+    def add(ridden: Ride, out: Array) -> None:
+        out[ridden.held == window, axis] += size
+
+    return add
+
+
+def tooth(ridden: Ride, out: Array) -> None:
+    """A joint's tooth, which in these positions goes as the force to the 2nd power."""
+    alpha = np.deg2rad([LADDER[i][0] for i in np.maximum(ridden.held, 0)])
+    out[:, 2] += 0.05 * np.sin(8 * alpha + 0.5)
+
+
+def misset(monkeypatch: pytest.MonkeyPatch, window: int, *degrees: float) -> None:
+    """Turn the device otherwise in one position than the session says."""
+    way = [
+        tuple(np.add(a, degrees)) if i == window else a for i, a in enumerate(LADDER)
+    ]
+    monkeypatch.setattr(ladder, "LADDER", tuple(way))
+
+
+def places(said: Diagnosis) -> set[tuple[str, tuple[int, ...]]]:
+    return {(m.channel, m.positions) for m in said.mismatch if m.kind == "position"}
+
+
+@pytest.mark.parametrize("window", AMID)
+def test_one_axis_in_one_position(window: int, tmp_path: Path) -> None:
+    axis = window % 3
+    said = diagnosed(tmp_path / "s", TACTICAL, off(window, axis, 0.006), seed=window)
+    assert said.verdict == "unexplained" and not named(said)
+    assert places(said) == {("a" + "xyz"[axis], (window,))}
+
+
+@pytest.mark.parametrize(
+    ("window", "alpha", "beta"),
+    [(2, 1.5, 0.0), (4, 0.0, -1.5), (7, 3.0, 2.0), (5, 22.5, 0.0)],
+)
+def test_angles_that_were_set_otherwise_are_said(
+    window: int,
+    alpha: float,
+    beta: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    misset(monkeypatch, window, alpha, beta)
+    said = diagnosed(tmp_path / "s", TACTICAL, seed=window)
+    assert said.verdict == "unexplained"
+    assert {p for _, p in places(said)} == {(window,)}
+    assert f"Position {window} is off by itself, as if" in said.says
+    for joint, degrees in (("α", alpha), ("β", beta)):
+        if degrees:
+            _, _, rest = said.says.partition(f"{joint} had been off by ")
+            value, _, sigma = rest.split(" ")[:3]
+            assert abs(float(value) - degrees) < 4 * float(sigma) < 0.01
+        else:
+            assert f"{joint} had been" not in said.says
+
+
+def test_a_size_that_no_device_has_is_no_cause(tmp_path: Path) -> None:
+    said = diagnosed(tmp_path / "s", TACTICAL, tooth)
+    assert said.verdict == "unexplained" and not named(said)
+    assert {m.channel for m in said.mismatch} == {"az"}

@@ -62,13 +62,14 @@ def test_angles_that_were_set_otherwise_are_said(
 ) -> None:
     misset(monkeypatch, window, alpha, beta)
     said = diagnosed(tmp_path / "s", TACTICAL, seed=window)
-    assert said.verdict == "unexplained"
+    assert said.verdict == "unexplained" and not named(said)
     assert {p for _, p in places(said)} == {(window,)}
+    assert said.after.held_out_rms < 0.2 * said.before.held_out_rms
     assert f"Position {window} is off by itself, as if" in said.says
     for joint, degrees in (("α", alpha), ("β", beta)):
         if degrees:
             _, _, rest = said.says.partition(f"{joint} had been off by ")
-            value, _, sigma = rest.split(" ")[:3]
+            value, _, sigma = rest.partition(" deg")[0].split()
             assert abs(float(value) - degrees) < 4 * float(sigma) < 0.01
         else:
             assert f"{joint} had been" not in said.says

@@ -83,6 +83,7 @@ class Bench:
         self.free = bool((~x.oriented).any())
         known = np.ones(self.places, dtype=bool)
         known[x.position[~x.oriented]] = False
+        known[list(self.errors.loose)] = False
         self.leeway = np.where(known, self.errors.setting, TURN)
         self.rated = bool(x.rate.any())
         used: NDArray[np.bool_] = np.any(rows.used, axis=0)

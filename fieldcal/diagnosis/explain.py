@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from fieldcal.diagnosis.candidates import Hypothesis, hypotheses
 from fieldcal.diagnosis.contender import Model
 from fieldcal.diagnosis.estimate import RELAX
 from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.misplaced import JOINTS, Turned, misplaced
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.prepare import Prepared, divided, refined
 from fieldcal.diagnosis.reduce import rate_of
@@ -22,7 +23,7 @@ from fieldcal.diagnosis.together import together
 from fieldcal.diagnosis.turning import Turning, Turntable
 from fieldcal.diagnosis.turns import Turn
 from fieldcal.diagnosis.unwind import turned
-from fieldcal.diagnosis.whiten import Errors, Part
+from fieldcal.diagnosis.whiten import ALONE, Errors, Part
 from fieldcal.frames import EARTH_RATE
 
 SEES_EARTH = 20.0
@@ -53,6 +54,8 @@ class Explanation:
     instead : what would do as well in turns, by the id of what is in the model
     earth : by how much the Earth's rate raises ln Z; 0 where it is not in the model
     in_step : first channels of the triads whose axes seem to wander, in one course
+    misset : angles that single positions were set at otherwise
+    unaware : what was found before these were let loose, if there are any
 
     """
 
@@ -71,6 +74,8 @@ class Explanation:
     instead: Mapping[str, tuple[str, ...]]
     earth: float
     in_step: frozenset[int]
+    misset: Mapping[int, tuple[Turned, ...]] = field(default_factory=dict)
+    unaware: Explanation | None = None
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -92,13 +97,42 @@ class Explanation:
 def explain(prepared: Prepared) -> Explanation:
     """Find what explains a recording.
 
-    What turns say of the gyroscopes shows in the Earth's rate as well, where they see
-    that; the windows are searched again with it then.
+    Where single positions were set at other angles than is said, these are let loose:
+    turns end at them as well. What turns say of the gyroscopes shows in the Earth's
+    rate, where they see that; the windows are searched again with it then.
     """
     found = _explained(prepared, ())
+    unaware, misset = found, _misset(found)
+    if misset:
+        prepared = _loosened(prepared, misset)
+        found = _explained(prepared, ())
     if prepared.navigation and (rates := _of_rates(found)):
-        return _explained(prepared, rates)
-    return found
+        found = _explained(prepared, rates)
+    return replace(found, misset=misset, unaware=unaware) if misset else found
+
+
+def _misset(found: Explanation) -> dict[int, tuple[Turned, ...]]:
+    """Positions that are off by themselves, of which the angles explain it."""
+    out = {}
+    for part in found.model.bench.errors.parts:
+        if part.kind.startswith(ALONE) and part.channel < len("xyz"):
+            position = int(part.kind.removeprefix(ALONE))
+            if angles := misplaced(found.wide, found.fit, position):
+                out[position] = angles
+    return out
+
+
+def _loosened(prepared: Prepared, misset: Mapping[int, tuple[Turned, ...]]) -> Prepared:
+    """With single positions where they seem to be, and their angles estimated."""
+    bench = prepared.bench
+    angles = {joint: getattr(bench.rows.x, joint).copy() for joint in JOINTS}
+    for position, wrong in misset.items():
+        inside = bench.rows.x.position == position
+        for one in wrong:
+            angles[one.joint][inside] += np.deg2rad(one.angle.value)
+    rows = replace(bench.rows, x=bench.rows.x.turned(**angles))
+    errors = replace(bench.errors, loose=tuple(sorted(misset)))
+    return replace(prepared, bench=bench.but(rows=rows, errors=errors))
 
 
 def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
@@ -195,7 +229,7 @@ def untold(fit: Fit, told: tuple[Term, ...]) -> Fit:
 
 def bare(prepared: Prepared, model: Model, fit: Fit) -> tuple[Bench, Fit]:
     """The effects that were found, without anything random but the angles' setting."""
-    errors = Errors(setting=model.bench.errors.setting)
+    errors = replace(model.bench.errors, parts=())
     bench = prepared.bench.but(errors=errors, relax=RELAX)
     return bench, bench.fit(fit.terms, fit)
 

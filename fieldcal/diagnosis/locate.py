@@ -7,6 +7,7 @@ channels whose squares it accounts for, the positions in which it stands out.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +84,7 @@ def of_chance(explanation: Explanation) -> Iterator[Mismatch]:
     """Scatter that was found random."""
     bench = explanation.model.bench
     if bench.errors.setting > 0:
-        plain = bench.but(errors=type(bench.errors)(bench.errors.parts, 0.0))
+        plain = bench.but(errors=replace(bench.errors, setting=0.0))
         fit = plain.fit(explanation.fit.terms, explanation.fit)
         squares = (fit.white**2).sum(axis=0) - (explanation.fit.white**2).sum(axis=0)
         covariate = catalogue()["angle_setting"].covariate

@@ -18,6 +18,7 @@ import numpy as np
 
 from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.result import Quantity
 from fieldcal.samples import Array
 
 WIDEST = np.deg2rad(20.0)
@@ -25,15 +26,14 @@ WIDEST = np.deg2rad(20.0)
 
 ANEW = 4
 STANDS = 3.5
-JOINTS = ("α", "β")
+JOINTS = ("alpha", "beta")
 
 
 class Turned(NamedTuple):
-    """By how much an angle was another than the one that was said, deg."""
+    """By how much the angle of a joint was another than the one that was said."""
 
     joint: str
-    degrees: float
-    sigma: float
+    angle: Quantity
 
 
 def misplaced(bench: Bench, fit: Fit, position: int) -> tuple[Turned, ...]:
@@ -71,10 +71,10 @@ def misplaced(bench: Bench, fit: Fit, position: int) -> tuple[Turned, ...]:
     left = d - a @ step
     if left @ np.linalg.solve(v, left) > STANDS**2:
         return ()
-    sigma = np.sqrt(np.diag(covariance))
+    size, sigma = np.rad2deg(theta), np.rad2deg(np.sqrt(np.diag(covariance)))
     return tuple(
-        Turned(joint, float(np.rad2deg(t)), float(np.rad2deg(s)))
-        for joint, t, s in zip(JOINTS, theta, sigma, strict=True)
+        Turned(joint, Quantity(float(t), float(s), "deg"))
+        for joint, t, s in zip(JOINTS, size, sigma, strict=True)
         if abs(t) > STANDS * s
     )
 

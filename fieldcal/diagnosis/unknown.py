@@ -8,7 +8,7 @@ wander do, which is named as random and is no unknown, unless the axes go in ste
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.explain import Explanation, bare, wandering
 from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import cells
-from fieldcal.diagnosis.misplaced import Turned, misplaced
+from fieldcal.diagnosis.misplaced import Turned
 from fieldcal.diagnosis.scatter import alike
 from fieldcal.diagnosis.whiten import ALONE, Part, factor, nameless
 from fieldcal.effects import Experience
@@ -73,7 +73,18 @@ def unknowns(explanation: Explanation) -> list[Unknown]:
             out += [replace(p, kind="time") if p.kind == "walk" else p for p in scatter]
         elif len(alike(offsets)) < ALIKE:
             out += alike(offsets)
-    return [_of(explanation, part) for part in out]
+    return [*_misset(explanation), *(_of(explanation, part) for part in out)]
+
+
+def _misset(explanation: Explanation) -> Iterator[Unknown]:
+    """Positions that were not set where they are said to have been."""
+    if (unaware := explanation.unaware) is None:
+        return
+    for part in unaware.model.bench.errors.parts:
+        if part.kind.startswith(ALONE) and part.channel < len("xyz"):
+            found = _of(unaware, part)
+            if turned := explanation.misset.get(found.positions[0]):
+                yield replace(found, turned=turned)
 
 
 def walking(explanation: Explanation) -> list[Part]:
@@ -99,12 +110,9 @@ def _of(explanation: Explanation, part: Part) -> Unknown:
     z = np.nan_to_num(mean[:, c] / sd[:, c])
     squares = float((fit.white[:, c] ** 2).sum())
     excess = max(squares - float(bench.rows.used[:, c].sum()), 1.0)
-    turned: tuple[Turned, ...] = ()
     out = np.unique(position[np.abs(z) > STANDS])
     if part.kind.startswith(ALONE):
         out = np.array([int(part.kind.removeprefix(ALONE))])
-        if c < len("xyz"):
-            turned = misplaced(explanation.wide, explanation.fit, int(out[0]))
     elif not len(out):
         out = position[[int(np.argmax(np.abs(z)))]]
     covariate, correlation = _follows(bench.rows.x, fit.residual[:, c], part)
@@ -119,7 +127,6 @@ def _of(explanation: Explanation, part: Part) -> Unknown:
         rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
         sigma=float(np.sqrt(excess)),
         squares=excess,
-        turned=turned,
     )
 
 

@@ -60,7 +60,8 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
 def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     """What follows from an explanation of the samples of a block."""
     lost = {t.effect.id: naming.removed(explanation, t) for t in explanation.terms}
-    first, then = before(block, explanation), after(explanation)
+    first = before(block, explanation.unaware or explanation)
+    then = after(explanation)
     unknown = _unknown(explanation, first, then)
     others = aliases(explanation)
     effects = _effects(explanation, lost, then, others)

@@ -20,7 +20,7 @@ Each random part belongs to one channel. F of
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,17 +58,19 @@ class Errors:
     ----------
     parts : random parts of the channels
     setting : scatter of the angles from position to position, rad
+    loose : positions that were not set at the angles that are said
 
     """
 
     parts: tuple[Part, ...] = ()
     setting: float = 0.0
+    loose: tuple[int, ...] = ()
 
     def but(self, parts: tuple[Part, ...]) -> Errors:
         """The same with some parts put in place of those of their kind and channel."""
         new = {(p.kind, p.channel) for p in parts}
         kept = tuple(p for p in self.parts if (p.kind, p.channel) not in new)
-        return Errors(kept + tuple(p for p in parts if p.size > 0), self.setting)
+        return replace(self, parts=kept + tuple(p for p in parts if p.size > 0))
 
 
 class Whitener:

@@ -21,6 +21,8 @@ SHOWN = 3.0
 EACH = 3
 """Times up to which an effect that happened again is told each time."""
 
+GREEK = {"alpha": "α", "beta": "β"}
+
 MOST = 6
 """Places that are told."""
 
@@ -164,8 +166,7 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
     places = ", ".join(map(str, one.positions))
     if one.turned:
         angles = " and ".join(
-            f"{t.joint} had been off by {said(Quantity(t.degrees, t.sigma, '°'))}"
-            for t in one.turned
+            f"{GREEK[t.joint]} had been off by {said(t.angle)}" for t in one.turned
         )
         return (
             f"Position {places} is off by itself, as if {angles} there: set it anew and"

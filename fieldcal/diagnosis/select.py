@@ -139,10 +139,11 @@ class Search:
         )
 
     def _instead(self, model: Model) -> list[Model]:
-        """With the likeliest causes, and the random parts as small as these leave them.
+        """With the likeliest causes, and the random parts as these leave them.
 
         A random part that was let in first has the size of all that was unexplained
-        then; held against it, a cause would seem to explain next to nothing.
+        then; held against it, a cause would seem to explain next to nothing. It is made
+        as small as a cause leaves it, or another takes its place.
         """
         if not model.random:
             return []
@@ -151,12 +152,15 @@ class Search:
             bench = bench.but(errors=dropped(bench.errors, name))
         bare = self.rules.model(model.chosen, bench, model.fit, (), model.shaped)
         ranked = sorted(self.larger(bare), key=lambda m: -m.objective)[:BEAM]
-        return [
+        again = [
             self._anew(
                 self.rules.model(m.chosen, model.bench, m.fit, model.random, m.shaped)
             )
             for m in ranked
         ]
+        chances = [max(wanders(m.bench, m.fit), key=lambda w: w.gain) for m in ranked]
+        pairs = zip(ranked, chances, strict=True)
+        return again + [self.with_random(m, c) for m, c in pairs if c.gain > self.price]
 
     def _followed(self, model: Model, first: Sequence[Model]) -> Model:
         """The best of one or two more hypotheses."""

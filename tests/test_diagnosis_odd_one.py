@@ -7,8 +7,8 @@ from pathlib import Path
 import ladder
 import numpy as np
 import pytest
-from ladder import LADDER, TACTICAL, Array, Fault, Ride
-from ladder_sessions import diagnosed, named
+from ladder import LADDER, TACTICAL, Array, Fault, Ride, windows
+from ladder_sessions import agrees, diagnosed, named
 
 from fieldcal.diagnosis.result import Diagnosis
 
@@ -27,6 +27,19 @@ def tooth(ridden: Ride, out: Array) -> None:
     """A joint's tooth, which in these positions goes as the force to the 2nd power."""
     alpha = np.deg2rad([LADDER[i][0] for i in np.maximum(ridden.held, 0)])
     out[:, 2] += 0.05 * np.sin(8 * alpha + 0.5)
+
+
+def coupling(ridden: Ride, out: Array) -> None:
+    out[:, :3] += ridden.f @ np.array([[0, -0.006, 0], [0.008, 0, 0.007], [0, 0, 0]])
+
+
+def gyro_coupling(ridden: Ride, out: Array) -> None:
+    out[:, 3:] += ridden.w @ np.array([[0, 0, 0], [0.01, 0, 0], [0, 0.006, 0]])
+
+
+def step(ridden: Ride, out: Array) -> None:
+    """Across the force, so that an angle would do as well in the windows."""
+    out[ridden.t > windows()[0][1] + 1.0, 0] += 0.05
 
 
 def misset(monkeypatch: pytest.MonkeyPatch, window: int, *degrees: float) -> None:
@@ -51,7 +64,7 @@ def test_one_axis_in_one_position(window: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("window", "alpha", "beta"),
-    [(2, 1.5, 0.0), (4, 0.0, -1.5), (7, 3.0, 2.0), (5, 22.5, 0.0)],
+    [(0, 1.0, 0.0), (2, 1.5, 0.0), (4, 0.0, -1.5), (7, 3.0, 2.0), (8, 22.5, 1.0)],
 )
 def test_angles_that_were_set_otherwise_are_said(
     window: int,
@@ -73,6 +86,24 @@ def test_angles_that_were_set_otherwise_are_said(
             assert abs(float(value) - degrees) < 4 * float(sigma) < 0.01
         else:
             assert f"{joint} had been" not in said.says
+
+
+def test_an_effect_besides_has_its_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    misset(monkeypatch, 3, 0.5, 0.5)
+    said = diagnosed(tmp_path / "s", TACTICAL, coupling, seed=3)
+    assert said.verdict == "unexplained" and named(said) == ["cross_coupling"]
+    agrees(said, "cross_coupling", {"k12": 0.008, "k21": -0.006, "k32": 0.007})
+    assert "Position 3 is off by itself, as if α had been off by 0.49" in said.says
+
+
+def test_a_step_behind_the_first_position_is_one(tmp_path: Path) -> None:
+    """Turns that end where they are said to end tell it from an angle."""
+    said = diagnosed(tmp_path / "s", TACTICAL, step, gyro_coupling)
+    assert named(said) == ["bias_step", "gyro_cross_coupling"]
+    agrees(said, "bias_step", {"ax": 0.05})
+    agrees(said, "gyro_cross_coupling", {"s12": 0.01, "s23": 0.006})
 
 
 def test_a_size_that_no_device_has_is_no_cause(tmp_path: Path) -> None:

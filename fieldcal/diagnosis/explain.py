@@ -12,18 +12,18 @@ from fieldcal.diagnosis.candidates import Hypothesis, hypotheses
 from fieldcal.diagnosis.contender import Model
 from fieldcal.diagnosis.estimate import RELAX
 from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.misplaced import JOINTS, Turned, misplaced
+from fieldcal.diagnosis.loosened import Misset, at_an_end, loosened, missets
 from fieldcal.diagnosis.model import Term
 from fieldcal.diagnosis.prepare import Prepared, divided, refined
 from fieldcal.diagnosis.reduce import rate_of
 from fieldcal.diagnosis.rivals import estimated, gauged, with_turns
-from fieldcal.diagnosis.select import Search
+from fieldcal.diagnosis.select import SEEN, Search
 from fieldcal.diagnosis.steps import jump_instant
 from fieldcal.diagnosis.together import together
 from fieldcal.diagnosis.turning import Turning, Turntable
 from fieldcal.diagnosis.turns import Turn
 from fieldcal.diagnosis.unwind import turned
-from fieldcal.diagnosis.whiten import ALONE, Errors, Part
+from fieldcal.diagnosis.whiten import Errors, Part
 from fieldcal.frames import EARTH_RATE
 
 SEES_EARTH = 20.0
@@ -74,13 +74,19 @@ class Explanation:
     instead: Mapping[str, tuple[str, ...]]
     earth: float
     in_step: frozenset[int]
-    misset: Mapping[int, tuple[Turned, ...]] = field(default_factory=dict)
+    misset: Misset = field(default_factory=dict)
     unaware: Explanation | None = None
 
     @property
     def terms(self) -> tuple[Term, ...]:
         """Effects of the windows, each once."""
         return tuple(t for t in self.fit.terms if t.columns)
+
+    def plainer(self, other: Explanation) -> bool:
+        """Whether turns and windows need less than another explanation has."""
+        mine, theirs = (e.turning.terms if e.turning else () for e in (self, other))
+        turns = len(mine) < len(theirs) or not (mine or theirs)
+        return turns and len(self.terms) < len(other.terms)
 
     @property
     def sees_earth(self) -> bool:
@@ -102,37 +108,30 @@ def explain(prepared: Prepared) -> Explanation:
     rate, where they see that; the windows are searched again with it then.
     """
     found = _explained(prepared, ())
-    unaware, misset = found, _misset(found)
+    unaware, misset = found, missets(found.model, found.wide, found.fit)
+    if not misset:
+        unaware, misset = _at_an_end(found)
     if misset:
-        prepared = _loosened(prepared, misset)
-        found = _explained(prepared, ())
+        loose = loosened(prepared, misset)
+        aware = _explained(loose, ())
+        if unaware is found or aware.plainer(found):
+            prepared, found = loose, aware
+        else:
+            misset = {}
     if prepared.navigation and (rates := _of_rates(found)):
         found = _explained(prepared, rates)
     return replace(found, misset=misset, unaware=unaware) if misset else found
 
 
-def _misset(found: Explanation) -> dict[int, tuple[Turned, ...]]:
-    """Positions that are off by themselves, of which the angles explain it."""
-    out = {}
-    for part in found.model.bench.errors.parts:
-        if part.kind.startswith(ALONE) and part.channel < len("xyz"):
-            position = int(part.kind.removeprefix(ALONE))
-            if angles := misplaced(found.wide, found.fit, position):
-                out[position] = angles
-    return out
-
-
-def _loosened(prepared: Prepared, misset: Mapping[int, tuple[Turned, ...]]) -> Prepared:
-    """With single positions where they seem to be, and their angles estimated."""
-    bench = prepared.bench
-    angles = {joint: getattr(bench.rows.x, joint).copy() for joint in JOINTS}
-    for position, wrong in misset.items():
-        inside = bench.rows.x.position == position
-        for one in wrong:
-            angles[one.joint][inside] += np.deg2rad(one.angle.value)
-    rows = replace(bench.rows, x=bench.rows.x.turned(**angles))
-    errors = replace(bench.errors, loose=tuple(sorted(misset)))
-    return replace(prepared, bench=bench.but(rows=rows, errors=errors))
+def _at_an_end(found: Explanation) -> tuple[Explanation, Misset]:
+    """The same with the first or last position off by itself, and not all the rest."""
+    shown = found.turning is not None and found.turning.terms
+    if shown or found.model.excess > SEEN:
+        if (model := at_an_end(found.search, found.model)) is not None:
+            wide, fit, _ = estimated(found.search, model)
+            other = replace(found, model=model, wide=wide, fit=fit)
+            return other, missets(model, wide, fit)
+    return found, {}
 
 
 def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:

@@ -91,6 +91,11 @@ def wanders(bench: Bench, fit: Fit) -> Iterator[Wander]:
         yield _of_angles(bench, fit)
 
 
+def alone(bench: Bench, fit: Fit, window: int) -> Wander:
+    """The part of one window that the accelerometers have."""
+    return _of(bench, fit, f"{ALONE} {window}", *TRIADS[0])
+
+
 def cautious(bench: Bench, fit: Fit) -> Errors:
     """The errors with whatever scatter of the windows there may be, proved or not.
 

@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.diagnosis.aliases import decided_by, telling_position
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import Found
-from fieldcal.diagnosis.unknown import Unknown
+from fieldcal.diagnosis.unknown import Unknown, listed
 from fieldcal.effects import Chain, Scatter, catalogue
 from fieldcal.samples import CHANNELS
 
@@ -25,13 +25,12 @@ def advice(
         if isinstance(catalogue()[one.id], Chain):
             yield f"{one.id}: {decided_by(one.id)}, then diagnose again."
     yield from _deciding(explanation, effects)
-    for mystery in unknown:
-        yield _look(mystery)
+    yield from dict.fromkeys(_look(mystery) for mystery in unknown)
     known = [f.id for f in effects if not f.aliases and _deterministic(f)]
     if known and not unknown:
-        listed = ", ".join(f'"{i}"' for i in known)
+        ids = ", ".join(f'"{i}"' for i in known)
         yield (
-            f"put effects = [{listed}] with the values found into [model] of"
+            f"put effects = [{ids}] with the values found into [model] of"
             " session.toml, or keep the device file that --twin writes."
         )
     if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
@@ -61,10 +60,11 @@ def _deciding(explanation: Explanation, effects: Sequence[Found]) -> Iterator[st
 
 
 def _look(unknown: Unknown) -> str:
-    channel = CHANNELS[unknown.channel]
-    places = ", ".join(map(str, unknown.positions))
+    channel, places = CHANNELS[unknown.channel], listed(unknown.positions)
+    if unknown.turned:
+        return f"set {places} anew and take it again: its angles were others."
     if not np.isfinite(unknown.correlation):
-        return f"take positions {places} again: {channel} is off there by itself."
+        return f"take {places} again: {channel} is off there by itself."
     return (
         f"vary {unknown.kind} on purpose and hold the rest: {channel} follows it, and"
         " no effect in the catalogue does."

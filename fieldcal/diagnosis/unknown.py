@@ -204,3 +204,14 @@ def _waves(t: Array) -> dict[str, Array]:
 def matters(found: Sequence[Unknown], explained: float) -> bool:
     """Whether what is unknown is more than a small rest of what is explained."""
     return sum(u.squares for u in found) > SMALL * explained
+
+
+def listed(positions: Sequence[int], most: int | None = None) -> str:
+    """Name positions, up to so many.
+
+    >>> listed([4]), listed([1, 2, 3], most=2)
+    ('position 4', 'positions 1, 2…')
+    """
+    word = "position" if len(positions) == 1 else "positions"
+    some = ", ".join(map(str, positions[:most]))
+    return f"{word} {some}" + "…" * (most is not None and len(positions) > most)

@@ -11,7 +11,7 @@ import numpy as np
 from fieldcal.diagnosis.aliases import decided_by, telling_position
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import Found, Mismatch, Quality, Quantity, Verdict
-from fieldcal.diagnosis.unknown import Unknown
+from fieldcal.diagnosis.unknown import Unknown, listed
 from fieldcal.effects import Scatter, catalogue
 from fieldcal.samples import CHANNELS
 
@@ -25,6 +25,9 @@ GREEK = {"alpha": "α", "beta": "β"}
 
 MOST = 6
 """Places that are told."""
+
+SHOWN_PLACES = 6
+"""Positions of one place that are told."""
 
 
 def said(quantity: Quantity) -> str:
@@ -115,10 +118,7 @@ def _places(mismatch: Sequence[Mismatch]) -> str:
 
 
 def _where(m: Mismatch) -> str:
-    places = ", ".join(map(str, m.positions[:6])) + (
-        "…" if len(m.positions) > 6 else ""
-    )
-    return f"positions {places}, {m.from_s:.0f} to {m.to_s:.0f} s"
+    return f"{listed(m.positions, SHOWN_PLACES)}, {m.from_s:.0f} to {m.to_s:.0f} s"
 
 
 def _is_random(found: Found) -> bool:
@@ -163,21 +163,20 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
             f" {100 * one.share:.0f} % of its variance."
         )
     alike = [u for u in all_ if (u.kind, u.positions) == (one.kind, one.positions)]
-    places = ", ".join(map(str, one.positions))
+    places = listed(one.positions)
     if one.turned:
         angles = " and ".join(
             f"{GREEK[t.joint]} had been off by {said(t.angle)}" for t in one.turned
         )
         return (
-            f"Position {places} is off by itself, as if {angles} there: set it anew and"
-            " take it again."
+            f"{places.capitalize()} is off by itself, as if {angles} there: set it anew"
+            " and take it again."
         )
     channels = " and ".join(dict.fromkeys(CHANNELS[u.channel] for u in alike))
     verb = "is" if len(alike) == 1 else "are"
-    where = "position" if len(one.positions) == 1 else "positions"
     return (
-        f"{channels} {verb} off in {where} {places} by itself; take it again, and look"
-        " for what was different there."
+        f"{channels} {verb} off in {places} by itself; take it again, and look for what"
+        " was different there."
     )
 
 

@@ -73,6 +73,25 @@ def test_the_replay_with_what_was_found_agrees_with_the_recording(
     assert [p["position"] for p in replays["positions"]] == list(range(9))
 
 
+def test_a_position_set_otherwise_is_replayed_where_it_was(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    positions = places()
+    windows = windows_of(positions)
+    windows[4] = replace(windows[4], alpha=windows[4].alpha + np.deg2rad(2.0))
+    block = simulate(DEVICE, windows, seed=4)
+    folder = write_session(tmp_path / "s", block, positions)
+    code, said, twin = diagnosed(folder, capsys)
+    assert code == 1 and said["verdict"] == "unexplained" and not twin.effects
+    assert {tuple(m["positions"]) for m in said["mismatch"]} == {(4,)}
+    assert said["next"] == [
+        "set position 4 anew and take it again: its angles were others."
+    ]
+    replays = said["twin"]
+    assert 0.8 < replays["twin"]["chi2_per_dof"] < 1.2
+    assert replays["refitted"]["chi2_per_dof"] > 10.0
+
+
 def test_windows_that_were_calm_are_calm_in_the_replay(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -104,7 +104,8 @@ def _cases(explanation: Explanation, profile: Profile, raw: Bench) -> dict[str, 
     """The devices, by name."""
     source = explanation.prepared.source
     nominal, start = source.about.nominal, float(source.block.t[0])
-    base, refitted = explanation.base.state, raw.fit(explanation.always)
+    base = (explanation.unaware or explanation).base.state
+    refitted = raw.fit(explanation.always)
     plain = replace(
         base,
         bias=np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),

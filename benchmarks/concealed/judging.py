@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.concealed.sessions import Session
 from fieldcal.diagnosis import Diagnosis
+from fieldcal.effects import Line, catalogue
 
 ALWAYS = frozenset({"earth_rate"})
 """True of every session, so never a false alarm."""
@@ -109,4 +110,7 @@ def _pulls(session: Session, told: Diagnosis) -> Iterator[tuple[str, float]]:
             value, sigma = quantity.value, quantity.sigma
             if isinstance(value, str) or not sigma:
                 continue
-            yield f"{effect.id}.{name}", (value - truth.get(name, 0.0)) / sigma
+            there = truth.get(name, 0.0)
+            if isinstance(catalogue()[effect.id], Line):
+                there = abs(there)  # each channel has a phase, which takes the sign
+            yield f"{effect.id}.{name}", (value - there) / sigma

@@ -252,8 +252,11 @@ def test_the_circle_closes(
     assert code == 1 and [e["id"] for e in said["effects"]] == ["base_tilt"]
     twin = f"--virtual=--profile={first / 'twin.toml'}"
     run = ["--headless", "--speed", "max", "--json", "--no-report", "--seconds", "20"]
-    assert main(["run", "five_position", twin, *run, "-o", str(second)]) == 0
-    again = json.loads(capsys.readouterr().out)["parameters"]
+    # a chi-squared that is high by chance leaves the numbers less sure than is asked
+    assert main(["run", "five_position", twin, *run, "-o", str(second)]) in (0, 1)
+    result = json.loads(capsys.readouterr().out)
+    assert result["verdict"] == "good"
+    again = result["parameters"]
     for group in ("acc_bias", "acc_scale", "gyr_bias", "base_tilt"):
         apart = np.subtract(again[group]["value"], real[group]["value"])
         sigma = np.hypot(again[group]["sigma"], real[group]["sigma"])

@@ -47,23 +47,13 @@ def misplaced(bench: Bench, fit: Fit, position: int) -> tuple[Turned, ...]:
 
     """
     rows = bench.rows
-    inside = rows.x.position == position
-    use = rows.used[inside, :3]
-    if not (rows.x.oriented.all() and use.any(axis=0).all()):
+    used = rows.used[rows.x.position == position, :3]
+    if not (rows.x.oriented.all() and used.any(axis=0).all()):
         return ()
-    weight = np.where(use, 1 / np.where(use, rows.sd[inside, :3], 1.0) ** 2, 0.0)
-    total = weight.sum(axis=0)
-    weight /= total
-    free = np.einsum("ic,ick->ck", weight, fit.design[inside, :3])
-    shared = rows.common[inside, :3][0] ** 2
-    v = np.diag(1 / total + shared) + free @ fit.covariance @ free.T
-    theta, aside = np.zeros(2), np.resize(fit.state.aside, (bench.places, 2))
+    weight, v = _averaged(bench, fit, position)
+    theta = step = np.zeros(2)
     for _ in range(ANEW):
-        state = replace(fit.state, aside=aside + _only(position, theta, len(aside)))
-        apart = np.where(use, (rows.y - state.predict(rows.x))[inside, :3], 0.0)
-        own = bench.aside(state)[inside, :3, 2 * position : 2 * position + 2]
-        d = (weight * apart).sum(axis=0)
-        a = np.einsum("ic,icj->cj", weight, own)
+        d, a = _off(bench, fit, position, weight, theta)
         pull = np.linalg.solve(v, a)
         covariance = np.linalg.inv(a.T @ pull + np.eye(2) / WIDEST**2)
         step = covariance @ (pull.T @ d - theta / WIDEST**2)
@@ -79,8 +69,29 @@ def misplaced(bench: Bench, fit: Fit, position: int) -> tuple[Turned, ...]:
     )
 
 
-def _only(position: int, theta: Array, places: int) -> Array:
-    """Small turns of one position, (places, 2)."""
-    out = np.zeros((places, 2))
-    out[position] = theta
-    return out
+def _averaged(bench: Bench, fit: Fit, position: int) -> tuple[Array, Array]:
+    """Weights of a window's rows in its mean, (n, 3), and that mean's covariance V."""
+    rows = bench.rows
+    inside = rows.x.position == position
+    use = rows.used[inside, :3]
+    weight = np.where(use, 1 / np.where(use, rows.sd[inside, :3], 1.0) ** 2, 0.0)
+    total = weight.sum(axis=0)
+    weight = weight / total
+    free = np.einsum("ic,ick->ck", weight, fit.design[inside, :3])
+    shared = rows.common[inside, :3][0] ** 2
+    return weight, np.diag(1 / total + shared) + free @ fit.covariance @ free.T
+
+
+def _off(
+    bench: Bench, fit: Fit, position: int, weight: Array, theta: Array
+) -> tuple[Array, Array]:
+    """Mean d (3,) that a window is off by once turned by theta, and A (3, 2) there."""
+    rows = bench.rows
+    inside = rows.x.position == position
+    aside = np.resize(fit.state.aside, (bench.places, 2))
+    aside[position] += theta
+    state = replace(fit.state, aside=aside)
+    apart = (rows.y - state.predict(rows.x))[inside, :3]
+    own = bench.aside(state)[inside, :3, 2 * position : 2 * position + 2]
+    d = (weight * np.where(weight > 0, apart, 0.0)).sum(axis=0)
+    return d, np.einsum("ic,icj->cj", weight, own)

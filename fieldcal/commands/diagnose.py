@@ -90,7 +90,7 @@ def _replayed(
     from fieldcal.sim_device.profile_file import to_toml
     from fieldcal.twin import rerun
 
-    raw = raw_bench(session.block, (explanation.unaware or explanation).prepared)
+    raw = raw_bench(session.block, explanation.as_said.prepared)
     again = rerun(explanation, found, raw)
     write_whole(path, to_toml(again.profile))
     return again

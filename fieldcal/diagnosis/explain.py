@@ -82,6 +82,11 @@ class Explanation:
         """Effects of the windows, each once."""
         return tuple(t for t in self.fit.terms if t.columns)
 
+    @property
+    def as_said(self) -> Explanation:
+        """What was found with every position at the angles that are said."""
+        return self.unaware or self
+
     def plainer(self, other: Explanation) -> bool:
         """Whether turns and windows need less than another explanation has."""
         mine, theirs = (e.turning.terms if e.turning else () for e in (self, other))

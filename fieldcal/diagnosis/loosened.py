@@ -18,7 +18,6 @@ from fieldcal.diagnosis.misplaced import JOINTS, Turned, misplaced
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.scatter import alone
 from fieldcal.diagnosis.select import Search
-from fieldcal.diagnosis.whiten import ALONE
 
 Misset = Mapping[int, tuple[Turned, ...]]
 """Angles that single positions were set at otherwise."""
@@ -26,13 +25,12 @@ Misset = Mapping[int, tuple[Turned, ...]]
 
 def missets(model: Model, wide: Bench, fit: Fit) -> Misset:
     """Positions that are off by themselves, of which the angles explain it."""
-    out = {}
+    out: dict[int, tuple[Turned, ...]] = {}
     for part in model.bench.errors.parts:
-        if part.kind.startswith(ALONE) and part.channel < len("xyz"):
-            position = int(part.kind.removeprefix(ALONE))
-            if angles := misplaced(wide, fit, position):
-                out[position] = angles
-    return out
+        position = part.window
+        if position is not None and part.channel < len("xyz") and position not in out:
+            out[position] = misplaced(wide, fit, position)
+    return {position: angles for position, angles in out.items() if angles}
 
 
 def at_an_end(search: Search, model: Model) -> Model | None:

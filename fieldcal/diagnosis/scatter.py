@@ -20,7 +20,7 @@ import numpy as np
 
 from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.whiten import ALONE, SMOOTH, Errors, Part, factor
+from fieldcal.diagnosis.whiten import SMOOTH, Errors, Part, factor, kind_of
 from fieldcal.samples import CHANNELS, Array
 
 VARIANCE = 2.0
@@ -80,7 +80,7 @@ def wanders(bench: Bench, fit: Fit) -> Iterator[Wander]:
             if not any((kind, c) in there for c in channels):
                 yield _of(bench, fit, kind, triad, channels)
         if bench.windows >= FEWEST:
-            kind = f"{ALONE} {_odd_one(bench, fit, channels)}"
+            kind = kind_of(_odd_one(bench, fit, channels))
             if not any((kind, c) in there for c in channels):
                 yield _of(bench, fit, kind, triad, channels)
     for c, name in enumerate(CHANNELS):
@@ -93,7 +93,7 @@ def wanders(bench: Bench, fit: Fit) -> Iterator[Wander]:
 
 def alone(bench: Bench, fit: Fit, window: int) -> Wander:
     """The part of one window that the accelerometers have."""
-    return _of(bench, fit, f"{ALONE} {window}", *TRIADS[0])
+    return _of(bench, fit, kind_of(window), *TRIADS[0])
 
 
 def cautious(bench: Bench, fit: Fit) -> Errors:
@@ -105,7 +105,7 @@ def cautious(bench: Bench, fit: Fit) -> Errors:
     errors = bench.errors
     if bench.windows < FEWEST:
         return errors
-    there = {p.channel for p in errors.parts if not p.kind.startswith(ALONE)}
+    there = {p.channel for p in errors.parts if p.window is None}
     parts = []
     for c in np.flatnonzero(bench.rows.used.any(axis=0)):
         if c not in there:
@@ -193,8 +193,7 @@ def fees(errors: Errors) -> float:
     for first in (0, 3):
         parts = [p for p in errors.parts if first <= p.channel < first + 3]
         total += UNKNOWN * sum(p.kind in SMOOTH for p in parts)
-        alone = {p.kind for p in parts if p.kind.startswith(ALONE)}
-        total += (UNKNOWN + WHICH) * len(alone)
+        total += (UNKNOWN + WHICH) * len({p.window for p in parts} - {None})
         total += UNKNOWN * (len(alike([p for p in parts if p.kind == "offset"])) == 1)
         total += LONE * (sum(p.kind == "walk" for p in parts) == 1)
         total += sum(_wonder(p) for p in parts)

@@ -19,7 +19,7 @@ from fieldcal.diagnosis.fit import Fit
 from fieldcal.diagnosis.heldout import cells
 from fieldcal.diagnosis.misplaced import Turned
 from fieldcal.diagnosis.scatter import alike
-from fieldcal.diagnosis.whiten import ALONE, Part, factor, nameless
+from fieldcal.diagnosis.whiten import Part, factor, nameless
 from fieldcal.effects import Experience
 from fieldcal.samples import Array
 
@@ -81,10 +81,9 @@ def _misset(explanation: Explanation) -> Iterator[Unknown]:
     if (unaware := explanation.unaware) is None:
         return
     for part in unaware.model.bench.errors.parts:
-        if part.kind.startswith(ALONE) and part.channel < len("xyz"):
-            found = _of(unaware, part)
-            if turned := explanation.misset.get(found.positions[0]):
-                yield replace(found, turned=turned)
+        turned = explanation.misset.get(-1 if part.window is None else part.window)
+        if turned and part.channel < len("xyz"):
+            yield replace(_of(unaware, part), turned=turned)
 
 
 def walking(explanation: Explanation) -> list[Part]:
@@ -111,8 +110,8 @@ def _of(explanation: Explanation, part: Part) -> Unknown:
     squares = float((fit.white[:, c] ** 2).sum())
     excess = max(squares - float(bench.rows.used[:, c].sum()), 1.0)
     out = np.unique(position[np.abs(z) > STANDS])
-    if part.kind.startswith(ALONE):
-        out = np.array([int(part.kind.removeprefix(ALONE))])
+    if part.window is not None:
+        out = np.array([part.window])
     elif not len(out):
         out = position[[int(np.argmax(np.abs(z)))]]
     covariate, correlation = _follows(bench.rows.x, fit.residual[:, c], part)
@@ -147,7 +146,7 @@ def _share(bench: Bench, fit: Fit, part: Part) -> float:
 def _follows(x: Experience, residual: Array, part: Part) -> tuple[str, float]:
     """The simplest thing that the residual follows, and the correlation."""
     known = np.isfinite(residual)
-    if part.kind.startswith(("offset", ALONE)) or known.sum() < 3:
+    if part.kind == "offset" or part.window is not None or known.sum() < 3:
         return "the position itself", np.nan
     found = {}
     for name, course in courses(x, part).items():

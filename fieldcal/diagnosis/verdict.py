@@ -60,7 +60,7 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
 def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     """What follows from an explanation of the samples of a block."""
     lost = {t.effect.id: naming.removed(explanation, t) for t in explanation.terms}
-    first = before(block, explanation.unaware or explanation)
+    first = before(block, explanation.as_said)
     then = after(explanation)
     unknown = _unknown(explanation, first, then)
     others = aliases(explanation)

@@ -49,6 +49,11 @@ class Part:
     channel: int
     size: float
 
+    @property
+    def window(self) -> int | None:
+        """The only window that it is in, if it is of that sort."""
+        return window_of(self.kind)
+
 
 @dataclass(frozen=True, slots=True)
 class Errors:
@@ -148,7 +153,7 @@ def _inverse_root(rows: Rows, errors: Errors, channel: int) -> Array:
     common = rows.common[use, channel]
     cov += np.outer(common, common) * np.equal.outer(*[rows.x.position[use]] * 2)
     parts = [p for p in errors.parts if p.channel == channel]
-    if any(p.kind != "offset" and not p.kind.startswith(ALONE) for p in parts):
+    if any(p.kind != "offset" and p.window is None for p in parts):
         return np.linalg.inv(np.linalg.cholesky(cov))
     out, position = np.zeros_like(cov), rows.x.position[use]
     for p in np.unique(position):
@@ -169,8 +174,8 @@ def covariance(rows: Rows, errors: Errors, channel: int) -> Array:
 
 def factor(kind: str, x: Experience, channel: int) -> Array:
     """F of a part, (n, m)."""
-    if kind.startswith(ALONE):
-        there: Array = np.equal(x.position, int(kind.removeprefix(ALONE))).astype(float)
+    if (window := window_of(kind)) is not None:
+        there: Array = np.equal(x.position, window).astype(float)
         return there[:, None]
     return _FACTORS[kind](x, channel)
 
@@ -277,6 +282,20 @@ SMOOTH = tuple(_FACTORS)[2:]
 """Kinds that are a smooth function of something."""
 
 
+def window_of(kind: str) -> int | None:
+    """The window that a kind of part is of alone.
+
+    >>> window_of(kind_of(7)), window_of("walk")
+    (7, None)
+    """
+    return int(kind.removeprefix(ALONE)) if kind.startswith(ALONE) else None
+
+
+def kind_of(window: int) -> str:
+    """Kind of the part of one window alone."""
+    return f"{ALONE} {window}"
+
+
 def nameless(kind: str) -> bool:
     """Whether a part is no random process that devices have, but something unknown."""
-    return kind in SMOOTH or kind.startswith(ALONE)
+    return kind in SMOOTH or window_of(kind) is not None

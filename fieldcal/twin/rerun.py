@@ -104,7 +104,7 @@ def _cases(explanation: Explanation, profile: Profile, raw: Bench) -> dict[str, 
     """The devices, by name."""
     source = explanation.prepared.source
     nominal, start = source.about.nominal, float(source.block.t[0])
-    base = (explanation.unaware or explanation).base.state
+    base = explanation.as_said.base.state
     refitted = raw.fit(explanation.always)
     plain = replace(
         base,

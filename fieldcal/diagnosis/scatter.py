@@ -13,7 +13,7 @@ chapter 6 (restricted maximum likelihood).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +52,9 @@ FEWEST = 4
 
 TRIADS = (("acc", (0, 1, 2)), ("gyr", (3, 4, 5)))
 
+Projected = Mapping[int, tuple[Array, Array]]
+"""F^T P F and F^T P r of a part, by channel."""
+
 
 @dataclass(frozen=True, slots=True)
 class Wander:
@@ -74,26 +77,31 @@ def wanders(bench: Bench, fit: Fit) -> Iterator[Wander]:
     """Every part that is not there yet, with its gain."""
     there = {(p.kind, p.channel) for p in bench.errors.parts}
     for triad, channels in TRIADS:
-        for kind in ("walk", "offset"):
-            if kind == "offset" and bench.windows < FEWEST:
-                continue
-            if not any((kind, c) in there for c in channels):
-                yield _of(bench, fit, kind, triad, channels)
-        if bench.windows >= FEWEST:
-            kind = kind_of(_odd_one(bench, fit, channels))
-            if not any((kind, c) in there for c in channels):
-                yield _of(bench, fit, kind, triad, channels)
+        if not any(("walk", c) in there for c in channels):
+            yield _wander(bench, "walk", triad, _seen(bench, fit, "walk", channels))
+        if bench.windows < FEWEST:
+            continue
+        each = _seen(bench, fit, "offset", channels)
+        if not any(("offset", c) in there for c in channels):
+            yield _wander(bench, "offset", triad, each)
+        window = _odd_one(each)
+        kind = kind_of(int(np.unique(bench.rows.x.position)[window]))
+        if not any((kind, c) in there for c in channels):
+            only = {c: _part(of, window) for c, of in each.items()}
+            yield _wander(bench, kind, triad, only)
     for c, name in enumerate(CHANNELS):
         for kind in SMOOTH:
             if (kind, c) not in there and _known(bench, kind):
-                yield _of(bench, fit, kind, name, (c,))
+                yield _wander(bench, kind, name, _seen(bench, fit, kind, (c,)))
     if bench.rows.x.oriented.all() and bench.errors.setting == 0:
         yield _of_angles(bench, fit)
 
 
 def alone(bench: Bench, fit: Fit, window: int) -> Wander:
     """The part of one window that the accelerometers have."""
-    return _of(bench, fit, kind_of(window), *TRIADS[0])
+    triad, channels = TRIADS[0]
+    kind = kind_of(window)
+    return _wander(bench, kind, triad, _seen(bench, fit, kind, channels))
 
 
 def cautious(bench: Bench, fit: Fit) -> Errors:
@@ -152,33 +160,35 @@ def _known(bench: Bench, kind: str) -> bool:
     return not kind.startswith("force") or bench.windows >= FEWEST
 
 
-def _odd_one(bench: Bench, fit: Fit, channels: tuple[int, ...]) -> int:
-    """The window that is off the most on these channels."""
-    held = np.unique(bench.rows.x.position)
-    off = np.zeros(len(held))
+def _seen(bench: Bench, fit: Fit, kind: str, channels: Sequence[int]) -> Projected:
+    """What the rows say of a part on each of some channels, if they are enough."""
+    out = {}
     for c in channels:
-        white = bench.whiten.channel(factor("offset", bench.rows.x, c), c)
-        information, pull = projected_channel(fit, white, c)
+        if bench.rows.used[:, c].sum() >= FEW_ROWS:
+            white = bench.whiten.channel(factor(kind, bench.rows.x, c), c)
+            out[c] = projected_channel(fit, white, c)
+    return out
+
+
+def _odd_one(each: Projected) -> int:
+    """Index of the window that is off the most, of what is said of offsets."""
+    off = np.zeros(1)
+    for information, pull in each.values():
         strength = np.diag(information)
-        seen = strength > ROUNDED * np.maximum((white**2).sum(axis=0), 1e-300)
-        off[seen] += pull[seen] ** 2 / strength[seen]
-    return int(held[np.argmax(off)])
+        off = off + np.where(strength > 0, pull**2 / np.maximum(strength, 1e-300), 0.0)
+    return int(np.argmax(off))
 
 
-def _of(
-    bench: Bench,
-    fit: Fit,
-    kind: str,
-    label: str,
-    channels: tuple[int, ...],
-) -> Wander:
+def _part(of: tuple[Array, Array], column: int) -> tuple[Array, Array]:
+    """The same of one column alone."""
+    some = slice(column, column + 1)
+    return of[0][some, some], of[1][some]
+
+
+def _wander(bench: Bench, kind: str, label: str, seen: Projected) -> Wander:
     found, gain = [], 0.0
-    for c in channels:
-        use = bench.rows.used[:, c]
-        if use.sum() < FEW_ROWS:
-            continue
-        white = bench.whiten.channel(factor(kind, bench.rows.x, c), c)
-        size, more = raised(*projected_channel(fit, white, c))
+    for c, of in seen.items():
+        size, more = raised(*of)
         if more > VARIANCE:
             found.append(Part(kind, c, size))
             gain += more
@@ -265,7 +275,7 @@ def projected_channel(fit: Fit, columns: Array, channel: int) -> tuple[Array, Ar
 
 
 def _told(information: Array, pull: Array, columns: Array) -> tuple[Array, Array]:
-    """Both, or zeros if projecting leaves of the columns what is rounded only."""
-    if np.trace(information) < ROUNDED * float((columns**2).sum()):
-        return np.zeros_like(information), np.zeros_like(pull)
-    return (information + information.T) / 2, pull
+    """Both, with zeros where projecting leaves of a column what is rounded only."""
+    rounded = np.diag(information) < ROUNDED * (columns**2).sum(axis=0)
+    information = np.where(rounded | rounded[:, None], 0.0, information)
+    return (information + information.T) / 2, np.where(rounded, 0.0, pull)

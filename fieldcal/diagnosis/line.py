@@ -16,18 +16,25 @@ Source: D. Rife, R. Boorstyn, Single-tone parameter estimation, 1974.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.heldout import FEW, FOLDS, LONG
-from fieldcal.diagnosis.periodogram import Complex, Pieces, wave_of
+from fieldcal.diagnosis.periodogram import Complex, Pieces
 from fieldcal.effects import Line
 from fieldcal.samples import CHANNELS, Array
 
 PARTS, LEAST = 15, 4
 """Parts of a window whose sums are kept, so that a frequency can be shifted, and the
 fewest samples in one."""
+
+FEW, STRETCHES, FOLDS = 3, 5, 12
+"""Windows below which stretches of them are left out instead, how many of each, and
+parts of the recording that are left out in turn."""
+
+AT_ONCE = 256
+"""Frequencies tried together: all of a long recording would take much memory."""
 
 SHOWS = 4.0
 """Standard deviations from which a channel is said to have the line."""
@@ -99,7 +106,7 @@ class Moments:
     near : Hz
     sums : (k, 6)
     middle : (k,) s, mean time of each part
-    apart : (k, g) which parts belong to which group: windows, or stretches of them
+    bound : (g + 1,) first part of each group, a window or a stretch of one
     window : (g,) of each group
     counts : (g,) samples
 
@@ -108,24 +115,26 @@ class Moments:
     near: float
     sums: Complex
     middle: Array
-    apart: Array
+    bound: NDArray[np.intp]
     window: NDArray[np.intp]
     counts: Array
 
-    def seen(self, offset: float) -> Complex:
-        """Amplitudes (g, 6) of each group at a frequency a little off."""
-        turned = self.sums * np.exp(-2j * np.pi * offset * self.middle)[:, None]
-        amplitude: Complex = 2 / self.counts[:, None] * (self.apart.T @ turned)
+    def seen(self, offset: Array) -> Complex:
+        """Amplitudes (o, g, 6) of each group at frequencies a little off, (o,)."""
+        wave = np.exp(-2j * np.pi * offset[:, None] * self.middle)
+        parts = [wave[:, a:b] @ self.sums[a:b] for a, b in pairwise(self.bound)]
+        amplitude: Complex = 2 / self.counts[:, None] * np.stack(parts, axis=1)
         return amplitude
 
     def only(self, groups: NDArray[np.bool_]) -> Moments:
         """Some of the groups."""
-        parts = self.apart[:, groups].any(axis=1)
+        size = np.diff(self.bound)
+        parts = np.repeat(groups, size)
         return Moments(
             self.near,
             self.sums[parts],
             self.middle[parts],
-            self.apart[parts][:, groups],
+            np.append(0, np.cumsum(size[groups])),
             self.window[groups],
             self.counts[groups],
         )
@@ -133,22 +142,35 @@ class Moments:
 
 def moments_of(pieces: Pieces, near: float, stretches: int = 1) -> Moments:
     """Sums over windows, each divided into stretches that are groups of their own."""
-    sums, middle, group = [], [], []
+    sums, middle, bound = [], [], [0]
     counts: list[float] = []
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
-        wave = np.conj(wave_of(t, near))
-        for stretch in np.array_split(np.arange(len(t)), stretches):
-            count = min(PARTS, max(len(stretch) // LEAST, 1))
-            for part in np.array_split(stretch, count):
-                sums.append(wave[part] @ samples[part])
-                middle.append(t[part].mean())
-                group.append(len(counts))
-            counts.append(float(len(stretch)))
-    apart = np.equal.outer(group, np.arange(len(counts))).astype(float)
+        for first, last in pairwise(_cuts(0, len(t), stretches)):
+            parts = min(PARTS, max((last - first) // LEAST, 1))
+            for a, b in pairwise(_cuts(first, last, parts)):
+                turned = 2 * np.pi * near * t[a:b]
+                real, imaginary = (
+                    np.stack([np.cos(turned), np.sin(turned)]) @ (samples[a:b])
+                )
+                sums.append(real - 1j * imaginary)
+                middle.append(t[a:b].mean())
+            bound.append(len(sums))
+            counts.append(float(last - first))
     window = np.repeat(np.arange(len(pieces.samples)), stretches)
     return Moments(
-        near, np.array(sums), np.array(middle), apart, window, np.array(counts)
+        near,
+        np.array(sums),
+        np.array(middle),
+        np.array(bound),
+        window,
+        np.array(counts),
     )
+
+
+def _cuts(first: int, last: int, parts: int) -> list[int]:
+    """Bounds of parts of nearly equal length, the longer ones first."""
+    each, more = divmod(last - first, parts)
+    return [first + i * each + min(i, more) for i in range(parts + 1)]
 
 
 def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
@@ -162,10 +184,10 @@ def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
 def remains(pieces: Pieces, tone: Tone) -> Remains:
     """What is left of a line, fitted to it or foretold from the rest."""
     many = len(pieces.samples) >= FEW
-    moments = moments_of(pieces, tone.hz, 1 if many else LONG)
+    moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES)
     groups = np.arange(len(moments.counts))
-    fold = groups % (FOLDS if many else LONG)
-    seen = moments.seen(0.0)
+    fold = groups % (FOLDS if many else STRETCHES)
+    seen = moments.seen(np.zeros(1))[0]
     fitted = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[moments.window]
     ahead = seen.copy()
     span = max(float(np.ptp(moments.middle)), 1 / tone.hz)
@@ -190,7 +212,8 @@ def remains(pieces: Pieces, tone: Tone) -> Remains:
 def _turning(moments: Moments, offset: float) -> Complex:
     """Mean of exp(2 pi i offset t) over each group, (g, 1)."""
     turned = np.exp(2j * np.pi * offset * moments.middle)
-    mean: Complex = (moments.apart.T @ turned) / moments.apart.sum(axis=0)
+    total = np.add.reduceat(turned, moments.bound[:-1])
+    mean: Complex = total / np.diff(moments.bound)
     return mean[:, None]
 
 
@@ -208,34 +231,57 @@ def _at_best(
     rounds: int,
 ) -> Tone:
     for _ in range(rounds):
-        tones = [_fitted(pieces, effect, moments, o) for o in offsets]
-        at = int(np.argmax([tone.chi2 for tone in tones]))
-        offsets = offsets[at] + np.linspace(-step, step, 11)
+        some = np.array_split(offsets, -(-len(offsets) // AT_ONCE))
+        chi2 = [_fitted(pieces, effect, moments, each)[2] for each in some]
+        near = float(offsets[np.argmax(np.concatenate(chi2))])
+        offsets = near + np.linspace(-step, step, 11)
         step /= 5
-    return tones[at]
+    return _tone(pieces, effect, moments, near)
 
 
-def _fitted(pieces: Pieces, effect: Line, moments: Moments, offset: float) -> Tone:
-    """The effect at a frequency, whatever its causes."""
-    hz, seen, counts = moments.near + offset, moments.seen(offset), moments.counts
+def _fitted(
+    pieces: Pieces, effect: Line, moments: Moments, offset: Array
+) -> tuple[Complex, Array, Array]:
+    """The effect at frequencies a little off, (o,), whatever its causes.
+
+    Returns
+    -------
+    causes : (o, m)
+    sigma : (o, m) their standard deviation
+    chi2 : (o,) by how much the squares fall
+
+    """
+    count, size = len(offset), 6 * len(moments.counts)
+    seen = moments.seen(offset).reshape(count, size, 1)
+    each = [effect.response(pieces.x, hz) for hz in moments.near + offset]
+    response = np.array(each)[:, moments.window].reshape(count, size, -1)
     # a channel that never changes tells nothing
     heard = np.nan_to_num(pieces.noise) > 0
     weight = np.where(heard, 1 / np.where(heard, pieces.noise, 1.0) ** 2, 0.0)
-    response = effect.response(pieces.x, hz)[moments.window]
-    half = counts[:, None, None] / 2
-    weighted = np.conj(response) * weight[:, None] * half
-    normal = np.einsum("wcm,wcn->mn", weighted, response)
-    normal += 1e-12 * np.trace(normal).real * np.eye(len(normal))
-    causes = np.linalg.solve(normal, np.einsum("wcm,wc->m", weighted, seen))
-    sigma = np.sqrt(np.diag(np.linalg.inv(normal)).real)
+    weight = np.outer(moments.counts / 2, weight).ravel()
+    weighted = np.conj(np.swapaxes(response, 1, 2)) * weight
+    normal = weighted @ response
+    trace = np.trace(normal, axis1=1, axis2=2).real[:, None, None]
+    normal += 1e-12 * trace * np.eye(normal.shape[-1])
+    causes = np.linalg.solve(normal, weighted @ seen)[..., 0]
+    own = np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2)
+    sigma = np.sqrt(own.real)
     if effect.kind == "sensor":  # outputs of their own: those without it have none
         causes = np.where(np.abs(causes) > SHOWS * sigma, causes, 0.0)
-    left = seen - response @ causes
-    fallen = half[:, :, 0] * weight * (np.abs(seen) ** 2 - np.abs(left) ** 2)
-    chi2 = float(fallen.sum())
+    left = seen - response @ causes[..., None]
+    fallen = np.abs(seen) ** 2 - np.abs(left) ** 2
+    return causes, sigma, fallen[..., 0] @ weight
+
+
+def _tone(pieces: Pieces, effect: Line, moments: Moments, offset: float) -> Tone:
+    """The effect at one frequency, with what it explains."""
+    hz = moments.near + offset
+    found = _fitted(pieces, effect, moments, np.array([offset]))
+    causes, sigma, chi2 = found[0][0], found[1][0], float(found[2][0])
+    response = effect.response(pieces.x, hz)[moments.window]
     strength = np.abs(causes / sigma) ** 2
     amplitude = np.sqrt((np.abs(response @ causes) ** 2).mean(axis=0))
-    error = pieces.noise * np.sqrt(2 / counts.sum())
+    error = pieces.noise * np.sqrt(2 / moments.counts.sum())
     clear = [
         c for c, a, e in zip(CHANNELS, amplitude, error, strict=True) if a > SHOWS * e
     ]

@@ -110,7 +110,8 @@ def _share(pieces: Pieces, tone: Tone, moments: Moments) -> float:
     that is pushed has as much energy there, but another phase each time.
     """
     clear = tone.clear
-    seen, half = moments.seen(tone.hz - moments.near), moments.counts[:, None] / 2
+    seen = moments.seen(np.array([tone.hz - moments.near]))[0]
+    half = moments.counts[:, None] / 2
     modelled = tone.effect.response(pieces.x, tone.hz) @ tone.causes
     energy = (half * np.abs(seen[:, clear]) ** 2).sum(axis=0)
     left = (half * np.abs((seen - modelled)[:, clear]) ** 2).sum(axis=0)

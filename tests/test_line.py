@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fieldcal.diagnosis.line import Remains, moments_of, remains, tuned
+from fieldcal.diagnosis.line import Remains, remains, tuned
+from fieldcal.diagnosis.moments import moments_of
 from fieldcal.diagnosis.periodogram import Pieces
 from fieldcal.effects import Experience
 from fieldcal.effects.hum import Hum

@@ -1,33 +1,23 @@
 """A line in the spectrum: its frequency, its causes, and what it foretells.
 
-The samples of a window, or of a stretch of one, are summed up as the amplitude of a
-wave,
-
-    A = 2/n sum_k s_k exp(-2 pi i hz t_k)
-
-which in white noise of sigma has the variance 4 sigma^2 / n. What causes c make of it
-is R c, with R of the effect; they follow by least squares, and hz is where they take
-most. What a line is worth on samples that it was not fitted to is held against the
-same amplitudes: a part of the windows is left out, causes and frequency are found from
-the rest, and |A - R c|^2 / 2 of the part left out is what remains of the mean square.
+Of the amplitudes A of a wave in windows, or in stretches of them (`moments`), causes c
+make R c, with R of the effect; they follow by least squares, and hz is where they take
+most. What a line is worth on samples that it was not fitted to is held against the same
+amplitudes: a part of the windows is left out, causes and frequency are found from the
+rest, and |A - R c|^2 / 2 of the part left out is what remains of the mean square.
 Source: D. Rife, R. Boorstyn, Single-tone parameter estimation, 1974.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fieldcal.diagnosis.moments import Moments, moments_of
 from fieldcal.diagnosis.periodogram import Complex, Pieces
 from fieldcal.effects import Line
 from fieldcal.samples import CHANNELS, Array
-
-PARTS, LEAST = 15, 4
-"""Parts of a window whose sums are kept, so that a frequency can be shifted, and the
-fewest samples in one."""
 
 FEW, STRETCHES, FOLDS = 3, 5, 12
 """Windows below which stretches of them are left out instead, how many of each, and
@@ -97,82 +87,6 @@ class Remains:
         return float(1 - np.sqrt(self.held_out[most] / self.before[most]))
 
 
-@dataclass(frozen=True, slots=True)
-class Moments:
-    """Sums of the samples times a wave of frequency `near`, over parts of windows.
-
-    Attributes
-    ----------
-    near : Hz
-    sums : (k, 6)
-    middle : (k,) s, mean time of each part
-    bound : (g + 1,) first part of each group, a window or a stretch of one
-    window : (g,) of each group
-    counts : (g,) samples
-
-    """
-
-    near: float
-    sums: Complex
-    middle: Array
-    bound: NDArray[np.intp]
-    window: NDArray[np.intp]
-    counts: Array
-
-    def seen(self, offset: Array) -> Complex:
-        """Amplitudes (o, g, 6) of each group at frequencies a little off, (o,)."""
-        wave = np.exp(-2j * np.pi * offset[:, None] * self.middle)
-        parts = [wave[:, a:b] @ self.sums[a:b] for a, b in pairwise(self.bound)]
-        amplitude: Complex = 2 / self.counts[:, None] * np.stack(parts, axis=1)
-        return amplitude
-
-    def only(self, groups: NDArray[np.bool_]) -> Moments:
-        """Some of the groups."""
-        size = np.diff(self.bound)
-        parts = np.repeat(groups, size)
-        return Moments(
-            self.near,
-            self.sums[parts],
-            self.middle[parts],
-            np.append(0, np.cumsum(size[groups])),
-            self.window[groups],
-            self.counts[groups],
-        )
-
-
-def moments_of(pieces: Pieces, near: float, stretches: int = 1) -> Moments:
-    """Sums over windows, each divided into stretches that are groups of their own."""
-    sums, middle, bound = [], [], [0]
-    counts: list[float] = []
-    for samples, t in zip(pieces.samples, pieces.times, strict=True):
-        for first, last in pairwise(_cuts(0, len(t), stretches)):
-            parts = min(PARTS, max((last - first) // LEAST, 1))
-            for a, b in pairwise(_cuts(first, last, parts)):
-                turned = 2 * np.pi * near * t[a:b]
-                real, imaginary = (
-                    np.stack([np.cos(turned), np.sin(turned)]) @ (samples[a:b])
-                )
-                sums.append(real - 1j * imaginary)
-                middle.append(t[a:b].mean())
-            bound.append(len(sums))
-            counts.append(float(last - first))
-    window = np.repeat(np.arange(len(pieces.samples)), stretches)
-    return Moments(
-        near,
-        np.array(sums),
-        np.array(middle),
-        np.array(bound),
-        window,
-        np.array(counts),
-    )
-
-
-def _cuts(first: int, last: int, parts: int) -> list[int]:
-    """Bounds of parts of nearly equal length, the longer ones first."""
-    each, more = divmod(last - first, parts)
-    return [first + i * each + min(i, more) for i in range(parts + 1)]
-
-
 def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
     """The effect at the frequency, near that of the sums, at which it takes most."""
     shortest = min(map(len, pieces.samples)) / pieces.rate
@@ -212,9 +126,8 @@ def remains(pieces: Pieces, tone: Tone) -> Remains:
 def _turning(moments: Moments, offset: float) -> Complex:
     """Mean of exp(2 pi i offset t) over each group, (g, 1)."""
     turned = np.exp(2j * np.pi * offset * moments.middle)
-    total = np.add.reduceat(turned, moments.bound[:-1])
-    mean: Complex = total / np.diff(moments.bound)
-    return mean[:, None]
+    mean: Complex = np.add.reduceat(turned, moments.bound[:-1]).astype(complex)
+    return (mean / np.diff(moments.bound))[:, None]
 
 
 def _mean_square(amplitude: Complex) -> Array:

@@ -48,6 +48,12 @@ NEAR = 2.0
 LOOKS = 10
 """Spectra looked at."""
 
+AT_ONCE = 1 << 16
+"""Samples that a line is taken out of at once."""
+
+SHORTEST = 64
+"""Samples of a window from which it is looked at."""
+
 COHERENT = 1 << 18
 """Samples up to which windows are put together with one phase."""
 
@@ -63,42 +69,77 @@ class Pieces:
     rate: float
 
 
+def held_in(source: Source, rows: Rows) -> list[tuple[int, int, int]]:
+    """Windows that are long enough: the first of their rows, and their bounds."""
+    first = {int(p): i for i, p in reversed(list(enumerate(rows.x.position)))}
+    bounds = enumerate(spans(source.block, source.about))
+    return [
+        (first[p], int(a), int(b))
+        for p, (a, b) in bounds
+        if b - a >= SHORTEST and p in first
+    ]
+
+
 def pieces_of(source: Source, rows: Rows) -> Pieces:
     """Windows of a recording that are long enough.
 
     Outputs of which rows say nothing, as of gravity on a table that turns, are zero.
     """
-    block = source.block
-    first = {int(p): i for i, p in reversed(list(enumerate(rows.x.position)))}
-    kept, samples, times = [], [], []
-    for p, (a, b) in enumerate(spans(block, source.about)):
-        if b - a >= 64 and p in first:
-            kept.append(first[p])
-            known = source.usable[a:b] & rows.used[first[p]]
-            six = np.where(known, block[a:b].six, np.nan)
-            samples.append(_flat(block.t[a:b], six))
-            times.append(block.t[a:b])
-    x = rows.x
-    some = np.array(kept, dtype=np.intp)
-    at = Experience.at_rest(
+    block, held = source.block, held_in(source, rows)
+    times = tuple(block.t[a:b] for _, a, b in held)
+    samples = []
+    for (row, a, b), t in zip(held, times, strict=True):
+        usable = source.usable[a:b] & rows.used[row]
+        samples.append(_flat(t, block.acc[a:b], block.gyr[a:b], usable))
+    x = places_of(rows, held)
+    return Pieces(x, tuple(samples), times, rows.noise, rate_of(block))
+
+
+def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
+    """Where the device is in windows that `held_in` gives."""
+    x, some = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
+    return Experience.at_rest(
         x.alpha[some], x.beta[some], x.gravity, f=x.f[some], mounting=x.mounting
     )
-    return Pieces(at, tuple(samples), tuple(times), rows.noise, rate_of(block))
 
 
-def _flat(t: Array, six: Array) -> Array:
-    """Samples without mean and slope; zero where not usable."""
+def _flat(t: Array, acc: Array, gyr: Array, usable: NDArray[np.bool_]) -> Array:
+    """Samples without mean and slope, (n, 6); zero where not usable."""
     s = (t - t.mean()) / max(np.ptp(t), 1e-9)
-    known = np.isfinite(six)
-    count = np.maximum(known.sum(axis=0), 1)
-    out = np.where(known, six, 0.0)
-    out = np.where(known, out - out.sum(axis=0) / count, 0.0)
-    slope = (s @ out) / np.maximum((s[:, None] ** 2 * known).sum(axis=0), 1e-12)
-    flat: Array = np.where(known, out - s[:, None] * slope, 0.0)
-    return flat
+    out = np.empty((len(t), 6))
+    for c in range(6):
+        values = (acc if c < 3 else gyr)[:, c % 3]
+        known = usable[:, c] & np.isfinite(values)
+        column = np.where(known, values, 0.0)
+        column -= column.sum() / max(int(known.sum()), 1)
+        column *= known
+        slope = (s @ column) / max(float((s * s) @ known), 1e-12)
+        column -= slope * s
+        column *= known
+        out[:, c] = column
+    return out
 
 
-def highest(pieces: Pieces, taken: Sequence[float]) -> float | None:
+@dataclass(frozen=True, slots=True)
+class Spectrum:
+    """Power of one or more channels.
+
+    Attributes
+    ----------
+    power : (c, m)
+    count : periodograms summed in it
+    hz : (m,)
+
+    """
+
+    power: Array
+    count: int
+    hz: Array
+
+
+def highest(
+    pieces: Pieces, spectra: Sequence[Spectrum], taken: Sequence[float]
+) -> float | None:
     """Frequency of the line that stands out most, None if none does.
 
     Near one that is taken already, what is left belongs to it.
@@ -106,18 +147,19 @@ def highest(pieces: Pieces, taken: Sequence[float]) -> float | None:
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     low = max(0.05, CYCLES / shortest)
     best, near = np.log(ODDS), None
-    for power, count, hz in _spectra(pieces):
+    for spectrum in spectra:
+        hz, count = spectrum.hz, spectrum.count
         band = hz >= low
         for other in taken:
             band &= np.abs(hz - other) > NEAR / shortest
         if band.sum() < 4 * BESIDE:
             continue
         stands = np.zeros(int(band.sum()))
-        for channel in power[band].T:
+        for channel in spectrum.power[:, band]:
             # median of Gamma(W) over its mean, by Wilson and Hilferty
             level = _floor(channel) / (1 - 1 / (9 * count)) ** 3
             stands += channel / _on_a_slope(channel, level) * count
-        degrees = count * power.shape[1]
+        degrees = count * len(spectrum.power)
         at = int(np.argmax(stands))
         odds = _beyond(float(stands[at]), degrees) + np.log(LOOKS * len(stands))
         if odds < best:
@@ -125,57 +167,59 @@ def highest(pieces: Pieces, taken: Sequence[float]) -> float | None:
     return near
 
 
-def _spectra(pieces: Pieces) -> Iterator[tuple[Array, int, Array]]:
-    """Power of one or more channels, periodograms summed in it, and frequencies, Hz.
+def spectra_of(pieces: Pieces) -> list[Spectrum]:
+    """Spectra in which a line may stand out.
 
     Channel by channel window by window; and triads with one phase throughout, in
     the device's axes and, where the angles are known, in the base's. Windows are
     tapered: what settles at the start of each is no line, though it comes as often.
     """
-    power, count, hz = _power(pieces)
-    used = np.flatnonzero(power.any(axis=0))
-    for c in used:
-        yield power[:, [c]], count, hz
+    whole = _power(pieces)
+    used = np.flatnonzero(whole.power.any(axis=1))
+    out = [Spectrum(whole.power[[c]], whole.count, whole.hz) for c in used]
     if sum(map(len, pieces.samples)) > COHERENT:
-        return
+        return out
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
         turned = turn(pieces.x.alpha, pieces.x.beta)
         frames.append(np.moveaxis(pieces.x.mounting.T @ turned, 1, 2))
     for frame in frames:
-        whole, hz = _one_phase(pieces, frame)
-        for triad in ([0, 1, 2], [3, 4, 5], list(range(6))):
-            if set(triad) <= set(used.tolist()):
-                yield whole[:, triad], 1, hz
+        power, hz = _one_phase(pieces, frame)
+        for some in (slice(0, 3), slice(3, 6), slice(0, 6)):
+            if set(range(6)[some]) <= set(used.tolist()):
+                out.append(Spectrum(power[some], 1, hz))
+    return out
 
 
 def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, Array]:
-    """Power of the whole recording, windows turned into a frame, nothing between."""
+    """Power (6, m) of the whole recording, windows turned into a frame, and Hz."""
     start, end = pieces.times[0][0], pieces.times[-1][-1]
-    whole = np.zeros((int(round((end - start) * pieces.rate)) + 1, 6))
+    whole = np.zeros((6, int(round((end - start) * pieces.rate)) + 1))
     for samples, t, to_frame in zip(pieces.samples, pieces.times, frame, strict=True):
         at = np.round((t - start) * pieces.rate).astype(np.intp)
-        taper = np.hanning(len(t))[:, None]
-        whole[at, :3] = taper * samples[:, :3] @ to_frame.T
-        whole[at, 3:] = taper * samples[:, 3:] @ to_frame.T
-    n = 2 << (len(whole) - 1).bit_length()
-    return np.abs(np.fft.rfft(whole, n, axis=0)) ** 2, np.fft.rfftfreq(
-        n, 1 / pieces.rate
-    )
+        tapered = (np.hanning(len(t))[:, None] * samples).T
+        whole[:3, at], whole[3:, at] = to_frame @ tapered[:3], to_frame @ tapered[3:]
+    n = 2 << (whole.shape[1] - 1).bit_length()
+    return _square(np.fft.rfft(whole, n)), np.fft.rfftfreq(n, 1 / pieces.rate)
 
 
-def _power(pieces: Pieces) -> tuple[Array, int, Array]:
+def _power(pieces: Pieces) -> Spectrum:
+    """Of all channels, window by window."""
     length = min(LONGEST, max(map(len, pieces.samples)))
     n = 1 << (length - 1).bit_length()
-    total, count = np.zeros((n // 2 + 1, 6)), 0
+    total, count = np.zeros((6, n // 2 + 1)), 0
     for samples in pieces.samples:
         parts = max(1, len(samples) // LONGEST)
         for part in np.array_split(samples, parts):
             taper = np.hanning(len(part))
-            spectrum = np.fft.rfft(part * taper[:, None], n, axis=0)
-            total += np.abs(spectrum) ** 2 / (taper @ taper)
+            total += _square(np.fft.rfft(part.T * taper, n)) / (taper @ taper)
             count += 1
-    return total, count, np.fft.rfftfreq(n, 1 / pieces.rate)
+    return Spectrum(total, count, np.fft.rfftfreq(n, 1 / pieces.rate))
+
+
+def _square(spectrum: Complex) -> Array:
+    square: Array = spectrum.real**2 + spectrum.imag**2
+    return square
 
 
 def _floor(power: Array) -> Array:
@@ -194,14 +238,19 @@ def _on_a_slope(power: Array, floor: Array) -> Array:
     What settles or drifts has the more power the lower the frequency; a line stands out
     of that, too.
     """
-    totals = np.concatenate([[0.0], np.cumsum(power)])
-    at = np.arange(len(power))
+    n = len(power)
+    # sums up to and including each; beyond the ends there is nothing to add
+    totals = np.pad(np.cumsum(power), (FAR + 1, FAR + 1), "edge")
+    totals[: FAR + 1] = 0.0
+    counts = np.pad(np.arange(n + 1), (FAR, FAR + 1), "edge")
     sides = []
     for low, high in ((-FAR, -CLOSE), (CLOSE + 1, FAR + 1)):
-        first = np.clip(at + low, 0, len(power))
-        last = np.clip(at + high, 0, len(power))
-        mean = (totals[last] - totals[first]) / np.maximum(last - first, 1)
-        sides.append(np.where(last > first, mean, np.inf))
+        first, last = FAR + low, FAR + high
+        count = counts[last : last + n] - counts[first : first + n]
+        mean = (totals[last : last + n] - totals[first : first + n]) / np.maximum(
+            count, 1
+        )
+        sides.append(np.where(count > 0, mean, np.inf))
     below, above = sides
     # beyond the lowest frequency there is but more of a slope
     beside = np.where(np.isfinite(above), np.maximum(below, above), below)
@@ -221,7 +270,21 @@ def _beyond(x: float, count: int) -> float:
     return float(min(0.0, -x + top + np.log(np.exp(terms - top).sum())))
 
 
-def wave_of(t: Array, hz: float) -> Complex:
-    """exp(2 pi i hz t), (n,)."""
-    wave: Complex = np.exp(2j * np.pi * hz * t)
-    return wave
+def line_of(t: Array, hz: float, amplitude: Complex) -> Array:
+    """Line of some complex amplitudes, Re(amplitude exp(2 pi i hz t)), (n, c)."""
+    turned = 2 * np.pi * hz * t
+    both = np.array([amplitude.real, -amplitude.imag])
+    line: Array = np.column_stack([np.cos(turned), np.sin(turned)]) @ both
+    return line
+
+
+def take_out(values: Array, t: Array, hz: float, amplitude: Complex) -> None:
+    """Take a line out of samples, (n, c), in place."""
+    for some in stretches(0, len(t)):
+        values[some] -= line_of(t[some], hz, amplitude)
+
+
+def stretches(first: int, last: int) -> Iterator[slice]:
+    """Samples a part at a time: what is made of them takes memory, too."""
+    for start in range(first, last, AT_ONCE):
+        yield slice(start, min(start + AT_ONCE, last))

@@ -12,8 +12,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.diagnosis.line import Moments, Remains, Tone, moments_of, remains, tuned
-from fieldcal.diagnosis.periodogram import Pieces, highest, pieces_of, wave_of
+from fieldcal.diagnosis.line import Remains, Tone, remains, tuned
+from fieldcal.diagnosis.moments import Moments, moments_of
+from fieldcal.diagnosis.periodogram import (
+    Pieces,
+    held_in,
+    highest,
+    line_of,
+    pieces_of,
+    places_of,
+    spectra_of,
+    stretches,
+    take_out,
+)
 from fieldcal.diagnosis.reduce import Rows, Source
 from fieldcal.effects import Line, catalogue
 from fieldcal.samples import Block
@@ -36,8 +47,9 @@ def tones(source: Source, rows: Rows) -> list[tuple[Tone, Remains]]:
     pieces = pieces_of(source, rows)
     found: list[tuple[Tone, Remains]] = []
     looked: list[float] = []
-    while pieces.samples and len(found) < MOST and len(looked) < LOOKS + len(found):
-        near = highest(pieces, looked)
+    spectra = spectra_of(pieces) if pieces.samples else []
+    while spectra and len(found) < MOST and len(looked) < LOOKS + len(found):
+        near = highest(pieces, spectra, looked)
         if near is None:
             break
         looked.append(near)
@@ -47,23 +59,29 @@ def tones(source: Source, rows: Rows) -> list[tuple[Tone, Remains]]:
         if left.foretold[tone.clear].sum() > 0:
             found.append((tone, left))
             looked[-1] = tone.hz
-            pieces = _without(pieces, tone)
+            _lessen(pieces, tone)
+            spectra = spectra_of(pieces)
     return found
 
 
 def without(block: Block, source: Source, rows: Rows, found: Sequence[Tone]) -> Block:
     """The samples less the lines: of all windows, and on the way what sensors add."""
-    six = block.six
-    where = pieces_of(source, rows)
+    triads = [block.acc, block.gyr]
+    held = held_in(source, rows)
+    x = places_of(rows, held)
     for tone in found:
-        response = tone.effect.response(where.x, tone.hz) @ tone.causes
+        response = tone.effect.response(x, tone.hz) @ tone.causes
+        where = [
+            (slice(a, b), seen) for (_, a, b), seen in zip(held, response, strict=True)
+        ]
         if tone.effect.kind == "sensor":
-            six -= np.real(wave_of(block.t, tone.hz)[:, None] * response[0])
-            continue
-        for seen, t in zip(response, where.times, strict=True):
-            at = np.searchsorted(block.t, t)
-            six[at] -= np.real(wave_of(t, tone.hz)[:, None] * seen)
-    return replace(block, acc=six[:, :3], gyr=six[:, 3:])
+            where = [(slice(0, len(block)), response[0])]
+        for i, own in enumerate((slice(0, 3), slice(3, 6))):
+            if response[:, own].any():
+                triads[i] = triads[i].copy()
+                for span, seen in where:
+                    take_out(triads[i][span], block.t[span], tone.hz, seen[own])
+    return replace(block, acc=triads[0], gyr=triads[1])
 
 
 def _explained(pieces: Pieces, near: float) -> Tone | None:
@@ -92,12 +110,15 @@ def _lasts(pieces: Pieces, tone: Tone) -> bool:
     What fades after turns has lines, too, where positions follow one another evenly.
     """
     clear = tone.clear
-    seen = tone.effect.response(pieces.x, tone.hz) @ tone.causes
+    seen = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[:, clear]
     taken = np.zeros(2)
     for s, t, one in zip(pieces.samples, pieces.times, seen, strict=True):
-        line = np.real(wave_of(t, tone.hz)[:, None] * one)
-        fallen = (((2 * s - line) * line / pieces.noise**2)[:, clear]).sum(axis=1)
-        taken += [part.sum() for part in np.array_split(fallen, 2)]
+        middle = -(-len(t) // 2)
+        for half, ends in enumerate(((0, middle), (middle, len(t)))):
+            for some in stretches(*ends):
+                line = line_of(t[some], tone.hz, one)
+                fallen = ((2 * s[some, clear] - line) * line).sum(axis=0)
+                taken[half] += (fallen / pieces.noise[clear] ** 2).sum()
     # half of E varies by 2 sqrt(E / 2)
     chance = CHANCE * 2 * np.sqrt(max(float(taken.sum()), 0.0) / 2)
     return bool(taken.min() + chance > LASTS * taken.sum())
@@ -120,10 +141,8 @@ def _share(pieces: Pieces, tone: Tone, moments: Moments) -> float:
     return float(1 - (weight @ left - noise) / max(weight @ energy - noise, 1e-9))
 
 
-def _without(pieces: Pieces, tone: Tone) -> Pieces:
+def _lessen(pieces: Pieces, tone: Tone) -> None:
+    """Take a line out of the samples, in place: there are many of them."""
     response = tone.effect.response(pieces.x, tone.hz) @ tone.causes
-    left = [
-        s - np.real(wave_of(t, tone.hz)[:, None] * seen)
-        for s, t, seen in zip(pieces.samples, pieces.times, response, strict=True)
-    ]
-    return replace(pieces, samples=tuple(left))
+    for samples, t, seen in zip(pieces.samples, pieces.times, response, strict=True):
+        take_out(samples, t, tone.hz, seen)

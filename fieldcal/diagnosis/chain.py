@@ -17,6 +17,7 @@ from fieldcal.diagnosis.noise import quick_of
 from fieldcal.diagnosis.reduce import masked, rate_of, spans, table_rate
 from fieldcal.diagnosis.vibration import usual_noise
 from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
+from fieldcal.effects.recording import lsb_of
 from fieldcal.frames import earth_rate_home, force_home
 from fieldcal.positions import angles
 from fieldcal.samples import CHANNELS, Array, Block
@@ -133,6 +134,8 @@ def _off_rails(found: list[Fault], seen: Recording) -> list[Fault]:
 
     What stands still does so once and anywhere; what is clipped always stops there.
     """
+    if not found:
+        return found
     rails = {f.channel: f.rows for f in _find("saturation", seen)}
     clipped = [bool(np.isin(f.rows, rails.get(f.channel, ())).all()) for f in found]
     often = Counter(f.channel for f, c in zip(found, clipped, strict=True) if c)
@@ -189,6 +192,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
         bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
         noise=noise,
         quick=quick_of(block, held) if len(held) else noise,
+        steps=np.array([lsb_of(c) for c in (*block.acc.T, *block.gyr.T)]),
         limits=np.array(limits),
         rate_hz=about.rate_hz or np.nan,
     )

@@ -140,6 +140,8 @@ class Source:
 
 def masked(block: Block, usable: NDArray[np.bool_]) -> Block:
     """Samples with nan for those that may not be used; the block itself if all may."""
+    if usable.all():
+        return block
     new = {}
     for name, may in (("acc", usable[:, :3]), ("gyr", usable[:, 3:])):
         triad = getattr(block, name)

@@ -105,9 +105,10 @@ def _compared(
 def _squares(values: Array) -> Array:
     """Mean square of the steps of each column, nan where there is none."""
     steps = np.diff(values, axis=0)
+    count = np.full(values.shape[1], len(steps))
     known = np.isfinite(steps)
-    count = known.sum(axis=0)
     if not known.all():
+        count = known.sum(axis=0)
         steps[~known] = 0.0
     total = np.einsum("nc,nc->c", steps, steps)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.effects import Chain, Fault, Recording, Shape
-from fieldcal.effects.recording import lsb_of, runs
+from fieldcal.effects.recording import runs
 from fieldcal.samples import CHANNELS, Array
 
 LARGEST = 6.5
@@ -62,14 +62,15 @@ def disturbed(z: Array, m: int) -> NDArray[np.intp]:
     spread = usual(z)
     z = z / (spread * np.where(spread > SHAKEN, TAILS, 1.0))
     loud: NDArray[np.bool_] = np.any(np.abs(z) > LARGEST, axis=1)
-    total = np.vstack([np.zeros(z.shape[1]), np.cumsum(z, axis=0)])
+    total = np.zeros((z.shape[1], len(z) + 1)).T
+    np.cumsum(z, axis=0, out=total[1:])
     for width in (m, 4 * m):
         if width < 2 or width >= len(z):
             continue
-        mean = (total[width:] - total[:-width]) / np.sqrt(width)
-        peak = np.abs(mean) / usual(mean)
-        for first, last in runs((peak > MEAN).any(axis=1)):
-            at = first + int(np.argmax(peak[first:last].max(axis=1)))
+        mean = np.abs(total[width:] - total[:-width]) / np.sqrt(width)
+        level = usual(mean)
+        for first, last in runs((mean > MEAN * level).any(axis=1)):
+            at = first + int(np.argmax((mean[first:last] / level).max(axis=1)))
             loud[at : at + width] = True
     return np.array([_trimmed(z, a, b) for a, b in _joined(runs(loud), 2 * m)])
 
@@ -116,16 +117,16 @@ class Bump(Chain):
         """Disturbed stretches of every window."""
         t, out = recording.block.t, []
         rate = 1 / float(np.median(np.diff(t)))
-        steps = 0.5 * np.array([lsb_of(recording.channel(c)) for c in range(6)])
+        steps = 0.5 * recording.steps
         noise = np.maximum(recording.noise, steps)
         for p, (first, last) in enumerate(recording.windows):
             if last - first < 20:
                 continue
-            piece = recording.block[first:last].six
-            z = _quick(piece, rate) / noise
-            z = np.nan_to_num(z)
+            piece = recording.six(first, last)
+            z = np.nan_to_num(_quick(piece, rate) / noise, copy=False)
             # what goes to the next step and back is rounded, not touched
-            z[(steps >= noise) & (np.abs(z) <= NEXT)] = 0.0
+            for c in np.flatnonzero(steps >= noise):
+                z[np.abs(z[:, c]) <= NEXT, c] = 0.0
             if recording.x.rate[p].any():
                 z[:, :3] = 0.0  # the force goes round with the table
             shortest = max(2, round(0.1 * rate))
@@ -142,16 +143,50 @@ def _quick(piece: Array, rate: float) -> Array:
     """What is left of a window when its course over seconds is taken out."""
     width = int(np.clip(round(2 * rate), 8, max(len(piece) // 4, 8)))
     count = max(len(piece) // width, 1)
-    parts = np.array_split(np.arange(len(piece)), count)
-    centre = np.array([p.mean() for p in parts])
-    rows = np.arange(len(piece))
+    level, centre = medians(piece, count)
     out = np.zeros_like(piece)
-    for c in range(piece.shape[1]):
-        known = [i for i, p in enumerate(parts) if np.isfinite(piece[p, c]).any()]
-        if known:
-            level = [float(np.nanmedian(piece[parts[i], c])) for i in known]
-            out[:, c] = piece[:, c] - _course(rows, centre[known], level)
+    for c, column in enumerate(piece.T):
+        known = np.isfinite(level[:, c])
+        if known.any():
+            course = _course(len(piece), centre[known], level[known, c])
+            out[:, c] = column - course
     return out
+
+
+def medians(piece: Array, parts: int) -> tuple[Array, Array]:
+    """Medians (parts, c) of what is known in parts of a window, and their middles.
+
+    The parts are as long as each other, but for one sample; nan where nothing is known.
+
+    >>> medians(np.array([[1.0], [5.0], [3.0], [7.0], [np.nan]]), 2)
+    (array([[3.],
+           [7.]]), array([1. , 3.5]))
+    """
+    each, more = divmod(len(piece), parts)
+    middle = more * (each + 1)
+    halves = [part for part in (piece[:middle], piece[middle:]) if len(part)]
+    counts = [n for n in (more, parts - more) if n]
+    level = np.empty((parts, piece.shape[1]))
+    for c in range(piece.shape[1]):
+        level[:, c] = np.concatenate(
+            [
+                _middle(half[:, c].reshape(n, -1))
+                for half, n in zip(halves, counts, strict=True)
+            ]
+        )
+    first = np.arange(parts) * each + np.minimum(np.arange(parts), more)
+    return level, (first + np.append(first[1:], len(piece)) - 1) / 2
+
+
+def _middle(values: Array) -> Array:
+    """Median of what is known in each row, (n,)."""
+    if not np.isfinite(values.sum()):
+        some = [row[np.isfinite(row)] for row in values]
+        return np.array([np.median(row) if len(row) else np.nan for row in some])
+    half, odd = divmod(values.shape[1], 2)
+    ordered = np.partition(values, half, axis=1)
+    upper: Array = ordered[:, half]
+    return upper if odd else (ordered[:, :half].max(axis=1) + upper) / 2
 
 
 def _steady(z: Array, spread: Array, stretch: tuple[int, int], rate: float) -> bool:
@@ -197,16 +232,15 @@ def _fading(z: Array, tau: float) -> Array:
     return course
 
 
-def _course(rows: NDArray[np.intp], centre: Array, level: list[float]) -> Array:
-    """Straight from part to part, and on beyond the first and the last."""
-    course = np.interp(rows, centre, level)
-    for end, side in (
-        (slice(0, 2), rows < centre[0]),
-        (slice(-2, None), rows > centre[-1]),
-    ):
-        if len(centre) > 1:
-            line = np.polynomial.Polynomial.fit(centre[end], level[end], 1)
-            course[side] = line(rows[side])
+def _course(n: int, centre: Array, level: Array) -> Array:
+    """Straight from part to part, and on beyond the first and the last, (n,)."""
+    rows = np.arange(n)
+    course: Array = np.interp(rows, centre, level)
+    if len(centre) > 1:
+        ends = (slice(0, int(centre[0]) + 1), 0), (slice(int(centre[-1]), n), -2)
+        for side, at in ends:
+            slope = (level[at + 1] - level[at]) / (centre[at + 1] - centre[at])
+            course[side] = level[at] + slope * (rows[side] - centre[at])
     return course
 
 

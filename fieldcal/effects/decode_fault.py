@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.effects.recording import lsb_of
 from fieldcal.samples import CHANNELS, Array
 
 Counts = NDArray[np.int64]
@@ -101,8 +100,9 @@ class DecodeFault(Chain):
 
 def _fault(recording: Recording, c: int) -> Fault | None:
     """What happened to one channel."""
+    lsb = float(recording.steps[c])
     values, t = recording.channel(c), recording.block.t
-    if not np.isfinite(values).all() or not (lsb := lsb_of(values)):
+    if not lsb or not np.isfinite(values).all():
         return None
     if np.abs(values).max() > WIDEST * lsb:
         return None

@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.effects.recording import lsb_of
 from fieldcal.samples import CHANNELS, Array
 
 RATIO = 1.8
@@ -46,8 +45,8 @@ class NoiseLevel(Chain):
             if not np.isfinite(recording.quick[first : first + 3]).all():
                 continue
             # what is rounded more coarsely changes seldom, and then by a whole step
-            steps = [lsb_of(recording.channel(c)) for c in range(first, first + 3)]
-            noise = np.maximum(recording.quick[first : first + 3], steps)
+            triad = slice(first, first + 3)
+            noise = np.maximum(recording.quick[triad], recording.steps[triad])
             if not noise.all():
                 continue
             worst, ratio = louder(noise)

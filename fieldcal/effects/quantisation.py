@@ -19,7 +19,6 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.effects.recording import lsb_of
 from fieldcal.samples import CHANNELS
 
 MATTERS = 0.5
@@ -61,12 +60,11 @@ class Quantisation(Chain):
         return out
 
     def _step(self, recording: Recording, c: int) -> float:
-        values = recording.channel(c)
-        lsb = lsb_of(values)
+        lsb = float(recording.steps[c])
         return lsb if lsb > 2 * MATTERS * self._noise(recording, c) else 0.0
 
     @staticmethod
     def _noise(recording: Recording, c: int) -> float:
         """Noise before rounding, as far as it can be told."""
-        measured, lsb = recording.noise[c], lsb_of(recording.channel(c))
+        measured, lsb = recording.noise[c], recording.steps[c]
         return float(np.sqrt(max(measured**2 - lsb**2 / 12, 0.0)))

@@ -29,6 +29,7 @@ class Recording:
     scale, bias : (6,) nominal calibration, in `samples.CHANNELS` order
     noise : (6,) standard deviation of one sample, as means over a second obey it
     quick : (6,) the same, as one sample differs from the next
+    steps : (6,) step of the grid that values lie on, 0 where they lie on none
     limits : (2,) full scale of accelerometers and gyroscopes, SI; nan where unknown
     rate_hz : nominal rate; nan where unknown
 
@@ -41,6 +42,7 @@ class Recording:
     bias: Array
     noise: Array
     quick: Array
+    steps: Array
     limits: Array
     rate_hz: float
 
@@ -55,7 +57,14 @@ class Recording:
     def channel(self, c: int) -> Array:
         """Samples of one output by its index in `samples.CHANNELS`, (n,)."""
         triad = self.block.acc if c < 3 else self.block.gyr
-        return triad[:, c % 3]
+        return np.ascontiguousarray(triad[:, c % 3])
+
+    def six(self, first: int, last: int) -> Array:
+        """All outputs of some samples, (n, 6), each channel in one piece."""
+        out = np.empty((6, last - first))
+        out[:3] = self.block.acc[first:last].T
+        out[3:] = self.block.gyr[first:last].T
+        return out.T
 
     def position_of(self, row: int) -> int:
         """Index of the position whose window holds a sample, -1 if none does."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.effects.recording import Rows, lsb_of
+from fieldcal.effects.recording import Rows
 from fieldcal.samples import CHANNELS, Array
 
 FEWEST = 5
@@ -77,7 +77,7 @@ class Saturation(Chain):
                 for c in range(first, first + 3):
                     values = recording.channel(c)
                     if c not in found and np.isfinite(values).any():
-                        coarse = lsb_of(values) > noise
+                        coarse = bool(recording.steps[c] > noise)
                         if at := rails(values, limit, coarse):
                             found[c] = np.sort(np.concatenate(at))
                 if not found:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.effects import Chain, Fault, Recording, Shape
-from fieldcal.effects.recording import lsb_of, runs
+from fieldcal.effects.recording import runs
 from fieldcal.samples import CHANNELS, Array
 
 ODDS = 1e-6
@@ -73,7 +73,7 @@ class Stuck(Chain):
         still = recording.still
         for c, name in enumerate(CHANNELS):
             values_of = recording.channel(c)
-            step_of = lsb_of(values_of) / max(float(recording.noise[c]), 1e-300)
+            step_of = float(recording.steps[c]) / max(float(recording.noise[c]), 1e-300)
             for first, last in repeats(values_of):
                 if step_of > 2 and still[first:last].all():
                     continue
@@ -113,7 +113,7 @@ def _usual(recording: Recording, c: int, first: int, last: int) -> bool:
         beside = [values[i] for i in (first - 1, last) if 0 <= i < len(values)]
         jump = np.abs(np.array(beside) - values[first]).max(initial=0.0)
         turned = max(move) > TURNED * recording.noise[axes].max()
-        return not (turned and jump > JUMP * lsb_of(values))
+        return not (turned and jump > JUMP * recording.steps[c])
     start, end = recording.windows[at]
     equal = np.diff(values[start:end]) == 0
     equal = np.delete(equal, slice(first - start, last - 1 - start))

@@ -49,6 +49,9 @@ AROUND_S = 3.0
 FADES_S = (1.0, 1.5, 2.0, 3.0, 4.5)
 """Time constants of what fades after a turn; slower ones are no disturbance anyway."""
 
+FEWEST = 20
+"""Samples of a window that tell what is usual in it."""
+
 SHORTEST = 3
 """Samples; a single wild one is left out and not called a bump."""
 
@@ -59,20 +62,32 @@ def disturbed(z: Array, m: int) -> NDArray[np.intp]:
     `z` is (n, c) in standard deviations, without its slow part; `m` the samples of the
     shortest stretch looked at as a whole.
     """
-    spread = usual(z)
-    z = z / (spread * np.where(spread > SHAKEN, TAILS, 1.0))
-    loud: NDArray[np.bool_] = np.any(np.abs(z) > LARGEST, axis=1)
-    total = np.zeros((z.shape[1], len(z) + 1)).T
-    np.cumsum(z, axis=0, out=total[1:])
+    scale = usual(z)
+    scale *= np.where(scale > SHAKEN, TAILS, 1.0)
+    # channel by channel: an hour of samples need not be in memory once more
+    size = np.zeros(len(z))
+    for column, one in zip(z.T, scale, strict=True):
+        np.maximum(size, np.abs(column) / one, out=size)
+    loud = size > LARGEST
     for width in (m, 4 * m):
         if width < 2 or width >= len(z):
             continue
-        mean = np.abs(total[width:] - total[:-width]) / np.sqrt(width)
-        level = usual(mean)
-        for first, last in runs((mean > MEAN * level).any(axis=1)):
-            at = first + int(np.argmax((mean[first:last] / level).max(axis=1)))
+        peak = np.zeros(len(z) - width + 1)
+        for column, one in zip(z.T, scale, strict=True):
+            np.maximum(peak, _means(column / one, width), out=peak)
+        for first, last in runs(peak > MEAN):
+            at = first + int(np.argmax(peak[first:last]))
             loud[at : at + width] = True
-    return np.array([_trimmed(z, a, b) for a, b in _joined(runs(loud), 2 * m)])
+    found = _joined(runs(loud), 2 * m)
+    return np.array([_trimmed(size, a, b) for a, b in found])
+
+
+def _means(column: Array, width: int) -> Array:
+    """Means over stretches of that width, in those that are usual, (n - width + 1,)."""
+    total = np.concatenate([[0.0], np.cumsum(column)])
+    mean: Array = np.abs(total[width:] - total[:-width]) / np.sqrt(width)
+    mean /= usual(mean[:, None])
+    return mean
 
 
 def usual(z: Array) -> Array:
@@ -97,9 +112,9 @@ def _joined(stretches: NDArray[np.intp], gap: int) -> NDArray[np.intp]:
     return np.array(out, dtype=np.intp).reshape(-1, 2)
 
 
-def _trimmed(z: Array, first: int, last: int) -> tuple[int, int]:
-    """A stretch from its first large sample to its last."""
-    large = np.flatnonzero((np.abs(z[first:last]) > LARGE).any(axis=1))
+def _trimmed(size: Array, first: int, last: int) -> tuple[int, int]:
+    """A stretch from its first large sample to its last; `size` (n,) in deviations."""
+    large = np.flatnonzero(size[first:last] > LARGE)
     if len(large) < 2:
         return first, last
     return first + int(large[0]), first + int(large[-1]) + 1
@@ -115,42 +130,46 @@ class Bump(Chain):
 
     def find(self, recording: Recording) -> list[Fault]:
         """Disturbed stretches of every window."""
-        t, out = recording.block.t, []
-        rate = 1 / float(np.median(np.diff(t)))
-        steps = 0.5 * recording.steps
-        noise = np.maximum(recording.noise, steps)
-        for p, (first, last) in enumerate(recording.windows):
-            if last - first < 20:
-                continue
-            piece = recording.six(first, last)
-            z = np.nan_to_num(_quick(piece, rate) / noise, copy=False)
-            # what goes to the next step and back is rounded, not touched
-            for c in np.flatnonzero(steps >= noise):
-                z[np.abs(z[:, c]) <= NEXT, c] = 0.0
-            if recording.x.rate[p].any():
-                z[:, :3] = 0.0  # the force goes round with the table
-            shortest = max(2, round(0.1 * rate))
-            for a, b in disturbed(z, shortest):
-                if b - a > LONGEST_S * rate:
-                    continue
-                if _steady(piece / noise, usual(z), (int(a), int(b)), rate):
-                    continue
-                out.append(_fault(recording, t, int(first), int(a), int(b), z, rate))
-        return out
+        rate = 1 / float(np.median(np.diff(recording.block.t)))
+        held = enumerate(recording.windows)
+        some = [p for p, (first, last) in held if last - first >= FEWEST]
+        return [fault for p in some for fault in _touched(recording, p, rate)]
 
 
-def _quick(piece: Array, rate: float) -> Array:
-    """What is left of a window when its course over seconds is taken out."""
+def _touched(recording: Recording, p: int, rate: float) -> list[Fault]:
+    """Disturbed stretches of one window."""
+    out = []
+    first, last = (int(i) for i in recording.windows[p])
+    steps = 0.5 * recording.steps
+    noise = np.maximum(recording.noise, steps)
+    z = recording.six(first, last)
+    _flatten(z, rate)
+    z /= noise
+    np.nan_to_num(z, copy=False)
+    # what goes to the next step and back is rounded, not touched
+    for c in np.flatnonzero(steps >= noise):
+        z[np.abs(z[:, c]) <= NEXT, c] = 0.0
+    if recording.x.rate[p].any():
+        z[:, :3] = 0.0  # the force goes round with the table
+    around = round(AROUND_S * rate)
+    for a, b in disturbed(z, max(2, round(0.1 * rate))):
+        if b - a > LONGEST_S * rate:
+            continue
+        near = recording.six(first + max(a - around, 0), min(first + b + around, last))
+        if not _steady(near / noise, usual(z), int(a), rate):
+            out.append(_fault(recording, first, int(a), int(b), z, rate))
+    return out
+
+
+def _flatten(piece: Array, rate: float) -> None:
+    """Take its course over seconds out of a window, in place."""
     width = int(np.clip(round(2 * rate), 8, max(len(piece) // 4, 8)))
     count = max(len(piece) // width, 1)
     level, centre = medians(piece, count)
-    out = np.zeros_like(piece)
     for c, column in enumerate(piece.T):
         known = np.isfinite(level[:, c])
         if known.any():
-            course = _course(len(piece), centre[known], level[known, c])
-            out[:, c] = column - course
-    return out
+            column -= _course(len(piece), centre[known], level[known, c])
 
 
 def medians(piece: Array, parts: int) -> tuple[Array, Array]:
@@ -189,16 +208,15 @@ def _middle(values: Array) -> Array:
     return upper if odd else (ordered[:, :half].max(axis=1) + upper) / 2
 
 
-def _steady(z: Array, spread: Array, stretch: tuple[int, int], rate: float) -> bool:
+def _steady(near: Array, spread: Array, start: int, rate: float) -> bool:
     """Whether the level only jumps there, or fades from the window's start.
 
-    `z` is (n, 6) in standard deviations, `spread` (6,) what is usual in the window.
+    `near` is (n, 6) in standard deviations, what lies around a stretch that begins
+    with a sample of the window, `spread` (6,) what is usual in that.
     """
-    a, b = stretch
-    around = round(AROUND_S * rate)
-    near = np.nan_to_num(z[max(a - around, 0) : b + around])
+    near, around = np.nan_to_num(near), round(AROUND_S * rate)
     courses = [_jump(near, around // 2)]
-    if a < around:
+    if start < around:
         courses += [_fading(near, tau * rate) for tau in FADES_S]
     rest = [near - c for c in courses if c is not None]
     shortest = max(2, round(0.1 * rate))
@@ -245,8 +263,9 @@ def _course(n: int, centre: Array, level: Array) -> Array:
 
 
 def _fault(
-    recording: Recording, t: Array, start: int, a: int, b: int, z: Array, rate: float
+    recording: Recording, start: int, a: int, b: int, z: Array, rate: float
 ) -> Fault:
+    t = recording.block.t
     worst = int(np.argmax(np.abs(z[a:b]).max(axis=0)))
     at, length = float(t[start + a]), float(t[start + b - 1] - t[start + a]) + 1 / rate
     margin = round(0.2 * rate)

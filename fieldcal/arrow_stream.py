@@ -158,10 +158,14 @@ class _Decoder:
 
         self._data = pa.py_buffer(data)
         self._raw = data
-        self._faults = (pa.ArrowException, OSError, EOFError, ValueError, KeyError)
+        self._faults = (pa.ArrowException, OSError, EOFError, ValueError, KeyError,
+                        StopIteration)  # fmt: skip
         self._usual = usual
         self._head = b""
         self._schema: pa.Schema | None = None
+        self._source = pa.BufferReader(self._data)
+        self._stream: Any = None
+        self._next = -1
         self._batches: list[Any] = []
         self._says: list[str] = []
         self._expected, self._row, self._checked = 0, 0, True
@@ -186,10 +190,10 @@ class _Decoder:
         """Where the first batch begins."""
         import pyarrow as pa
 
-        source = pa.BufferReader(self._data)
         try:
-            self._schema = pa.ipc.open_stream(source).schema
-            end = int(source.tell())
+            self._stream = pa.ipc.open_stream(self._source)
+            self._schema = self._stream.schema
+            self._next = end = int(self._source.tell())
             self._head = self._raw[:end]
             return end
         except self._faults:
@@ -241,24 +245,22 @@ class _Decoder:
         """End of a message, its batch and what it says of itself; None if not whole."""
         import pyarrow as pa
 
+        try:
+            if at == self._next:  # behind the last: no copy of its bytes is needed
+                found = _batch(self._stream)
+                self._next = int(self._source.tell())
+                return self._next, *found
+        except self._faults:
+            self._next = -1
         source = pa.BufferReader(self._data.slice(at))
         try:
             message = pa.ipc.read_message(source)
             end = at + int(source.tell())
             if message.type != "record batch":
                 return end, None, {}
-            stream = pa.ipc.open_stream(self._head + self._raw[at:end])
-            batch, said = stream.read_next_batch_with_custom_metadata()
-            batch.validate(full=True)
-        except (*self._faults, StopIteration):
+            return end, *_batch(pa.ipc.open_stream(self._head + self._raw[at:end]))
+        except self._faults:
             return None
-        # Arrow takes metadata that are no text
-        pairs = (said or {}).items()
-        return (
-            end,
-            batch,
-            {k.decode(errors="replace"): v.decode(errors="replace") for k, v in pairs},
-        )
 
     def _message(self, at: int) -> int | None:
         """Take the message that begins here; where it ends, None if it is not whole."""
@@ -297,3 +299,14 @@ class _Decoder:
             )
         self._expected, self._row = number + 1, row + batch.num_rows
         self._batches.append(batch)
+
+
+def _batch(stream: Any) -> tuple[Any, dict[str, str]]:
+    """Next batch of a stream, and what it says of itself."""
+    batch, said = stream.read_next_batch_with_custom_metadata()
+    batch.validate(full=True)
+    # Arrow takes metadata that are no text
+    pairs = (said or {}).items()
+    return batch, {
+        k.decode(errors="replace"): v.decode(errors="replace") for k, v in pairs
+    }

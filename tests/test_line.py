@@ -5,7 +5,7 @@ import pytest
 
 from fieldcal.diagnosis.line import Remains, remains, tuned
 from fieldcal.diagnosis.moments import moments_of
-from fieldcal.diagnosis.periodogram import Pieces
+from fieldcal.diagnosis.periodogram import LONGEST, Pieces
 from fieldcal.effects import Experience
 from fieldcal.effects.hum import Hum
 from fieldcal.effects.sway import Sway
@@ -88,3 +88,12 @@ def test_sway_is_foretold_in_positions_not_seen() -> None:
     found = remains(pieces, tone)
     assert tone.clear
     assert found.gain(tone.clear) > 0.7
+
+
+def test_a_line_is_tuned_in_windows_longer_than_a_periodogram() -> None:
+    """What a periodogram tells of its frequency is far from what the window tells."""
+    pieces = recorded(3, 1, 12 * LONGEST)
+    off = 0.3 * RATE / LONGEST
+    tone = tuned(pieces, Hum(), moments_of(pieces, HZ + off))
+    assert tone.channels == ("ay",)
+    assert abs(tone.hz - HZ) < 4 * tone.sigmas["hz"]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.diagnosis.moments import Moments, moments_of
-from fieldcal.diagnosis.periodogram import Complex, Pieces
+from fieldcal.diagnosis.periodogram import LONGEST, Complex, Pieces
 from fieldcal.effects import Line
 from fieldcal.samples import CHANNELS, Array
 
@@ -89,7 +89,7 @@ class Remains:
 
 def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
     """The effect at the frequency, near that of the sums, at which it takes most."""
-    shortest = min(map(len, pieces.samples)) / pieces.rate
+    shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     step = 0.2 / max(float(np.ptp(moments.middle)), shortest)
     offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
     return _at_best(pieces, effect, moments, offsets, step, 3)

@@ -15,12 +15,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.periodogram import Complex, Pieces
+from fieldcal.diagnosis.periodogram import LONGEST, Complex, Pieces
 from fieldcal.samples import Array
 
 PARTS, LEAST = 15, 4
-"""Parts of a window whose sums are kept, so that a frequency can be shifted, and the
-fewest samples in one."""
+"""Parts of a window, or of as much of it as a periodogram has, whose sums are kept, so
+that a frequency can be shifted by what that leaves open; fewest samples in one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,8 @@ def moments_of(pieces: Pieces, near: float, stretches: int = 1) -> Moments:
     counts: list[float] = []
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
         for first, last in pairwise(_cuts(0, len(t), stretches)):
-            parts = min(PARTS, max((last - first) // LEAST, 1))
+            most = PARTS * max((last - first) // LONGEST, 1)
+            parts = min(most, max((last - first) // LEAST, 1))
             for a, b in pairwise(_cuts(first, last, parts)):
                 turned = 2 * np.pi * near * t[a:b]
                 real, imaginary = (

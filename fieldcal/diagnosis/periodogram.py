@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.effects import Experience
+from fieldcal.effects.recording import medians
 from fieldcal.frames import turn
 from fieldcal.samples import Array
 
@@ -47,6 +48,9 @@ NEAR = 2.0
 
 LOOKS = 10
 """Spectra looked at."""
+
+TRIADS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
+"""Channels of one phase that are looked at together."""
 
 AT_ONCE = 1 << 16
 """Samples that a line is taken out of at once."""
@@ -122,19 +126,21 @@ def _flat(t: Array, acc: Array, gyr: Array, usable: NDArray[np.bool_]) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Power of one or more channels.
+    """Power of all channels.
 
     Attributes
     ----------
-    power : (c, m)
+    power : (6, m)
     count : periodograms summed in it
     hz : (m,)
+    together : channels in whose sums a line may stand out
 
     """
 
     power: Array
     count: int
     hz: Array
+    together: tuple[tuple[int, ...], ...]
 
 
 def highest(
@@ -154,16 +160,19 @@ def highest(
             band &= np.abs(hz - other) > NEAR / shortest
         if band.sum() < 4 * BESIDE:
             continue
-        stands = np.zeros(int(band.sum()))
-        for channel in spectrum.power[:, band]:
+        stands = {}
+        for c in sorted({c for some in spectrum.together for c in some}):
+            power = spectrum.power[c, band]
             # median of Gamma(W) over its mean, by Wilson and Hilferty
-            level = _floor(channel) / (1 - 1 / (9 * count)) ** 3
-            stands += channel / _on_a_slope(channel, level) * count
-        degrees = count * len(spectrum.power)
-        at = int(np.argmax(stands))
-        odds = _beyond(float(stands[at]), degrees) + np.log(LOOKS * len(stands))
-        if odds < best:
-            best, near = odds, float(hz[band][at])
+            level = _floor(power) / (1 - 1 / (9 * count)) ** 3
+            stands[c] = power / _on_a_slope(power, level) * count
+        for some in spectrum.together:
+            total = np.sum([stands[c] for c in some], axis=0)
+            at = int(np.argmax(total))
+            odds = _beyond(float(total[at]), count * len(some))
+            odds += np.log(LOOKS * len(total))
+            if odds < best:
+                best, near = odds, float(hz[band][at])
     return near
 
 
@@ -174,25 +183,22 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
     the device's axes and, where the angles are known, in the base's. Windows are
     tapered: what settles at the start of each is no line, though it comes as often.
     """
-    whole = _power(pieces)
-    used = np.flatnonzero(whole.power.any(axis=1))
-    out = [Spectrum(whole.power[[c]], whole.count, whole.hz) for c in used]
+    power, count, hz = _power(pieces)
+    used = np.flatnonzero(power.any(axis=1)).tolist()
+    out = [Spectrum(power, count, hz, tuple((c,) for c in used))]
     if sum(map(len, pieces.samples)) > COHERENT:
         return out
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
         turned = turn(pieces.x.alpha, pieces.x.beta)
         frames.append(np.moveaxis(pieces.x.mounting.T @ turned, 1, 2))
-    for frame in frames:
-        power, hz = _one_phase(pieces, frame)
-        for some in (slice(0, 3), slice(3, 6), slice(0, 6)):
-            if set(range(6)[some]) <= set(used.tolist()):
-                out.append(Spectrum(power[some], 1, hz))
+    triads = [some for some in TRIADS if set(some) <= set(used)]
+    out += [Spectrum(*_one_phase(pieces, frame), tuple(triads)) for frame in frames]
     return out
 
 
-def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, Array]:
-    """Power (6, m) of the whole recording, windows turned into a frame, and Hz."""
+def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, int, Array]:
+    """Of the whole recording, with windows turned into a frame, as in `Spectrum`."""
     start, end = pieces.times[0][0], pieces.times[-1][-1]
     whole = np.zeros((6, int(round((end - start) * pieces.rate)) + 1))
     for samples, t, to_frame in zip(pieces.samples, pieces.times, frame, strict=True):
@@ -200,11 +206,11 @@ def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, Array]:
         tapered = (np.hanning(len(t))[:, None] * samples).T
         whole[:3, at], whole[3:, at] = to_frame @ tapered[:3], to_frame @ tapered[3:]
     n = 2 << (whole.shape[1] - 1).bit_length()
-    return _square(np.fft.rfft(whole, n)), np.fft.rfftfreq(n, 1 / pieces.rate)
+    return _square(np.fft.rfft(whole, n)), 1, np.fft.rfftfreq(n, 1 / pieces.rate)
 
 
-def _power(pieces: Pieces) -> Spectrum:
-    """Of all channels, window by window."""
+def _power(pieces: Pieces) -> tuple[Array, int, Array]:
+    """Of all channels, window by window, as in `Spectrum`."""
     length = min(LONGEST, max(map(len, pieces.samples)))
     n = 1 << (length - 1).bit_length()
     total, count = np.zeros((6, n // 2 + 1)), 0
@@ -214,7 +220,7 @@ def _power(pieces: Pieces) -> Spectrum:
             taper = np.hanning(len(part))
             total += _square(np.fft.rfft(part.T * taper, n)) / (taper @ taper)
             count += 1
-    return Spectrum(total, count, np.fft.rfftfreq(n, 1 / pieces.rate))
+    return total, count, np.fft.rfftfreq(n, 1 / pieces.rate)
 
 
 def _square(spectrum: Complex) -> Array:
@@ -226,7 +232,7 @@ def _floor(power: Array) -> Array:
     """Running median, by stretches."""
     parts = max(1, len(power) // (2 * BESIDE))
     each = len(power) // parts
-    level = np.median(power[: parts * each].reshape(parts, each), axis=1)
+    level = medians(power[: parts * each].reshape(parts, each))
     middle = (np.arange(parts) + 0.5) * each
     floor: Array = np.interp(np.arange(len(power)), middle, level)
     return np.maximum(floor, 1e-300)

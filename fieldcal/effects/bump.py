@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.effects import Chain, Fault, Recording, Shape
-from fieldcal.effects.recording import runs
+from fieldcal.effects.recording import medians, runs
 from fieldcal.samples import CHANNELS, Array
 
 LARGEST = 6.5
@@ -165,19 +165,19 @@ def _flatten(piece: Array, rate: float) -> None:
     """Take its course over seconds out of a window, in place."""
     width = int(np.clip(round(2 * rate), 8, max(len(piece) // 4, 8)))
     count = max(len(piece) // width, 1)
-    level, centre = medians(piece, count)
+    level, centre = _levels(piece, count)
     for c, column in enumerate(piece.T):
         known = np.isfinite(level[:, c])
         if known.any():
             column -= _course(len(piece), centre[known], level[known, c])
 
 
-def medians(piece: Array, parts: int) -> tuple[Array, Array]:
+def _levels(piece: Array, parts: int) -> tuple[Array, Array]:
     """Medians (parts, c) of what is known in parts of a window, and their middles.
 
     The parts are as long as each other, but for one sample; nan where nothing is known.
 
-    >>> medians(np.array([[1.0], [5.0], [3.0], [7.0], [np.nan]]), 2)
+    >>> _levels(np.array([[1.0], [5.0], [3.0], [7.0], [np.nan]]), 2)
     (array([[3.],
            [7.]]), array([1. , 3.5]))
     """
@@ -189,23 +189,12 @@ def medians(piece: Array, parts: int) -> tuple[Array, Array]:
     for c in range(piece.shape[1]):
         level[:, c] = np.concatenate(
             [
-                _middle(half[:, c].reshape(n, -1))
+                medians(half[:, c].reshape(n, -1))
                 for half, n in zip(halves, counts, strict=True)
             ]
         )
     first = np.arange(parts) * each + np.minimum(np.arange(parts), more)
     return level, (first + np.append(first[1:], len(piece)) - 1) / 2
-
-
-def _middle(values: Array) -> Array:
-    """Median of what is known in each row, (n,)."""
-    if not np.isfinite(values.sum()):
-        some = [row[np.isfinite(row)] for row in values]
-        return np.array([np.median(row) if len(row) else np.nan for row in some])
-    half, odd = divmod(values.shape[1], 2)
-    ordered = np.partition(values, half, axis=1)
-    upper: Array = ordered[:, half]
-    return upper if odd else (ordered[:, :half].max(axis=1) + upper) / 2
 
 
 def _steady(near: Array, spread: Array, start: int, rate: float) -> bool:

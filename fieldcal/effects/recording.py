@@ -113,6 +113,20 @@ def runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.column_stack([np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)])
 
 
+def medians(values: Array) -> Array:
+    """Median of what is known in each row, (n,); nan where nothing is.
+
+    `numpy.median` looks for nan in each row, which takes four times as long.
+    """
+    if not np.isfinite(values.sum()):
+        some = [row[np.isfinite(row)] for row in values]
+        return np.array([np.median(row) if len(row) else np.nan for row in some])
+    half, odd = divmod(values.shape[1], 2)
+    ordered = np.partition(values, half, axis=1)
+    upper: Array = ordered[:, half]
+    return upper if odd else (ordered[:, :half].max(axis=1) + upper) / 2
+
+
 def lsb_of(values: Array) -> float:
     """Step of the grid that values lie on, 0 where they lie on none.
 

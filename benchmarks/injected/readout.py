@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 
 from fieldcal.samples import Array
 
-AT_RAIL = 10
-"""Samples that make a rail, if they are many more than at the value next to it."""
-
-MORE = 4.0
+FEWEST, MORE = 5, 4.0
+"""Samples that make a rail, if they are so many more than at the value next to it."""
 
 NEAR = 20.0
 """Steps within which gaps tell a grid; a text's decimals add up over wider ones."""
@@ -49,7 +47,7 @@ def rails(values: Array) -> tuple[float, float]:
     if len(levels) < 3:
         return -np.inf, np.inf
     low, high = (
-        counts[end] > max(AT_RAIL, MORE * counts[beside])
+        counts[end] >= max(FEWEST, MORE * counts[beside])
         for end, beside in ((0, 1), (-1, -2))
     )
     return float(levels[0]) if low else -np.inf, float(levels[-1]) if high else np.inf

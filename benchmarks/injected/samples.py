@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.injected.physics import Added, CannotShow, Rng, direction
-from benchmarks.injected.readout import AT_RAIL, grid, put_out
+from benchmarks.injected.readout import grid, put_out, rails
 from benchmarks.injected.scene import Scene
 from fieldcal.samples import CHANNELS, Array
 
@@ -31,6 +31,9 @@ NEIGHBOURS = np.concatenate([np.linspace(0.85, 0.96, 6), np.linspace(1.04, 1.15,
 """Frequencies that tell the noise about a line, in its own."""
 
 BUMP_S = 1.0
+
+AT_RAIL = 10
+"""Samples that must be clipped."""
 
 
 def hum(scene: Scene, sigmas: float, rng: Rng) -> Added:
@@ -147,11 +150,15 @@ def saturation(scene: Scene, sigmas: float, rng: Rng) -> Added:
 
 
 def quantisation(scene: Scene, sigmas: float, rng: Rng) -> Added:
-    """Coarse steps on one triad."""
-    first = int(rng.choice(scene.triads))
+    """Coarse steps on one triad that stops at no rail."""
+    six = scene.block.six.copy()
+    stops = [bool(np.isfinite(rails(six[:, c])).any()) for c in range(6)]
+    whole = [f for f in scene.triads if not any(stops[f : f + 3])]
+    if not whole:
+        raise CannotShow("every triad is clipped")
+    first = int(rng.choice(whole))
     noise = float(scene.noise[first : first + 3].max())
     step = (1.8 if sigmas > STRONG else 1.4) * noise
-    six = scene.block.six.copy()
     own = max(grid(six[:, c]) for c in range(first, first + 3))
     if step < 4 * own:
         raise CannotShow("its steps are coarse anyway")

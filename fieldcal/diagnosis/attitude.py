@@ -1,10 +1,7 @@
-"""Kinematics of a turn: attitudes from small turns, what is known at both ends.
+"""Kinematics of a turn: what of it is known at both ends.
 
-    R_k = exp(-[w dt]x) R_{k-1}
-
-R (3, 3) takes vectors of the attitude at the start to that at the k-th edge; angles in
-rad, t in s. Source: kinematics of rotation; the trapezoid rule with the next term of
-Euler and Maclaurin.
+R (3, 3) takes vectors of the attitude at the start to that on the way (`rotation`);
+angles in rad, t in s.
 """
 
 from __future__ import annotations
@@ -15,7 +12,7 @@ from numpy.typing import NDArray
 from fieldcal.effects import Experience
 from fieldcal.frames import turn
 from fieldcal.samples import Array
-from fieldcal.solve.rotation import exponential, products
+from fieldcal.solve.rotation import carry, small_turns
 
 SMOOTH_S = 0.1
 """Means that the angular acceleration is taken from."""
@@ -32,36 +29,6 @@ def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
     length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
     mean: Array = np.diff(total[cut], axis=0) / length
     return mean
-
-
-def carry(angle: Array) -> Array:
-    """Attitudes from small turns, (m + 1, 3, 3), the first of them identity.
-
-    `angle` is (m, 3) rad; the turn of a body by it turns vectors seen in it back.
-
-    >>> quarter = carry(np.full((90, 3), [0.0, 0.0, np.pi / 180]))
-    >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0
-    array([ 0., -1.,  0.])
-    """
-    return np.concatenate([np.eye(3)[None], products(exponential(-angle))])
-
-
-def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
-    """Small turns between edges, (m, 3) rad: the trapezoid rule and its corrections.
-
-    The next term of Euler and Maclaurin is -dt^2/12 (w'(b) - w'(a)). Where the axis of
-    the turn itself turns, a step of length T is not the integral of its rate, but
-
-        theta = int w dt + T^2/12 w(a) x w(b)
-
-    for a rate that changes evenly (Magnus; the coning term of strapdown attitude).
-    """
-    step = float(np.median(np.diff(t)))
-    slope = np.gradient(w, t, axis=0)[edge]
-    length = np.diff(t[edge])[:, None]
-    total: Array = trapezoid_means(t, w, edge) * length
-    coning = length**2 / 12 * np.cross(w[edge[:-1]], w[edge[1:]])
-    return total - step**2 / 12 * np.diff(slope, axis=0) + coning
 
 
 def between(attitude: Array, done: Array, start: Array, end: Array) -> Array:

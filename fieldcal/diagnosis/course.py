@@ -11,15 +11,16 @@ the turn that is done. Axes of the device, rad/s. Source: rotation kinematics.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.attitude import between, carry, small_turns
-from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.attitude import between
 from fieldcal.diagnosis.reduce import Rows, Source, rate_of
 from fieldcal.effects import Experience
 from fieldcal.samples import Array
+from fieldcal.solve.rotation import carry, small_turns
 
 FINE_S = 0.02
 """Step of the integration at high sampling rates."""
@@ -61,6 +62,26 @@ class Undo:
 NOTHING = Undo(np.zeros((3, 3)), 0.0)
 
 
+class Sensors(Protocol):
+    """Bias and scale factor of the outputs, (6,) each."""
+
+    @property
+    def bias(self) -> Array:
+        """m/s^2 and rad/s."""
+
+    @property
+    def scale(self) -> Array:
+        """Output per input."""
+
+
+class Fitted(Protocol):
+    """What was fitted to the windows."""
+
+    @property
+    def state(self) -> Sensors:
+        """The sensors by it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Leg:
     """One turn to be followed, by the model of the windows.
@@ -77,7 +98,7 @@ class Leg:
 
     source: Source
     rows: Rows
-    fit: Fit
+    fit: Fitted
     x: Experience
     undo: Undo
     pair: tuple[int, int]

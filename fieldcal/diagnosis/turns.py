@@ -147,7 +147,7 @@ def _turn(leg: Leg, before: Turn | None) -> Turn | None:
         return None
     rid: Array = np.zeros((len(steps.edge), 3))
     if before is not None:
-        rid = errors_of(leg.fit, before.x)
+        rid = errors_of(leg.fit, before.x)  # type: ignore[arg-type]
         if not rid.any():
             return before
     way = integrated(leg, steps, rid)

@@ -2,17 +2,22 @@
 
 A vector u that is fixed outside, seen from a body that turns at w, obeys
 
-    du/dt = -w x u,   u(t) = F(t) u(0),   F = ... E_2 E_1,   E_k = exp(-[q_k x])
-    q_k = h (13 (w_k + w_k+1) - w_k-1 - w_k+2) / 24 + h^2 (w_k x w_k+1) / 12
+    du/dt = -w x u,   u(t) = F(t) u(0),   F = ... E_2 E_1,   E_j = exp(-[q_j x])   (1)
 
-in steps h; the second term is what two axes turning in turn (coning) leave after a
-cycle. Where steps are unequal, and at the ends, the mean of two rates is taken. A
-change dw of the rates turns the result by
+in steps from edge a to edge b of T seconds, with samples every h seconds in them:
 
-    du = u x s,   s = sum_k B_k dw_k h,   B_k = F(end) F(k)^T
+    m_k = (w_k + w_k+1) / 2 - h_k (w'_k+1 - w'_k) / 12                            (2)
+    q_j = sum_k h_k m_k + T^2 (w_a x w_b) / 12                                    (3)
 
-w rad/s, device axes. Source: Magnus 1954, to fourth order in h; P. G. Savage 1998, for
-coning.
+(2) is the mean of the rate from one sample to the next, of the fourth order in even
+steps, where it is (13 (w_k + w_k+1) - w_k-1 - w_k+2) / 24; w' are differences over two
+steps. The last term of (3) is what two axes turning in turn (coning) leave after a
+cycle. A change dw of the rates turns the result by
+
+    du = u x s,   s = sum_k B_k dw_k h,   B_k = F(end) F(k)^T                      (4)
+
+w rad/s, device axes. Source: rule of Euler and Maclaurin (2); Magnus 1954, for rates
+that change evenly within a step (3); P. G. Savage 1998, for coning.
 """
 
 from __future__ import annotations
@@ -20,11 +25,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.samples import Array
-
-EVEN = 0.05
-"""Largest difference of neighbouring steps, as a share, that counts as none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,23 +51,45 @@ class Turn:
 
 def integrate(t: Array, w: Array) -> Turn:
     """Integrate rates (k + 1, 3) at instants t (k + 1,), s."""
-    h = np.diff(t)[:, None]
-    rate = _mean_rate(h[:, 0], w)
-    angle = h * rate + h**2 / 12 * np.cross(w[:-1], w[1:])
-    until = products(exponential(-angle))
+    every = np.arange(len(t))
+    angle, h = small_turns(t, w, every), np.diff(t)
+    until = carry(angle)[1:]
     whole = until[-1]
     # to the middle of a step, since that is where its mean rate acts
     half = until @ exponential(angle / 2)
-    return Turn(whole, whole @ np.swapaxes(half, -1, -2), rate, h[:, 0])
+    later = whole @ np.swapaxes(half, -1, -2)  # (4)
+    return Turn(whole, later, mean_rates(t, w), h)
 
 
-def _mean_rate(h: Array, w: Array) -> Array:
-    """Mean rate of each step, from the cubic through four samples where it fits."""
-    mean = (w[:-1] + w[1:]) / 2
-    even = np.ptp(np.stack([h[:-2], h[1:-1], h[2:]]), axis=0) < EVEN * h[1:-1]
-    cubic = (13 * (w[1:-2] + w[2:-1]) - w[:-3] - w[3:]) / 24
-    mean[1:-1] = np.where(even[:, None], cubic, mean[1:-1])
-    return np.asarray(mean)
+def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:
+    """Small turns q (m, 3), rad, between edges (m + 1,), samples of a turn, (3)."""
+    total = np.add.reduceat(
+        (np.diff(t)[:, None] * mean_rates(t, w))[: edge[-1]], edge[:-1], axis=0
+    )
+    coning = np.cross(w[edge[:-1]], w[edge[1:]])
+    turns: Array = total + np.diff(t[edge])[:, None] ** 2 / 12 * coning
+    return turns
+
+
+def mean_rates(t: Array, w: Array) -> Array:
+    """Mean of the rate (n, 3) from each sample to the next, (n - 1, 3), (2)."""
+    mean: Array = (w[:-1] + w[1:]) / 2
+    if len(t) > 2:
+        slope = np.gradient(w, t, axis=0)
+        mean -= np.diff(t)[:, None] * np.diff(slope, axis=0) / 12
+    return mean
+
+
+def carry(angle: Array) -> Array:
+    """Attitudes from small turns, (m + 1, 3, 3), the first of them identity, (1).
+
+    `angle` is (m, 3) rad; the turn of a body by it turns vectors seen in it back.
+
+    >>> quarter = carry(np.full((90, 3), [0.0, 0.0, np.pi / 180]))
+    >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0
+    array([ 0., -1.,  0.])
+    """
+    return np.concatenate([np.eye(3)[None], products(exponential(-angle))])
 
 
 def exponential(angle: Array) -> Array:

@@ -10,16 +10,22 @@ X the columns of all else and V = L L' the covariance of the rows, is seen with
 Where the angles are known, the rows are the six outputs. Where they are not, the force
 is seen by its length, and across it by what changes within a window: how the device
 lies is free in each, and the force of all columns is the mean of the window.
+
+The scatter is not known, but found from few means. Of an effect of k sigma, found with
+n degrees of freedom, a likelihood ratio of no more than (n / 2) ln(1 + k^2 / n) tells;
+n is Welch and Satterthwaite's, of what white noise and the rest make of sigma^2.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from benchmarks.injected import columns
 from benchmarks.injected.parts import cut
-from benchmarks.injected.scatter import scatter, span
+from benchmarks.injected.scatter import Scatter, scatter, span
 from fieldcal.description import Description
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.samples import Array, Block
@@ -32,6 +38,25 @@ UNSEEN = 1e-4
 
 ALWAYS = ""
 """Under which bias, scale factor and how the device lies are kept."""
+
+
+class Seen(NamedTuple):
+    """How well an effect is seen.
+
+    Attributes
+    ----------
+    sigma : standard deviation of its size; inf where it is not seen
+    freedom : degrees of freedom that tell this sigma
+
+    """
+
+    sigma: float
+    freedom: float
+
+    def evidence(self, sigmas: float) -> float:
+        """Logarithm of the likelihood ratio that an effect of a size can have."""
+        n = max(self.freedom, 1e-9)
+        return float(n / 2 * np.log1p(sigmas**2 / n))
 
 
 class Oracle:
@@ -107,11 +132,12 @@ class Oracle:
         design = np.array([self._turned(c) for c in every])
         lie = [] if self._oriented else [1, 2]
         self._factor: dict[int, Array] = {}
+        self._scatter: dict[int, Scatter] = {}
         for c in self._seen:
             free = self._held.astype(float) if c in lie else self._held[:, :0]
             own = np.hstack([design[:, :, c].T, free])
-            cov = scatter(lies[:, c], own, self.parts, float(noise[c]))
-            self._factor[c] = cholesky(cov, lower=True)
+            self._scatter[c] = scatter(lies[:, c], own, self.parts, float(noise[c]))
+            self._factor[c] = cholesky(self._scatter[c].cov, lower=True)
         self._known = {
             name: [self._rows(self._turned(c)) for c in table]
             for name, table in known.items()
@@ -128,13 +154,25 @@ class Oracle:
         ]
         return np.concatenate(some)
 
-    def sigma(self, effect: str, change: Array) -> float:
-        """Standard deviation of how much of a change (n, 6) is there; inf: unseen."""
+    def sees(self, effect: str, change: Array) -> Seen:
+        """How well it is known how much of a change (n, 6) is there."""
         rows = self._rows(self._turned(np.nan_to_num(self.parts.of(change))))
-        others = [
-            r for name, some in self._known.items() if name != effect for r in some
-        ]
+        each = self._known.items()
+        others = [row for name, some in each if name != effect for row in some]
         reached, _ = span(np.column_stack(others))
         left = rows - reached @ (reached.T @ rows)
         size, whole = float(np.linalg.norm(left)), float(np.linalg.norm(rows))
-        return 1 / size if size > UNSEEN * whole else np.inf
+        if size <= UNSEEN * whole:
+            return Seen(np.inf, 0.0)
+        return Seen(1 / size, self._freedom(left / size))
+
+    def _freedom(self, unit: Array) -> float:
+        """Degrees of freedom of the variance of a sum of rows, of unit variance."""
+        total = 0.0
+        for part, c in zip(np.split(unit, len(self._seen)), self._seen, strict=True):
+            found = self._scatter[c]
+            weights = solve_triangular(self._factor[c], part, lower=True, trans=1)
+            white = float((weights**2 * found.white).sum())
+            rest = max(float(part @ part) - white, 0.0)
+            total += white**2 / found.white_dof + rest**2 / found.other_dof
+        return 1 / max(total, 1e-9)

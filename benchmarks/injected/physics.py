@@ -59,6 +59,9 @@ LARGEST: Mapping[str, tuple[float, float]] = {
 }
 """Numbers beyond which no device goes, accelerometers and gyroscopes."""
 
+TELLS = 12.0
+"""Evidence, ln, below which even an oracle could take an effect for chance."""
+
 WARMER_K, TURNS, READ_K = 4.0, 1.3, 0.02
 """Course of a temperature made up: its amplitude, how many waves, and how well read."""
 
@@ -177,10 +180,13 @@ def physical(name: str, scene: Scene, sigmas: float, rng: Rng) -> Added:
         change = np.outer(truly - truly[0], direction(scene, rng))
     else:
         change = pattern(name, scene, rng)
-    size = sigmas * scene.oracle.sigma(name, change)
+    seen = scene.oracle.sees(name, change)
+    size = sigmas * seen.sigma
     triad = int(np.abs(change[:, :3]).max() == 0)
     if not size < LARGEST[name][triad]:
         raise CannotShow(f"{size:.2g} is more than any device has")
+    if seen.evidence(sigmas) < TELLS:
+        raise CannotShow(f"{seen.freedom:.1f} degrees of freedom tell the scatter")
     six = put_out(scene.block.six, size * change, rng)
     return Added(
         scene.but(six, degrees),

@@ -10,11 +10,13 @@ maximise
 
     -2 ln L = ln det S + d ln(z' S^-1 z / d),   S = K' (V / s^2) K,   z = K' y
 
-K spans what X leaves free, d its dimension.
+K spans what X leaves free, d its dimension. What is told of s^2 rests on d degrees of
+freedom, what is told of a and b on as many as X leaves of the windows' own means.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -30,6 +32,24 @@ FEWEST = 2
 """Degrees of freedom below which nothing is said of the scatter."""
 
 
+@dataclass(frozen=True)
+class Scatter:
+    """How much the means of one output scatter.
+
+    Attributes
+    ----------
+    cov : (m, m) covariance
+    white : (m,) variances that the white noise has of it
+    white_dof, other_dof : degrees of freedom that tell it, and the rest
+
+    """
+
+    cov: Array
+    white: Array
+    white_dof: float
+    other_dof: float
+
+
 def span(design: Array) -> tuple[Array, Array]:
     """Orthonormal bases of what a design reaches and of what it leaves free."""
     size = np.linalg.norm(design, axis=0)
@@ -39,8 +59,8 @@ def span(design: Array) -> tuple[Array, Array]:
     return u[:, :rank], u[:, rank:]
 
 
-def scatter(y: Array, design: Array, parts: Parts, noise: float) -> Array:
-    """Covariance of an output's means, (m, m).
+def scatter(y: Array, design: Array, parts: Parts, noise: float) -> Scatter:
+    """Find how an output's means scatter about a design, (m, p).
 
     Where the design takes up each window's mean, nothing is said of what windows share.
 
@@ -50,9 +70,8 @@ def scatter(y: Array, design: Array, parts: Parts, noise: float) -> Array:
     _, free = span(design)
     z = free.T @ y
     if len(z) < FEWEST:
-        return noise**2 * white
-    best = np.inf
-    found: Array = noise**2 * white
+        return _told(noise**2, white, white, design, parts)
+    best, found = np.inf, _told(noise**2, white, white, design, parts)
     for shape in _shapes(parts, white, free):
         try:
             factor = cho_factor(free.T @ shape @ free, lower=True)
@@ -64,8 +83,22 @@ def scatter(y: Array, design: Array, parts: Parts, noise: float) -> Array:
         logdet = 2 * float(np.log(np.diag(factor[0])).sum())
         cost = logdet + len(z) * np.log(size)
         if cost < best:
-            best, found = cost, size * shape
+            best, found = cost, _told(size, shape, white, design, parts)
     return found
+
+
+def _told(
+    size: float, shape: Array, white: Array, design: Array, parts: Parts
+) -> Scatter:
+    """Scatter of that size and shape, with its degrees of freedom."""
+    own = len(shape) - np.linalg.matrix_rank(design)
+    held = (parts.window[:, None] == np.unique(parts.window)).astype(float)
+    free = held.shape[1] - np.linalg.matrix_rank(held.T @ design)
+    alone = held.shape[1] == 1 or free <= 0 < own  # what is told within windows
+    dof = own if alone else free
+    return Scatter(
+        size * shape, size * np.diag(white), max(own, 0.5), max(float(dof), 0.5)
+    )
 
 
 def _shapes(parts: Parts, white: Array, free: Array) -> list[Array]:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.noise import quick_of
 from fieldcal.diagnosis.reduce import masked, rate_of, spans, table_rate
 from fieldcal.diagnosis.vibration import usual_noise
 from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
@@ -21,6 +20,7 @@ from fieldcal.effects.recording import lsb_of
 from fieldcal.frames import earth_rate_home, force_home
 from fieldcal.positions import angles
 from fieldcal.samples import CHANNELS, Array, Block
+from fieldcal.windows.noise import Noise
 
 MENDING = ("decode_fault", "mounting")
 """In this order: a channel with wrong bytes looks like one of another axis."""
@@ -168,7 +168,10 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
     """What the checks look at."""
     windows, rate = spans(block, about), rate_of(block)
     block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
-    noise = usual_noise(block, held, rate) if len(held) else np.full(6, np.nan)
+    unknown = np.full(6, np.nan)
+    noise = Noise(unknown, unknown)
+    if len(held):
+        noise = usual_noise(block, held, rate)
     if about.positions:
         alpha, beta = angles(about.positions)
     else:
@@ -190,8 +193,8 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
         x=x,
         scale=np.concatenate([about.nominal["acc_scale"], about.nominal["gyr_scale"]]),
         bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
-        noise=noise,
-        quick=quick_of(block, held) if len(held) else noise,
+        noise=noise.white,
+        quick=noise.quick,
         steps=np.array([lsb_of(c) for c in (*block.acc.T, *block.gyr.T)]),
         limits=np.array(limits),
         rate_hz=about.rate_hz or np.nan,

@@ -167,7 +167,7 @@ def reduce(source: Source) -> Rows:
         noise,
         np.repeat(seen.variance, rows, axis=0),
     )
-    off = np.tile(rounding(block, windows[held], noise), (len(out.x), 1))
+    off = np.repeat(rounding(block, windows[held]), rows, axis=0)
     # the Earth turns a device of unknown orientation about any of its axes; one that
     # was never turned has it in its bias
     free = ~out.x.oriented & (len(held) > 1)

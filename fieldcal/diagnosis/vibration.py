@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.diagnosis.noise import grain_of, noise_of
 from fieldcal.samples import Array, Block
+from fieldcal.windows.noise import Noise, short_lag
 
 LOUDER = 6.0
 """Significance from which a window counts as noisier than the others."""
@@ -61,7 +62,8 @@ def shaking(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Shaking:
     The usual noise is that of the quiet windows. Others have more: what their samples
     have on top of it, or, if that is less, what means over a second have.
     """
-    noise, more, loud = _compared(block, windows, rate_hz)
+    found, more, loud = _compared(block, windows, rate_hz)
+    noise = found.white
     levels = np.sqrt(noise**2 + more)
     variance = levels[:, :3] ** 2
     six = block.six if loud.any() else np.empty((0, 6))
@@ -72,46 +74,34 @@ def shaking(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Shaking:
     if loud.any():
         block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
     for i in np.flatnonzero(loud).tolist():
-        alone = noise_of(block, windows[i : i + 1], rate_hz)
+        alone = noise_of(block, windows[i : i + 1], rate_hz).white
         levels[i] = np.fmax(noise, np.fmin(levels[i], alone))
     return Shaking(noise, levels, variance, block)
 
 
-def usual_noise(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Array:
-    """Deviation of one sample in the quiet windows, (6,)."""
+def usual_noise(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Noise:
+    """Noise of one sample in the quiet windows, (6,)."""
     return _compared(block, windows, rate_hz)[0]
 
 
 def _compared(
     block: Block, windows: NDArray[np.intp], rate_hz: float
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Noise, Array, NDArray[np.bool_]]:
     """Usual noise (6,), what windows have on top (w, 6), and which are loud (w,)."""
     out = np.empty((len(windows), 6))
     for i, (a, b) in enumerate(windows):
-        squares = [_squares(triad[a:b]) for triad in (block.acc, block.gyr)]
-        out[i] = np.sqrt(np.concatenate(squares) / 2)
+        out[i] = np.concatenate([short_lag(t[a:b]) for t in (block.acc, block.gyr)])
     grain = grain_of(block, windows)  # outputs may stay on one step all through some
     low = np.fmax(np.sort(out, axis=0)[(len(out) - 1) // 4], grain)  # nan comes last
     margin = LOUDER / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
     louder = out > low * np.exp(margin)
     loud: NDArray[np.bool_] = np.any(louder, axis=1)
-    quiet = windows if loud.all() else windows[~loud]
-    noise = noise_of(block, quiet, rate_hz)
-    noise = np.where(grain > 0, np.fmax(noise, grain), noise)
+    noise = noise_of(block, windows if loud.all() else windows[~loud], rate_hz)
+    white, quick = (
+        np.where(grain > 0, np.fmax(n, grain), n) for n in (noise.white, noise.quick)
+    )
     more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0)
-    return noise, more, loud
-
-
-def _squares(values: Array) -> Array:
-    """Mean square of the steps of each column, nan where there is none."""
-    steps = np.diff(values, axis=0)
-    count = np.full(values.shape[1], len(steps))
-    known = np.isfinite(steps)
-    if not known.all():
-        count = known.sum(axis=0)
-        steps[~known] = 0.0
-    total = np.einsum("nc,nc->c", steps, steps)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return Noise(white, quick), more, loud
 
 
 def without_lines(piece: Array, rate_hz: float) -> Array:

@@ -7,11 +7,13 @@ Below that the mean of a window itself is off, by up to
 
     (lsb / pi) exp(-2 pi^2 (noise / lsb)^2)
 
-which longer averaging does not mend. Source: B. Widrow, I. Kollar, Quantization Noise,
-chapter 4.
+which longer averaging does not mend; `fieldcal.windows.rounding` has the whole of it.
+Source: B. Widrow, I. Kollar, Quantization Noise, chapter 4.
 
->>> round(bias_of(1.0, 0.3), 4)
-0.0539
+>>> import numpy as np
+>>> sampled = np.hypot(0.3, rounding.least(np.array([1.0])))
+>>> np.sqrt(2 * rounding.of_mean(np.array([1.0]), sampled)).round(4)
+array([0.0539])
 """
 
 from __future__ import annotations
@@ -20,14 +22,10 @@ import numpy as np
 
 from fieldcal.effects import Chain, Fault, Param, Recording
 from fieldcal.samples import CHANNELS
+from fieldcal.windows import rounding
 
 MATTERS = 0.5
 """Noise in steps from which rounding is no matter: LSB > 2 sigma is far beyond it."""
-
-
-def bias_of(lsb: float, noise: float) -> float:
-    """How far rounding can move the mean of many samples."""
-    return lsb / np.pi * float(np.exp(-2 * np.pi**2 * (noise / lsb) ** 2))
 
 
 class Quantisation(Chain):
@@ -60,11 +58,6 @@ class Quantisation(Chain):
         return out
 
     def _step(self, recording: Recording, c: int) -> float:
-        lsb = float(recording.steps[c])
-        return lsb if lsb > 2 * MATTERS * self._noise(recording, c) else 0.0
-
-    @staticmethod
-    def _noise(recording: Recording, c: int) -> float:
-        """Noise before rounding, as far as it can be told."""
-        measured, lsb = recording.noise[c], recording.steps[c]
-        return float(np.sqrt(max(measured**2 - lsb**2 / 12, 0.0)))
+        lsb = recording.steps[c]
+        own = rounding.before(recording.noise[c], lsb)
+        return float(lsb) if lsb > 2 * MATTERS * own else 0.0

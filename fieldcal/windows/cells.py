@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.samples import Array, Block
+from fieldcal.windows.rounding import shown
 from fieldcal.windows.sums import channels, finest, warmth
 from fieldcal.windows.trend import line
 
@@ -28,9 +29,6 @@ CELL = 0.1
 
 _CHUNK = 8192
 """Samples summed at a time, so that what is in hand stays in the processor's cache."""
-
-_COARSE = 0.6
-"""Noise, in steps of the resolution, below which the rounding shows."""
 
 _GRACE = 1e-5
 """Part of a cell by which a time may miss its edge through rounding."""
@@ -115,7 +113,7 @@ class Table:
     @property
     def resolution(self) -> Array:
         """Finest change seen on any axis of the same sensor, (6,); 0 where none."""
-        return _resolution(self.finest.min(axis=0, initial=np.inf))
+        return resolution(self.finest.min(axis=0, initial=np.inf))
 
     @property
     def mean(self) -> Array:
@@ -151,7 +149,7 @@ class Table:
     @property
     def rounding(self) -> Array:
         """Resolution where the noise does not hide it, (6,); 0 elsewhere."""
-        return rounding(self.noise, self.finest.min(axis=0, initial=np.inf))
+        return shown(self.resolution, self.noise)
 
 
 class Cells:
@@ -249,17 +247,8 @@ class Cells:
         return Table(times, self._sums[:size], self._origin)
 
 
-def rounding(noise: Array, finest: Array) -> Array:
-    """Resolution where the noise does not hide it, (6,); 0 elsewhere.
-
-    From the short-lag noise and the smallest change of each channel, (6,) each.
-    """
-    resolution = _resolution(finest)
-    return np.where(np.nan_to_num(noise) < _COARSE * resolution, resolution, 0.0)
-
-
-def _resolution(finest: Array) -> Array:
-    """Smallest change on any axis of the same sensor; 0 where there was none."""
+def resolution(finest: Array) -> Array:
+    """Smallest change on any axis of the same sensor, (6,); 0 where there was none."""
     sensor = np.repeat(finest.reshape(2, 3).min(axis=1), 3)
     return np.where(np.isfinite(sensor), sensor, 0.0)
 

@@ -1,9 +1,8 @@
 """What a device rounds its outputs to, where it says so, and what that does to a mean.
 
-A mean of values rounded to a step q is off by as much as the noise does not smooth:
-(6) of module `longrun`. Values that are cut toward zero and put in the middle of what
-they may have been, k + sign(k)/2 and 0, are off besides, around zero, where two steps
-have become one of twice the width:
+A mean of values rounded to a step q is off as `rounding` says. Values that are cut
+toward zero and put in the middle of what they may have been, k + sign(k)/2 and 0, are
+off besides, around zero, where two steps have become one of twice the width:
 
     d(x) = -1/2 for 0 < x < 1, 1/2 for -1 < x < 0, 0 elsewhere                   (1)
     D(v, s) = E d(v + s n) = (2 P(0) - P(1) - P(-1)) / 2,  P(a) = Phi((a - v)/s) (2)
@@ -12,13 +11,7 @@ The mean of the values is v + D, and v is known from it to about a step, so
 
     var = mean of D(u, s)^2 over |u - v| < 1                                     (3)
 
-is added. Where the noise is so low that only two neighbouring values come, a share p of
-the one, the mean is off by p - 1/2 - s Phi^-1(p) with an s that nothing tells; over
-s < 0.3 the mean of its square is near
-
-    var = (1 - 4 p (1 - p)) / 12,   p (1 - p) the variance of the values         (4)
-
-Symbols: x, v true output and its mean in steps, s its noise in steps before
+is added. Symbols: x, v true output and its mean in steps, s its noise in steps before
 rounding, n standard normal, Phi its distribution. Without noise (3) and the rounding
 make the variance 1/3 of a value that is anywhere within (-1, 1). Device axes, SI.
 """
@@ -30,7 +23,7 @@ from math import erf
 import numpy as np
 
 from fieldcal.samples import Array, Grain
-from fieldcal.windows.longrun import rounding_variance
+from fieldcal.windows import rounding
 
 AROUND = np.linspace(-1.0, 1.0, 21)
 """Where the true mean may lie about the mean of what was cut, steps."""
@@ -38,14 +31,11 @@ AROUND = np.linspace(-1.0, 1.0, 21)
 SHARP = 1e-3
 """Least noise, steps: what does not vary at all falls on one side of an edge."""
 
-UNSURE = 3.6
-"""In place of the 4 of (4), for what a window does not tell of p (1 - p)."""
-
 ZERO = 2.0
 """Means below this are around zero, steps."""
 
-WIDE, FINE = 1.5, 0.6
-"""Noise, in steps, below which single steps show: around zero, and elsewhere."""
+WIDE = 1.5
+"""Noise, in steps, below which single steps show around zero."""
 
 
 def variance(grain: Grain, mean: Array, sampled: Array, seen: Array) -> Array:
@@ -60,14 +50,13 @@ def variance(grain: Grain, mean: Array, sampled: Array, seen: Array) -> Array:
 
     """
     q = np.where(grain.step > 0, grain.step, seen)
-    before = np.sqrt(np.maximum(sampled**2 - q**2 / 12, 0.0))
-    rounded = rounding_variance(q, before)
-    per = np.where(grain.step > 0, grain.step, 1.0)
-    few = np.maximum(0.0, 1 - UNSURE * (sampled / per) ** 2) / 12  # (4)
-    rounded = np.maximum(rounded, grain.step**2 * few)
+    few = rounding.of_few(grain.step, sampled)
+    rounded = np.maximum(rounding.of_mean(q, sampled), few)
     if not grain.cut:
         return rounded
-    zone = _around_zero(np.nan_to_num(mean) / per, before / per)
+    per = np.where(grain.step > 0, grain.step, 1.0)
+    own = rounding.before(sampled, q)
+    zone = _around_zero(np.nan_to_num(mean) / per, own / per)
     return rounded + np.where(grain.step > 0, grain.step**2 * zone, 0.0)
 
 
@@ -77,7 +66,7 @@ def shows(grain: Grain, mean: Array, sampled: Array) -> Array:
     0 where it does, or where the steps are not known; as for `variance`.
     """
     q = grain.step
-    fine = np.where(sampled < FINE * q, q, 0.0)
+    fine = rounding.shown(q, sampled)
     if not grain.cut:
         return fine
     around = (np.abs(np.nan_to_num(mean)) < ZERO * q) & (sampled < WIDE * q)

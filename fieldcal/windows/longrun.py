@@ -19,13 +19,7 @@ frequencies below 1/T, and nothing in the window shows that part; a knee below a
 3/T hides in the white noise and is seen by several windows of a device together, which
 is why the shapes learnt from one window can be handed to the next.
 
-A channel whose noise is less than half its resolution q has an error that averaging
-does not lower, and that is added:
-
-    sum over h = 1, 2, .. of (q / (pi h))^2 / 2 * exp(-4 pi^2 h^2 s^2 / q^2)     (6)
-
-Sources: Whittle 1953; IEEE 952-1997 annex C (Allan variances); Widrow and Kollar 2008
-(quantisation, s is the noise before rounding).
+Sources: Whittle 1953; IEEE 952-1997 annex C (Allan variances).
 """
 
 from __future__ import annotations
@@ -179,15 +173,3 @@ def error_of_mean(
 def _relative(log_likelihood: Array) -> Array:
     relative: Array = log_likelihood - log_likelihood.max(axis=0)
     return relative
-
-
-def rounding_variance(resolution: Array, noise: Array) -> Array:
-    """Variance, (c,), of a mean of values rounded to `resolution`, (6).
-
-    `noise` is the standard deviation of the values before rounding.
-    """
-    h = np.arange(1.0, 6.0)[:, None]
-    q = np.where(resolution > 0, resolution, 1.0)
-    lines = (q / (np.pi * h)) ** 2 / 2 * np.exp(-((2 * np.pi * h * noise / q) ** 2))
-    total: Array = np.where(resolution > 0, lines.sum(axis=0), 0.0)  # (6)
-    return total

@@ -19,8 +19,9 @@ from collections import deque
 import numpy as np
 
 from fieldcal.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells, rounding
+from fieldcal.windows.cells import CELL, Cells, resolution
 from fieldcal.windows.limits import Limits
+from fieldcal.windows.rounding import shown
 
 SPAN = 8
 """Cells that are looked at together: 0.8 s."""
@@ -106,7 +107,7 @@ class Stillness:
 
     def _noise(self, sampled: Array) -> Array:
         smallest = _SMALLEST * np.quantile(self._noises, 0.1, axis=0)
-        noise: Array = np.maximum(smallest, rounding(sampled, self._finest))
+        noise: Array = np.maximum(smallest, shown(resolution(self._finest), sampled))
         return noise
 
     def _unrest(self, y: Array, noise: Array) -> float:

@@ -1,0 +1,186 @@
+"""White noise of samples, from what bends at short lags inside windows.
+
+With means over m consecutive samples, the Hadamard variance times m,
+
+    s^2(m) = m <(mean_{k+2} - 2 mean_{k+1} + mean_k)^2> / 6                      (1)
+
+is the variance of one sample for white noise, whatever m and however the mean drifts.
+What is wanted is the level that a mean over a second obeys; shorter m are pooled in as
+long as they agree with it, so that filtered or otherwise coloured outputs are not taken
+for quieter ones. The mean of squares leaves out the largest tenth, so that a few
+disturbed spots do not count.
+Biases that walk by q sqrt(t) add a term in m^2, and where the levels rise like that,
+white noise is what they rise from. Of one sample to the next (m = 1) the level is that
+of the quickest noise alone. What shakes for long must not be left out where one asks
+which window is louder: there the short-lag noise is
+
+    s^2 = <(x_{k+1} - x_k)^2> / 2                                                (2)
+
+No level is below what the steps of the outputs allow (`rounding`). Source: IEEE Std
+952, annex C; J. von Neumann 1941 for (2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.samples import Array
+from fieldcal.windows import rounding
+from fieldcal.windows.sums import finest
+
+KEEP = 0.9
+KEPT = 0.62302
+"""Second moment of a unit normal inside its central nine tenths."""
+
+MOST = 200_000
+"""Differences that give a level to a third of a percent; more would only take time."""
+
+SHOWN = 2000
+"""Samples of a window in which the step of coarse outputs shows."""
+
+AGREE = 3.0
+ANCHOR_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviation of one sample of each channel, (c,); nan where unknown.
+
+    Attributes
+    ----------
+    white : as means over a second obey it
+    quick : as one sample differs from the next
+
+    """
+
+    white: Array
+    quick: Array
+
+
+def noise_of(pieces: Sequence[Array], rate_hz: float) -> Noise:
+    """Measure the noise of a sensor.
+
+    Parameters
+    ----------
+    pieces : (n_i, c) samples of each window, one at least, nan where not to be used
+    rate_hz : samples a second
+
+    """
+    anchor = max(1, round(ANCHOR_S * rate_hz))
+    anchor = max(1, min(anchor, max(map(len, pieces)) // 8))
+    lengths = [anchor]
+    while lengths[-1] > 1:
+        lengths.append(max(1, lengths[-1] // 4))
+    found = [_level(pieces, m) for m in lengths]
+    levels, spreads = (np.array(both).T for both in zip(*found, strict=True))
+    white = [_pooled(lengths, v, s) for v, s in zip(levels, spreads, strict=True)]
+    # outputs coarser than their noise may not change at all while the device is held
+    least = rounding.least(steps_of(pieces))
+    quick = np.maximum(np.sqrt(levels[:, -1]), least)
+    return Noise(np.maximum(white, least), quick)
+
+
+def short_lag(values: Array) -> Array:
+    """Deviation of one sample (c,) from the next, of samples (n, c), (2)."""
+    steps = np.diff(values, axis=0)
+    count = np.full(values.shape[1], len(steps))
+    known = np.isfinite(steps)
+    if not known.all():
+        count = known.sum(axis=0)
+        steps[~known] = 0.0
+    total = np.einsum("nc,nc->c", steps, steps)
+    return np.sqrt(np.where(count > 0, total / np.maximum(2 * count, 1), np.nan))
+
+
+def steps_of(pieces: Sequence[Array]) -> Array:
+    """Smallest change of each channel from one sample to the next, (c,); 0 if none."""
+    each = [_least_change(p[:SHOWN]) for p in pieces if len(p) > 1]
+    least: Array = np.min(each, axis=0) if each else np.full(pieces[0].shape[1], np.inf)
+    return np.where(np.isfinite(least), least, 0.0)
+
+
+def _least_change(values: Array) -> Array:
+    steps = np.nan_to_num(np.diff(values, axis=0))
+    change: Array = finest(steps.T, np.zeros(1, dtype=np.int64))[0]
+    return change
+
+
+def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
+    """s^2(m) of each channel and its relative standard error, (1)."""
+    most = max(MOST // len(pieces), 1)
+    steps = [_steps(p, m, most) for p in pieces if len(p) >= 3 * m]
+    if not steps:
+        nothing = np.full(pieces[0].shape[1], np.nan)
+        return nothing, nothing
+    squares = m * np.concatenate(steps) ** 2 / 6
+    count = np.isfinite(squares).sum(axis=0)
+    level = np.full(squares.shape[1], np.nan)
+    for c in np.flatnonzero(count >= 4):
+        column = squares[np.isfinite(squares[:, c]), c]
+        kept = int(np.ceil(KEEP * len(column)))
+        level[c] = np.partition(column, kept - 1)[:kept].mean() / KEPT
+    return level, np.sqrt(6.0 / np.maximum(count, 1))
+
+
+def _steps(piece: Array, m: int, most: int) -> Array:
+    """Bends over means of m samples in turn; of many, `most` evenly spread."""
+    triples, channels = len(piece) // (3 * m), piece.shape[1]
+    if triples > most:
+        some = piece[: 3 * m * triples].reshape(triples, -1)[:: triples // most]
+        means = _means(some.reshape(-1, m, channels)).reshape(-1, 3, channels)
+        out: Array = np.diff(means, 2, axis=1)[:, 0]
+        return out
+    whole = len(piece) // m * m
+    return np.diff(_means(piece[:whole].reshape(-1, m, channels)), 2, axis=0)
+
+
+def _means(rows: Array) -> Array:
+    """Means (n, c) of m samples each, (n, m, c)."""
+    n, m, channels = rows.shape
+    each = np.full(m, 1 / m)
+    if np.isnan(rows.sum()):
+        return np.asarray(each @ rows)
+    # one product is much faster than one for each row, but spreads what is missing
+    return np.asarray(rows.reshape(n, -1) @ np.kron(each[:, None], np.eye(channels)))
+
+
+def _pooled(lengths: Sequence[int], levels: Array, spreads: Array) -> float:
+    """Level at the shortest m that all longer ones agree with."""
+    under = _under_a_walk(lengths, levels, spreads)
+    if under is not None:
+        return under
+    best, spread = levels[0], spreads[0]
+    for level, finer in zip(levels[1:], spreads[1:], strict=True):
+        if not np.isfinite(best):
+            best, spread = level, finer
+        elif not _agree(level, best, spread, finer):
+            break
+        else:
+            best, spread = level, finer
+    return float(np.sqrt(best))
+
+
+def _under_a_walk(
+    lengths: Sequence[int], levels: Array, spreads: Array
+) -> float | None:
+    """White noise a of s^2(m) = a + b m^2, if that is what the levels obey."""
+    if len(levels) < 3 or not np.isfinite(levels).all():
+        return None
+    square = np.square(lengths, dtype=float)
+    slope = (levels[0] - levels[1]) / (square[0] - square[1])
+    least = levels[1] - slope * square[1]
+    if slope <= 0 or least <= 0 or _agree(levels[1], levels[0], *spreads[:2]):
+        return None
+    rest = zip(square[2:], levels[2:], spreads[2:], strict=True)
+    if all(_agree(v, least + slope * m, spreads[1], s) for m, v, s in rest):
+        return float(np.sqrt(least))
+    return None
+
+
+def _agree(one: float, other: float, spread: float, finer: float) -> bool:
+    """Whether two levels are the same but for their relative errors."""
+    error = np.hypot(spread, finer) * max(one, other)
+    return bool(abs(one - other) <= AGREE * error)

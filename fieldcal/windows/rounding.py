@@ -1,0 +1,80 @@
+"""What rounding to a step does to samples, and to the mean of many.
+
+    U = q round(V / q),   V with noise s of its own, its mean anywhere within a step
+
+With s above half a step rounding only adds to the variance of a sample,
+
+    var U = s^2 + q^2 / 12                                                       (1)
+
+Below that samples may not vary at all, though each is off by q / sqrt(12), rms: no
+noise of a sample is taken for less. The mean itself is off then, which averaging does
+not lower, by
+
+    var = sum over h = 1, 2, .. of (q / (pi h))^2 / 2 * exp(-4 pi^2 h^2 s^2 / q^2)   (2)
+
+and at most by what a value anywhere within a step is off by. Where the noise is so low
+that only two neighbouring values come, a share p of the one, the mean is off by
+p - 1/2 - s Phi^-1(p) steps, with an s that nothing tells (Phi is the distribution of
+a unit normal); over s < 0.3 q the mean of its square is near
+
+    var = (1 - 4 p (1 - p)) q^2 / 12,   p (1 - p) q^2 the variance of the values     (3)
+
+Source: B. Widrow and I. Kollar, Quantization Noise, chapter 4; (3) is worked out here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.samples import Array
+
+WAVES = 5
+"""Terms of (2); those beyond are taken to fade as the next does."""
+
+UNSURE = 3.6
+"""In place of the 4 of (3), for what a window does not tell of p (1 - p)."""
+
+FINE = 0.6
+"""Noise of samples, in steps, below which single steps show."""
+
+
+def least(step: Array) -> Array:
+    """Least deviation that a sample is known to, (c,), of outputs with these steps."""
+    deviation: Array = np.asarray(step, dtype=float) / np.sqrt(12.0)
+    return deviation
+
+
+def before(sampled: Array, step: Array) -> Array:
+    """Noise before rounding, (c,), as far as that of the samples tells it, (1)."""
+    return np.sqrt(np.maximum(sampled**2 - least(step) ** 2, 0.0))
+
+
+def of_mean(step: Array, sampled: Array) -> Array:
+    """Variance, (..., c), that rounding leaves in a mean of many values, (2).
+
+    `sampled` is the deviation of the values at short lags.
+
+    >>> still = of_mean(np.array([1.0]), np.array([0.0]))
+    >>> noisy = of_mean(np.array([1.0]), np.array([0.5]))
+    >>> np.sqrt([still[0], noisy[0]]).round(4)
+    array([0.2887, 0.0084])
+    """
+    h = np.arange(1.0, WAVES + 2)
+    size = 1 / (2 * (np.pi * h) ** 2)
+    size[-1] = 1 / 12 - size[:-1].sum()
+    s = before(sampled, step) / np.where(step > 0, step, 1.0)
+    fading = np.exp(-((2 * np.pi * h * s[..., None]) ** 2))
+    variance: Array = step**2 * (fading @ size)  # (2)
+    return variance
+
+
+def of_few(step: Array, sampled: Array) -> Array:
+    """Least variance, (..., c), of a mean of values that may be but two, (3)."""
+    share = sampled / np.where(step > 0, step, 1.0)
+    variance: Array = step**2 * np.maximum(0.0, 1 - UNSURE * share**2) / 12
+    return variance
+
+
+def shown(step: Array, sampled: Array) -> Array:
+    """Steps that the noise of the samples does not hide, (c,); 0 elsewhere."""
+    return np.where(np.nan_to_num(sampled) < FINE * step, step, 0.0)

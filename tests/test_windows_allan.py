@@ -55,6 +55,16 @@ def test_what_was_not_measured_is_nan_and_a_nan_is_bridged() -> None:
     assert np.isfinite(found.deviation[:, :3]).all()
 
 
+def test_no_mean_is_better_than_the_steps_of_the_outputs_allow() -> None:
+    block = still(300)
+    step = 0.5  # ten times the noise
+    block.acc[:] = step * np.round((block.acc + [0.2, 0.0, 0.0]) / step)
+    found = allan_deviation(block)
+    assert np.ptp(block.acc[:, 0]) == step and np.ptp(block.acc[:, 2]) == 0
+    assert found.sigma_of_mean(60.0)[2] == pytest.approx(step / np.sqrt(12))
+    assert (found.sigma_of_mean(60.0)[3:] < 1e-4).all()
+
+
 def test_what_cannot_be_told_is_refused() -> None:
     with pytest.raises(InputError, match="20 s is too short"):
         allan_deviation(still(20))

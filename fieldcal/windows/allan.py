@@ -18,6 +18,9 @@ import numpy as np
 
 from fieldcal.errors import InputError
 from fieldcal.samples import CHANNELS, Array, Block
+from fieldcal.windows.cells import resolution
+from fieldcal.windows.noise import SHOWN, short_lag, steps_of
+from fieldcal.windows.rounding import of_mean
 
 SHORTEST = 60.0
 """Shortest recording that says anything about windows, s."""
@@ -38,6 +41,7 @@ class AllanDeviation:
     tau : (k,) s, about three to the octave
     deviation : (k, 6) m/s^2 and rad/s; nan where not measured
     low, high : (k, 6) the interval that holds the true value in 68 cases of 100
+    rounding : (6,) deviation that rounding leaves in any mean, however long
 
     """
 
@@ -45,6 +49,7 @@ class AllanDeviation:
     deviation: Array
     low: Array
     high: Array
+    rounding: Array
 
     def sigma_of_mean(self, seconds: float) -> Array:
         """Standard error of a mean over `seconds`, (6,), m/s^2 and rad/s.
@@ -63,7 +68,9 @@ class AllanDeviation:
             )
         logs = np.log(np.where(self.deviation > 0, self.deviation, np.nan))
         at = [np.interp(np.log(seconds), np.log(self.tau), column) for column in logs.T]
-        return np.exp(at)
+        # one mean is off by its rounding as the next is: no difference shows it
+        sigma: Array = np.hypot(np.nan_to_num(np.exp(at)), self.rounding)
+        return np.where(sigma > 0, sigma, np.nan)
 
     @property
     def best(self) -> Array:
@@ -100,7 +107,11 @@ def allan_deviation(block: Block) -> AllanDeviation:
         x = six[:, channel]
         if np.isnan(x).mean() < 0.5:
             table[:, :, channel] = _of_channel(tools, _filled(x), rate, m)
-    return AllanDeviation(m / rate, *table)
+    pieces = [six[first : first + SHOWN] for first in range(0, len(six), SHOWN)]
+    steps = steps_of(pieces)
+    step = resolution(np.where(steps > 0, steps, np.inf))
+    rounding = np.sqrt(of_mean(step, np.nan_to_num(short_lag(six))))
+    return AllanDeviation(m / rate, table[0], table[1], table[2], rounding)
 
 
 def _of_channel(tools: Any, x: Array, rate: float, m: Array) -> Array:

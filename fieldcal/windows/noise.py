@@ -141,10 +141,9 @@ def _means(rows: Array) -> Array:
     """Means (n, c) of m samples each, (n, m, c)."""
     n, m, channels = rows.shape
     each = np.full(m, 1 / m)
-    if np.isnan(rows.sum()):
-        return np.asarray(each @ rows)
-    # one product is much faster than one for each row, but spreads what is missing
-    return np.asarray(rows.reshape(n, -1) @ np.kron(each[:, None], np.eye(channels)))
+    means = rows.reshape(n, -1) @ np.kron(each[:, None], np.eye(channels))
+    # that is much faster than a product for each row, but spreads what is missing
+    return np.asarray(each @ rows if np.isnan(means).any() else means)
 
 
 def _pooled(lengths: Sequence[int], levels: Array, spreads: Array) -> float:

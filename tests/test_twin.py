@@ -14,11 +14,15 @@ from processes import Recalibrated
 from session_folders import SITE, places, recorded, windows_of, write_session
 
 from fieldcal.cli import main
+from fieldcal.effects import Experience, catalogue
+from fieldcal.model.state import State, Term
 from fieldcal.samples import Block
 from fieldcal.sim_device import profile_file
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import parse
+from fieldcal.twin.device import settled
+from fieldcal.twin.physical import from_one_instant
 
 QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
 DEVICE = Profile(noise=QUIET)
@@ -52,6 +56,7 @@ def later(block: Block, seconds: float) -> Block:
         "base_tilt:about_x_deg=1,about_z_deg=-0.7",
         "cross_coupling:k12=0.01,k31=-0.008,k32=0.02",
         "settling:ax=0.05,az=-0.04,tau_s=5",
+        "settling:ax=0.05,gx=0.003,tau_s=5",
         "mounting:axes=+y-x+z",
         "stuck:channel=gy,from_s=40,to_s=43",
     ],
@@ -148,6 +153,39 @@ def test_a_session_may_begin_at_any_time_of_the_device(
     assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
 
 
+def test_the_twin_feels_the_earth_as_its_fixture_is_turned(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Gyroscopes without a compass show where north is; biases go along with that."""
+    noise = replace(QUIET, acc=(2e-3,) * 3, gyr=(1e-4,) * 3)
+    effects = (parse("earth_rate"), parse("heading_error:psi_deg=60"))
+    device = replace(DEVICE, noise=noise, effects=effects)
+    angles = [(0, 0), (90, 0), (-90, 0), (180, 0), (0, 90), (0, -90), (45, 45)]
+    positions = places([(float(a), float(b)) for a, b in angles], seconds=40.0)
+    block = recorded(device, positions)
+    _, said, twin = diagnosed(write_session(tmp_path / "s", block, positions), capsys)
+    heading = twin.one("heading_error")
+    assert heading is not None and heading["psi_deg"] == pytest.approx(60, abs=5)
+    np.testing.assert_allclose(twin.truth.gyr_bias, DEVICE.truth.gyr_bias, atol=1e-5)
+    assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
+    assert said["twin"]["refitted"]["chi2_per_dof"] > 2
+
+
+def test_what_settles_counts_from_one_instant() -> None:
+    """From where it counts changes what the rows are by nothing."""
+    effect, shape = catalogue()["settling"], {"tau_s": 5.0}
+    on = np.eye(6)
+    terms = (Term(effect, 0.05 * on[0], shape), Term(effect, 3e-3 * on[3], shape, 1))
+    state = State(np.zeros(6), np.ones(6), np.zeros((1, 2)), np.zeros(3), terms)
+    x = Experience.at_rest(np.zeros(9), np.zeros(9), 9.8)
+    since = np.arange(9.0) + [[2.0], [0.0]]
+    once = from_one_instant(state, since)
+    assert [t.origin for t in once.terms] == [1, 1]
+    np.testing.assert_allclose(once.output(x, since), state.output(x, since))
+    both = settled(once.terms, 0.0)
+    assert len(both) == 1 and both[0]["gx"] == 3e-3
+
+
 @pytest.mark.parametrize(
     ("concealed", "triad"),
     [
@@ -240,6 +278,21 @@ def test_positions_without_angles_are_replayed_where_they_were(
     # below 1: which way the Earth turns it is in the gyroscopes' uncertainty
     assert 0.6 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
     assert said["twin"]["refitted"]["chi2_per_dof"] > 2
+
+
+def test_positions_without_angles_on_a_tilted_base_are_replayed_where_they_were(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    angles = [(0, 0), (90, 0), (-90, 0), (180, 0), (0, 90), (0, -90)]
+    angles += [(45, 30), (-45, 40), (130, -30), (-120, 50), (60, -60), (20, 70)]
+    positions = places([(float(a), float(b)) for a, b in angles])
+    device = replace(DEVICE, effects=(parse("base_tilt:about_x_deg=2,about_z_deg=-1"),))
+    block = recorded(device, positions)
+    for p in positions[2::3]:
+        del p["alpha_deg"], p["beta_deg"]
+    _, said, _ = diagnosed(write_session(tmp_path / "s", block, positions), capsys)
+    assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
+    assert said["twin"]["refitted"]["chi2_per_dof"] > 10
 
 
 def test_the_circle_closes(

@@ -85,12 +85,11 @@ def _replayed(
     path: Path, session: Session, explanation: Explanation, found: Diagnosis
 ) -> Rerun:
     """Replay the session on its twin, and write the twin's device file."""
-    from fieldcal.diagnosis.quality import raw_bench
+    from fieldcal.diagnosis.quality import raw
     from fieldcal.session import write_whole
     from fieldcal.sim_device.profile_file import to_toml
     from fieldcal.twin import rerun
 
-    raw = raw_bench(session.block, explanation.as_said.prepared)
-    again = rerun(explanation, found, raw)
+    again = rerun(explanation, found, raw(session.block, explanation))
     write_whole(path, to_toml(again.profile))
     return again

@@ -6,7 +6,7 @@ from typing import IO, TYPE_CHECKING
 
 from fieldcal.calibration.wording import ranges
 from fieldcal.diagnosis import Diagnosis
-from fieldcal.diagnosis.quality import UNITS
+from fieldcal.diagnosis.agreement import UNITS
 from fieldcal.diagnosis.result import Found, Mismatch
 from fieldcal.diagnosis.words import said
 from fieldcal.samples import common_unit

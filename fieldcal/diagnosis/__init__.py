@@ -1,9 +1,8 @@
 """What physics a simulation leaves out of a recording.
 
 Samples are checked (`chain`), cleaned of lines (`spectrum`) and reduced to block means
-(`reduce`); hypotheses from the catalogue are compared by their evidence (`select`) in
-one fit (`fit`), turns between positions tell the rest (`turning`), and `verdict` puts
-it together.
+(`reduce`); windows and the turns between them are laid to causes of the catalogue by
+one model (`fieldcal.model`, `explain`), and `verdict` puts it together.
 """
 
 from fieldcal.diagnosis.result import Diagnosis

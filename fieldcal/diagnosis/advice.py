@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.diagnosis.aliases import decided_by, telling_position
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import Found
+from fieldcal.diagnosis.telling import decided_by, telling_position
 from fieldcal.diagnosis.unknown import Unknown, listed
 from fieldcal.effects import Chain, Scatter, catalogue
-from fieldcal.samples import CHANNELS
 
 LESS_THAN = 3
 """Positions below which nothing can be predicted unseen."""
@@ -35,7 +34,7 @@ def advice(
         )
     if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
         yield "hold more positions, or longer ones: what is random averages out."
-    held = len(np.unique(explanation.prepared.bench.rows.x.position))
+    held = len(explanation.dictionary.held)
     if held < LESS_THAN:
         yield f"record more than {held} position{'s' * (held > 1)}: few tell little."
 
@@ -44,12 +43,7 @@ def _deciding(explanation: Explanation, effects: Sequence[Found]) -> Iterator[st
     """How to tell an effect from its aliases."""
     for one in effects:
         for other in one.aliases:
-            chosen = {h.effect.id for h, _ in explanation.model.chosen}
-            place = (
-                telling_position(explanation, one.id, other)
-                if one.id in chosen
-                else None
-            )
+            place = telling_position(explanation, one.id, other)
             if place is None:
                 yield f"to tell {one.id} from {other}: {decided_by(one.id)}."
             else:
@@ -60,14 +54,15 @@ def _deciding(explanation: Explanation, effects: Sequence[Found]) -> Iterator[st
 
 
 def _look(unknown: Unknown) -> str:
-    channel, places = CHANNELS[unknown.channel], listed(unknown.positions)
+    one = unknown.mismatch
+    places = listed(one.positions)
     if unknown.turned:
         return f"set {places} anew and take it again: its angles were others."
-    if not np.isfinite(unknown.correlation):
-        return f"take {places} again: {channel} is off there by itself."
+    if not np.isfinite(one.correlation):
+        return f"take {places} again: {one.channel} is off there by itself."
     return (
-        f"vary {unknown.kind} on purpose and hold the rest: {channel} follows it, and"
-        " no effect in the catalogue does."
+        f"vary {unknown.cause} on purpose and hold the rest: {one.channel} follows it,"
+        " and no effect in the catalogue does."
     )
 
 

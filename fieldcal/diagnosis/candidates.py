@@ -1,144 +1,172 @@
-"""What could be behind a mismatch in this session: the hypotheses to be compared.
-
-An effect on accelerometers and gyroscopes alike is two hypotheses, one for each; one
-with a shape parameter is tried over a grid of it.
-"""
+"""What was tried on a recording, and why it lost."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.diagnosis.bench import Bench
-from fieldcal.diagnosis.model import Term
-from fieldcal.effects import Effect, Motion, Sensor, catalogue
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.parts import rms
+from fieldcal.diagnosis.result import Found, number
+from fieldcal.effects import Scatter, catalogue
+from fieldcal.model.held_out import held_out
+from fieldcal.model.search import Offer, Set
 
-TURNS = ("time_delay",)
-"""Seen while the device turns only, and not in what a table does evenly."""
+LARGEST = 40.0
+"""Odds are not said beyond e to this."""
 
-RATED = ("gyro_cross_coupling", "gyro_products", "lever_arm")
-"""Seen in windows only where a table turns the device."""
+FOLLOWED = 1
+"""Losers whose predictions are worked out: each costs a fit for every position."""
 
-CALIBRATION = ("gravity_error", "gyro_scale", "earth_rate")
-"""Not told from the calibration by what windows show."""
-
-BEYOND = ("warm_up", "bias_drift", "thermal_hysteresis")
-"""Meant for what a changing temperature itself does not explain."""
-
-BEYOND_COST = 6.0
-
-POINTS = 8
-"""Values of a time constant to try."""
+LITTLE = 2.0
+"""Rise of ln L of a cause that takes next to nothing."""
 
 
 @dataclass(frozen=True, slots=True)
-class Hypothesis:
-    """One explanation: an effect, or the part of it on one triad.
+class Candidate:
+    """One explanation that was tried.
 
-    `variants` are the terms to try, one for each value of the shape; `cost` is what it
-    pays more than others, ln; `known` says that it is bound to be there, and the
-    question is only whether it shows.
-    """
-
-    effect: Effect
-    part: str
-    variants: tuple[Term, ...]
-    cost: float = 0.0
-    known: bool = False
-
-    @property
-    def name(self) -> str:
-        """Unique name: the id, with the triad where there are two."""
-        return f"{self.effect.id}:{self.part}" if self.part else self.effect.id
-
-
-def hypotheses(bench: Bench, warming: bool, navigation: bool) -> list[Hypothesis]:
-    """Whatever the rows can show at all.
-
-    Parameters
+    Attributes
     ----------
-    warming : whether the temperature is known and changes
-    navigation : whether the gyroscopes see the Earth
+    id : of the effect
+    delta_chi2 : by how much the squares fall with it alone
+    delta_bic : the same less ln(rows) for every parameter
+    held_out_gain : part of the held-out rms that goes with it, where it was chosen
+    probability : that it is there
+    chosen : whether it is among the effects found
+    why : why it lost, in words; empty if it did not
 
     """
-    found: list[Hypothesis] = []
-    x, gyros = bench.rows.x, bench.rows.used[:, 3:]
-    if gyros.any() and x.oriented.any() and not x.base_rate.any():
-        effect = catalogue()["earth_rate"]
-        found.append(Hypothesis(effect, "", (Term(effect, ()),), known=True))
-    for effect in catalogue().values():
-        if isinstance(effect, Motion | Sensor) and effect.params:
-            if _shows(effect, bench, warming, navigation):
-                cost = BEYOND_COST if warming and effect.id in BEYOND else 0.0
-                found += [replace(h, cost=cost) for h in _parts(effect, bench)]
+
+    id: str
+    delta_chi2: float
+    delta_bic: float
+    held_out_gain: float
+    probability: float
+    chosen: bool
+    why: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        return {
+            "id": self.id,
+            "delta_chi2": number(self.delta_chi2),
+            "delta_bic": number(self.delta_bic),
+            "held_out_gain": number(self.held_out_gain),
+            "probability": number(self.probability),
+            "chosen": self.chosen,
+            "why": self.why,
+        }
+
+
+def candidates(
+    explanation: Explanation, found: Sequence[Found]
+) -> tuple[Candidate, ...]:
+    """Every effect that was tried on the rows, the one that takes most first."""
+    posterior = explanation.posterior
+    search, best = posterior.search, posterior.best
+    nothing = search.evaluated(())
+    alone = _best(search.offers(nothing))
+    beside = _best(search.offers(best))
+    taken = {f.id: f for f in found}
+    rows = int(explanation.rows.used.sum())
+    losers = (i for i in alone if i in catalogue() and i not in taken)
+    followed = list(losers)[:FOLLOWED]
+    out = []
+    for id_ in dict.fromkeys(c.name for c in explanation.dictionary.causes):
+        effect = catalogue().get(id_)
+        if effect is None or isinstance(effect, Scatter):
+            continue
+        offer = alone.get(id_)
+        delta = 2 * _rise(offer, nothing) if offer else 0.0
+        width = len(offer.member[1].columns) if offer else 0
+        one = taken.get(id_)
+        why = "" if one else _why(id_, explanation, offer, beside.get(id_))
+        gain = one.evidence.get("held_out_gain", np.nan) if one else np.nan
+        if one is None and offer is not None and id_ in followed:
+            gain = _alone(explanation, search.taken(nothing, offer))
+            if gain < 0:
+                why = f"what it was not fitted to it predicts worse; {why}"
+        out.append(
+            Candidate(
+                id_,
+                delta,
+                delta - width * float(np.log(rows)),
+                gain,
+                one.probability if one else posterior.probability([id_]),
+                one is not None,
+                why,
+            )
+        )
+    return tuple(sorted(out, key=lambda c: -c.delta_chi2))
+
+
+def _alone(explanation: Explanation, there: Set) -> float:
+    """Part of the held-out rms that goes with a set, in the channel where most goes."""
+    best, nothing = explanation.best, explanation.posterior.search.evaluated(())
+    before, after = (
+        rms(best.rows, held_out(replace(best, set=one), [one], ()))
+        for one in (nothing, there)
+    )
+    known = np.isfinite(before) & np.isfinite(after) & (before > 0)
+    if not known.any():
+        return np.nan
+    change = np.where(known, before - after, 0.0) / np.nanmax(before)
+    c = int(np.argmax(np.abs(change)))
+    return float(1 - after[c] / before[c])
+
+
+def _best(offers: Sequence[Offer]) -> Mapping[str, Offer]:
+    """Of an effect's parts the one that does most."""
+    found: dict[str, Offer] = {}
+    for offer in offers:
+        found.setdefault(offer.member[0].name, offer)
     return found
 
 
-def _shows(effect: Effect, bench: Bench, warming: bool, navigation: bool) -> bool:
-    x = bench.rows.x
-    if effect.id in (*TURNS, *CALIBRATION):
-        return False
-    if effect.id in RATED and not bench.rated:
-        return False
-    if effect.id == "settling" and not np.isfinite(x.since_turn).any():
-        return False
-    if effect.id == "heading_error":
-        return navigation and bool(x.oriented.any())
-    if effect.id == "vibration_rectification":
-        return bool((np.ptp(x.variance, axis=0) > 0).any())
-    if effect.covariate.startswith(("temperature", "rate of the temperature")):
-        return warming
-    return not isinstance(effect, Motion) or bool(x.oriented.any())
+def _rise(offer: Offer, there: Set) -> float:
+    """Rise of the evidence with a cause, its chance left out, ln; 0 at least."""
+    cause = offer.member[0]
+    chance = np.log(cause.chance / len(cause.variants))
+    return max(offer.score - there.score - float(chance), 0.0)
 
 
-def _parts(effect: Effect, bench: Bench) -> Iterator[Hypothesis]:
-    shapes = list(_grid(effect, bench))
-    seen: NDArray[np.bool_] = np.any(bench.rows.used, axis=0)
-    names = [p.name for p in effect.params]
-    if set(names) <= set(CHANNELS):
-        for part, letter in (("acc", "a"), ("gyr", "g")):
-            columns = tuple(
-                j
-                for j, n in enumerate(names)
-                if n[0] == letter and seen[CHANNELS.index(n)]
+def _why(
+    id_: str, explanation: Explanation, alone: Offer | None, beside: Offer | None
+) -> str:
+    posterior = explanation.posterior
+    best = posterior.best
+    names = " and ".join(dict.fromkeys(c.name for c, _ in best.members))
+    for standing in explanation.standing:
+        if id_ in standing.aliases:
+            return (
+                f"explains it about as well as {standing.name}; this recording cannot"
+                " tell"
             )
-            if columns and shapes:
-                variants = tuple(Term(effect, columns, shape) for shape in shapes)
-                yield Hypothesis(effect, part, variants)
-    else:
-        columns = tuple(range(len(names)))
-        yield Hypothesis(
-            effect, "", tuple(Term(effect, columns, shape) for shape in shapes)
-        )
+    rise = _rise(alone, posterior.search.evaluated(())) if alone else 0.0
+    if rise < LITTLE or alone is None:
+        return "takes no more than chance would"
+    odds = _odds(alone.score - posterior.search.evaluated(()).score)
+    if not best.members:
+        return f"takes a little: its odds are {odds}"
+    if beside is not None and _rise(beside, best) > LITTLE:
+        return f"beside {names} it takes a little, at odds of {odds}"
+    return f"{names} takes it: beside that nothing is left for it"
 
 
-def _grid(effect: Effect, bench: Bench) -> Iterator[dict[str, float]]:
-    x = bench.rows.x
-    if not effect.shapes:
-        yield {}
-    for shape in effect.shapes:
-        if shape.name == "at_s":
-            for at in instants(bench):
-                yield {"at_s": float(at)}
-            continue
-        span = float(np.ptp(x.t))
-        if effect.id == "settling":
-            soonest = float(x.since_turn.min())
-            if not np.isfinite(soonest):  # it was never turned
-                return
-            low, high = max(shape.low, soonest / 4), min(shape.high, span / 3)
-        else:
-            low, high = max(shape.low, span / 20), min(shape.high, 3 * span)
-        for tau in np.geomspace(low, max(high, low * 1.01), POINTS):
-            yield {shape.name: float(tau)}
+def _odds(gain: float) -> str:
+    """Odds from their logarithm.
 
-
-def instants(bench: Bench) -> Array:
-    """Between one row and the next, (n - 1,) s."""
-    t = bench.rows.x.t
-    middle: Array = (t[1:] + t[:-1]) / 2
-    return middle
+    >>> _odds(0.0), _odds(-3.0), _odds(-80.0)
+    ('1 to 1', '1 to 20', 'below 1 to 2e+17')
+    """
+    if gain > 0:
+        more = np.exp(min(gain, LARGEST))
+        return f"{'above ' if gain > LARGEST else ''}{more:.2g} to 1"
+    more = np.exp(min(-gain, LARGEST))
+    if gain < -LARGEST:
+        return f"below 1 to {more:.0e}"
+    return f"1 to {more:.2g}"

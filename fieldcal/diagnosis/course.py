@@ -11,13 +11,12 @@ the turn that is done. Axes of the device, rad/s. Source: rotation kinematics.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.attitude import between
-from fieldcal.diagnosis.reduce import Rows, Source, rate_of
+from fieldcal.diagnosis.reduce import Source, rate_of
 from fieldcal.effects import Experience
 from fieldcal.samples import Array
 from fieldcal.solve.rotation import carry, small_turns
@@ -36,71 +35,25 @@ FEWEST = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Undo:
-    """Gyroscope errors to be taken out before anything is integrated.
-
-    Attributes
-    ----------
-    matrix : (3, 3) dW = matrix w
-    delay : s by which the gyroscopes are late
-
-    """
-
-    matrix: Array
-    delay: float
-
-    def of(self, name: str) -> float:
-        """Value by a parameter's full name, zero for what is not undone."""
-        group, _, part = name.partition(".")
-        if group == "gyro_scale":
-            return float(self.matrix[int(part[1]) - 1, int(part[1]) - 1])
-        if group == "gyro_cross_coupling":
-            return float(self.matrix[int(part[1]) - 1, int(part[2]) - 1])
-        return self.delay if group == "time_delay" else 0.0
-
-
-NOTHING = Undo(np.zeros((3, 3)), 0.0)
-
-
-class Sensors(Protocol):
-    """Bias and scale factor of the outputs, (6,) each."""
-
-    @property
-    def bias(self) -> Array:
-        """m/s^2 and rad/s."""
-
-    @property
-    def scale(self) -> Array:
-        """Output per input."""
-
-
-class Fitted(Protocol):
-    """What was fitted to the windows."""
-
-    @property
-    def state(self) -> Sensors:
-        """The sensors by it."""
-
-
-@dataclass(frozen=True, slots=True)
 class Leg:
     """One turn to be followed, by the model of the windows.
 
     Attributes
     ----------
-    source, rows, fit : of the windows
-    x : what is experienced in them
-    undo : what is taken out of the gyroscopes
+    source : samples
+    x : what is experienced in the windows
+    bias, scale : (3,) of the gyroscopes
+    late : s by which they are late
     pair : windows that the turn leads from and to
     first, last : bounds of the motion, in samples
 
     """
 
     source: Source
-    rows: Rows
-    fit: Fitted
     x: Experience
-    undo: Undo
+    bias: Array
+    scale: Array
+    late: float
     pair: tuple[int, int]
     first: int
     last: int
@@ -187,12 +140,10 @@ def _between(t: Array, at: Array, values: Array) -> Array:
 
 def _undone(leg: Leg, t: Array, rid: Array) -> Array:
     """Angular rate at some samples, (n, 3) rad/s."""
-    block, state = leg.source.block, leg.fit.state
+    block = leg.source.block
     first, n = int(np.searchsorted(block.t, t[0])), len(t)
     span = slice(max(first - n, 0), first + 2 * n)
-    late = t + leg.undo.delay
+    late = t + leg.late
     seen = [np.interp(late, block.t[span], g) for g in block.gyr[span].T]
-    response = np.diag(state.scale[3:]) + leg.undo.matrix
-    rest = np.array(seen) - state.bias[3:, None] - rid.T
-    rate: Array = np.linalg.solve(response, rest).T
+    rate: Array = (np.stack(seen, axis=1) - leg.bias - rid) / leg.scale
     return rate

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.diagnosis.agreement import Agreement
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.heldout import cells
-from fieldcal.diagnosis.quality import Agreement
+from fieldcal.diagnosis.parts import averages
 from fieldcal.diagnosis.reduce import Rows
 from fieldcal.diagnosis.result import Mismatch, number
 from fieldcal.samples import CHANNELS, Array
@@ -74,9 +74,9 @@ def curves(
             continue
         done.add((m.channel, name))
         c = CHANNELS.index(m.channel)
-        rows = first.bench.rows
-        before, sd, position = cells(rows, first.fit.residual)
-        after = cells(then.bench.rows, then.fit.residual)[0]
+        rows = first.rows
+        before, sd, position = averages(rows, first.residual)
+        after = averages(then.rows, then.residual)[0]
         position = np.array(source.about.numbered(position))
         x = _mean(rows, COVARIATES[name](rows)) + (start if unit == "°C" else 0.0)
         if name == "position":
@@ -106,7 +106,7 @@ COVARIATES: Mapping[str, Callable[[Rows], Array]] = {
 def _mean(rows: Rows, values: Array) -> Array:
     """Means of something known in each row over the same parts of windows."""
     six = np.broadcast_to(values[:, None], rows.y.shape)
-    mean = cells(rows, six)[0]
+    mean = averages(rows, six)[0]
     known = np.isfinite(mean)
     weight = np.where(known, mean, 0.0).sum(axis=1)
     out: Array = weight / np.maximum(known.sum(axis=1), 1)

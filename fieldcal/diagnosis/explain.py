@@ -1,283 +1,176 @@
-"""The search for what explains a recording, windows first, then turns."""
+"""What explains a recording: the one model's answer, beside the simulation's."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from fieldcal.diagnosis.bench import Bench
-from fieldcal.diagnosis.candidates import Hypothesis, hypotheses
-from fieldcal.diagnosis.contender import Model
-from fieldcal.diagnosis.estimate import RELAX
-from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.loosened import Misset, at_an_end, loosened, missets
-from fieldcal.diagnosis.model import Term
-from fieldcal.diagnosis.prepare import Prepared, divided, refined
-from fieldcal.diagnosis.reduce import rate_of
-from fieldcal.diagnosis.rivals import estimated, gauged, with_turns
-from fieldcal.diagnosis.select import SEEN, Search
-from fieldcal.diagnosis.steps import jump_instant
-from fieldcal.diagnosis.together import together
-from fieldcal.diagnosis.turning import Turning, Turntable
-from fieldcal.diagnosis.turns import Turn
-from fieldcal.diagnosis.unwind import turned
-from fieldcal.diagnosis.whiten import Errors, Part
+from fieldcal.description import Description
+from fieldcal.diagnosis.dwell import beginnings
+from fieldcal.diagnosis.noise import grain_of
+from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.frames import EARTH_RATE
+from fieldcal.model.causes import Dictionary
+from fieldcal.model.fitted import Fitted
+from fieldcal.model.inference import Inference, Inferred
+from fieldcal.model.posterior import Posterior, Standing
+from fieldcal.model.search import Search
+from fieldcal.model.state import State
+from fieldcal.model.system import System
+from fieldcal.model.turn import Turning
+from fieldcal.model.turn_rows import Turns
+from fieldcal.samples import Array
+
+ROUGH = 0.7
+"""Part of the noise that rounding makes when it is most of it."""
 
 SEES_EARTH = 20.0
 """Earth rate over the noise of one window from which tactical gyroscopes see it."""
 
 
-TOGETHER = 5.0
-"""How much likelier one course has to be than one for each axis, ln."""
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Explanation:
     """What was found.
 
     Attributes
     ----------
     prepared : the rows it was found in
-    always : terms that are in every model: what the simulation has already
-    search : the search, with what else was tried
-    model : what the windows say
-    rivals : models that explain windows and turns about as well
-    base : the simulation alone, refitted
-    wide : rows with wide priors, and all the scatter there may be
-    fit : in them, with the effects of the windows
-    left : parameters that the rows leave open
-    made : the turns
-    table, turning : what the turns say; None where there are none
-    instead : what would do as well in turns, by the id of what is in the model
-    earth : by how much the Earth's rate raises ln Z; 0 where it is not in the model
-    in_step : first channels of the triads whose axes seem to wander, in one course
-    misset : angles that single positions were set at otherwise
-    unaware : what was found before these were let loose, if there are any
+    inferred : set, state and search
+    best, base : with what was found, and bias and scale factor alone
+    posterior : probabilities
 
     """
 
     prepared: Prepared
-    always: tuple[Term, ...]
-    search: Search
-    model: Model
-    rivals: tuple[Model, ...]
-    base: Fit
-    wide: Bench
-    fit: Fit
-    left: tuple[str, ...]
-    made: tuple[Turn, ...]
-    table: Turntable | None
-    turning: Turning | None
-    instead: Mapping[str, tuple[str, ...]]
-    earth: float
-    in_step: frozenset[int]
-    misset: Misset = field(default_factory=dict)
-    unaware: Explanation | None = None
+    inferred: Inferred
+    best: Fitted
+    base: Fitted
+    posterior: Posterior
 
     @property
-    def terms(self) -> tuple[Term, ...]:
-        """Effects of the windows, each once."""
-        return tuple(t for t in self.fit.terms if t.columns)
+    def rows(self) -> Rows:
+        """Rows of the windows."""
+        return self.prepared.rows
 
     @property
-    def as_said(self) -> Explanation:
-        """What was found with every position at the angles that are said."""
-        return self.unaware or self
+    def dictionary(self) -> Dictionary:
+        """What rows were laid to."""
+        return self.best.dictionary
 
-    def plainer(self, other: Explanation) -> bool:
-        """Whether turns and windows need less than another explanation has."""
-        mine, theirs = (e.turning.terms if e.turning else () for e in (self, other))
-        turns = len(mine) < len(theirs) or not (mine or theirs)
-        return turns and len(self.terms) < len(other.terms)
+    @property
+    def state(self) -> State:
+        """Where what was found stands."""
+        return self.inferred.state
+
+    @cached_property
+    def standing(self) -> tuple[Standing, ...]:
+        """Causes that are likelier there than not."""
+        return tuple(self.posterior.standing())
+
+    @cached_property
+    def earth(self) -> float:
+        """By how much the Earth's rate of the model raises ln Z; 0 without it."""
+        always = self.dictionary.always
+        if not any(g.cause == "earth" for g in always):
+            return 0.0
+        rows = self.best.set.state.rows
+        at = np.concatenate([g.columns for g in always if g.cause == "earth"])
+        found = self.best.set.state
+        kept = ~np.isin(found.columns, at)
+        less = type(found).of(rows, found.columns[kept], found.sizes[kept])
+        return found.score - less.score
+
+    @property
+    def shows_earth(self) -> bool:
+        """Whether the rows show the Earth's rate at all."""
+        return bool(self.earth > np.log(1000.0))
 
     @property
     def sees_earth(self) -> bool:
         """Whether tactical gyroscopes see the Earth's rate in a single window."""
-        if self.earth <= self.search.price:
+        rows, d = self.rows, self.dictionary
+        if not self.shows_earth:
             return False
-        bench = self.prepared.bench
-        samples = bench.rows.length.sum() / bench.windows
-        samples *= rate_of(self.prepared.source.block)
-        ratio = EARTH_RATE / (np.nanmax(bench.rows.noise[3:]) / np.sqrt(samples))
+        samples = rows.length.sum() / len(d.held) * rate_of(self.prepared.source.block)
+        ratio = EARTH_RATE / (np.nanmax(rows.noise[3:]) / np.sqrt(samples))
         return bool(ratio > SEES_EARTH)
 
 
 def explain(prepared: Prepared) -> Explanation:
-    """Find what explains a recording.
-
-    Where single positions were set at other angles than is said, these are let loose:
-    turns end at them as well. What turns say of the gyroscopes shows in the Earth's
-    rate, where they see that; the windows are searched again with it then.
-    """
-    found = _explained(prepared, ())
-    unaware, misset = found, missets(found.model, found.wide, found.fit)
-    if not misset:
-        unaware, misset = _at_an_end(found)
-    if misset:
-        loose = loosened(prepared, misset)
-        aware = _explained(loose, ())
-        if unaware is found or aware.plainer(found):
-            prepared, found = loose, aware
-        else:
-            misset = {}
-    if prepared.navigation and (rates := _of_rates(found)):
-        found = _explained(prepared, rates)
-    return replace(found, misset=misset, unaware=unaware) if misset else found
-
-
-def _at_an_end(found: Explanation) -> tuple[Explanation, Misset]:
-    """The same with the first or last position off by itself, and not all the rest."""
-    shown = found.turning is not None and found.turning.terms
-    if shown or found.model.excess > SEEN:
-        if (model := at_an_end(found.search, found.model)) is not None:
-            wide, fit, _ = estimated(found.search, model)
-            other = replace(found, model=model, wide=wide, fit=fit)
-            return other, missets(model, wide, fit)
-    return found, {}
-
-
-def _explained(prepared: Prepared, told: tuple[Term, ...]) -> Explanation:
-    """What explains windows, and then turns; `told` is known of the windows' rates."""
-    always = (*prepared.known, *told)
-    prepared, search, model, rivals = _searched(prepared, always)
-    wide, fit, left = estimated(search, model)
-    made, table, turning = turned(prepared, wide, untold(fit, told), search.price)
-    better, instead = gauged(prepared, search, model, turning)
-    if better is not model:
-        model = better
-        wide, fit, left = estimated(search, model)
-        made, table, turning = turned(prepared, wide, untold(fit, told), search.price)
+    """Find what explains a recording."""
+    inference = inference_of(prepared.source, prepared.rows, prepared)
+    found = inference.run()
+    windows = inference.system.linearised(found.state)
+    best = Fitted(
+        prepared.rows, inference.dictionary, windows, found.values, found.best
+    )
     return Explanation(
-        prepared,
+        prepared, found, best, base_of(inference), Posterior(found.search, found.best)
+    )
+
+
+def inference_of(source: Source, rows: Rows, prepared: Prepared) -> Inference:
+    """The inference of some rows, ready to run."""
+    about = source.about
+    swayed = any(t.effect.kind == "motion" for t in prepared.tones)
+    turned = bool(about.positions) and not swayed  # a base that rocks turns it as well
+    held = np.unique(rows.x.position)
+    common = np.array([rows.common[rows.x.position == p][0] for p in held])
+    nominal = nominal_of(about, int(rows.x.position.max()) + 1, prepared)
+    dictionary = Dictionary(
+        rows.x, rows.used, origins(source, rows), common, np.abs(nominal.scale), turned
+    )
+    grain = grain_of(source.block, spans(source.block, about))
+    rough = bool((grain[:3] > ROUGH * rows.noise[:3]).any())
+    turning = Turning(source, rows, dictionary.since)
+    turns = Turns(turning, dictionary, not rough) if turned else None
+    return Inference(System(rows, dictionary), nominal, turns)
+
+
+def nominal_of(about: Description, places: int, prepared: Prepared) -> State:
+    """The state that a simulation starts from."""
+    nominal = about.nominal
+    return State(
+        np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
+        np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
+        np.zeros((places, 2)),
+        np.zeros(3),
         prepared.known,
-        search,
-        model,
-        rivals,
-        prepared.bench.fit(prepared.known),
-        wide,
-        fit,
-        left,
-        made,
-        table,
-        turning,
-        instead,
-        _earth(search, model),
-        _in_step(prepared, model, fit),
     )
 
 
-def _searched(
-    prepared: Prepared, always: tuple[Term, ...]
-) -> tuple[Prepared, Search, Model, tuple[Model, ...]]:
-    """The best model and its rivals, with rows that suit what they found.
+def origins(source: Source, rows: Rows) -> Array:
+    """Time since the turn, (o, n) s, from each instant that it may count from.
 
-    A jump divides a row, and what settles is counted from when it really begins.
+    That is the end of the motion, as each window shows it or a fixed time before each:
+    where it is hard to see, what is usual is the better guess. And before the first
+    window the device may have been turned, or not.
     """
-
-    def search() -> Search:
-        return Search(prepared.bench, _pool(prepared, prepared.bench), always)
-
-    tried = search()
-    best = tried.run()
-    if (at := _jump(prepared, tried, best)) is not None:
-        prepared = divided(prepared, at)
-        tried = search()
-        best = tried.run()
-    model, rivals = with_turns(prepared, tried, best)
-    if any(h.effect.id == "settling" for h, _ in model.chosen):
-        prepared = refined(prepared, model.fit)
-        bench = prepared.bench.but(errors=model.bench.errors)
-        tried = search()
-        fitted = tried.rules.model
-        model = fitted(model.chosen, bench, None, model.random, model.shaped)
-    return prepared, tried, model, rivals
-
-
-def _jump(prepared: Prepared, search: Search, model: Model) -> float | None:
-    """When the biases jumped, s, if they did."""
-    for term in model.fit.terms:
-        if "at_s" in term.shape:
-            less = search.without(model, term.effect.id)
-            return jump_instant(
-                prepared.source, model.bench, less.fit, model.fit, term
-            )[0]
-    return None
-
-
-def _of_rates(found: Explanation) -> tuple[Term, ...]:
-    """What the turns showed of the gyroscopes, with its values."""
-    if (turning := found.turning) is None:
-        return ()
-    values = dict(zip(turning.names, turning.values.tolist(), strict=True))
-    return tuple(
-        replace(
-            term,
-            columns=(),
-            start=tuple(values[f"{term.effect.id}.{n}"] for n in term.names),
-        )
-        for term in turning.terms
-        if term.effect.id.startswith("gyro")
-    )
-
-
-def untold(fit: Fit, told: tuple[Term, ...]) -> Fit:
-    """A fit without terms that are known: the turns are to find them themselves."""
-    pairs = zip(fit.state.terms, fit.state.values, strict=True)
-    kept = [(t, v) for t, v in pairs if t not in told]
-    terms, values = tuple(t for t, _ in kept), tuple(v for _, v in kept)
-    return replace(fit, state=replace(fit.state, terms=terms, values=values))
-
-
-def bare(prepared: Prepared, model: Model, fit: Fit) -> tuple[Bench, Fit]:
-    """The effects that were found, without anything random but the angles' setting."""
-    errors = replace(model.bench.errors, parts=())
-    bench = prepared.bench.but(errors=errors, relax=RELAX)
-    return bench, bench.fit(fit.terms, fit)
-
-
-def _in_step(prepared: Prepared, model: Model, fit: Fit) -> frozenset[int]:
-    """Triads of which the axes seem to wander, but follow one course.
-
-    Biases wander each for itself.
-    """
-    out = set()
-    for first in (0, 3):
-        errors = model.bench.errors
-        axes = {p.channel for p in wandering(errors, first)}
-        if axes:  # one that is smooth may be of the same course
-            axes |= {
-                p.channel
-                for p in errors.parts
-                if p.kind.endswith("time") and p.channel // 3 == first // 3
-            }
-        if len(axes) > 1:
-            if together(*bare(prepared, model, fit), sorted(axes)) > TOGETHER:
-                out.add(first)
-    return frozenset(out)
-
-
-def wandering(errors: Errors, first: int) -> list[Part]:
-    """Walks and offsets of the triad that begins with a channel."""
-    return [
-        p
-        for p in errors.parts
-        if p.kind in ("walk", "offset") and first <= p.channel < first + 3
+    x, arrived = rows.x, source.arrived
+    if not source.about.positions:
+        return np.full((1, len(x)), np.inf)
+    starts = beginnings(source)
+    lead = (starts - arrived)[np.isfinite(arrived)]
+    usual = starts - (float(np.median(lead)) if len(lead) else 0.0)
+    first = np.arange(len(starts)) == x.position.min()
+    instants = [
+        one
+        for each in (arrived, usual)
+        for one in (each, np.where(first, -np.inf, each))
     ]
+    return np.array([x.t - at[x.position] for at in instants])
 
 
-def _pool(prepared: Prepared, bench: Bench) -> list[Hypothesis]:
-    return hypotheses(bench, prepared.source.warmth.changes, prepared.navigation)
-
-
-def _earth(search: Search, model: Model) -> float:
-    """By how much the Earth's rate raises ln Z, if it is in the model."""
-    there = [h.effect.id == "earth_rate" for h, _ in model.chosen]
-    if not any(there):
-        return 0.0
-    at = there.index(True)
-    chosen = model.chosen[:at] + model.chosen[at + 1 :]
-    less = search.rules.model(chosen, model.bench, model.fit, model.random)
-    return model.fit.score - less.fit.score
+def base_of(whole: Inference) -> Fitted:
+    """Bias and scale factor alone, refitted to the windows."""
+    d = whole.dictionary.plain()
+    inference = Inference(System(whole.system.rows, d), whole.nominal)
+    start: Array = np.zeros(d.width)
+    state, values, _ = inference.settled(inference.nominal, start, ())
+    wanted = inference.wanted(())
+    linear = inference.system.linearised(state, wanted)
+    found = Search(d, inference.gram_of(linear, values, wanted)).evaluated(())
+    return Fitted(inference.system.rows, d, linear, values, found)

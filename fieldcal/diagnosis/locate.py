@@ -1,25 +1,24 @@
 """Where recording and simulation part: channel, positions, stretch of time, covariate.
 
-For an effect of the windows the residual without it, all else fitted, is looked at: the
-channels whose squares it accounts for, the positions in which it stands out.
+For a cause the residual without it, all else fitted, is looked at: the channels whose
+squares it accounts for, the positions in which it stands out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.heldout import cells
-from fieldcal.diagnosis.naming import Removed
+from fieldcal.diagnosis.following import courses
+from fieldcal.diagnosis.naming import Removed, in_turns
+from fieldcal.diagnosis.parts import averages
 from fieldcal.diagnosis.reduce import spans
 from fieldcal.diagnosis.result import Kind, Mismatch
-from fieldcal.diagnosis.unknown import Unknown, walking
 from fieldcal.effects import Fault, catalogue
+from fieldcal.model.posterior import Standing
 from fieldcal.samples import CHANNELS, Array
 
 CLEAR = 25.0
@@ -31,84 +30,28 @@ PART = 0.03
 STANDS = 3.5
 """Standard deviations from which a position stands out."""
 
-KINDS: Mapping[str, Kind] = {
-    "temperature": "temperature",
-    "rate of the temperature": "temperature",
-    "temperature × force": "temperature",
-    "time": "time",
-    "faster time": "time",
-    "fast time": "time",
-    "force and time": "time",
-    "time since the start": "time",
-    "time since the turn": "transient",
-    "since turn": "transient",
-    "scatter between windows beyond white noise": "time",
-    "walk": "time",
-}
 
-
-def of_effects(
-    explanation: Explanation, lost: Mapping[str, Removed]
+def of_cause(
+    explanation: Explanation, standing: Standing, lost: Removed
 ) -> Iterator[Mismatch]:
-    """Mismatches that effects of the windows account for."""
-    for name, without in lost.items():
-        covariate = catalogue()[name].covariate
-        kind = KINDS.get(covariate, "position")
-        yield from _of_residual(
-            explanation, without.fit, without.squares, kind, covariate
-        )
-
-
-def of_unknown(
-    explanation: Explanation, found: Sequence[Unknown]
-) -> Iterator[Mismatch]:
-    """Mismatches that no effect in the catalogue accounts for."""
-    for unknown in found:
-        positions = unknown.positions
-        start, end = _stretch(explanation, positions)
-        yield Mismatch(
-            channel=CHANNELS[unknown.channel],
-            kind=KINDS.get(unknown.kind, "position"),
-            positions=positions,
-            from_s=start,
-            to_s=end,
-            covariate=unknown.covariate,
-            rms=unknown.rms,
-            sigma=unknown.sigma,
-            correlation=unknown.correlation,
-            share=unknown.share,
-        )
-
-
-def of_chance(explanation: Explanation) -> Iterator[Mismatch]:
-    """Scatter that was found random."""
-    bench = explanation.model.bench
-    if bench.errors.setting > 0:
-        plain = bench.but(errors=replace(bench.errors, setting=0.0))
-        fit = plain.fit(explanation.fit.terms, explanation.fit)
-        squares = (fit.white**2).sum(axis=0) - (explanation.fit.white**2).sum(axis=0)
-        covariate = catalogue()["angle_setting"].covariate
-        yield from _of_residual(explanation, fit, squares, "position", covariate)
-    walks = [p.channel for p in walking(explanation) if p.kind == "walk"]
-    if walks:
-        plain = explanation.prepared.bench
-        fit = plain.fit(explanation.fit.terms, explanation.fit)
-        squares = (fit.white**2).sum(axis=0) - plain.rows.used.sum(axis=0)
-        squares[[c not in walks for c in range(6)]] = 0.0
-        covariate = catalogue()["random_walk"].covariate
-        yield from _of_residual(explanation, fit, squares, "time", covariate)
+    """Mismatches that an effect of the catalogue accounts for."""
+    effect = catalogue()[standing.name]
+    if in_turns(lost):
+        yield from _of_turns(explanation, standing, lost)
+        return
+    yield from _of_residual(explanation, lost, effect.seen_in, effect.covariate)
 
 
 def _of_residual(
-    explanation: Explanation, fit: Fit, squares: Array, kind: Kind, covariate: str
+    explanation: Explanation, lost: Removed, kind: Kind, covariate: str
 ) -> Iterator[Mismatch]:
-    bench = explanation.prepared.bench
-    mean, sd, position = cells(bench.rows, fit.residual)
-    needed = max(CLEAR, PART * float(np.nanmax(squares)))
-    for c in np.flatnonzero(squares >= min(needed, float(np.nanmax(squares)))):
+    squares = lost.squares
+    mean, sd, position = averages(explanation.rows, lost.residual)
+    most = float(np.nanmax(squares))
+    for c in np.flatnonzero(squares >= min(max(CLEAR, PART * most), most)):
         at = standing_out(mean[:, c] / sd[:, c], position)
         inside = np.isin(position, at)
-        start, end = _stretch(explanation, at)
+        start, end = stretch(explanation, at)
         yield Mismatch(
             channel=CHANNELS[c],
             kind=kind,
@@ -130,11 +73,131 @@ def standing_out(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
     return tuple(int(p) for p in out)
 
 
-def _stretch(explanation: Explanation, positions: Sequence[int]) -> tuple[float, float]:
+def stretch(explanation: Explanation, positions: Sequence[int]) -> tuple[float, float]:
+    """Device time from the first to the last sample of some positions, s."""
     source = explanation.prepared.source
     windows = spans(source.block, source.about)[list(positions)]
     t = source.block.t
     return float(t[windows[:, 0].min()]), float(t[windows[:, 1].max() - 1])
+
+
+def _of_turns(
+    explanation: Explanation, standing: Standing, lost: Removed
+) -> Iterator[Mismatch]:
+    """What a cause does while the device is turned, channel by channel."""
+    turned = explanation.inferred.turned
+    if not turned:
+        return
+    columns = np.concatenate([g.columns for _, g in standing.members])
+    values = explanation.best.estimate
+    squares = np.zeros(len(turned))
+    for i, turn in enumerate(turned):
+        at = np.isin(turn.columns, columns)
+        off = turn.design[:, at] @ values[turn.columns[at]]
+        way = turn.way_design[:, at] @ values[turn.columns[at]]
+        squares[i] = float(turn.info @ off**2) + float(way @ way)
+    out = squares > max(STANDS**2, 0.05 * squares.max())
+    some = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
+    places = tuple(sorted({p for t in some for p in t.positions}))
+    source = explanation.prepared.source
+    windows = spans(source.block, source.about)
+    t = source.block.t
+    gaps = [(windows[p, 1], windows[q, 0]) for p, q in (s.positions for s in some)]
+    effect = catalogue()[standing.name]
+    delta = 2 * (explanation.posterior.best.state.score - lost.set.state.score)
+    for channel, size in shown(explanation, standing).items():
+        yield Mismatch(
+            channel=channel,
+            kind="turn",
+            positions=places,
+            from_s=float(t[min(a for a, _ in gaps)]),
+            to_s=float(t[max(b for _, b in gaps) - 1]),
+            covariate=effect.covariate,
+            rms=size,
+            sigma=float(np.sqrt(max(delta, 0.0))),
+        )
+
+
+def shown(explanation: Explanation, standing: Standing) -> dict[str, float]:
+    """Largest output that a cause makes in turns, by channel, rms of the worst turn."""
+    inference = explanation.inferred.inference
+    out: dict[str, float] = {}
+    for course in inference.on_turns(explanation.state, standing.members):
+        for c, name in enumerate(CHANNELS):
+            size = float(np.sqrt(np.mean(course[:, c] ** 2)))
+            out[name] = max(out.get(name, 0.0), size)
+    for triad in (CHANNELS[:3], CHANNELS[3:]):
+        largest = max((out.get(n, 0.0) for n in triad), default=0.0)
+        for name in triad:
+            if out.get(name, 0.0) <= 0.1 * largest or largest <= 0.0:
+                out.pop(name, None)
+    return out
+
+
+def of_unknown(
+    explanation: Explanation, standing: Standing, lost: Removed
+) -> Iterator[Mismatch]:
+    """Mismatches that no effect in the catalogue accounts for."""
+    for cause, group in standing.members:
+        positions = (group.position,) if group.position >= 0 else None
+        channels = (
+            [CHANNELS.index(group.part)]
+            if group.part in CHANNELS
+            else np.flatnonzero(lost.squares[:3] > CLEAR).tolist()
+            or [int(np.nanargmax(lost.squares[:3]))]
+        )
+        for c in channels:
+            mean, sd, position = averages(explanation.rows, lost.residual)
+            at = positions or standing_out(mean[:, c] / sd[:, c], position)
+            start, end = stretch(explanation, at)
+            inside = np.isin(position, at)
+            covariate, correlation, share = followed(
+                explanation, cause.name, c, lost.residual
+            )
+            yield Mismatch(
+                channel=CHANNELS[c],
+                kind=KINDS.get(cause.name, "position"),
+                positions=tuple(at),
+                from_s=start,
+                to_s=end,
+                covariate=covariate,
+                rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
+                sigma=float(np.sqrt(max(lost.squares[c], 0.0))),
+                correlation=correlation,
+                share=share,
+            )
+
+
+KINDS: dict[str, Kind] = {
+    "time": "time",
+    "force and time": "time",
+    "temperature": "temperature",
+    "since turn": "transient",
+}
+"""Kind of mismatch of functions that no effect makes; the others go by position."""
+
+
+def followed(
+    explanation: Explanation, name: str, channel: int, residual: Array
+) -> tuple[str, float, float]:
+    """What an unexplained residual follows best, the correlation, and its share."""
+    if name in ("window", "position", "misset"):
+        return "the position itself", np.nan, np.nan
+    x, off = explanation.rows.x, residual[:, channel]
+    known = np.isfinite(off)
+    best, correlation = name, np.nan
+    for label, course in courses(name, x, channel).items():
+        spread = course[known].std()
+        if spread > 1e-9:
+            one = float(np.corrcoef(course[known], off[known])[0, 1])
+            if not np.isfinite(correlation) or abs(one) > abs(correlation):
+                best, correlation = label, one
+    after = explanation.best.residual()[:, channel]
+    sd = explanation.rows.sd[:, channel]
+    noise = float(known.sum())
+    total = float(((off / sd)[known] ** 2).sum()) - noise
+    left = float(((after / sd)[known] ** 2).sum()) - noise
+    return best, correlation, float(np.clip(1 - left / max(total, 1e-9), 0.0, 1.0))
 
 
 def of_faults(
@@ -147,14 +210,15 @@ def of_faults(
             for p, (a, b) in enumerate(windows)
             if b > a and t[a] <= fault.to_s and t[b - 1] >= fault.from_s
         ]
+        effect = catalogue()[name]
         for channel in fault.channels or (fault.channel,):
             yield Mismatch(
                 channel=str(channel),
-                kind="spectrum" if name == "noise_level" else "samples",
+                kind=effect.seen_in,
                 positions=tuple(inside),
                 from_s=fault.from_s,
                 to_s=fault.to_s,
-                covariate=catalogue()[name].covariate,
+                covariate=effect.covariate,
                 rms=fault.size,
                 sigma=fault.sigma,
             )
@@ -162,9 +226,8 @@ def of_faults(
 
 def of_tones(explanation: Explanation) -> Iterator[Mismatch]:
     """Lines in the spectrum."""
-    held = np.unique(explanation.prepared.bench.rows.x.position)
-    positions = tuple(int(p) for p in held)
-    start, end = _stretch(explanation, positions)
+    positions = tuple(int(p) for p in explanation.dictionary.held)
+    start, end = stretch(explanation, positions)
     for tone in explanation.prepared.tones:
         for name in tone.channels:
             size = float(tone.amplitude[CHANNELS.index(name)])
@@ -177,31 +240,4 @@ def of_tones(explanation: Explanation) -> Iterator[Mismatch]:
                 covariate=f"{tone.hz:.4g} Hz",
                 rms=size / np.sqrt(2),
                 sigma=float(np.sqrt(tone.chi2)),
-            )
-
-
-def of_turns(explanation: Explanation) -> Iterator[Mismatch]:
-    """Effects that the turns show."""
-    table, turning = explanation.table, explanation.turning
-    if table is None or turning is None:
-        return
-    for term in turning.terms:
-        kept = tuple(t for t in turning.terms if t is not term)
-        now = table.fit(turning.terms, turning.rows, 20.0)
-        less = table.fit(kept, turning.rows, 20.0)
-        rise = less.white**2 - now.white**2
-        at = table.turn[turning.rows]
-        by_turn = np.bincount(at, rise, minlength=len(explanation.made))
-        out = np.flatnonzero(by_turn > max(STANDS**2, 0.05 * by_turn.max()))
-        made = [explanation.made[i] for i in out]
-        for channel, size in table.shown(term, turning, out).items():
-            yield Mismatch(
-                channel=channel,
-                kind="turn",
-                positions=tuple(sorted({p for t in made for p in t.positions})),
-                from_s=min(float(t.t[0]) for t in made),
-                to_s=max(float(t.t[-1]) for t in made),
-                covariate=term.effect.covariate,
-                rms=size,
-                sigma=float(np.sqrt(max(rise.sum(), 0.0))),
             )

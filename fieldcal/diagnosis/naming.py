@@ -2,189 +2,196 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.diagnosis.dwell import ARRIVAL_S
-from fieldcal.diagnosis.estimate import RELAX, sigmas
+from fieldcal.diagnosis.agreement import Agreement
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.heldout import held_out, rms
-from fieldcal.diagnosis.model import Term
-from fieldcal.diagnosis.quality import Agreement
+from fieldcal.diagnosis.instant import instant
+from fieldcal.diagnosis.line import Tone
+from fieldcal.diagnosis.parts import rms
 from fieldcal.diagnosis.result import Found, Quantity
-from fieldcal.diagnosis.scatter import dropped, size_sigma, wanders
-from fieldcal.diagnosis.steps import jump_instant
-from fieldcal.diagnosis.unknown import walking
-from fieldcal.effects import Fault, catalogue
+from fieldcal.effects import Fault, Scatter, catalogue
+from fieldcal.model import priors
+from fieldcal.model.causes import Group
+from fieldcal.model.evidence import Index
+from fieldcal.model.fitted import Fitted
+from fieldcal.model.held_out import held_out, turns_foretold
+from fieldcal.model.posterior import Standing
+from fieldcal.model.search import Member, Set
+from fieldcal.model.way import ARRIVAL_S
 from fieldcal.samples import CHANNELS, Array
 
-MATERIAL = 44.0
-"""Twice the rise of ln L from which what wanders is said: less only widens."""
+DETERMINED = 0.3
+"""Part of its variance before the rows that a parameter has left at most to be told."""
+
+
+SHOWS = 12.0
+"""Squares that windows have to lose for a cause to show in them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Removed:
-    """What is lost when one effect is taken out of the windows' model.
+    """What is lost when one cause is taken out.
 
     Attributes
     ----------
-    fit : without it
+    set : without it
+    residual : (n, 6) of that
     squares : (6,) by how much the whitened squares of each channel rise
-    held_out : (6,) held-out rms without it
 
     """
 
-    fit: Fit
+    set: Set
+    residual: Array
     squares: Array
-    held_out: Array
 
 
-def removed(explanation: Explanation, term: Term) -> Removed:
-    """Fit and predict without one effect."""
-    bench = explanation.wide
-    rest = [t for t in explanation.fit.terms if t.effect.id != term.effect.id]
-    fit = bench.fit(rest, explanation.fit)
-    squares = (fit.white**2).sum(axis=0) - (explanation.fit.white**2).sum(axis=0)
-    return Removed(fit, squares, rms(bench.rows, held_out(bench, rest, fit)))
+def in_turns(lost: Removed) -> bool:
+    """Whether windows lose nothing with a cause: then turns do."""
+    return float(np.nan_to_num(lost.squares).max()) < SHOWS
 
 
-def of_windows(
-    explanation: Explanation,
-    lost: Mapping[str, Removed],
-    then: Agreement,
-    aliases: Mapping[str, Sequence[str]],
-) -> Iterator[Found]:
-    """Effects with an equation that the windows show."""
-    for term in explanation.terms:
-        name = term.effect.id
-        without = lost[name]
-        parameters = {
-            n: Quantity(v, s, term.effect.unit(n))
-            for n, (v, s) in sigmas(explanation.fit, term).items()
-        }
-        if name == "settling":
-            parameters = _since_arrival(parameters)
-        if "at_s" in term.shape:
-            at, error = jump_instant(
-                explanation.prepared.source,
-                explanation.wide,
-                without.fit,
-                explanation.fit,
-                term,
-            )
-            parameters["at_s"] = Quantity(at, error, "s")
-        delta = without.fit.chi2 - explanation.fit.chi2
-        count = len(term.names) + ("at_s" in term.shape)
-        used = int(explanation.prepared.bench.rows.used.sum())
-        evidence = {
-            "delta_chi2": delta,
-            "delta_bic": delta - count * float(np.log(used)),
-            "held_out_gain": gain(without, then.held_out),
-        }
-        yield Found(name, parameters, tuple(aliases.get(name, ())), evidence)
+def rms_of(values: Array) -> float:
+    """Root mean square; nan of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
 
 
-def _since_arrival(found: dict[str, Quantity]) -> dict[str, Quantity]:
-    """Amplitudes with the uncertainty of the instant that they are counted from."""
-    tau = found["tau_s"].value if "tau_s" in found else np.inf
-    out = dict(found)
-    for name in (n for n in found if n in CHANNELS):
-        value, sigma, unit = found[name].value, found[name].sigma, found[name].unit
-        if not isinstance(value, str) and not isinstance(tau, str):
-            unsure = abs(value) * ARRIVAL_S / max(tau, ARRIVAL_S)
-            out[name] = Quantity(value, float(np.hypot(sigma or 0.0, unsure)), unit)
+def removed(explanation: Explanation, standing: Standing) -> Removed:
+    """Take a cause out, and see what its columns had taken."""
+    best = explanation.best
+    less = explanation.posterior.without(standing.name)
+    there = Fitted(best.rows, best.dictionary, best.linear, best.values, less)
+    residual = there.residual()
+    return Removed(less, residual, best.squares_of(residual) - best.squares)
+
+
+def of_rows(
+    explanation: Explanation, standing: Standing, lost: Removed, then: Agreement
+) -> Found:
+    """A cause of the catalogue that windows or turns show."""
+    posterior = explanation.posterior
+    delta = 2 * (posterior.best.state.score - _at(lost.set, posterior.best))
+    count = sum(len(g.columns) for _, g in standing.members)
+    count += sum(len(g.shape) for _, g in standing.members[:1])
+    used = int(explanation.rows.used.sum())
+    evidence = {
+        "delta_chi2": delta,
+        "delta_bic": delta - count * float(np.log(used)),
+        "held_out_gain": gain(explanation, lost, then),
+        "log_evidence": posterior.evidence(posterior.best)
+        - posterior.evidence(lost.set),
+    }
+    known = tuple(n for n in standing.aliases if n in catalogue())
+    return Found(
+        standing.name,
+        parameters(explanation, standing),
+        known,
+        evidence,
+        standing.probability,
+    )
+
+
+def _at(less: Set, best: Set) -> float:
+    """Score of a set at the instabilities of another."""
+    rows = best.state.rows
+    return type(less.state).of(rows, less.state.columns, less.state.sizes).score
+
+
+def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
+    """Numbers of a cause, as far as the rows determine them."""
+    effect = catalogue()[standing.name]
+    if isinstance(effect, Scatter):
+        return sizes(explanation, standing)
+    out: dict[str, Quantity] = {}
+    for _, group in standing.members:
+        value, sigma, prior = estimates(explanation.best.set, group.columns)
+        own: dict[str, Quantity] = {}
+        for j, v, s, wide in zip(group.params, value, sigma, prior, strict=True):
+            if s**2 < DETERMINED * wide**2:
+                name = effect.params[j].name
+                own[name] = Quantity(float(v), float(s), effect.params[j].unit)
+        out |= _since_arrival(own, group)
+    for shape in effect.shapes:
+        known = [m for m in standing.members if shape.name in m[1].shape]
+        found = [shape_of(explanation, m) for m in known]
+        weight = np.array([1 / max(error, 1e-12) ** 2 for _, error in found])
+        at = float(weight @ [at for at, _ in found] / weight.sum())
+        out[shape.name] = Quantity(at, float(weight.sum() ** -0.5), shape.unit)
     return out
 
 
-def gain(without: Removed, now: Array) -> float:
+def _since_arrival(found: dict[str, Quantity], group: Group) -> dict[str, Quantity]:
+    """Amplitudes with the uncertainty of the instant that they are counted from."""
+    shapes = group.effect.shapes if group.effect else ()
+    tau = next((group.shape[s.name] for s in shapes if s.kind == "turn"), np.inf)
+    part = ARRIVAL_S / max(tau, ARRIVAL_S)
+    return {
+        name: Quantity(q.value, float(np.hypot(q.sigma, q.value * part)), q.unit)
+        for name, q in found.items()
+        if isinstance(q.value, float) and q.sigma is not None
+    }
+
+
+def shape_of(explanation: Explanation, member: Member) -> tuple[float, float]:
+    """A shape parameter and its standard uncertainty; an instant from the samples."""
+    _, group = member
+    (value,) = group.shape.values()
+    (shape,) = group.effect.shapes  # type: ignore[union-attr]
+    if shape.kind == "instant":
+        return instant(explanation, member)
+    return value, min(group.unsure, value)
+
+
+def estimates(found: Set, columns: Index) -> tuple[Array, Array, Array]:
+    """Values, sigmas and sizes before the rows of some columns of a set."""
+    at = np.array([int(np.flatnonzero(found.state.columns == c)[-1]) for c in columns])
+    value, sigma = found.state.estimate[at], np.sqrt(np.diag(found.state.inverse)[at])
+    return value, sigma, found.state.sizes[at]
+
+
+def sizes(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
+    """Sizes of what is random, with their uncertainty from the information on ln v."""
+    best, out = explanation.best.set, {}
+    for member in standing.members:
+        group = member[1]
+        effect = catalogue()[standing.name]
+        i = best.members.index(member)
+        v = float(priors.SIZES[best.sizes.members[i]])
+        _, sigma, wide = estimates(best, group.columns)
+        known = 2 * float(((1 - (sigma / wide) ** 2) ** 2).sum())
+        part = 1 / np.sqrt(max(known, 0.1))
+        names = [effect.params[c] for c in group.params] or list(effect.params)
+        for param in names:
+            size = v * param.typical
+            out[param.name] = Quantity(size, size * float(part), param.unit)
+    return out
+
+
+def gain(explanation: Explanation, lost: Removed, then: Agreement) -> float:
     """Part of the held-out rms that goes, in the channel where the effect is most."""
-    share = np.where(np.isfinite(now) & (without.held_out > 0), without.squares, -1.0)
+    best, turned = explanation.best, explanation.inferred.turned
+    there = Fitted(best.rows, best.dictionary, best.linear, best.values, lost.set)
+    if in_turns(lost):
+        foretold = [rms_of(turns_foretold(f, turned)) for f in (there, best)]
+        return float(1 - foretold[1] / foretold[0])
+    ahead = rms(best.rows, held_out(there, [lost.set], ()))
+    now = then.held_out
+    share = np.where(np.isfinite(now) & (ahead > 0), lost.squares, -1.0)
     c = int(np.argmax(share))
-    if share[c] <= 0:
-        return np.nan
-    return float(1 - now[c] / without.held_out[c])
+    return float(1 - now[c] / ahead[c]) if share[c] > 0 else np.nan
 
 
-def of_chance(
-    explanation: Explanation, aliases: Mapping[str, Sequence[str]]
-) -> Iterator[Found]:
-    """Random effects: what wanders, and angles set by hand."""
-    bench, model = explanation.model.bench, explanation.model
-    plain = explanation.prepared.bench
-    if bench.errors.setting > 0:
-        sigma = size_sigma(plain, explanation.fit, "setting", 0, bench.errors.setting)
-        yield Found(
-            "angle_setting",
-            {
-                "sigma_deg": Quantity(
-                    float(np.rad2deg(bench.errors.setting)),
-                    float(np.rad2deg(sigma)),
-                    "deg",
-                )
-            },
-            tuple(aliases.get("angle_setting", ())),
-            _rise(explanation, "setting"),
-        )
-    walks = walking(explanation)
-    names = [n for n in model.random if n.startswith(("walk", "offset"))]
-    rise = _rise(explanation, *names) if walks else {}
-    if walks and rise["delta_chi2"] > MATERIAL:
-        unit = catalogue()["random_walk"].unit
-        found = {}
-        for part in walks:
-            name = CHANNELS[part.channel]
-            size = part.size
-            if part.kind == "offset":  # over the time from one window to the next
-                size /= float(np.sqrt(np.ptp(plain.rows.x.t) / plain.windows))
-            sigma = size_sigma(plain, explanation.fit, "walk", part.channel, size)
-            found[name] = Quantity(size, sigma, unit(name))
-        others = tuple(aliases.get("random_walk", ()))
-        yield Found("random_walk", found, others, rise)
-
-
-def _rise(explanation: Explanation, *names: str) -> dict[str, float]:
-    total = 0.0
-    for name in names:
-        bench = explanation.model.bench
-        bench = bench.but(errors=dropped(bench.errors, name), relax=RELAX)
-        without = bench.fit(explanation.fit.terms, explanation.fit)
-        gains = {w.name: w.gain for w in wanders(bench, without)}
-        total += 2 * gains.get(name, 0.0)
-    return {"delta_chi2": total, "delta_bic": total, "held_out_gain": np.nan}
-
-
-def of_turns(
-    explanation: Explanation, aliases: Mapping[str, Sequence[str]]
-) -> Iterator[Found]:
-    """Effects that the turns show."""
-    turning, table = explanation.turning, explanation.table
-    if turning is None or table is None:
-        return
-    error = np.sqrt(np.diag(turning.covariance))
-    for term in turning.terms:
-        name = term.effect.id
-        kept = tuple(t for t in turning.terms if t is not term)
-        less = table.fit(kept, turning.rows, RELAX)
-        now = table.fit(turning.terms, turning.rows, RELAX)
-        found = {}
-        for n in term.names:
-            at = turning.names.index(f"{name}.{n}")
-            if turning.determined[at]:
-                found[n] = Quantity(
-                    float(turning.values[at]), float(error[at]), term.effect.unit(n)
-                )
-        delta = less.chi2 - now.chi2
-        ahead = table.left_out(turning.terms, turning.rows)
-        alone = table.left_out(kept, turning.rows)
-        evidence = {
-            "delta_chi2": delta,
-            "delta_bic": delta - len(term.names) * float(np.log(turning.rows.sum())),
-            "held_out_gain": 1 - ahead / alone,
-        }
-        yield Found(name, found, tuple(aliases.get(name, ())), evidence)
+def of_tone(tone: Tone, gained: float) -> Found:
+    """A line in the spectrum."""
+    values = {
+        n: Quantity(v, tone.sigmas[n], tone.effect.unit(n))
+        for n, v in tone.values.items()
+    }
+    evidence = {"delta_chi2": tone.chi2, "held_out_gain": gained}
+    return Found(tone.effect.id, values, evidence=evidence)
 
 
 def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[Found]:
@@ -208,7 +215,7 @@ def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[Found]:
         yield Found("quantisation", steps)
 
 
-def _unit(name: str, fault: Fault, units: Mapping[str, str]) -> str:
+def _unit(name: str, fault: Fault, units: dict[str, str]) -> str:
     if name == "limit":
-        return "m/s^2" if fault.channel.startswith("a") else "rad/s"
+        return "m/s^2" if fault.channel in CHANNELS[:3] else "rad/s"
     return units.get(name, "1")

@@ -10,26 +10,21 @@ from typing import Any
 import numpy as np
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.bench import Bench
-from fieldcal.diagnosis.candidates import hypotheses
 from fieldcal.diagnosis.chain import Checked, check, checked_again
-from fieldcal.diagnosis.dwell import arrivals, beginnings, clamped
-from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.dwell import arrivals
 from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.line import Remains, Tone
-from fieldcal.diagnosis.model import Term
-from fieldcal.diagnosis.reduce import Rows, Source, recounted, spans
+from fieldcal.diagnosis.reduce import Rows, Source, spans
 from fieldcal.diagnosis.spectrum import tones, without
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Line, Scatter, catalogue
 from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block
+from fieldcal.model.state import Term
+from fieldcal.samples import Block
 from fieldcal.solve.observations import ACC, GYR
 
 SHORTEST = 20
 """Samples of a window from which it can be used."""
-
-BETTER = 3.0
 
 TURNED = np.deg2rad(10.0)
 """Angle from which a device was not held where it was, rad."""
@@ -43,21 +38,19 @@ class Prepared:
     ----------
     checked : what the checks of the chain found
     source : samples and what rows are made of
-    bench : the rows
+    rows : of the windows
     known : effects that the simulation has already
     tones : lines found, and taken out of the samples
     remains : what is left of each
-    rest : (p,) ends of the motion before each window, s
 
     """
 
     checked: Checked
     source: Source
-    bench: Bench
+    rows: Rows
     known: tuple[Term, ...]
     tones: tuple[Tone, ...]
     remains: tuple[Remains, ...]
-    rest: Array
 
     @property
     def navigation(self) -> bool:
@@ -96,10 +89,7 @@ def prepare(block: Block, about: Description) -> Prepared:
             "nothing in the windows can be used: every output is missing, stuck or"
             " clipped there; record them again"
         )
-    bench = bench_of(rows, about)
-    source = _counted(source, bench, known)
-    bench = _from(bench, source.arrived)
-    return Prepared(checked, source, bench, known, found, left, rest)
+    return Prepared(checked, source, _warming(rows, warmth), known, found, left)
 
 
 def _as_shaken(calm: Rows, shaken: Rows) -> Rows:
@@ -109,18 +99,12 @@ def _as_shaken(calm: Rows, shaken: Rows) -> Rows:
     return replace(calm, x=replace(calm.x, variance=shaken.x.variance))
 
 
-def bench_of(rows: Rows, about: Description) -> Bench:
-    """Rows with the calibration a simulation starts from."""
-    nominal = about.nominal
-    return Bench(
-        rows,
-        np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
-        np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
-    )
-
-
-def _from(bench: Bench, arrived: Array) -> Bench:
-    return bench.but(rows=recounted(bench.rows, arrived))
+def _warming(rows: Rows, warmth: Thermometer) -> Rows:
+    """Rows without a temperature that did not change."""
+    if warmth.changes:
+        return rows
+    unknown = np.full(len(rows.x), np.nan)
+    return replace(rows, x=replace(rows.x, warming=unknown))
 
 
 def _refuse_empty(block: Block, about: Description) -> None:
@@ -189,12 +173,12 @@ def known_terms(model: Mapping[str, Mapping[str, Any]]) -> tuple[Term, ...]:
             )
         if isinstance(effect, Chain | Line | Scatter):
             continue
-        start = tuple(_value(name, table, p.name) for p in effect.params)
+        values = np.array([_value(name, table, p.name) for p in effect.params])
         missing = [s.name for s in effect.shapes if s.name not in table]
         if missing:
             raise InputError(f"[model.{name}] needs {missing[0]} as well")
         shape = {s.name: _value(name, table, s.name) for s in effect.shapes}
-        out.append(Term(effect, (), shape, start=start))
+        out.append(Term(effect, values, shape))
     return tuple(out)
 
 
@@ -203,52 +187,3 @@ def _value(name: str, table: Mapping[str, Any], key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"[model.{name}] {key} = {value!r} is not a number; mend it")
     return float(value)
-
-
-def _counted(source: Source, bench: Bench, known: tuple[Term, ...]) -> Source:
-    """With what settles counted from the instant that fits best.
-
-    That is the end of the motion, or a fixed time before each window; any fixed time
-    gives the same course inside windows, so the windows' starts stand for it here. And
-    before the first window the device may have been turned, or not.
-    """
-    if not source.about.positions:
-        return source
-    starts = beginnings(source)
-    held = np.flatnonzero(np.diff(spans(source.block, source.about), axis=1)[:, 0] > 0)
-    first = np.arange(len(starts)) == held[0]
-    best, most = source.arrived, _settles(bench, known) + BETTER
-    for arrived in (source.arrived, starts):
-        for tried in (arrived, np.where(first, -np.inf, arrived)):
-            if tried is source.arrived:
-                continue
-            if (gain := _settles(_from(bench, tried), known)) > most:
-                best, most = tried, gain
-    return replace(source, arrived=best)
-
-
-def _settles(bench: Bench, known: tuple[Term, ...]) -> float:
-    """How much settling raises ln Z, over both triads."""
-    plain, total = bench.fit(known), 0.0
-    for hypothesis in hypotheses(bench, False, False):
-        if hypothesis.effect.id == "settling":
-            fits = [bench.fit([*known, term], plain) for term in hypothesis.variants]
-            total += max(0.0, max(fit.score for fit in fits) - plain.score)
-    return total
-
-
-def divided(prepared: Prepared, at: float) -> Prepared:
-    """Without the row in the midst of which something changed, at an instant, s."""
-    rows = prepared.bench.rows
-    across = (rows.span[:, 0] < at) & (at <= rows.span[:, 1])
-    return replace(prepared, bench=prepared.bench.but(rows=rows.without(across)))
-
-
-def refined(prepared: Prepared, fit: Fit) -> Prepared:
-    """With settling counted from the instant that the samples before windows show."""
-    turned = np.isfinite(prepared.source.arrived)
-    rest = np.where(turned, prepared.rest, -np.inf)
-    plain = replace(prepared.source, arrived=rest)
-    arrived = clamped(plain, prepared.bench, fit)
-    source = replace(prepared.source, arrived=arrived)
-    return replace(prepared, source=source, bench=_from(prepared.bench, arrived))

@@ -1,122 +1,100 @@
 """How well recording and simulation agree, before and after.
 
-Residuals are averaged over parts of the windows before their rms is taken, so that it
-is the mismatch that counts and not the white noise of single samples. Lines do not show
-in such means: their squares, averaged over windows at their own frequency, are added.
+Lines do not show in means over a second: their squares, averaged over windows at their
+own frequency, are added.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.diagnosis.bench import Bench
-from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.fit import Fit
+from fieldcal.diagnosis.agreement import Agreement
+from fieldcal.diagnosis.explain import Explanation, base_of, inference_of
 from fieldcal.diagnosis.hand import rows_of
-from fieldcal.diagnosis.heldout import LONG, SHORT, held_out, rms
-from fieldcal.diagnosis.prepare import Prepared, bench_of
-from fieldcal.diagnosis.reduce import Source, reduce
+from fieldcal.diagnosis.naming import rms_of
+from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.diagnosis.reduce import reduce
 from fieldcal.diagnosis.result import Quality
-from fieldcal.samples import CHANNELS, Array, Block
+from fieldcal.model.fitted import Fitted
+from fieldcal.model.held_out import held_out, turn_residual, turns_foretold
+from fieldcal.model.turn_rows import TurnRows
+from fieldcal.samples import Array, Block
 
-UNITS = ("m/s^2", "rad/s")
-
-
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """Residuals of one model.
-
-    Attributes
-    ----------
-    bench, fit : the model
-    ahead : (n, 6) residuals of what was predicted
-    rms, held_out : (6,) over parts of windows
-    lines, lines_ahead : (6,) mean squares at the lines' frequencies, and as predicted
-
-    """
-
-    bench: Bench
-    fit: Fit
-    ahead: Array
-    rms: Array
-    held_out: Array
-    lines: Array
-    lines_ahead: Array
-
-    @property
-    def whole(self) -> Array:
-        """Root mean squares with what there is of lines, (6,)."""
-        return np.sqrt(self.rms**2 + self.lines)
-
-    def quality(self, triad: int) -> Quality:
-        """In the unit of one triad: 0 accelerometers, 1 gyroscopes."""
-        part = slice(3 * triad, 3 * triad + 3)
-        held_out = np.sqrt(self.held_out**2 + self.lines_ahead)
-        seen = {
-            n: float(v)
-            for n, v in zip(CHANNELS, held_out, strict=True)
-            if np.isfinite(v)
-        }
-        return Quality(
-            rms=_mean(self.whole[part]),
-            chi2_per_dof=self.fit.chi2 / max(self.fit.dof, 1),
-            held_out_rms=_mean(held_out[part]),
-            by_channel=seen,
-        )
+OF_TURNS = "standard deviations, in turns"
 
 
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
-
-
-def agreement(
-    bench: Bench, fit: Fit, stretches: int, lines: Array, lines_ahead: Array
+def _agreement(
+    fitted: Fitted, ahead: Array, lines: Array, foretold: Array, weighed: Fitted
 ) -> Agreement:
-    """Residuals of a fit, seen and predicted."""
-    ahead = held_out(bench, fit.terms, fit, stretches)
-    seen, unseen = (rms(bench.rows, r, stretches) for r in (fit.residual, ahead))
-    return Agreement(bench, fit, ahead, seen, unseen, lines, lines_ahead)
+    """Residuals of a fit; squares are weighed as another has the instability."""
+    squares = weighed.squares_of(fitted.residual()) if _alike(fitted, weighed) else None
+    total = fitted.squares.sum() if squares is None else squares.sum()
+    return Agreement(
+        fitted.rows,
+        fitted.residual(fitted.certain),
+        ahead,
+        lines,
+        foretold,
+        float(total) / max(fitted.dof, 1),
+    )
+
+
+def _alike(one: Fitted, other: Fitted) -> bool:
+    """Whether two fits are of the same rows."""
+    return one.rows.y.shape == other.rows.y.shape
 
 
 def before(block: Block, explanation: Explanation) -> Agreement:
     """The simulation alone, on the samples as they came."""
     prepared = explanation.prepared
-    bench = raw_bench(block, prepared)
-    fit = explanation.base if bench is prepared.bench else bench.fit(explanation.always)
+    base = raw(block, explanation)
     lines = sum((r.before for r in prepared.remains), np.zeros(6))
-    return agreement(bench, fit, _stretches(explanation), lines, lines)
+    ahead = held_out(base, [base.set], ())
+    return _agreement(base, ahead, lines, lines, explanation.best)
 
 
 def after(explanation: Explanation) -> Agreement:
-    """The simulation with the effects found in the windows."""
-    remains = explanation.prepared.remains
+    """The simulation with what was found."""
+    remains, found = explanation.prepared.remains, explanation.inferred
     lines = sum((r.after for r in remains), np.zeros(6))
-    ahead = sum((r.held_out for r in remains), np.zeros(6))
-    bench, fit = explanation.wide, explanation.fit
-    return agreement(bench, fit, _stretches(explanation), lines, ahead)
+    foretold = sum((r.held_out for r in remains), np.zeros(6))
+    visited = list(found.search.visited.values())
+    ahead = held_out(explanation.best, visited, ())
+    best = explanation.best
+    return _agreement(best, ahead, lines, foretold, best)
 
 
-def _stretches(explanation: Explanation) -> int:
-    """Of few windows: long ones, unless nothing but chance could foretell them."""
-    only_chance = explanation.model.random and not explanation.terms
-    return SHORT if only_chance else LONG
+def in_turns(explanation: Explanation) -> tuple[Quality, Quality]:
+    """The turns without and with what was found, in standard deviations."""
+    best, turned = explanation.best, explanation.inferred.turned
+    nothing = explanation.posterior.search.evaluated(())
+    plain = replace(best, set=nothing)
+    return _of_turns(plain, turned), _of_turns(best, turned)
 
 
-def raw_bench(block: Block, prepared: Prepared) -> Bench:
-    """Rows of the samples as they came, if anything was done to them."""
+def _of_turns(fitted: Fitted, turned: Sequence[TurnRows]) -> Quality:
+    seen = np.concatenate([turn_residual(t, fitted.estimate) for t in turned])
+    ahead = turns_foretold(fitted, turned)
+    return Quality(rms_of(seen), float(np.mean(seen**2)), rms_of(ahead))
+
+
+def raw(block: Block, explanation: Explanation) -> Fitted:
+    """Bias and scale factor alone, on the samples as they came."""
+    prepared: Prepared = explanation.prepared
     if block is prepared.source.block and not prepared.checked.ids:
-        return prepared.bench
-    source: Source = replace(
+        return explanation.base
+    source = replace(
         prepared.source,
         block=block,
         usable=np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)]),
     )
     # a device that was touched is not held by hand for that: rows of the same kind
-    one_each = len(prepared.bench.rows.x) == prepared.bench.windows
-    return bench_of((rows_of if one_each else reduce)(source), source.about)
+    one_each = len(prepared.rows.x) == len(explanation.dictionary.held)
+    rows = (rows_of if one_each else reduce)(source)
+    return base_of(inference_of(source, rows, prepared))
 
 
 def parted(one: Agreement, other: Agreement) -> int:
@@ -128,7 +106,7 @@ def parted(one: Agreement, other: Agreement) -> int:
     for triad in (0, 1):
         part, gains = slice(3 * triad, 3 * triad + 3), [0.0]
         for pair in ((one.whole, other.whole), (one.held_out, other.held_out)):
-            first, then = (np.nan_to_num(rms[part]) for rms in pair)
+            first, then = (np.nan_to_num(some[part]) for some in pair)
             gain = float((first**2 - then**2).max())
             gains.append(gain / max(float(then.max()) ** 2, 1e-300))
         sizes.append(max(gains))

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 if TYPE_CHECKING:
+    from fieldcal.diagnosis.candidates import Candidate
     from fieldcal.diagnosis.curves import Curve
-    from fieldcal.diagnosis.league import Candidate
 
 Verdict = Literal["consistent", "left_out", "ambiguous", "unexplained"]
 
@@ -94,7 +94,8 @@ class Found:
     id : its name in the catalogue
     parameters : by name
     aliases : ids that would explain the same in this recording
-    evidence : delta_chi2, delta_bic, held_out_gain
+    evidence : delta_chi2, delta_bic, held_out_gain, log_evidence
+    probability : that it, or one of its aliases, is there
 
     """
 
@@ -102,11 +103,13 @@ class Found:
     parameters: Mapping[str, Quantity]
     aliases: tuple[str, ...] = ()
     evidence: Mapping[str, float] = field(default_factory=dict)
+    probability: float = 1.0
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
         return {
             "id": self.id,
+            "probability": number(self.probability),
             "parameters": {n: q.to_json() for n, q in self.parameters.items()},
             "aliases": list(self.aliases),
             "evidence": {n: number(v) for n, v in self.evidence.items()},
@@ -173,6 +176,7 @@ class Diagnosis:
     Attributes
     ----------
     verdict : consistent, left_out, ambiguous or unexplained
+    probability : that the verdict is right
     mismatch : where the two part
     effects : what is left out
     unit : of the rms values: of the triad that parts most
@@ -187,6 +191,7 @@ class Diagnosis:
     """
 
     verdict: Verdict
+    probability: float
     mismatch: tuple[Mismatch, ...]
     effects: tuple[Found, ...]
     unit: str
@@ -203,6 +208,7 @@ class Diagnosis:
         """Return the content of diagnosis.json."""
         return {
             "verdict": self.verdict,
+            "probability": number(self.probability),
             "mismatch": [m.to_json() for m in self.mismatch],
             "effects": [e.to_json() for e in self.effects],
             "fit": {

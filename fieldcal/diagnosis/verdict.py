@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,15 +10,13 @@ import numpy as np
 from fieldcal.description import Description
 from fieldcal.diagnosis import locate, naming
 from fieldcal.diagnosis.advice import advice
-from fieldcal.diagnosis.aliases import Aliases, aliases
-from fieldcal.diagnosis.common import common_scale
+from fieldcal.diagnosis.agreement import UNITS, Agreement
+from fieldcal.diagnosis.candidates import candidates
 from fieldcal.diagnosis.curves import curves
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.league import league
 from fieldcal.diagnosis.naming import Removed
 from fieldcal.diagnosis.prepare import prepare
-from fieldcal.diagnosis.quality import UNITS, Agreement, after, before, parted
+from fieldcal.diagnosis.quality import OF_TURNS, after, before, in_turns, parted
 from fieldcal.diagnosis.reduce import spans
 from fieldcal.diagnosis.result import (
     Diagnosis,
@@ -26,17 +24,18 @@ from fieldcal.diagnosis.result import (
     Group,
     Mismatch,
     Quality,
-    Quantity,
     Verdict,
 )
-from fieldcal.diagnosis.unknown import Unknown, matters, unknowns
+from fieldcal.diagnosis.unknown import Unknown, unknown
 from fieldcal.diagnosis.words import notes, paragraph
+from fieldcal.effects import catalogue
+from fieldcal.model import priors
+from fieldcal.model.posterior import Standing
 from fieldcal.samples import Block
 
-GROUPS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
-GROUP_UNITS = ("m/s^2", "1", "rad/s", "1")
+GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}
 
-ABSURD = (1.0, 0.1, 0.1, 0.1)
+ABSURD = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
 """Sigma from which a parameter of a group counts as not determined."""
 
 
@@ -59,34 +58,28 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
 
 def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     """What follows from an explanation of the samples of a block."""
-    lost = {t.effect.id: naming.removed(explanation, t) for t in explanation.terms}
-    first = before(block, explanation.as_said)
-    then = after(explanation)
-    unknown = _unknown(explanation, first, then)
-    others = aliases(explanation)
-    effects = _effects(explanation, lost, then, others)
-    verdict = _verdict(effects, unknown, others)
+    standing = explanation.standing
+    lost = {s.name: naming.removed(explanation, s) for s in standing}
+    first, then = before(block, explanation), after(explanation)
+    effects = _effects(explanation, lost, then)
+    strange = _strange(explanation, lost)
+    verdict = _verdict(explanation, effects, strange)
     # so far positions were counted as they were held, from here on as they are listed
     numbered = explanation.prepared.source.about.numbered
-    mismatch = tuple(
-        replace(m, positions=tuple(sorted(numbered(m.positions))))
-        for m in _mismatch(block, explanation, lost, unknown)
-    )
-    unknown = [
-        replace(u, positions=tuple(sorted(numbered(u.positions)))) for u in unknown
-    ]
-    quality = _quality(explanation, first, then)
+
+    def listed(one: Mismatch) -> Mismatch:
+        return replace(one, positions=tuple(sorted(numbered(one.positions))))
+
+    mismatch = tuple(listed(m) for m in _mismatch(block, explanation, lost, strange))
+    strange = [replace(u, mismatch=listed(u.mismatch)) for u in strange]
+    quality = _quality(explanation, lost, first, then)
     words = paragraph(
-        verdict,
-        effects,
-        mismatch,
-        unknown,
-        quality,
-        explanation,
-        notes(explanation, explanation.left),
-    )
+        verdict, effects, mismatch, strange, quality, explanation,
+        notes(explanation, _open(explanation)),
+    )  # fmt: skip
     return Diagnosis(
         verdict=verdict,
+        probability=_probability(explanation, verdict),
         mismatch=mismatch,
         effects=tuple(effects),
         unit=quality[2],
@@ -95,154 +88,190 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
         calibration=_calibration(explanation),
         warnings=_warnings(explanation),
         says=words,
-        candidates=league(explanation, effects),
+        candidates=candidates(explanation, effects),
         curves=tuple(curves(explanation, mismatch, first, then)),
-        next=tuple(advice(explanation, effects, unknown)),
+        next=tuple(advice(explanation, effects, strange)),
     )
 
 
-def _unknown(
-    explanation: Explanation, first: Agreement, then: Agreement
-) -> list[Unknown]:
-    found = unknowns(explanation)
-    explained = first.fit.chi2 - explanation.fit.chi2
-    return found if matters(found, explained) or not explanation.terms else []
+def _quality(
+    explanation: Explanation,
+    lost: Mapping[str, Removed],
+    first: Agreement,
+    then: Agreement,
+) -> tuple[Quality, Quality, str]:
+    """Before, after and the unit: of the windows, or of the turns if only they part."""
+    prepared = explanation.prepared
+    of_samples = prepared.tones or prepared.checked.ids
+    if lost and not of_samples and all(map(naming.in_turns, lost.values())):
+        if explanation.inferred.turned:
+            return *in_turns(explanation), OF_TURNS
+    triad = parted(first, then)
+    return first.quality(triad), then.quality(triad), UNITS[triad]
 
 
 def _effects(
-    explanation: Explanation,
-    lost: dict[str, Removed],
-    then: Agreement,
-    others: Aliases,
+    explanation: Explanation, lost: Mapping[str, Removed], then: Agreement
 ) -> list[Found]:
     prepared = explanation.prepared
     found = list(naming.of_samples(prepared.checked.faults))
     for tone, left in zip(prepared.tones, prepared.remains, strict=True):
-        values = {
-            n: Quantity(v, tone.sigmas[n], tone.effect.unit(n))
-            for n, v in tone.values.items()
-        }
-        evidence = {"delta_chi2": tone.chi2, "held_out_gain": left.gain(tone.clear)}
-        found.append(Found(tone.effect.id, values, evidence=evidence))
-    found += naming.of_windows(explanation, lost, then, others.ids)
-    found += naming.of_chance(explanation, others.ids)
-    found += naming.of_turns(explanation, others.ids)
+        found.append(naming.of_tone(tone, left.gain(tone.clear)))
+    for one in explanation.standing:
+        if one.name in catalogue():
+            found.append(naming.of_rows(explanation, one, lost[one.name], then))
     if explanation.sees_earth:
         evidence = {"delta_chi2": 2 * explanation.earth}
         found.append(Found("earth_rate", {}, evidence=evidence))
-    if (gravity := common_scale(explanation)) is not None:
-        found.append(gravity)
     return found
 
 
+def _strange(explanation: Explanation, lost: Mapping[str, Removed]) -> list[Unknown]:
+    """Mismatches of causes that are no effects."""
+    out = []
+    for one in explanation.standing:
+        if one.name not in catalogue():
+            places = list(locate.of_unknown(explanation, one, lost[one.name]))
+            out += unknown(explanation, one, places)
+    return out
+
+
 def _verdict(
-    effects: Sequence[Found], unknown: Sequence[Unknown], others: Aliases
+    explanation: Explanation, effects: Sequence[Found], strange: Sequence[Unknown]
 ) -> Verdict:
-    if unknown:
+    if strange:
         return "unexplained"
-    if any(f.id == "gravity_error" or f.id in others.open for f in effects):
+    if any(_is_open(explanation, one) for one in explanation.standing):
         return "ambiguous"
     return "left_out" if effects else "consistent"
+
+
+def _is_open(explanation: Explanation, one: Standing) -> bool:
+    """Whether something else may as well be there in the place of a cause."""
+    if one.name in catalogue() and catalogue()[one.name].like_calibration:
+        return True
+    others = explanation.posterior.probability(one.aliases)
+    return others > priors.OPEN
+
+
+def _probability(explanation: Explanation, verdict: Verdict) -> float:
+    """That the verdict is right: all that is said to be there is, or nothing is."""
+    posterior = explanation.posterior
+    if verdict == "consistent":
+        return sum(w for s, w in posterior.weights if not s.members)
+    wanted = [{one.name, *one.aliases} for one in explanation.standing]
+    return sum(
+        w
+        for s, w in posterior.weights
+        if all(some & set(posterior.names(s)) for some in wanted)
+    )
 
 
 def _mismatch(
     block: Block,
     explanation: Explanation,
-    lost: dict[str, Removed],
-    unknown: Sequence[Unknown],
+    lost: Mapping[str, Removed],
+    strange: Sequence[Unknown],
 ) -> list[Mismatch]:
     prepared = explanation.prepared
-    about = prepared.source.about
-    windows = spans(block, about)
+    windows = spans(block, prepared.source.about)
     out = list(locate.of_faults(block.t, windows, prepared.checked.faults))
     out += locate.of_tones(explanation)
-    out += locate.of_effects(explanation, lost)
-    out += locate.of_chance(explanation)
-    out += locate.of_turns(explanation)
-    out += locate.of_unknown(explanation, unknown)
+    for one in explanation.standing:
+        if one.name in catalogue():
+            out += locate.of_cause(explanation, one, lost[one.name])
+    out += [u.mismatch for u in strange]
     return sorted(out, key=lambda m: -m.sigma)
 
 
-def _quality(
-    explanation: Explanation, first: Agreement, then: Agreement
-) -> tuple[Quality, Quality, str]:
-    """Before, after and the unit: of the windows, or of the turns if only they part."""
-    turning, table = explanation.turning, explanation.table
-    prepared = explanation.prepared
-    seen = bool(explanation.terms or prepared.tones or prepared.checked.ids)
-    seen = seen or bool(explanation.model.random)
-    if turning is not None and table is not None and turning.terms and not seen:
-        plain = table.fit((), turning.rows)
-        one = Quality(
-            float(np.sqrt(plain.chi2 / max(turning.rows.sum(), 1))),
-            plain.chi2 / max(plain.dof, 1),
-            table.left_out((), turning.rows),
-        )
-        other = Quality(
-            float(np.sqrt(turning.chi2 / max(turning.rows.sum(), 1))),
-            turning.chi2 / max(turning.dof, 1),
-            table.left_out(turning.terms, turning.rows),
-        )
-        return one, other, "standard deviations, in turns"
-    triad = parted(first, then)
-    return first.quality(triad), then.quality(triad), UNITS[triad]
-
-
 def _calibration(explanation: Explanation) -> dict[str, Group]:
-    fit: Fit = explanation.fit
     about = explanation.prepared.source.about
     nominal, gauge = about.nominal, about.gauge
+    found = _numbers(explanation)
     out = {}
-    for group, unit, absurd in zip(GROUPS, GROUP_UNITS, ABSURD, strict=True):
+    for group, unit in GROUPS.items():
         value, sigma = np.full(3, np.nan), np.full(3, np.nan)
         for i, axis in enumerate("xyz"):
-            if (name := f"{group}.{axis}") in fit.names:
-                at = fit.names.index(name)
-                if fit.determined[at] and fit.sigma[at] < absurd * _size(fit, group, i):
-                    value[i], sigma[i] = fit.values[at], fit.sigma[at]
+            if f"{group}.{axis}" in found:
+                v, s, size = found[f"{group}.{axis}"]
+                if s < ABSURD[group] * size:
+                    value[i], sigma[i] = v, s
         if np.isfinite(value).any():
             change = value - nominal[group]
             size, unit = gauge.of(group) or (1.0, unit)
-            found = [tuple((size * part).tolist()) for part in (value, sigma, change)]
-            out[group] = Group(found[0], found[1], found[2], unit)
+            three = [tuple((size * part).tolist()) for part in (value, sigma, change)]
+            out[group] = Group(three[0], three[1], three[2], unit)
     return out
 
 
-def _size(fit: Fit, group: str, axis: int) -> float:
-    scale = fit.state.scale[axis + 3 * group.startswith("gyr")]
-    return float(abs(scale)) or 1.0
+def _numbers(explanation: Explanation) -> dict[str, tuple[float, float, float]]:
+    """Bias and scale factor by full name: value, sigma, scale factor of the axis."""
+    d, found = explanation.dictionary, explanation.best.set.state
+    nominal = explanation.inferred.inference.nominal
+    sigma = np.sqrt(np.diag(found.inverse))
+    out = {}
+    for first, base, kind in (
+        (d.bias, nominal.bias, "bias"),
+        (d.scale, nominal.scale, "scale"),
+    ):
+        for c in range(6):
+            at = np.flatnonzero(found.columns == first + c)
+            if len(at):
+                name = f"{'acc' if c < 3 else 'gyr'}_{kind}.{'xyz'[c % 3]}"
+                value = float(base[c] + found.estimate[at].sum())
+                size = float(abs(explanation.state.scale[c])) or 1.0
+                out[name] = value, float(sigma[at].max()), size
+    return out
+
+
+def _open(explanation: Explanation) -> list[str]:
+    """Parameters of what is there that the rows leave open."""
+    out = []
+    for one in explanation.standing:
+        effect = catalogue().get(one.name)
+        if effect is None:
+            continue
+        told = naming.parameters(explanation, one)
+        for _, group in one.members:
+            names = [effect.params[j].name for j in group.params]
+            out += [f"{one.name}.{n}" for n in names if n not in told]
+    return out
 
 
 def _warnings(explanation: Explanation) -> tuple[str, ...]:
-    bench, fit = explanation.prepared.bench, explanation.fit
     out = []
-    parameters = sum(n.startswith(("acc", "gyr")) for n in fit.names)
-    triads = [("accelerometers", 0), ("gyroscopes", 3)]
-    for name, first in triads:
-        if bench.rows.used[:, first : first + 3].any():
+    numbers = _numbers(explanation)
+    for name, first in (("accelerometers", 0), ("gyroscopes", 3)):
+        if explanation.rows.used[:, first : first + 3].any():
             spare = _spare(explanation, first)
             if spare <= 1:
                 out.append(
                     f"{max(spare, 0)} degrees of freedom in the means of the {name}:"
                     " their residual says nothing about the fit; take more positions"
                 )
-    open_ = [
-        n
-        for n, d in zip(fit.names, fit.determined, strict=True)
-        if not d and not n.startswith("aside")
+    loose = [
+        name
+        for name, (_, sigma, size) in numbers.items()
+        if not sigma < ABSURD[name.partition(".")[0]] * size
     ]
-    if open_ and parameters:
-        out.append(f"not determined by these positions: {', '.join(open_)}")
+    if loose:
+        out.append(f"not determined by these positions: {', '.join(loose)}")
     return tuple(out)
 
 
 def _spare(explanation: Explanation, first: int) -> int:
     """Means of windows less parameters, for one triad."""
-    bench, fit = explanation.prepared.bench, explanation.fit
+    rows, found = explanation.rows, explanation.best.set.state
     part = slice(first, first + 3)
     held = [
-        bench.rows.used[bench.rows.x.position == p][:, part].any(axis=0).sum()
-        for p in np.unique(bench.rows.x.position)
+        rows.used[rows.x.position == p][:, part].any(axis=0).sum()
+        for p in explanation.dictionary.held
     ]
-    columns = np.abs(fit.design[:, part]).max(axis=(0, 1)) > 0
-    return int(sum(held) - (columns & fit.determined).sum())
+    free = explanation.dictionary.free
+    turns = 2 * int(free.sum()) if first == 0 else 0
+    reach = np.zeros(explanation.dictionary.width, dtype=bool)
+    for one in explanation.best.linear:
+        if first <= one.channel < first + 3:
+            reach[one.columns] |= np.abs(one.design).max(axis=0) > 0
+    narrowed = np.diag(found.inverse) < naming.DETERMINED * found.sizes**2
+    return int(sum(held) - turns - (reach[found.columns] & narrowed).sum())

@@ -8,20 +8,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.diagnosis.aliases import decided_by, telling_position
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import Found, Mismatch, Quality, Quantity, Verdict
+from fieldcal.diagnosis.telling import decided_by, telling_position
 from fieldcal.diagnosis.unknown import Unknown, listed
 from fieldcal.effects import Scatter, catalogue
-from fieldcal.samples import CHANNELS
 
 SHOWN = 3.0
 """Standard deviations from which a parameter is worth its words."""
 
 EACH = 3
 """Times up to which an effect that happened again is told each time."""
-
-GREEK = {"alpha": "α", "beta": "β"}
 
 MOST = 6
 """Places that are told."""
@@ -156,23 +153,28 @@ def _deciding(explanation: Explanation, one: str, other: str) -> str:
 
 def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
     """What is known of a mismatch; channels that are off in the same places in one."""
-    if np.isfinite(one.correlation):
+    where = one.mismatch
+    if np.isfinite(where.correlation):
         return (
-            f"{CHANNELS[one.channel]} follows {one.covariate} (correlation"
-            f" {one.correlation:+.2f}); a smooth function of {one.kind} takes"
-            f" {100 * one.share:.0f} % of its variance."
+            f"{where.channel} follows {where.covariate} (correlation"
+            f" {where.correlation:+.2f}); a smooth function of {one.cause} takes"
+            f" {100 * where.share:.0f} % of its variance."
         )
-    alike = [u for u in all_ if (u.kind, u.positions) == (one.kind, one.positions)]
-    places = listed(one.positions)
+    places = listed(where.positions)
     if one.turned:
         angles = " and ".join(
-            f"{GREEK[t.joint]} had been off by {said(t.angle)}" for t in one.turned
+            f"{joint} had been off by {said(angle)}" for joint, angle in one.turned
         )
         return (
             f"{places.capitalize()} is off by itself, as if {angles} there: set it anew"
             " and take it again."
         )
-    channels = " and ".join(dict.fromkeys(CHANNELS[u.channel] for u in alike))
+    alike = [
+        u
+        for u in all_
+        if (u.cause, u.mismatch.positions) == (one.cause, where.positions)
+    ]
+    channels = " and ".join(dict.fromkeys(u.mismatch.channel for u in alike))
     verb = "is" if len(alike) == 1 else "are"
     return (
         f"{channels} {verb} off in {places} by itself; take it again, and look for what"
@@ -183,7 +185,7 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
 def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
     """What else a person should know."""
     out = []
-    if explanation.earth > explanation.search.price and not explanation.sees_earth:
+    if explanation.earth > np.log(1000.0) and not explanation.sees_earth:
         out.append("The gyroscopes show the Earth's rate, which is taken into account.")
     if left:
         out.append(f"The positions leave open: {', '.join(left)}.")

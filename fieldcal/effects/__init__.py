@@ -24,7 +24,7 @@ by the file's name.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -39,6 +39,9 @@ from fieldcal.effects.recording import Fault, Recording
 from fieldcal.samples import Array
 
 __all__ = [
+    "BEYOND",
+    "CHANCE",
+    "FINEST",
     "NO_SHAPE",
     "Chain",
     "Effect",
@@ -58,6 +61,29 @@ __all__ = [
 ]
 
 Kind = Literal["motion", "sensor", "chain"]
+Seen = Literal[
+    "position", "time", "temperature", "spectrum", "transient", "samples", "turn"
+]
+"""What a mismatch depends on."""
+
+POINTS = 8
+"""Values of a time constant to try: an exponential changes little from one to the
+next."""
+
+PIECES = 4
+"""Instants to try within a window; the best is refined by the samples."""
+
+ENDS = 3
+"""Rows at either end of a session in which a change is not told from coming to rest."""
+
+FINEST = 1.06
+"""Ratio of time constants that are told apart last."""
+
+CHANCE = 0.01
+"""That a session has an effect, where its file states no other: one of a hundred."""
+
+BEYOND = 5e-4
+"""The same of what would change by itself beside a temperature that is known to."""
 
 Values = Sequence[float] | Array
 NO_SHAPE: Mapping[str, float] = {}
@@ -78,12 +104,53 @@ class Param:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A parameter that the outputs are not linear in, and the range to search, s."""
+    """A parameter that the outputs are not linear in, and the range to search.
+
+    `kind` says what it is: a time constant of the "session" or since the "turn", an
+    "instant", or the "frequency" of a line, which is found in the spectrum.
+    """
 
     name: str
     unit: str
     low: float = 0.0
     high: float = np.inf
+    kind: Literal["session", "turn", "instant", "frequency"] = "frequency"
+
+    def grid(self, x: Experience, since: Array) -> Iterator[tuple[float, int]]:
+        """Values to try in rows, each with the origin that times count from.
+
+        `since` (o, n) is the time since the turn, by origin.
+        """
+        span = float(np.ptp(x.t))
+        if self.kind == "instant":
+            yield from ((float(at), 0) for at in instants(x))
+        elif self.kind == "session":
+            low, high = max(self.low, span / 20), min(self.high, 3 * span)
+            for tau in np.geomspace(low, max(high, 1.01 * low), POINTS):
+                yield float(tau), 0
+        elif self.kind == "turn":
+            for origin, times in enumerate(since):
+                if not np.isfinite(soonest := float(times.min())):
+                    continue  # it was never turned
+                low, high = max(self.low, soonest / 4), min(self.high, span / 3)
+                for tau in np.geomspace(low, max(high, 1.01 * low), POINTS):
+                    yield float(tau), origin
+
+    @property
+    def finer(self) -> tuple[float, ...]:
+        """Ratios to the next values to try, closer and closer."""
+        return (1.0,) if self.kind == "instant" else (1.3, 1.13, FINEST)
+
+    def near(self, x: Experience, here: float, ratio: float) -> Sequence[float]:
+        """Values about one: to either side, or every instant next to it."""
+        if self.kind != "instant":
+            return here / ratio, here * ratio
+        middle = (x.t[1:] + x.t[:-1]) / 2
+        grid = instants(x)
+        low = grid[grid < here].max(initial=-np.inf)
+        high = grid[grid > here].min(initial=np.inf)
+        found: list[float] = middle[(low < middle) & (middle < high)].tolist()
+        return [at for at in found if at != here]
 
 
 class Effect(ABC):
@@ -95,6 +162,7 @@ class Effect(ABC):
     params : its parameters, shape parameters not among them
     shapes : its shape parameters
     covariate : what it is seen through
+    seen_in : the kind of mismatch that it makes
     decided_by : what the operator can do to tell it from others
     source : where the equation and the sizes come from
 
@@ -104,8 +172,24 @@ class Effect(ABC):
     params: ClassVar[tuple[Param, ...]] = ()
     shapes: ClassVar[tuple[Shape, ...]] = ()
     covariate: ClassVar[str]
+    seen_in: ClassVar[Seen] = "position"
+    like_calibration: ClassVar[bool] = False
+    """Whether bias and scale factor do the same, so that it is only ever possible."""
+
     decided_by: ClassVar[str]
     source: ClassVar[str]
+
+    def applies(self, x: Experience) -> bool:
+        """Whether what it hangs on is known in some rows."""
+        return True
+
+    def chance(self, x: Experience) -> float:
+        """Probability that a session has it, before its rows are seen."""
+        return CHANCE
+
+    def late(self, values: Values) -> float:
+        """Seconds by which it makes the gyroscopes late."""
+        return 0.0
 
     @property
     def id(self) -> str:
@@ -132,6 +216,8 @@ class Motion(Effect):
 
     kind = "motion"
     order: ClassVar[int] = 0
+    on_the_way: ClassVar[bool] = False
+    """Whether it acts while the device is turned, and at rest not at all."""
 
     @abstractmethod
     def change(self, x: Experience, values: Values) -> Experience:
@@ -162,6 +248,8 @@ class Scatter(Effect):
 class Line(Effect):
     """An oscillation: a line in the spectrum of the outputs at rest."""
 
+    seen_in = "spectrum"
+
     band: ClassVar[tuple[float, float]]
     """Lowest and highest frequency, Hz."""
 
@@ -177,6 +265,7 @@ class Chain(Effect):
     """An effect on samples."""
 
     kind = "chain"
+    seen_in: ClassVar[Seen] = "samples"
 
     @abstractmethod
     def find(self, recording: Recording) -> list[Fault]:
@@ -194,6 +283,19 @@ def catalogue() -> Mapping[str, Effect]:
                 if issubclass(thing, Effect):
                     found[name] = thing()
     return found
+
+
+def instants(x: Experience) -> Array:
+    """Instants at which something may change: between rows, some for each window, s."""
+    middle = (x.t[1:] + x.t[:-1]) / 2
+    turned = np.diff(x.position) != 0
+    each = np.bincount(np.unique(x.position, return_inverse=True)[1])
+    number = np.concatenate([np.arange(n) for n in each])[1:]
+    step = np.repeat(np.maximum(each // PIECES, 1), each)[1:]
+    some = turned | (number % step == 0)
+    some[:ENDS] = some[-ENDS:] = False
+    kept: Array = middle[some]
+    return kept
 
 
 def six(unit_acc: str, acc: float, unit_gyr: str, gyr: float) -> tuple[Param, ...]:

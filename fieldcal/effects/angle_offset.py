@@ -26,6 +26,10 @@ class AngleOffset(Motion):
     source = "Avrutov and Pozniak 2023, (15); 0.1 to 3 deg"
     order = 3
 
+    def applies(self, x: Experience) -> bool:
+        """Where angles are known."""
+        return bool(x.oriented.any())
+
     def change(self, x: Experience, values: Values) -> Experience:
         """Add to the angles."""
         alpha0, beta0 = np.deg2rad(values)

@@ -24,6 +24,10 @@ class AngleScale(Motion):
     source = "model of this project; 0.1 to 3 % on protractors and stepped ladders"
     order = 2
 
+    def applies(self, x: Experience) -> bool:
+        """Where angles are known."""
+        return bool(x.oriented.any())
+
     def change(self, x: Experience, values: Values) -> Experience:
         """Stretch the angles."""
         a, b = values

@@ -30,6 +30,10 @@ class BaseTilt(Motion):
     source = "Avrutov and Pozniak 2023, (15), composed as matrices; 0.1 to 3 deg"
     order = 1
 
+    def applies(self, x: Experience) -> bool:
+        """Where angles are known."""
+        return bool(x.oriented.any())
+
     def change(self, x: Experience, values: Values) -> Experience:
         """Turn the base's vectors before the joints do."""
         about_x, about_z = np.deg2rad(values)

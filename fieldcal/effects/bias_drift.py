@@ -16,7 +16,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Experience, Sensor, six
+from fieldcal.effects import BEYOND, CHANCE, NO_SHAPE, Experience, Sensor, six
 from fieldcal.samples import Array
 
 
@@ -25,8 +25,13 @@ class BiasDrift(Sensor):
 
     params = six("m/s^2/s", 1e-4, "rad/s/s", 5e-6)
     covariate = "time"
+    seen_in = "time"
     decided_by = "the first position once more at the end"
     source = "IEEE Std 952, rate ramp"
+
+    def chance(self, x: Experience) -> float:
+        """Less where a thermometer shows what changes anyway."""
+        return BEYOND if x.warms else CHANCE
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Time on every output."""

@@ -25,8 +25,9 @@ class BiasStep(Sensor):
     """Jump of the biases."""
 
     params = six("m/s^2", 5e-2, "rad/s", 2e-3)
-    shapes = (Shape("at_s", "s", -np.inf, np.inf),)
+    shapes = (Shape("at_s", "s", -np.inf, np.inf, "instant"),)
     covariate = "time"
+    seen_in = "time"
     decided_by = "the position before the jump once more"
     source = "stress released, a supply switched, a range changed"
 

@@ -110,6 +110,11 @@ class Experience:
         return float(np.linalg.norm(self.base_force))
 
     @property
+    def warms(self) -> bool:
+        """Whether a thermometer shows that the temperature changes."""
+        return bool(np.isfinite(self.warming).all() and np.ptp(self.warming) > 0)
+
+    @property
     def oriented(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Rows whose both angles are known, (n,)."""
         known: np.ndarray[Any, np.dtype[np.bool_]] = np.isfinite(self.alpha + self.beta)

@@ -27,6 +27,11 @@ class GravityError(Motion):
     decided_by = "gravity at the site from a survey, or a calibration somewhere else"
     source = "NIMA TR8350.2; up to 3e-3 for a wrong latitude and height"
     order = 0
+    like_calibration = True
+
+    def chance(self, x: Experience) -> float:
+        """A latitude or a height that nobody said is no rare thing."""
+        return 0.05
 
     def change(self, x: Experience, values: Values) -> Experience:
         """Lengthen the specific force."""

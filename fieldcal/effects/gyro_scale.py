@@ -31,6 +31,10 @@ class GyroScale(Sensor):
     decided_by = "a turn about each axis in turn, by 90° or more"
     source = "Avrutov et al. 2017, (3.1); MEMS data sheets state 0.1 to 3 %"
 
+    def applies(self, x: Experience) -> bool:
+        """Where no table turns the device: there it is always estimated."""
+        return not x.rate.any()
+
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Rate about the output's own axis."""
         out = np.zeros((len(x), 6, 3))

@@ -29,6 +29,10 @@ class HeadingError(Motion):
     source = "Avrutov and Pozniak 2023, (38); 1 to 30 deg by compass or eye"
     order = 0
 
+    def applies(self, x: Experience) -> bool:
+        """Where the gyroscopes see the Earth, and angles are known."""
+        return bool(x.base_rate.any() and x.oriented.any())
+
     def change(self, x: Experience, values: Values) -> Experience:
         """Turn the Earth's rate about the vertical, y."""
         (psi,) = np.deg2rad(values)

@@ -29,6 +29,7 @@ class LeverArm(Motion):
     decided_by = "faster turns about each axis"
     source = "rigid body kinematics; 0.01 to 0.3 m on a fixture"
     order = 9
+    on_the_way = True
 
     def change(self, x: Experience, values: Values) -> Experience:
         """Add the centripetal and the tangential acceleration."""

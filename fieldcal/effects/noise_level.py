@@ -33,6 +33,7 @@ class NoiseLevel(Chain):
 
     params = (Param("ratio", "1", 10.0),)
     covariate = "spectrum at high frequency"
+    seen_in = "spectrum"
     decided_by = "the axes exchanged: what stays with the axis is the sensor's"
     source = "model of this project"
 

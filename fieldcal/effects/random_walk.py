@@ -29,6 +29,7 @@ class RandomWalk(Scatter):
     kind = "sensor"
     params = six("m/s^2/sqrt(s)", 3e-4, "rad/s/sqrt(s)", 3e-5)
     covariate = "scatter between windows beyond white noise"
+    seen_in = "time"
     decided_by = "one position held for an hour, and its Allan deviation"
     source = "IEEE Std 952, rate random walk"
 

@@ -25,8 +25,9 @@ class Settling(Sensor):
     """Exponential change of the biases since the last turn."""
 
     params = six("m/s^2", 3e-2, "rad/s", 1e-3)
-    shapes = (Shape("tau_s", "s", 0.7, 40.0),)
+    shapes = (Shape("tau_s", "s", 0.7, 40.0, "turn"),)
     covariate = "time since the turn"
+    seen_in = "transient"
     decided_by = "a longer wait between the turn and the window"
     source = "relaxation after a change of load; 1e-4 to 1e-2 m/s^2, 1 to 30 s"
 

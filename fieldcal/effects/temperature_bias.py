@@ -26,8 +26,13 @@ class TemperatureBias(Sensor):
 
     params = six("m/s^2/K", 1.5e-2, "rad/s/K", 5e-4)
     covariate = "temperature"
+    seen_in = "temperature"
     decided_by = "the same position again at another temperature"
     source = "IEEE Std 1293, 1431; 1e-4 to 1.5e-2 m/s^2/K, 1e-5 to 5e-4 rad/s/K"
+
+    def applies(self, x: Experience) -> bool:
+        """Where a thermometer shows a change."""
+        return x.warms
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Temperature on every output."""

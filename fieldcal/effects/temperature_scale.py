@@ -26,8 +26,13 @@ class TemperatureScale(Sensor):
 
     params = tuple(Param(i, "1/K", 3e-4) for i in "xyz")
     covariate = "temperature × force"
+    seen_in = "temperature"
     decided_by = "the axis up and down, cold and warm"
     source = "IEEE Std 1293; 1e-5 to 3e-4 on MEMS parts"
+
+    def applies(self, x: Experience) -> bool:
+        """Where a thermometer shows a change."""
+        return x.warms
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Temperature times force along the output's own axis."""

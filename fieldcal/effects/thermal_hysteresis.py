@@ -17,7 +17,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Experience, Sensor, six
+from fieldcal.effects import BEYOND, NO_SHAPE, Experience, Sensor, six
 from fieldcal.samples import Array
 
 
@@ -26,8 +26,17 @@ class ThermalHysteresis(Sensor):
 
     params = six("m/s^2/(K/s)", 1.0, "rad/s/(K/s)", 2e-2)
     covariate = "rate of the temperature"
+    seen_in = "temperature"
     decided_by = "the same temperature once heating and once cooling"
     source = "first-order lag of 10 to 100 s with the temperature_bias sizes"
+
+    def applies(self, x: Experience) -> bool:
+        """Where a thermometer shows a change."""
+        return x.warms
+
+    def chance(self, x: Experience) -> float:
+        """It comes on top of what the temperature itself does."""
+        return BEYOND
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Rate of the temperature on every output."""

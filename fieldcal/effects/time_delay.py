@@ -18,7 +18,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Experience, Param, Sensor
+from fieldcal.effects import NO_SHAPE, Experience, Param, Sensor, Values
 from fieldcal.samples import Array
 
 
@@ -29,6 +29,10 @@ class TimeDelay(Sensor):
     covariate = "angular acceleration in turns"
     decided_by = "faster turns"
     source = "model of this project; 1 to 50 ms from filters and buffers"
+
+    def late(self, values: Values) -> float:
+        """It is just that."""
+        return float(values[0])
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Minus the angular acceleration."""

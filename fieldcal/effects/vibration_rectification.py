@@ -32,6 +32,10 @@ class VibrationRectification(Sensor):
     decided_by = "the same position with the source of vibration off and on"
     source = "IEEE Std 1293; 1e-4 to 1e-2 on MEMS parts"
 
+    def applies(self, x: Experience) -> bool:
+        """Where some windows are shaken and others not."""
+        return bool((np.ptp(x.variance, axis=0) > 0).any())
+
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Variance of the vibration along the output's own axis."""
         out = np.zeros((len(x), 6, 3))

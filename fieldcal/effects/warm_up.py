@@ -17,7 +17,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Experience, Sensor, Shape, six
+from fieldcal.effects import BEYOND, CHANCE, NO_SHAPE, Experience, Sensor, Shape, six
 from fieldcal.samples import Array
 
 
@@ -25,10 +25,15 @@ class WarmUp(Sensor):
     """Exponential change of the biases since the start."""
 
     params = six("m/s^2", 5e-2, "rad/s", 2e-3)
-    shapes = (Shape("tau_s", "s", 30.0, 4000.0),)
+    shapes = (Shape("tau_s", "s", 30.0, 4000.0, "session"),)
     covariate = "time since the start"
+    seen_in = "time"
     decided_by = "a longer recording, until the change has died out"
     source = "first-order warm-up of a package, 100 to 2000 s"
+
+    def chance(self, x: Experience) -> float:
+        """Less where a thermometer shows what changes anyway."""
+        return BEYOND if x.warms else CHANCE
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """The exponential on every output."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fieldcal.diagnosis.quality import UNITS
+import numpy as np
+
+from fieldcal.diagnosis.agreement import UNITS
 from fieldcal.diagnosis.result import number
 from fieldcal.samples import Array
 from fieldcal.sim_device.profile import Profile
@@ -58,7 +60,7 @@ class Rerun:
     windows : (p, 2) from and to, s
     random : effects that the replay leaves to chance
     triad : that gained most: 0 accelerometers, 1 gyroscopes
-    turned : effects that were found in the turns
+    found : causes of what was recorded
 
     """
 
@@ -68,7 +70,7 @@ class Rerun:
     windows: Array
     random: tuple[str, ...]
     triad: int
-    turned: tuple[str, ...]
+    found: tuple[str, ...]
 
     def to_json(self, name: str) -> dict[str, Any]:
         """Return the object of diagnosis.json; `name` is the device file's."""
@@ -110,22 +112,26 @@ class Rerun:
             out.append(
                 f"Of the line it leaves {after[i]:.2g} of {before[i]:.2g} {UNITS[i]}."
             )
-        if {"gyro_scale", "gyro_cross_coupling"} & {*self.turned}:
-            out.append(
-                f"Turns come out {new.ways.angle:.2g} rad off instead of"
-                f" {old.ways.angle:.2g} rad."
-            )
-        if {"lever_arm", "time_delay"} & {*self.turned}:
-            out.append(
-                f"On the way the accelerometers are {new.ways.force:.2g} m/s^2 rms"
-                f" from the recording instead of {old.ways.force:.2g} m/s^2."
-            )
+        if np.isfinite(new.ways.angle):
+            out += self._on_ways(old.ways, new.ways)
         if self.random:
             out.append(
                 f"{' and '.join(self.random)} is drawn anew in every run of the twin:"
                 " compare its spread, not its numbers."
             )
         return " ".join(out)
+
+    def _on_ways(self, old: Apart, new: Apart) -> Iterator[str]:
+        if {"gyro_scale", "gyro_cross_coupling"} & {*self.found}:
+            yield (
+                f"Turns come out {new.angle:.2g} rad off instead of"
+                f" {old.angle:.2g} rad."
+            )
+        if {"lever_arm", "time_delay"} & {*self.found}:
+            yield (
+                f"On the way the accelerometers are {new.force:.2g} m/s^2 rms from the"
+                f" recording instead of {old.force:.2g} m/s^2."
+            )
 
 
 def _pair(values: Array) -> dict[str, float | None]:

@@ -11,7 +11,8 @@ takes the place of that. What the recording cannot tell stays as the session has
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,12 @@ from fieldcal.description import Description
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.line import Tone
-from fieldcal.diagnosis.model import State
 from fieldcal.diagnosis.reduce import rate_of
 from fieldcal.diagnosis.result import Found
 from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Effect, Scatter, catalogue
 from fieldcal.effects.recording import lsb_of
+from fieldcal.model.state import State, Term
 from fieldcal.samples import CHANNELS, Array
 from fieldcal.sim_device import vocabulary
 from fieldcal.sim_device.profile import (
@@ -40,6 +41,7 @@ from fieldcal.sim_device.profile import (
     Triad,
     Truth,
 )
+from fieldcal.twin.physical import Settled
 
 INSTANTS = ("at_s", "from_s", "to_s")
 """Parameters that are instants of device time."""
@@ -55,17 +57,17 @@ POINTS = 200
 VIBRATION = "vibration_rectification"
 
 
-def device_of(explanation: Explanation, found: Diagnosis) -> Profile:
+def device_of(explanation: Explanation, found: Diagnosis, known: Settled) -> Profile:
     """The device as a diagnosis knows it, with all that was found in it."""
     prepared = explanation.prepared
     start = float(prepared.source.block.t[0])
-    effects = [*settled(explanation.fit.state, start), *of_turns(explanation)]
+    effects = [*settled(known.state.terms, start), *of_earth(known.heading)]
     effects += known_chances(prepared.source.about)
     for tone in prepared.tones:
         effects += of_tone(tone, start)
     for one in found.effects:
         effects += of_samples(explanation, one, start)
-    return device(explanation, explanation.fit.state, _each_once(effects))
+    return device(explanation, known.state, _each_once(effects))
 
 
 def device(
@@ -76,10 +78,9 @@ def device(
     about = source.about
     bias, loud = state.bias.copy(), 0.0
     noise = _noise(explanation, effects)
-    for term, values in zip(state.terms, state.values, strict=True):
+    for term in state.terms:
         if term.effect.id == VIBRATION:  # the catalogue's variance has the noise in it
-            quiet = explanation.prepared.bench.rows.x.variance.min(axis=0)
-            bias[:3] += term.full(values) * quiet
+            bias[:3] += term.values * explanation.rows.x.variance.min(axis=0)
             loud = float(vibration(explanation).max(initial=0.0))
     effects = [_levelled(e, loud) if e.id == VIBRATION else e for e in effects]
     name, serial = (str(about.device.get(k, "")) for k in ("name", "serial"))
@@ -107,29 +108,29 @@ def device(
     )
 
 
-def settled(state: State, start: float) -> list[vocabulary.Effect]:
-    """Effects of a fit to the windows, with the values that they have there."""
+def settled(terms: Sequence[Term], start: float) -> list[vocabulary.Effect]:
+    """Effects with an equation, with their values; those of one shape are one."""
+    total: dict[tuple[str, tuple[tuple[str, float], ...]], Term] = {}
+    for term in terms:
+        key = (term.effect.id, tuple(term.shape.items()))
+        more = total[key].values if key in total else 0.0
+        total[key] = replace(term, values=term.values + more)
     out = []
-    for term, values in zip(state.terms, state.values, strict=True):
-        given = _numbers(term.effect, term.full(values))
+    for term in total.values():
+        given = _numbers(term.effect, term.values)
         if given or not term.effect.params:
-            given |= _counted(term.shaped(values), start)
+            given |= _counted(term.shape, start)
             out.append(vocabulary.effect(term.effect.id, given))
     return out
 
 
-def of_turns(explanation: Explanation) -> Iterator[vocabulary.Effect]:
-    """Effects that only the turns show."""
-    if (turning := explanation.turning) is None:
-        return
-    for term in turning.terms:
-        values = np.zeros(len(term.effect.params))
-        for j, name in zip(term.columns, term.names, strict=True):
-            at = turning.names.index(f"{term.effect.id}.{name}")
-            if turning.determined[at]:
-                values[j] = turning.values[at]
-        if given := _numbers(term.effect, values):
-            yield vocabulary.effect(term.effect.id, given)
+def of_earth(heading: float | None) -> Iterator[vocabulary.Effect]:
+    """The Earth's rate as a fixture of some heading, rad, feels it, if it does."""
+    if heading is not None:
+        yield vocabulary.effect("earth_rate", {})
+        if heading:
+            psi = float(np.rad2deg(heading))
+            yield vocabulary.effect("heading_error", {"psi_deg": psi})
 
 
 def known_chances(about: Description) -> Iterator[vocabulary.Effect]:
@@ -187,17 +188,16 @@ def climate(warmth: Thermometer, start: float) -> Climate:
 
 def vibration(explanation: Explanation) -> Array:
     """Vibration in each position beyond the quietest window, (p,) m/s^2 rms."""
-    bench = explanation.prepared.bench
-    x, scale = bench.rows.x, explanation.fit.state.scale[:3]
+    x, scale = explanation.rows.x, explanation.state.scale[:3]
     more = (x.variance - x.variance.min(axis=0)) / scale**2
-    out = np.zeros(bench.places)
+    out = np.zeros(explanation.dictionary.places)
     out[x.position] = np.sqrt(np.maximum(more, 0.0).mean(axis=1))
     return out
 
 
 def _noise(explanation: Explanation, effects: list[vocabulary.Effect]) -> NoiseFigures:
     """White noise before what the signal chain adds to it."""
-    noise = np.nan_to_num(explanation.prepared.bench.rows.noise)
+    noise = np.nan_to_num(explanation.rows.noise)
     for one in effects:
         if one.id == "quantisation":
             steps = np.repeat([one["acc"], one["gyr"]], 3)

@@ -6,10 +6,12 @@ recorded ones over the same stretches: rms over parts of windows, and
 
     chi^2 = sum |L^-1 (y - y_replayed)|^2
 
-with the covariance L L^T that the diagnosis has for them. Three devices are compared:
-the one session.toml describes, the same with bias and scale factor refitted, and the
-twin. What is random is drawn anew in every run of a device, so it is left out of the
-replay and stands in L; what happened to samples has been undone in the recording.
+with the covariance L L^T of white noise and of the instability that the diagnosis has
+for the windows. Three devices are compared: the one session.toml describes, the same
+with bias and scale factor refitted, and the twin. What is random is drawn anew in every
+run of a device, so it is left out of the replay, and so is what no effect makes: what
+the diagnosis estimates of both is taken from the twin's differences. Angles that were
+set otherwise are set so. What happened to samples has been undone in the recording.
 A line is compared by its amplitude. From window to window each device is carried along
 the way that it reads from the recorded gyroscopes itself (`ways`).
 """
@@ -23,18 +25,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis import Diagnosis
-from fieldcal.diagnosis.bench import Bench
-from fieldcal.diagnosis.course import NOTHING, Undo
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.fit import Fit
-from fieldcal.diagnosis.heldout import rms
+from fieldcal.diagnosis.parts import rms
 from fieldcal.diagnosis.reduce import Rows
-from fieldcal.diagnosis.turns import Turn, turns
+from fieldcal.model.fitted import Fitted
+from fieldcal.model.state import State
+from fieldcal.model.turn import Turn, Turning
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import Window, simulate
 from fieldcal.twin import device as twin
-from fieldcal.twin import schedule
+from fieldcal.twin import physical, schedule
 from fieldcal.twin.agreement import Rerun, Run
 from fieldcal.twin.ways import apart
 
@@ -51,13 +52,13 @@ SHAKEN = 64
 """Replays that are averaged where the device vibrates, which is random."""
 
 
-def rerun(explanation: Explanation, found: Diagnosis, raw: Bench) -> Rerun:
+def rerun(explanation: Explanation, found: Diagnosis, raw: Fitted) -> Rerun:
     """Replay a session on the twin and on the devices that it is compared with.
 
     Parameters
     ----------
     explanation, found : of the session
-    raw : rows of the samples as they came
+    raw : bias and scale factor alone, on the samples as they came
 
     Raises
     ------
@@ -65,11 +66,12 @@ def rerun(explanation: Explanation, found: Diagnosis, raw: Bench) -> Rerun:
         If the session's windows overlap, so that no device could go through them.
 
     """
-    profile = twin.device_of(explanation, found)
-    cases = _cases(explanation, profile, raw)
-    known = [{t.positions for t in cases[n].turns} for n in ("refitted", "twin")]
+    known = physical.as_found(explanation)
+    profile = twin.device_of(explanation, found, known)
+    cases = _cases(explanation, profile, known.state, raw)
+    followed = [{t.positions for t in cases[n].turns} for n in ("refitted", "twin")]
     runs = {
-        name: _run(explanation, case.only(set.intersection(*known)))
+        name: _run(explanation, case.only(set.intersection(*followed)))
         for name, case in cases.items()
     }
     held = np.unique(raw.rows.x.position)
@@ -79,20 +81,31 @@ def rerun(explanation: Explanation, found: Diagnosis, raw: Bench) -> Rerun:
         profile,
         runs,
         explanation.prepared.source.about.numbered(held),
-        np.array([_stretch(raw, p) for p in held]),
+        np.array([_stretch(raw.rows, p) for p in held]),
         tuple(e.id for e in profile.effects if e.id in RANDOM),
         int(np.argmax(gain)),
-        explanation.turning.ids if explanation.turning else (),
+        tuple(cause.name for cause, _ in explanation.best.set.members),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Case:
-    """A device that is compared: what it is, and where it was by its own lights."""
+    """A device that is compared: what it is, and where it was by its own lights.
+
+    Attributes
+    ----------
+    device : without anything random
+    fitted : rows, and how they are weighed
+    state : what says where the device was
+    apart : (n, 6) what of the rows is not the device's to replay
+    turns : as the gyroscopes tell them by that state
+
+    """
 
     device: Profile
-    bench: Bench
-    fit: Fit
+    fitted: Fitted
+    state: State
+    apart: Array
     turns: tuple[Turn, ...]
 
     def only(self, pairs: Set[tuple[int, int]]) -> _Case:
@@ -100,39 +113,47 @@ class _Case:
         return replace(self, turns=tuple(t for t in self.turns if t.positions in pairs))
 
 
-def _cases(explanation: Explanation, profile: Profile, raw: Bench) -> dict[str, _Case]:
-    """The devices, by name."""
-    source = explanation.prepared.source
-    nominal, start = source.about.nominal, float(source.block.t[0])
-    base = explanation.as_said.base.state
-    refitted = raw.fit(explanation.always)
-    plain = replace(
-        base,
-        bias=np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
-        scale=np.concatenate([nominal["acc_scale"], nominal["gyr_scale"]]),
-    )
-    table, turning = explanation.table, explanation.turning
-    undo = table.undo(turning) if table and turning else NOTHING
+def _cases(
+    explanation: Explanation, profile: Profile, found: State, raw: Fitted
+) -> dict[str, _Case]:
+    """The devices, by name, their differences weighed alike."""
+    best, nominal = explanation.best, explanation.inferred.inference.nominal
+    start = float(explanation.prepared.source.block.t[0])
+    effects = twin.settled(nominal.terms, start)
+    sizes = replace(raw.set.sizes, instability=best.set.sizes.instability)
+    raw = replace(raw, set=replace(raw.set, sizes=sizes))
+    refitted = physical.without(explanation, raw)
 
-    def case(device: Profile, bench: Bench, fit: Fit, undo: Undo) -> _Case:
-        made = turns(source, bench.rows, fit, undo) if explanation.made else ()
-        return _Case(_certain(device), bench, fit, tuple(made))
+    def simulated(state: State) -> _Case:
+        device = twin.device(explanation, state, effects)
+        return _case(explanation, device, raw, state, np.zeros(raw.rows.y.shape))
 
     return {
-        "simulation": case(
-            twin.device(explanation, plain, twin.settled(plain, start)),
-            raw,
-            replace(refitted, state=plain),
-            NOTHING,
-        ),
-        "refitted": case(
-            twin.device(explanation, refitted.state, twin.settled(base, start)),
-            raw,
-            refitted,
-            NOTHING,
-        ),
-        "twin": case(profile, explanation.model.bench, explanation.fit, undo),
+        "simulation": simulated(nominal),
+        "refitted": simulated(refitted),
+        "twin": _case(explanation, profile, best, found, _no_effect(best)),
     }
+
+
+def _case(
+    explanation: Explanation, device: Profile, fitted: Fitted, state: State, off: Array
+) -> _Case:
+    """A device with its turns, where the diagnosis looks at turns."""
+    made: tuple[Turn, ...] = ()
+    if explanation.inferred.inference.turns is not None:
+        source, since = explanation.prepared.source, fitted.dictionary.since
+        made = tuple(Turning(source, fitted.rows, since).turns(state))
+    return _Case(_certain(device), fitted, state, off, made)
+
+
+def _no_effect(fitted: Fitted) -> Array:
+    """What is laid to chance, and to what no effect makes, in each row, (n, 6)."""
+    taken = fitted.values.copy()
+    for _, group in fitted.set.members:
+        if not group.in_state:
+            taken[group.columns] = fitted.estimate[group.columns]
+    out: Array = fitted.residual(fitted.values) - fitted.residual(taken)
+    return np.nan_to_num(out)
 
 
 def _certain(profile: Profile) -> Profile:
@@ -143,12 +164,12 @@ def _certain(profile: Profile) -> Profile:
 
 def _run(explanation: Explanation, case: _Case) -> Run:
     """How far a device's replay is from the recording."""
-    device, bench, turns = case.device, case.bench, case.turns
-    source, rows = explanation.prepared.source, bench.rows
+    device, rows, turns = case.device, case.fitted.rows, case.turns
+    source = explanation.prepared.source
     start = float(source.block.t[0])
     shaken = bool(device.every(twin.VIBRATION))
     level = twin.vibration(explanation) * shaken
-    windows = schedule.windows(explanation, case.fit.state, bench, level, turns)
+    windows = schedule.windows(explanation, case.state, case.fitted, level, turns)
     t = schedule.instants(source.block.t, rows.span, schedule.ENOUGH, turns)
     plain = [e for e in device.effects if e.id not in LINES]
     blocks = [
@@ -159,22 +180,27 @@ def _run(explanation: Explanation, case: _Case) -> Run:
     ]
     block = replace(blocks[0], t=t)
     replayed = np.mean([_means(b, t, rows.span) for b in blocks], axis=0)
-    off = np.where(rows.used, rows.y - replayed, np.nan)
-    white = bench.whiten(rows.y - replayed) ** 2
-    places, chi2 = [], []
+    off = np.where(rows.used, rows.y - replayed - case.apart, np.nan)
+    total = float(case.fitted.squares_of(off).sum())
+    return Run(
+        _triads(rms(rows, off)),
+        total / max(case.fitted.dof, 1),
+        *_by_position(case.fitted, off),
+        _lines(explanation, device, windows, rows),
+        apart(turns, source.block, block),
+    )
+
+
+def _by_position(fitted: Fitted, off: Array) -> tuple[Array, Array]:
+    """Rms of each window, (p, 2), and its squares a mean, (p,)."""
+    rows, places, chi2 = fitted.rows, [], []
     for p in np.unique(rows.x.position):
         at: NDArray[np.bool_] = rows.x.position == p
         places.append(_triads(rms(rows, np.where(at[:, None], off, np.nan))))
         count = rows.used[at].sum()
-        chi2.append(float(white[at].sum() / count) if count else np.nan)
-    return Run(
-        _triads(rms(rows, off)),
-        float(white.sum()) / max(case.fit.dof, 1),
-        np.array(places),
-        np.array(chi2),
-        _lines(explanation, device, windows, rows),
-        apart(turns, source.block, block),
-    )
+        squares = fitted.squares_of(np.where(at[:, None], off, 0.0)).sum()
+        chi2.append(float(squares / count) if count else np.nan)
+    return np.array(places), np.array(chi2)
 
 
 def _lines(
@@ -228,6 +254,6 @@ def _triads(six: Array) -> Array:
     return out
 
 
-def _stretch(bench: Bench, position: int) -> tuple[float, float]:
-    span = bench.rows.span[bench.rows.x.position == position]
+def _stretch(rows: Rows, position: int) -> tuple[float, float]:
+    span = rows.span[rows.x.position == position]
     return float(span[0, 0]), float(span[-1, 1])

@@ -9,15 +9,16 @@ gyroscopes tell; where they do not, a turn ends when the device came to rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.diagnosis.bench import Bench
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.model import State
 from fieldcal.diagnosis.reduce import spans
-from fieldcal.diagnosis.turns import Turn
-from fieldcal.frames import angles_of
+from fieldcal.effects import Experience
+from fieldcal.model.fitted import Fitted
+from fieldcal.model.state import State
+from fieldcal.model.turn import Turn, only
 from fieldcal.samples import Array
 from fieldcal.sim_device.replay import Window
 from fieldcal.twin.ways import way_of
@@ -35,7 +36,7 @@ PUT_S = 60.0
 def windows(
     explanation: Explanation,
     state: State,
-    bench: Bench,
+    fitted: Fitted,
     shaken: Array,
     turns: Sequence[Turn],
 ) -> list[Window]:
@@ -44,24 +45,20 @@ def windows(
     `state` says where the device was in each, `shaken` (p,) is its vibration there,
     m/s^2; `turns` are those that the gyroscopes have followed.
     """
-    source, x = explanation.prepared.source, bench.rows.x
+    source, x = explanation.prepared.source, fitted.rows.x
     start, t = float(source.block.t[0]), source.block.t
-    felt = state.experienced(x)
+    felt, arrived = state.experienced(x).f, _arrived(state, fitted)
     out: list[Window] = []
     bounds = spans(source.block, source.about)
     ways = {turn.positions[1]: way_of(turn, start) for turn in turns}
     for p in sorted(np.unique(x.position), key=lambda p: int(bounds[p, 0])):
         row = int(np.argmax(x.position == p))
-        if x.oriented[row]:
-            aside = state.aside[p] if len(state.aside) > p else np.zeros(2)
-            alpha, beta = float(x.alpha[row] + aside[0]), float(x.beta[row] + aside[1])
-        else:
-            alpha, beta = angles_of(x.mounting @ felt.f[row])
+        alpha, beta = _angles(state, only(x, [row]), felt[row])
         begin, end = (float(v) - start for v in (t[bounds[p, 0]], t[bounds[p, 1] - 1]))
-        if not out and np.isfinite(source.arrived[p]):  # put there not long before
+        if not out and np.isfinite(arrived[row]):  # put there not long before
             out.append(Window(alpha, beta, begin - PUT_S, begin - PUT_S + 1.0))
         before = out[-1].end if out else -PUT_S
-        rest = float(np.clip(source.arrived[p] - start, before, begin))
+        rest = float(np.clip(arrived[row] - start, before, begin))
         way = ways.get(p)
         moves = max(rest - TURN_S, before) if way is None else float(way.t[0])
         out.append(
@@ -77,6 +74,51 @@ def windows(
             )
         )
     return out
+
+
+def _angles(state: State, x: Experience, felt: Array) -> tuple[float, float]:
+    """Angles, rad, that the joints are asked for in a position.
+
+    Where none are known, those that bring about the force felt there, (3,) m/s^2, with
+    all that is amiss with the base and the gauges of the joints.
+    """
+    if x.oriented[0]:
+        small = state.aside[x.position[0]]
+        return float(x.alpha[0] + small[0]), float(x.beta[0] + small[1])
+    state = replace(state, aside=np.zeros_like(state.aside))
+    asked = np.array([0.0, 1.0])
+    gauged = state.experienced(only(x, [0, 0]).turned(alpha=asked, beta=asked))
+    there = _joints(gauged.base_force, x.mounting @ felt)
+    out = []
+    for angle, read in zip(there, (gauged.alpha, gauged.beta), strict=True):
+        out.append(float((angle - read[0]) / (read[1] - read[0])))
+    return out[0], out[1]
+
+
+def _joints(base: Array, seen: Array) -> tuple[float, float]:
+    """Angles alpha, beta, rad, that turn a force in base axes to that seen, (3,) each.
+
+    With v = (., b_y cos a - b_x sin a, b_z) after the first joint, in unit vectors,
+
+        b_x cos a + b_y sin a = s_x,    b = arg(v_y + i v_z) - arg(s_y + i s_z)
+    """
+    x, y, z = base / np.linalg.norm(base)
+    s = seen / np.linalg.norm(seen)
+    rise = np.arcsin(np.clip(s[0] / np.hypot(x, y), -1.0, 1.0))
+    pairs = []
+    for first in (rise, np.pi - rise):
+        a = first - np.arctan2(x, y)
+        b = np.arctan2(z, y * np.cos(a) - x * np.sin(a)) - np.arctan2(s[2], s[1])
+        pairs.append([float(np.angle(np.exp(1j * angle))) for angle in (a, b)])
+    alpha, beta = min(pairs, key=lambda pair: abs(pair[1]))
+    return alpha, beta
+
+
+def _arrived(state: State, fitted: Fitted) -> Array:
+    """When the device came to rest for what settles afterwards, (n,) s by row."""
+    x, since = fitted.rows.x, fitted.dictionary.since
+    arrived: Array = x.t - since[max((t.origin for t in state.terms), default=0)]
+    return arrived
 
 
 def instants(t: Array, span: Array, most: int, turns: Sequence[Turn]) -> Array:

@@ -7,7 +7,7 @@ where the next window holds it:
     a_k = log(R_k R_{k-1}^T) - R_k phi (u_k - u_{k-1})
 
 with attitude R, closure phi and the part u of the turn that is done, as in
-`diagnosis.turns`. What the sensors put out on it is the virtual device's own physics,
+`model.turn`. What the sensors put out on it is the virtual device's own physics,
 and is compared with what they did put out: the accelerometers' means over parts of the
 way, and the gyroscopes' integrals from its start to its end.
 """
@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.diagnosis.attitude import vee
-from fieldcal.diagnosis.turns import Turn
+from fieldcal.model.turn import Turn
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device.way import Way
 

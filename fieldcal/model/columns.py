@@ -1,0 +1,213 @@
+"""Columns: the derivative of the rows by what a group can change.
+
+A `Course` is the same function of the row on every channel, a column a channel; all
+else is general. What a column is does not hang on where it is used: windows and turns
+ask the same object, with what the device goes through there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.effects import NO_SHAPE, Effect, Experience, Motion, Sensor
+from fieldcal.frames import EARTH_RATE
+from fieldcal.model.state import State, Term
+from fieldcal.samples import Array
+
+STEP = 1e-3
+"""Of numerical derivatives, in typical sizes."""
+
+SMALL = 1e-5
+"""Of turns, rad."""
+
+Pair = tuple[Experience, Experience, float]
+Sides = Callable[[Experience, State], Iterator[Pair]]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Rows as columns see them.
+
+    Attributes
+    ----------
+    plain : before the state changes what is experienced
+    x : as the state has it
+    since : (o, n) s since the turn, by origin
+    state : the base state
+
+    """
+
+    plain: Experience
+    x: Experience
+    since: Array
+    state: State
+
+    @classmethod
+    def of(cls, plain: Experience, since: Array, state: State) -> View:
+        """Rows at a base state."""
+        return cls(plain, state.experienced(plain), since, state)
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A function of the row alone, (n, m), on every channel: 6 m columns.
+
+    `timed` says that it is known on the way between windows as well.
+    """
+
+    name: str
+    of: Callable[[View], Array]
+    width: int
+    timed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class General:
+    """Columns (n, 6, k) of any form.
+
+    Attributes
+    ----------
+    name : what it is called
+    of : the columns of rows
+    sides : where it changes what is experienced in positions, rows with each column a
+        step up and down, and the step
+
+    """
+
+    name: str
+    of: Callable[[View], Array]
+    sides: Sides | None = None
+
+
+def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> General:
+    """Columns of an effect of the catalogue."""
+
+    def sensor(view: View) -> Array:
+        seen = replace(view.x, since_turn=view.since[origin])
+        design: Array = effect.design(seen, shape or NO_SHAPE)  # type: ignore[attr-defined]
+        return design
+
+    def sides(plain: Experience, state: State) -> Iterator[Pair]:
+        for j, param in enumerate(effect.params):
+            step = np.zeros(len(effect.params))
+            step[j] = STEP * param.typical
+            up, down = (_with(plain, state, effect, s) for s in (step, -step))
+            yield up, down, float(step[j])
+
+    def on_the_way(view: View) -> Array:
+        columns = []
+        for j, param in enumerate(effect.params):
+            step = np.zeros(len(effect.params))
+            step[j] = STEP * param.typical
+            ends = [effect.change(view.x, s) for s in (step, -step)]  # type: ignore[attr-defined]
+            columns.append(_apart(ends[0], ends[1], float(step[j]), view.state))
+        return np.stack(columns, axis=2)
+
+    if isinstance(effect, Motion):
+        if effect.on_the_way:
+            return General(effect.id, on_the_way)
+        return General(effect.id, _of_sides(sides), sides=sides)
+    return General(effect.id, sensor)
+
+
+def of_channels(
+    effect: Sensor, grid: Sequence[tuple[Mapping[str, float], int]]
+) -> Course:
+    """Courses of an effect that does the same to every output, by shape and origin."""
+
+    def of(view: View) -> Array:
+        courses = []
+        for shape, origin in grid:
+            seen = replace(view.x, since_turn=view.since[origin])
+            courses.append(effect.design(seen, shape or NO_SHAPE)[:, 0, 0])
+        return np.stack(courses, axis=1)
+
+    return Course(effect.id, of, len(grid), True)
+
+
+def _of_sides(sides: Sides) -> Callable[[View], Array]:
+    """Columns as central differences of what is experienced."""
+
+    def of(view: View) -> Array:
+        columns = [
+            _apart(up, down, step, view.state)
+            for up, down, step in sides(view.plain, view.state)
+        ]
+        return np.stack(columns, axis=2)
+
+    return of
+
+
+def _apart(up: Experience, down: Experience, step: float, state: State) -> Array:
+    change = np.hstack([up.f - down.f, up.w - down.w]) / (2 * step)
+    out: Array = change * state.scale
+    return out
+
+
+def _with(plain: Experience, state: State, effect: Effect, more: Array) -> Experience:
+    """What is experienced with an effect's parameters changed."""
+    there = [t.values for t in state.terms if t.effect is effect]
+    rest = tuple(t for t in state.terms if t.effect is not effect)
+    term = Term(effect, sum(there, np.zeros(len(more))) + more)
+    return replace(state, terms=(*rest, term)).experienced(plain)
+
+
+def bias(view: View) -> Array:
+    """One on each output's own bias."""
+    return np.broadcast_to(np.eye(6), (len(view.x), 6, 6))
+
+
+def scale(view: View) -> Array:
+    """Force and rate along each output's own axis."""
+    return np.eye(6) * np.hstack([view.x.f, view.x.w])[:, :, None]
+
+
+def earth_sides(plain: Experience, state: State) -> Iterator[Pair]:
+    """The rate of the base about each of its axes, rad/s."""
+    for axis in np.eye(3):
+        up, down = (
+            replace(state, earth=state.earth + sign * EARTH_RATE * axis).experienced(
+                plain
+            )
+            for sign in (1.0, -1.0)
+        )
+        yield up, down, EARTH_RATE
+
+
+earth = _of_sides(earth_sides)
+
+
+def aside_sides(plain: Experience, state: State) -> Iterator[Pair]:
+    """Two small turns of each position, rad, those of a position together."""
+    here = state.experienced(plain)
+    for p in range(len(state.aside)):
+        for joint in range(2):
+            if p not in plain.position:
+                yield here, here, SMALL
+                continue
+            ends = []
+            for sign in (1.0, -1.0):
+                small = state.aside.copy()
+                small[p, joint] += sign * SMALL
+                ends.append(replace(state, aside=small).experienced(plain))
+            yield ends[0], ends[1], SMALL
+
+
+def aside(view: View) -> Array:
+    """The same as columns (n, 6, 2 p), all positions turned at once."""
+    places = len(view.state.aside)
+    out = np.zeros((len(view.x), 6, 2 * places))
+    at = view.plain.position
+    held = np.flatnonzero(at >= 0)
+    for joint in range(2):
+        ends = []
+        for sign in (1.0, -1.0):
+            small = view.state.aside.copy()
+            small[:, joint] += sign * SMALL
+            ends.append(replace(view.state, aside=small).experienced(view.plain))
+        change = _apart(ends[0], ends[1], SMALL, view.state)
+        out[held, :, 2 * at[held] + joint] = change[held]
+    return out

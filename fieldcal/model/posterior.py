@@ -1,0 +1,139 @@
+"""Probabilities: of each cause, of what may stand in its place, of a verdict.
+
+The sets that were visited are weighted by evidence times chance. Another cause is an
+alias of one that was found when the best set with it instead has an evidence that is
+not clearly less, whatever the chances before; the probability that something is there
+counts the sets with an alias of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fieldcal.model import priors
+from fieldcal.model.causes import Cause
+from fieldcal.model.search import Member, Search, Set
+from fieldcal.samples import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """A cause of the best set.
+
+    Attributes
+    ----------
+    name : of the effect or the unknown function
+    members : of the best set with that name
+    probability : that it, or an alias of it, is there
+    aliases : names of what may stand in its place, the likeliest first
+
+    """
+
+    name: str
+    members: tuple[Member, ...]
+    probability: float
+    aliases: tuple[str, ...]
+
+    @property
+    def kind(self) -> str:
+        """Of the cause."""
+        return self.members[0][0].kind
+
+
+class Posterior:
+    """What a search says of causes.
+
+    Parameters
+    ----------
+    search : with the sets that it visited
+    best : of them
+
+    """
+
+    def __init__(self, search: Search, best: Set) -> None:
+        self.search, self.best = search, best
+        self.instead = {name: self._instead(name) for name in self.names(best)}
+
+    @staticmethod
+    def names(some: Set) -> tuple[str, ...]:
+        """Names of the causes of a set, each once."""
+        return tuple(dict.fromkeys(c.name for c, _ in some.members))
+
+    def without(self, name: str) -> Set:
+        """The best set without a cause, on both triads."""
+        kept = tuple(m for m in self.best.members if m[0].name != name)
+        return self.search.evaluated(kept, self.search.sizes_of(self.best, kept))
+
+    def _instead(self, name: str) -> dict[str, Set]:
+        """Sets with other causes in the place of one, by their names."""
+        less, found = self.without(name), dict[str, Set]()
+        parts = [c.part for c, _ in self.best.members if c.name == name]
+        own = self.evidence(self.best)
+        for offer in self.search.offers(less):
+            cause = offer.member[0]
+            chance = self.search.chance([*less.members, offer.member])
+            if cause.name == name or offer.score - chance < own - FAR:
+                continue
+            there = self._whole(self.search.taken(less, offer), cause, parts)
+            if self.evidence(there) > own - priors.SAME:
+                if cause.name not in found or there.score > found[cause.name].score:
+                    found[cause.name] = there
+        return found
+
+    def _whole(self, there: Set, cause: Cause, parts: Iterable[str]) -> Set:
+        """A set with the other triad of its newest cause, where that is better."""
+        for part in parts:
+            if part != cause.part:
+                for offer in self.search.offers(there):
+                    other = offer.member[0]
+                    if other.name == cause.name and other.part == part:
+                        there = max(
+                            [there, self.search.taken(there, offer)],
+                            key=lambda s: s.score,
+                        )
+        return there
+
+    def evidence(self, there: Set) -> float:
+        """Of a set, ln, without the chances of its causes; variants count alike."""
+        counts = sum(np.log(len(c.variants)) for c, _ in there.members)
+        return there.score - self.search.chance(there.members) - float(counts)
+
+    def _kind(self, name: str) -> str:
+        """Of a cause by its name."""
+        causes = self.search.dictionary.causes
+        return next(c.kind for c in causes if c.name == name)
+
+    @cached_property
+    def weights(self) -> list[tuple[Set, float]]:
+        """Sets visited, with their probabilities."""
+        sets = list(self.search.visited.values())
+        score: Array = np.array([s.score for s in sets])
+        share = np.exp(score - np.logaddexp.reduce(score))
+        return list(zip(sets, share.tolist(), strict=True))
+
+    def probability(self, names: Iterable[str]) -> float:
+        """That one of some causes is there."""
+        wanted = set(names)
+        return sum(w for s, w in self.weights if wanted & set(self.names(s)))
+
+    def standing(self) -> list[Standing]:
+        """Causes of the best set, as far as they are likelier there than not."""
+        out = []
+        for name in self.names(self.best):
+            others = sorted(self.instead[name].items(), key=lambda i: -i[1].score)
+            names = [n for n, _ in others]
+            strange = self._kind(name) == "unknown"
+            alike = [n for n in names if not strange or self._kind(n) == "unknown"]
+            probability = self.probability([name, *alike])
+            if probability >= priors.NAMED:
+                members = tuple(m for m in self.best.members if m[0].name == name)
+                out.append(Standing(name, members, probability, tuple(names)))
+        return out
+
+
+FAR = 6.0
+"""How far behind in evidence an offer may be foretold to be looked at, ln."""

@@ -1,0 +1,72 @@
+"""Every number that decides something, with why.
+
+Chances are probabilities before the rows are seen; sizes are in the units of the
+catalogue. What is typical of an effect stands in its own file.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.samples import Array
+
+SIZES: Array = np.geomspace(1e-5, 1e3, 33)
+"""Values of v, a factor of 1.78 apart: an evidence changes little between two."""
+
+TAIL = 4.0
+"""A size v times what is typical is as rare as v^-TAIL: so are outliers of data
+sheets."""
+
+STEEP = 8.0
+"""The same of instability: what scatters ten times as much as devices has a cause."""
+
+BIAS_ACC, BIAS_GYR, SCALE = 0.3, 2e-2, 1e-2
+"""Typical change from nominal: 30 mg, 1 deg/s, 1 %; what consumer grade reaches."""
+
+INSTABILITY_ACC, INSTABILITY_GYR = 1e-3, 3e-5
+"""Typical scatter of a bias from window to window, m/s^2 and rad/s: 0.1 mg, 6 deg/h."""
+
+CLOSURE = 5e-4
+"""Typical scatter of the angle that a turn closes with, rad, beyond noise: bandwidth,
+timing and the hand take half a milliradian."""
+
+UNLIKE = 0.3
+"""Spread of the instabilities of a triad's axes, ln: they are made alike."""
+
+UNKNOWN_ACC, UNKNOWN_GYR = 2e-2, 1e-3
+"""Typical size of what no effect makes, m/s^2 and rad/s: that of the effects."""
+
+MISSET_DEG = 3.0
+"""Typical error of a position that was set at another angle than is said, deg."""
+
+ASIDE = 1.0
+"""Turns of a position whose orientation nobody knows, rad: any."""
+
+PRESENT = 0.01
+"""Chance that a session has an effect for which its file states no other."""
+
+AGAIN = 0.3
+"""Chance of an effect in the gyroscopes when the accelerometers have it, and back."""
+
+ALONE = 0.1
+"""Part of the biases that wander of which one axis does, and the others do not."""
+
+UNKNOWN = 5e-4
+"""Chance of a function that no effect makes, for each covariate."""
+
+NAMED = 0.5
+"""Probability from which an effect is said to be there."""
+
+SAME = 4.6
+"""Evidence, ln, by which an explanation may be behind and still stand for another: 100
+to 1, beyond which nobody would ask."""
+
+OPEN = 0.1
+"""Probability of what may stand in its place from which a cause is ambiguous."""
+
+
+def density(tail: float = TAIL) -> Array:
+    """Probability of each of `SIZES`: even in ln v up to 1, then falling as v^-tail."""
+    weight = 1 / (1 + SIZES**tail)
+    share: Array = weight / weight.sum()
+    return share

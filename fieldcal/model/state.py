@@ -1,0 +1,113 @@
+"""The base state, and what it predicts.
+
+    U = b + diag(k) f' + sum_e D_e(f', w'; psi) v_e,     W = d + diag(s) w' + ...
+
+f', w' are what the small turns of each position, the Earth's rate and the motion
+effects make of f and w, in that order. m/s^2, rad/s, device axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fieldcal.effects import NO_SHAPE, Effect, Experience, Motion, Sensor
+from fieldcal.samples import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """An effect with its parameters.
+
+    Attributes
+    ----------
+    effect : of the catalogue
+    values : (k,) all its parameters
+    shape : its shape parameters
+    origin : index of the instants from which "since the turn" counts
+
+    """
+
+    effect: Effect
+    values: Array
+    shape: Mapping[str, float] = field(default_factory=dict)
+    origin: int = 0
+
+    @property
+    def order(self) -> int:
+        """Place in which motion effects are applied."""
+        return self.effect.order if isinstance(self.effect, Motion) else 0
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Everything that rows need to predict themselves.
+
+    Attributes
+    ----------
+    bias, scale : (6,)
+    aside : (p, 2) small turns of each position, rad
+    earth : (3,) rad/s, rate of the base beyond what is known
+    terms : effects
+
+    """
+
+    bias: Array
+    scale: Array
+    aside: Array
+    earth: Array
+    terms: tuple[Term, ...] = ()
+
+    def experienced(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
+        """What turns aside, the Earth's rate and motion effects make of rows."""
+        if self.aside.any():
+            x = turned_aside(x, self.aside)
+        if self.earth.any():
+            x = x.turned(base_rate=x.base_rate + self.earth)
+        terms = (*self.terms, *more) if more else self.terms
+        for term in sorted(terms, key=lambda t: t.order):
+            if isinstance(term.effect, Motion):
+                x = term.effect.change(x, term.values)
+        return x
+
+    def output(self, x: Experience, since: Array) -> Array:
+        """The six outputs of rows as they are experienced, (n, 6).
+
+        `since` (o, n) is the time since the turn, by origin.
+        """
+        out: Array = self.bias + self.scale * np.hstack([x.f, x.w])
+        for term in self.terms:
+            if isinstance(term.effect, Sensor):
+                seen = replace(x, since_turn=since[term.origin])
+                design = term.effect.design(seen, term.shape or NO_SHAPE)
+                out = out + design @ term.values
+        return out
+
+
+def turned_aside(x: Experience, aside: Array) -> Experience:
+    """Rows with each position turned a little: (p, 2) rad.
+
+    By alpha and beta where they are known; else about two axes across the force.
+    """
+    small = aside[np.maximum(x.position, 0)] * (x.position >= 0)[:, None]
+    free = ~x.oriented
+    x = x.turned(alpha=x.alpha + small[:, 0], beta=x.beta + small[:, 1])
+    if free.any():
+        f = x.f.copy()
+        one, two = across(f[free])
+        f[free] += small[free, :1] * one + small[free, 1:] * two
+        length = np.linalg.norm(f[free], axis=1, keepdims=True)
+        f[free] *= np.linalg.norm(x.f[free], axis=1, keepdims=True) / length
+        x = replace(x, f=f)
+    return x
+
+
+def across(f: Array) -> tuple[Array, Array]:
+    """Two vectors across each force and as long, (n, 3) each."""
+    least = np.eye(3)[np.argmin(np.abs(f), axis=1)]
+    one = np.cross(f, least)
+    length = np.linalg.norm(f, axis=1, keepdims=True)
+    one *= length / np.linalg.norm(one, axis=1, keepdims=True)
+    return one, np.cross(f, one) / length

@@ -1,0 +1,118 @@
+"""What no effect in the catalogue makes: smooth functions of what is known of a row.
+
+They compete with the effects on the same footing, so that a mismatch that follows the
+angle of a joint or the time, and no physics, is not laid to the physics that comes
+nearest. Each is a short series with smaller and smaller terms; a course in time is
+
+    sum_k a_k cos(pi k s),    s = (t - t_0) / (t_1 - t_0),    k = 1 ... WAVES
+
+with a_k ~ N(0, exp(-(k / w)^2 / 2)) for a smooth one of w half waves. A random walk is
+the same series with a_k of standard deviation q sqrt(2 T) / (pi k) (Karhunen-Loeve, but
+for its mean, which is the bias').
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from fieldcal.effects import Experience
+from fieldcal.samples import Array
+
+WAVES = 40
+SPANS = (1.5, 4.0, 9.0, 20.0)
+"""Half waves of a smooth course over the session, from slow to fast."""
+
+HARMONICS = 4
+SLOW = 4
+LONG_S = 1e4
+
+
+class Span:
+    """The stretch of time that a session's courses are drawn over."""
+
+    def __init__(self, t: Array) -> None:
+        self.start, self.length = float(t[0]), max(float(np.ptp(t)), 1e-9)
+
+    def waves(self, x: Experience) -> Array:
+        """Cosines of the time, (n, WAVES)."""
+        part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
+        out: Array = np.cos(np.pi * np.outer(part, np.arange(1, WAVES + 1)))
+        return out
+
+    def fading(self, x: Experience) -> Array:
+        """Force along each axis times powers of the time."""
+        part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
+        steps = np.polynomial.legendre.legvander(2 * part - 1, SLOW)[:, 1:]
+        f = x.f / x.gravity
+        out: Array = (f[:, :, None] * steps[:, None, :]).reshape(len(x), -1)
+        return out
+
+    def walk(self) -> Array:
+        """Standard deviation of each cosine in a walk of 1 per sqrt(s), (WAVES,)."""
+        sizes: Array = np.sqrt(2 * self.length) / (np.pi * np.arange(1, WAVES + 1))
+        return sizes
+
+
+def smooth(span: float) -> Array:
+    """Standard deviation of each cosine in a course of some half waves, (WAVES,)."""
+    k = np.arange(1, WAVES + 1)
+    sizes: Array = np.exp(-0.5 * (k / span) ** 2)
+    even: Array = sizes / np.sqrt((sizes**2).sum() / 2)
+    return even
+
+
+def alpha(x: Experience) -> Array:
+    """Harmonics of the first joint."""
+    return _angle(x.alpha)
+
+
+def beta(x: Experience) -> Array:
+    """Harmonics of the second joint."""
+    return _angle(x.beta)
+
+
+def joints(x: Experience) -> Array:
+    """Products of harmonics of both."""
+    one, two = (_angle(a)[:, [0, 1, 4, 5]] for a in (x.alpha, x.beta))
+    out: Array = (one[:, :, None] * two[:, None, :]).reshape(len(x), -1)
+    return out
+
+
+def _angle(angle: Array) -> Array:
+    k = np.arange(1, HARMONICS + 1)
+    turns = np.outer(np.nan_to_num(angle), k)
+    return np.hstack([np.sin(turns) / k, np.cos(turns) / k])
+
+
+def force(x: Experience) -> Array:
+    """Powers of the force along each axis, in gravities."""
+    f = x.f / x.gravity
+    powers = [f**n / n for n in (2, 3, 4, 5)]
+    return np.hstack([*powers, np.abs(f) / 2])
+
+
+def temperature(x: Experience) -> Array:
+    """Powers of the temperature."""
+    part = np.nan_to_num(x.warming) / max(float(np.ptp(np.nan_to_num(x.warming))), 1e-9)
+    return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
+
+
+def since_turn(x: Experience) -> Array:
+    """Powers of the logarithm of the time since the turn."""
+    part = np.log1p(np.clip(x.since_turn, 0.0, LONG_S)) / np.log1p(100.0)
+    return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
+
+
+def covariates(span: Span) -> Mapping[str, Callable[[Experience], Array]]:
+    """Functions of what is known of a row beside the time, by name."""
+    return {
+        "alpha": alpha,
+        "beta": beta,
+        "joints": joints,
+        "force": force,
+        "force and time": span.fading,
+        "temperature": temperature,
+        "since turn": since_turn,
+    }

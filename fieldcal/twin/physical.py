@@ -1,0 +1,124 @@
+"""What was fitted, as one device can have it.
+
+In the model the rate of the base is three free numbers e. A device feels the Earth's at
+its latitude, turned about the vertical by its heading, or nothing; what else was fitted
+goes along with that,
+
+    m' = m + C_e C_ee^-1 (e' - m_e)                                                (1)
+
+m and C being the estimates and their covariance. In the model what settles on one triad
+may count from the end of the motion, and on the other from the start of the window; a
+device settles from one instant, the later of them. What counts from d before it has
+
+    A' = A exp(-d / tau)                                                           (2)
+
+left then. Source: (1) the mean of a normal distribution, given some of its components.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.effects import Experience
+from fieldcal.frames import earth_rate_home
+from fieldcal.model.evidence import Index
+from fieldcal.model.fitted import Fitted
+from fieldcal.model.inference import Inference
+from fieldcal.model.state import State
+from fieldcal.model.system import System
+from fieldcal.samples import Array
+
+STANDS = 3.0
+"""Standard deviations from which the fixture does not point north."""
+
+HEADINGS = np.linspace(-np.pi, np.pi, 3601)
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """Where a device stands.
+
+    Attributes
+    ----------
+    state : its calibration and effects
+    heading : of the fixture, rad, if the Earth's rate is felt beyond what is known
+
+    """
+
+    state: State
+    heading: float | None = None
+
+
+def as_found(explanation: Explanation) -> Settled:
+    """The device with all that was found."""
+    best, heading, rate = explanation.best, None, np.zeros(3)
+    if explanation.shows_earth:
+        heading = _heading(best)
+        rate = _turned(best.rows.x, np.array([heading]))[0]
+    state = _given(explanation, best, rate)
+    return Settled(from_one_instant(state, best.dictionary.since), heading)
+
+
+def without(explanation: Explanation, fitted: Fitted) -> State:
+    """What was fitted, the Earth's rate being none beyond what is known."""
+    return _given(explanation, fitted, np.zeros(3))
+
+
+def _given(explanation: Explanation, fitted: Fitted, rate: Array) -> State:
+    """What was fitted, given the rate of the base, (3,) rad/s (1)."""
+    nominal = explanation.inferred.inference.nominal
+    inference = Inference(System(fitted.rows, fitted.dictionary), nominal)
+    found, at = fitted.set.state, _columns(fitted)
+    if len(at):
+        shared = found.inverse[:, at]
+        off = np.linalg.solve(shared[at], rate - found.estimate[at])
+        found = replace(found, estimate=found.estimate + shared @ off)
+    return inference.moved(replace(fitted.set, state=found))[0]
+
+
+def from_one_instant(state: State, since: Array) -> State:
+    """With all that settles counted from the same instants (2).
+
+    `since` (o, n) is the time since the turn in each row, by origin.
+    """
+    last, terms = max((t.origin for t in state.terms), default=0), []
+    for term in state.terms:
+        for shape in term.effect.shapes:
+            if shape.kind == "turn" and term.origin != last:
+                known = np.isfinite(since[[term.origin, last]]).all(axis=0)
+                ahead = np.median((since[term.origin] - since[last])[known])
+                left = np.exp(-ahead / term.shape[shape.name])
+                term = replace(term, values=left * term.values, origin=last)
+        terms.append(term)
+    return replace(state, terms=tuple(terms))
+
+
+def _columns(fitted: Fitted) -> Index:
+    """Where the rate of the base is among what was fitted, (3,) or (0,)."""
+    first = fitted.dictionary.earth
+    if first < 0:
+        return np.zeros(0, dtype=np.intp)
+    return np.flatnonzero(np.isin(fitted.set.state.columns, first + np.arange(3)))
+
+
+def _heading(fitted: Fitted) -> float:
+    """Heading that suits the rate that was fitted best, rad; 0 if that suits it."""
+    found, at = fitted.set.state, _columns(fitted)
+    off = _turned(fitted.rows.x, HEADINGS) - found.estimate[at]
+    known = np.linalg.inv(found.inverse[np.ix_(at, at)])
+    square = np.einsum("ni,ij,nj->n", off, known, off)
+    north = float(np.interp(0.0, HEADINGS, square))
+    best = int(np.argmin(square))
+    return float(HEADINGS[best]) if north - square[best] > STANDS**2 else 0.0
+
+
+def _turned(x: Experience, headings: Array) -> Array:
+    """The Earth's rate in base axes by heading, (n, 3) rad/s."""
+    east, down, north = earth_rate_home(x.latitude)
+    c, s = np.cos(headings), np.sin(headings)
+    return np.column_stack(
+        [c * east + s * north, np.full(len(c), down), c * north - s * east]
+    )

@@ -73,9 +73,6 @@ next."""
 PIECES = 4
 """Instants to try within a window; the best is refined by the samples."""
 
-ENDS = 3
-"""Rows at either end of a session in which a change is not told from coming to rest."""
-
 FINEST = 1.06
 """Ratio of time constants that are told apart last."""
 
@@ -292,9 +289,7 @@ def instants(x: Experience) -> Array:
     each = np.bincount(np.unique(x.position, return_inverse=True)[1])
     number = np.concatenate([np.arange(n) for n in each])[1:]
     step = np.repeat(np.maximum(each // PIECES, 1), each)[1:]
-    some = turned | (number % step == 0)
-    some[:ENDS] = some[-ENDS:] = False
-    kept: Array = middle[some]
+    kept: Array = middle[turned | (number % step == 0)]
     return kept
 
 

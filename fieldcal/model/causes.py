@@ -151,7 +151,7 @@ class Dictionary:
         out = copy(self)
         known = (g for g in self.always if g.cause != "earth")
         free = float(priors.SIZES[-1])
-        out.always = [g if g.fixed else replace(g, fixed=free) for g in known]
+        out.always = [replace(g, fixed=free) if g.in_state else g for g in known]
         return out
 
     @cached_property
@@ -372,6 +372,8 @@ class Dictionary:
     def _random(self) -> None:
         """Random effects: walks, and angles set by hand."""
         self._waves = self._course("waves", self.span.waves, unknown.WAVES, True)
+        if len(self.held) < FEW:
+            self._flicker()
         for effect in catalogue().values():
             if isinstance(effect, Scatter) and effect.applies(self.x):
                 self._of_scatter(effect)
@@ -427,6 +429,24 @@ class Dictionary:
             )  # fmt: skip
             chance = share * effect.chance(self.x)
             self.causes.append(Cause(effect.id, part, chance, groups, "random"))
+
+    def _flicker(self) -> None:
+        """Instability within the windows, where there are too few to have it between.
+
+        Of equal power in every octave: a cosine k has a variance as 1/k.
+        """
+        shape = 1 / np.sqrt(np.arange(1, unknown.WAVES + 1))
+        for part, channels in TRIADS:
+            at = [c for c in channels if c in self.seen]
+            if at:
+                size = (
+                    priors.INSTABILITY_ACC
+                    if part == "acc"
+                    else (priors.INSTABILITY_GYR)
+                )
+                columns = np.concatenate([self._wave(c) for c in at])
+                sizes = np.concatenate([shape * size * self.unit[c] for c in at])
+                self.always.append(Group("flicker", part, columns, sizes))
 
     def _wave(self, channel: int) -> Index:
         at: Index = self._waves + channel * unknown.WAVES + np.arange(unknown.WAVES)

@@ -44,6 +44,9 @@ class Fitted:
     def certain(self) -> Array:
         """The same without what is random: that takes nothing from a residual."""
         out = self.estimate
+        for group in self.dictionary.always:
+            if not group.in_state:
+                out[group.columns] = 0.0
         for cause, group in self.set.members:
             if cause.kind == "random":
                 out[group.columns] = 0.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -45,8 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command: 0 consistent, 1 something is left out or unexplained."""
-    # small matrices by the thousand: threads would only wait for each other
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare
     from fieldcal.diagnosis.verdict import concluded

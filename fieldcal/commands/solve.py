@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,10 +67,16 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.table import show
     from fieldcal.observing import rests, with_provenance
     from fieldcal.session import RESULT, Session
+    from fieldcal.uncarried import mended, told, uncarried
 
     session = Session.open(args.session)
+    if not args.as_printed:
+        session, repaired = mended(session)
     still = rests(session)
     found = with_provenance(_solved(args, session, still), session.about)
+    if not args.as_printed:
+        found = replace(found, warnings=(*repaired, *found.warnings))
+        found = told(found, uncarried(session, found))
     found = with_installed(found, session)
     found = _decided(args, found, session, still)
     path = session.write_json(RESULT, found.to_json())
@@ -87,8 +94,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibration:
     """What windows and turns say, estimated as the options want it."""
-    from dataclasses import replace
-
     from fieldcal.observing import observations, with_turns_between
     from fieldcal.solve import solve
 

@@ -108,7 +108,7 @@ def _alone(explanation: Explanation, there: Set) -> float:
     """Part of the held-out rms that goes with a set, in the channel where most goes."""
     best, nothing = explanation.best, explanation.posterior.search.evaluated(())
     before, after = (
-        rms(best.rows, held_out(replace(best, set=one), [one], ()))
+        rms(best.rows, held_out(replace(best, set=one), [one]))
         for one in (nothing, there)
     )
     known = np.isfinite(before) & np.isfinite(after) & (before > 0)

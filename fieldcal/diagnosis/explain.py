@@ -15,9 +15,10 @@ from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.frames import EARTH_RATE
 from fieldcal.model.causes import Dictionary
 from fieldcal.model.fitted import Fitted
+from fieldcal.model.held_out import HeldOut, in_question
 from fieldcal.model.inference import Inference, Inferred
 from fieldcal.model.posterior import Posterior, Standing
-from fieldcal.model.search import Search
+from fieldcal.model.search import Search, Set
 from fieldcal.model.state import State
 from fieldcal.model.system import System
 from fieldcal.model.turn import Turning
@@ -64,6 +65,17 @@ class Explanation:
     def state(self) -> State:
         """Where what was found stands."""
         return self.inferred.state
+
+    @cached_property
+    def in_question(self) -> list[Set]:
+        """Sets that may turn out the best where a position is left out."""
+        visited = list(self.inferred.search.visited.values())
+        return in_question(self.best.set, visited)
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """The rows without each of their parts."""
+        return HeldOut(self.best, self.in_question)
 
     @cached_property
     def standing(self) -> tuple[Standing, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.model.search import Member
+from fieldcal.model.sizing import Member
 from fieldcal.samples import CHANNELS, Array
 
 ROWS = 2

@@ -18,9 +18,10 @@ from fieldcal.model import priors
 from fieldcal.model.causes import Group
 from fieldcal.model.evidence import Index
 from fieldcal.model.fitted import Fitted
-from fieldcal.model.held_out import held_out, turns_foretold
+from fieldcal.model.held_out import turns_foretold
 from fieldcal.model.posterior import Standing
-from fieldcal.model.search import Member, Set
+from fieldcal.model.search import Set
+from fieldcal.model.sizing import Member
 from fieldcal.model.way import ARRIVAL_S
 from fieldcal.samples import CHANNELS, Array
 
@@ -64,8 +65,9 @@ def removed(explanation: Explanation, standing: Standing) -> Removed:
     best = explanation.best
     less = explanation.posterior.without(standing.name)
     there = Fitted(best.rows, best.dictionary, best.linear, best.values, less)
-    residual = there.residual()
-    return Removed(less, residual, best.squares_of(residual) - best.squares)
+    residual = there.residual(there.certain)
+    now = best.squares_of(best.residual(best.certain))
+    return Removed(less, residual, best.squares_of(residual) - now)
 
 
 def of_rows(
@@ -177,7 +179,7 @@ def gain(explanation: Explanation, lost: Removed, then: Agreement) -> float:
     if in_turns(lost):
         foretold = [rms_of(turns_foretold(f, turned)) for f in (there, best)]
         return float(1 - foretold[1] / foretold[0])
-    ahead = rms(best.rows, held_out(there, [lost.set], ()))
+    ahead = rms(best.rows, explanation.held_out.residual([lost.set]))
     now = then.held_out
     share = np.where(np.isfinite(now) & (ahead > 0), lost.squares, -1.0)
     c = int(np.argmax(share))

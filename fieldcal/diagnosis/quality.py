@@ -52,18 +52,20 @@ def before(block: Block, explanation: Explanation) -> Agreement:
     prepared = explanation.prepared
     base = raw(block, explanation)
     lines = sum((r.before for r in prepared.remains), np.zeros(6))
-    ahead = held_out(base, [base.set], ())
+    ahead = held_out(base, [base.set])
     return _agreement(base, ahead, lines, lines, explanation.best)
 
 
 def after(explanation: Explanation) -> Agreement:
-    """The simulation with what was found."""
-    remains, found = explanation.prepared.remains, explanation.inferred
+    """The simulation with what was found; alone, where rows show nothing more."""
+    remains, best = explanation.prepared.remains, explanation.best
     lines = sum((r.after for r in remains), np.zeros(6))
     foretold = sum((r.held_out for r in remains), np.zeros(6))
-    visited = list(found.search.visited.values())
-    ahead = held_out(explanation.best, visited, ())
-    best = explanation.best
+    if not best.set.members:
+        base = explanation.base
+        ahead = held_out(base, [base.set])
+        return _agreement(base, ahead, lines, foretold, best)
+    ahead = explanation.held_out.residual(explanation.in_question)
     return _agreement(best, ahead, lines, foretold, best)
 
 

@@ -31,6 +31,7 @@ from fieldcal.diagnosis.words import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.posterior import Standing
+from fieldcal.model.search import Set
 from fieldcal.samples import Block
 
 GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}
@@ -187,7 +188,7 @@ def _mismatch(
 def _calibration(explanation: Explanation) -> dict[str, Group]:
     about = explanation.prepared.source.about
     nominal, gauge = about.nominal, about.gauge
-    found = _numbers(explanation)
+    found = calibrated(explanation, explanation.best.set)
     out = {}
     for group, unit in GROUPS.items():
         value, sigma = np.full(3, np.nan), np.full(3, np.nan)
@@ -204,9 +205,11 @@ def _calibration(explanation: Explanation) -> dict[str, Group]:
     return out
 
 
-def _numbers(explanation: Explanation) -> dict[str, tuple[float, float, float]]:
-    """Bias and scale factor by full name: value, sigma, scale factor of the axis."""
-    d, found = explanation.dictionary, explanation.best.set.state
+def calibrated(
+    explanation: Explanation, one: Set
+) -> dict[str, tuple[float, float, float]]:
+    """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
+    d, found = explanation.dictionary, one.state
     nominal = explanation.inferred.inference.nominal
     sigma = np.sqrt(np.diag(found.inverse))
     out = {}
@@ -240,7 +243,7 @@ def _open(explanation: Explanation) -> list[str]:
 
 def _warnings(explanation: Explanation) -> tuple[str, ...]:
     out = []
-    numbers = _numbers(explanation)
+    numbers = calibrated(explanation, explanation.best.set)
     for name, first in (("accelerometers", 0), ("gyroscopes", 3)):
         if explanation.rows.used[:, first : first + 3].any():
             spare = _spare(explanation, first)

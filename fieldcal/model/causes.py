@@ -226,7 +226,14 @@ class Dictionary:
             if len(at) and (part == "acc" or self.rated):
                 typical = priors.SCALE * self.unit[at]
                 self.always.append(
-                    Group("scale", part, first + at, typical, in_state=True)
+                    Group(
+                        "scale",
+                        part,
+                        first + at,
+                        typical,
+                        in_state=True,
+                        in_step=True,
+                    )
                 )
         self.free = np.array(
             [

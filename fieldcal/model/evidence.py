@@ -251,6 +251,11 @@ def gains(inner: Array, pull: Array, own: Array | float) -> Array:
     power = (np.swapaxes(axes, -1, -2) @ pull[..., None])[..., 0] ** 2
     seen = strength > ROUNDED * np.maximum(np.asarray(own)[..., None], 1e-300)
     strength, power = np.where(seen, strength, 0.0), np.where(seen, power, 0.0)
+    return gained(strength, power)
+
+
+def gained(strength: Array, power: Array) -> Array:
+    """Gain (3) over `SIZES` of lambda and q^2, (..., k) each."""
     load = SIZES[:, None] ** 2 * strength[..., None, :]
     taken = SIZES[:, None] ** 2 * power[..., None, :] / (1 + load)
     gain: Array = 0.5 * (taken - np.log1p(load)).sum(axis=-1)

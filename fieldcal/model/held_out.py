@@ -32,43 +32,69 @@ IN_QUESTION, BEHIND = 6, 20.0
 further ones no position can bring back."""
 
 
-def held_out(
-    fitted: Fitted, visited: Sequence[Set], turns: Sequence[TurnRows]
-) -> Array:
-    """Residuals of rows foretold from the others, (n, 6); nan where none can be.
+class HeldOut:
+    """The rows of a session without each of its parts.
 
     Parameters
     ----------
     fitted : the best set
-    visited : sets in question, in any order
-    turns : rows of the turns about the same state
+    sets : of whose columns use is made
 
     """
-    d = fitted.dictionary
-    sets = _in_question(fitted.set, visited)
-    columns = _columns(d, sets) | (fitted.values != 0)
-    linear = [_narrowed(part, columns) for part in fitted.linear]
-    out = np.full(fitted.rows.y.shape, np.nan)
-    fold = folds(d)
-    if fold.max() == 0:
+
+    def __init__(self, fitted: Fitted, sets: Sequence[Set]) -> None:
+        self.fitted, self.dictionary = fitted, fitted.dictionary
+        self.fold = folds(fitted.dictionary)
+        columns = _columns(self.dictionary, sets) | (fitted.values != 0)
+        self.columns = np.flatnonzero(columns)
+        self.linear = [_narrowed(part, columns) for part in fitted.linear]
+        self._rest: dict[int, Search | None] = {}
+
+    def residual(self, sets: Sequence[Set]) -> Array:
+        """Residuals of rows foretold from the others, (n, 6); nan where none can be.
+
+        `sets` are those in question; of them one is chosen anew for every part.
+        """
+        d, out = self.dictionary, np.full(self.fitted.rows.y.shape, np.nan)
+        for i in np.unique(self.fold) if self.fold.max() else ():
+            if (search := self._without(int(i))) is None:
+                continue
+            left = self.fold == i
+            chosen = max(
+                (search.evaluated(s.members, s.sizes) for s in sets),
+                key=lambda s: s.score,
+            )
+            step = self.fitted.values - whole(chosen.state, d)
+            places = d.held[np.isin(d.held, d.x.position[left])]
+            for p in places if len(d.held) >= FEW else ():
+                step[d.aside + 2 * int(p) : d.aside + 2 * int(p) + 2] = 0.0
+            rows = [_rows(p, left[p.rows]) for p in self.linear]
+            _foretold(out, rows, step, chosen, d)
         return out
-    for i in np.unique(fold):
-        left = fold == i
-        rest = [_rows(part, ~left[part.rows]) for part in linear]
-        if not all(len(part.white) for part in rest):
-            continue
-        places = d.held[np.isin(d.held, d.x.position[left])]
-        kept = [t for t in turns if not set(t.positions) & set(places.tolist())]
-        some = np.flatnonzero(columns)
-        search = Search(d, gram(rest, d, fitted.values, kept, some))
-        chosen = max(
-            (search.evaluated(s.members, s.sizes) for s in sets), key=lambda s: s.score
-        )
-        step = fitted.values - whole(chosen.state, d)
-        for p in places if len(d.held) >= FEW else ():
-            step[d.aside + 2 * int(p) : d.aside + 2 * int(p) + 2] = 0.0
-        _foretold(out, [_rows(p, left[p.rows]) for p in linear], step, chosen, d)
-    return out
+
+    def _without(self, i: int) -> Search | None:
+        """What the rows say without a part; None where a channel has no others."""
+        if i not in self._rest:
+            left = self.fold == i
+            rest = [_rows(part, ~left[part.rows]) for part in self.linear]
+            values, d = self.fitted.values, self.dictionary
+            told = all(len(part.white) for part in rest)
+            rows = gram(rest, d, values, (), self.columns) if told else None
+            self._rest[i] = None if rows is None else Search(d, rows)
+        return self._rest[i]
+
+
+def held_out(fitted: Fitted, sets: Sequence[Set]) -> Array:
+    """Residuals of rows foretold from the others by sets in question, (n, 6)."""
+    return HeldOut(fitted, sets).residual(sets)
+
+
+def in_question(best: Set, visited: Sequence[Set]) -> list[Set]:
+    """Sets that may turn out better without a part: those near, and the empty one."""
+    ranked = sorted(visited, key=lambda s: -s.score)
+    near = [s for s in ranked if s.score > best.score - BEHIND]
+    none = [s for s in ranked if not s.members]
+    return list(dict.fromkeys([best, *near[:IN_QUESTION], *none]))
 
 
 def turns_foretold(fitted: Fitted, turns: Sequence[TurnRows]) -> Array:
@@ -105,13 +131,6 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
         ):
             out[part] = i
     return out
-
-
-def _in_question(best: Set, visited: Sequence[Set]) -> list[Set]:
-    ranked = sorted(visited, key=lambda s: -s.score)
-    near = [s for s in ranked if s.score > best.score - BEHIND]
-    none = [s for s in ranked if not s.members]
-    return list(dict.fromkeys([best, *near[:IN_QUESTION], *none]))
 
 
 def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:

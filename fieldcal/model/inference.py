@@ -16,7 +16,8 @@ from fieldcal.effects import FINEST, Motion, Sensor
 from fieldcal.model.causes import Cause, Dictionary, Group
 from fieldcal.model.evidence import Gram
 from fieldcal.model.fitted import whole
-from fieldcal.model.search import Member, Search, Set, Sizes
+from fieldcal.model.search import Search, Set
+from fieldcal.model.sizing import Member, Sizes
 from fieldcal.model.state import State, Term
 from fieldcal.model.system import System, gram
 from fieldcal.model.turn_rows import TurnRows, Turns

@@ -15,11 +15,8 @@ import numpy as np
 from fieldcal.model import priors
 from fieldcal.model.causes import Group
 from fieldcal.model.evidence import Eliminated, Index, gains
+from fieldcal.model.sizing import DENSITY, EVEN
 from fieldcal.samples import Array
-
-DENSITY = np.log(priors.density())
-EVEN = int(np.argmin(np.abs(np.log(priors.SIZES))))
-"""Index of v = 1: where what one alone needs is beyond any device."""
 
 
 def pairs(

@@ -8,15 +8,15 @@ counts the sets with an alias of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from fieldcal.model import priors
-from fieldcal.model.causes import Cause
-from fieldcal.model.search import Member, Search, Set
+from fieldcal.model.search import Offer, Search, Set
+from fieldcal.model.sizing import Member
 from fieldcal.samples import Array
 
 
@@ -71,30 +71,33 @@ class Posterior:
     def _instead(self, name: str) -> dict[str, Set]:
         """Sets with other causes in the place of one, by their names."""
         less, found = self.without(name), dict[str, Set]()
-        parts = [c.part for c, _ in self.best.members if c.name == name]
-        own = self.evidence(self.best)
-        for offer in self.search.offers(less):
+        parts = {c.part for c, _ in self.best.members if c.name == name}
+        own, near = self.evidence(self.best), 0
+        offers = self.search.offers(less)
+        for offer in offers:
             cause = offer.member[0]
             chance = self.search.chance([*less.members, offer.member])
             if cause.name == name or offer.score - chance < own - FAR:
                 continue
-            there = self._whole(self.search.taken(less, offer), cause, parts)
+            if (near := near + 1) > LOOKED_AT:
+                break
+            there = self._whole(less, offer, parts, offers)
             if self.evidence(there) > own - priors.SAME:
                 if cause.name not in found or there.score > found[cause.name].score:
                     found[cause.name] = there
         return found
 
-    def _whole(self, there: Set, cause: Cause, parts: Iterable[str]) -> Set:
-        """A set with the other triad of its newest cause, where that is better."""
-        for part in parts:
-            if part != cause.part:
-                for offer in self.search.offers(there):
-                    other = offer.member[0]
-                    if other.name == cause.name and other.part == part:
-                        there = max(
-                            [there, self.search.taken(there, offer)],
-                            key=lambda s: s.score,
-                        )
+    def _whole(
+        self, less: Set, offer: Offer, parts: set[str], offers: Sequence[Offer]
+    ) -> Set:
+        """A set with an offer, with its other triad where that is better."""
+        cause = offer.member[0]
+        there = self.search.taken(less, offer)
+        for other in offers:
+            its = other.member[0]
+            if its.name == cause.name and its.part != cause.part and its.part in parts:
+                both = self.search.taken(less, offer, other)
+                there = max([there, both], key=lambda s: s.score)
         return there
 
     def evidence(self, there: Set) -> float:
@@ -134,6 +137,9 @@ class Posterior:
                 out.append(Standing(name, members, probability, tuple(names)))
         return out
 
+
+LOOKED_AT = 8
+"""Causes that are tried in the place of one: further ones are worse."""
 
 FAR = 6.0
 """How far behind in evidence an offer may be foretold to be looked at, ln."""

@@ -19,23 +19,11 @@ from typing import Any
 import numpy as np
 
 from fieldcal.model import priors
-from fieldcal.model.causes import Cause, Dictionary, Group
+from fieldcal.model.causes import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, Weighed, gains
 from fieldcal.model.pairs import pairs
+from fieldcal.model.sizing import DENSITY, EVEN, Member, Sizes, Sizing, alike
 from fieldcal.samples import Array
-
-DENSITY = np.log(priors.density())
-UNSTEADY = np.log(priors.density(priors.STEEP))
-"""The same of instabilities."""
-
-EVEN = int(np.argmin(np.abs(np.log(priors.SIZES))))
-"""Index of v = 1."""
-
-STEP = float(np.log(priors.SIZES[1] / priors.SIZES[0]))
-"""From one size to the next, ln."""
-
-ROUNDS = 5
-"""Times that every size is sought beside the others."""
 
 SETTLED = 0.02
 """Rise of ln Z that is none."""
@@ -54,24 +42,6 @@ PROMISING = 16
 
 LEVELS = (0, 3, 6, 9, 40)
 """Steps in size by which instability may fall when something is explained."""
-
-TRIADS = ((0, 1, 2), (3, 4, 5), (6,))
-"""Kinds of instability that are alike: those of a triad's axes; the turns' closures."""
-
-Member = tuple[Cause, Group]
-
-
-@dataclass(frozen=True, slots=True)
-class Sizes:
-    """Indices in `priors.SIZES`.
-
-    `calibration` of the always-there groups, `instability` of the channels and the
-    turns, and `members` of the causes, in their order.
-    """
-
-    calibration: tuple[int, ...]
-    instability: tuple[int, ...]
-    members: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,11 +93,13 @@ class Table:
 
     Attributes
     ----------
+    down : by how much its instability is less
     state, score : of the set
     offers : the best first
 
     """
 
+    down: int
     state: Eliminated
     score: float
     offers: list[Offer]
@@ -154,7 +126,12 @@ class Search:
         """A set with its sizes at their likeliest, and its weight."""
         key = self.key(members)
         if key not in self.visited:
-            self.visited[key] = _Sizing(self, members, start).run()
+            sizing = Sizing(self.dictionary, self.gram, self.unstable, members, start)
+            sizes, score, wide = sizing.run()
+            rows = self.weighed(sizes.instability)
+            state = Eliminated.of(rows, sizing.every, wide)
+            score += self.chance(members)
+            self.visited[key] = Set(members, sizes, score, state)
         return self.visited[key]
 
     def chance(self, members: Iterable[Member]) -> float:
@@ -175,16 +152,7 @@ class Search:
 
     def alike(self, instability: Sequence[int] | Array) -> Any:
         """How likely instabilities (..., 7) are, ln: a triad's axes are much alike."""
-        sizes = np.asarray(instability, dtype=float)
-        total = np.zeros(sizes.shape[:-1])
-        for triad in TRIADS:
-            if on := [c for c in triad if self.unstable[c] > 0]:
-                some = sizes[..., on]
-                middle = some.mean(axis=-1)
-                total = total + np.interp(middle, np.arange(len(UNSTEADY)), UNSTEADY)
-                apart = (some - middle[..., None]) * (STEP / priors.UNLIKE)
-                total -= 0.5 * (apart**2).sum(axis=-1)
-        return total if total.ndim else float(total)
+        return alike(instability, self.unstable)
 
     # -- one more
 
@@ -203,7 +171,7 @@ class Search:
         key = self.key(there.members)
         if key not in self._tables:
             self._tables[key] = [
-                Table(state, score, self._at_level(there, state, score, down))
+                Table(down, state, score, self._at_level(there, state, score, down))
                 for down, state, score in self._levels(there)
             ]
         return self._tables[key]
@@ -246,12 +214,13 @@ class Search:
         base = there.score - there.state.score
         base -= self.alike(sizes.instability)
         columns, wide = there.state.columns, there.state.sizes
-        open_, freed = self._opened(there)
+        ways = [(wide, 0.0), self._opened(there)]
         for down in LEVELS if self.unstable.any() else LEVELS[:1]:
             less = tuple(max(i - down, 0) for i in sizes.instability)
-            before, cost = (open_, freed) if down else (wide, 0.0)
-            state = Eliminated.of(self.weighed(less), columns, before)
-            yield down, state, base + cost + state.score + self.alike(less)
+            rows = self.weighed(less)
+            for before, cost in ways if down and ways[1][1] else ways[:1]:
+                state = Eliminated.of(rows, columns, before)
+                yield down, state, base + cost + state.score + self.alike(less)
         first, rows = 0, self.weighed(sizes.instability)
         for group, size in zip(
             self.dictionary.always, sizes.calibration, strict=True
@@ -331,7 +300,9 @@ class Search:
     def _paired(self, there: Set) -> Set:
         """The best set with two more, of which neither is worth it alone."""
         tried: dict[tuple[str, str], tuple[float, Offer, Offer]] = {}
-        for table in self.tables(there)[1 : len(LEVELS)]:
+        for table in self.tables(there):
+            if not table.down:
+                continue
             known = [o for o in table.offers if o.member[0].kind != "unknown"]
             some = known[:PROMISING]
             groups, sizes = [o.member[1] for o in some], [o.size for o in some]
@@ -357,9 +328,7 @@ class Search:
         sizes, down = there.sizes, max(o.level for o in offers)
         less = tuple(max(i - down, 0) for i in sizes.instability)
         more = (o.size for o in offers)
-        open_ = tuple(max(i, EVEN) for i in sizes.calibration)
-        calibration = open_ if down else sizes.calibration
-        start = Sizes(calibration, less, (*sizes.members, *more))
+        start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluated((*there.members, *(o.member for o in offers)), start)
 
     def without(self, there: Set, i: int) -> Set:
@@ -387,107 +356,3 @@ LOST = -12.0
 
 def _score(one: Set) -> float:
     return one.score
-
-
-class _Sizing:
-    """The likeliest sizes of one set, each sought beside the others."""
-
-    def __init__(
-        self, search: Search, members: tuple[Member, ...], start: Sizes | None
-    ) -> None:
-        self.search, self.members = search, members
-        self.always = search.dictionary.always
-        self.groups: list[Group] = [*self.always, *(g for _, g in members)]
-        begin = start or Sizes(
-            (EVEN,) * len(self.always), (EVEN,) * 7, (EVEN,) * len(members)
-        )
-        self.sizes = [*begin.calibration, *begin.members]
-        self.instability = list(begin.instability)
-        self.unstable = search.unstable
-        self.columns = [g.columns for g in self.groups]
-        self.gram = search.gram.only(np.concatenate(self.columns))
-        self.rows = self._weighed(self.instability)
-
-    def run(self) -> Set:
-        """Seek sizes until they stay, and sum up."""
-        free = [i for i, g in enumerate(self.groups) if g.fixed is None]
-        channels = np.flatnonzero(self.unstable > 0).tolist()
-        profiles: list[Array] = []
-        for _ in range(ROUNDS):
-            before = (*self.sizes, *self.instability)
-            profiles = [self._member(i) for i in free]
-            for triad in TRIADS:
-                if some := [c for c in triad if c in channels]:
-                    profiles += self._triad(some)
-            if (*self.sizes, *self.instability) == before:
-                break
-        self.rows = self.search.weighed(self.instability)
-        state = self._eliminated()
-        score = state.score
-        score += sum(DENSITY[self.sizes[i]] for i in free)
-        score += self.search.alike(self.instability)
-        for profile in profiles:
-            score += float(np.logaddexp.reduce(profile - profile.max()))
-        score += self.search.chance(self.members)
-        k = len(self.always)
-        sizes = Sizes(
-            tuple(self.sizes[:k]), tuple(self.instability), tuple(self.sizes[k:])
-        )
-        return Set(self.members, sizes, score, state)
-
-    def _weighed(self, instability: Sequence[int]) -> Weighed:
-        return self.gram.weighed(priors.SIZES[list(instability)] * self.unstable)
-
-    def _eliminated(self, but: int = -1) -> Eliminated:
-        """Columns of all groups but one, eliminated."""
-        kept = [i for i in range(len(self.groups)) if i != but]
-        none = np.empty(0, dtype=np.intp)
-        columns = np.concatenate([none, *(self.columns[i] for i in kept)])
-        wide = np.concatenate([np.empty(0), *(self._wide(i) for i in kept)])
-        return Eliminated.of(self.rows, columns, wide)
-
-    def _wide(self, i: int) -> Array:
-        group = self.groups[i]
-        v = float(priors.SIZES[self.sizes[i]]) if group.fixed is None else group.fixed
-        return group.sizes(v)
-
-    def _member(self, i: int) -> Array:
-        """F over the sizes of one group, and its size at the top."""
-        one, rest = self.groups[i], self._eliminated(i)
-        inner, pull = rest.rest(one.columns, one.typical)
-        own = np.diag(inner).max() + 1e-300
-        profile: Array = rest.score + gains(inner, pull, own * 1e-3) + DENSITY
-        self.sizes[i] = int(np.argmax(profile))
-        return profile
-
-    def _triad(self, channels: Sequence[int]) -> list[Array]:
-        """F over the instabilities of each of some channels that are much alike.
-
-        They are set together: one by one none could leave the others behind.
-        """
-        alone = {c: self._channel(c) for c in channels}
-        index = np.arange(len(DENSITY))
-        apart = np.subtract.outer(index, index) * STEP / priors.UNLIKE
-        best = [gain - 0.5 * apart**2 for gain in alone.values()]  # by middle, size
-        total = sum(b.max(axis=1) for b in best) + UNSTEADY
-        middle = int(np.argmax(total))
-        for c, one in zip(channels, best, strict=True):
-            self.instability[c] = int(np.argmax(one[middle]))
-        self.rows = self._weighed(self.instability)
-        return [self._beside(c, alone[c]) for c in channels]
-
-    def _beside(self, c: int, gain: Array) -> Array:
-        """F over the sizes of a channel beside those of the others, of its gain."""
-        every = np.tile(self.instability, (len(DENSITY), 1))
-        every[:, c] = np.arange(len(DENSITY))
-        out: Array = gain + self.search.alike(every)
-        return out
-
-    def _channel(self, c: int) -> Array:
-        """Gain over the instabilities of one channel, the others as they are."""
-        none = self.unstable * priors.SIZES[self.instability]
-        none[c] = 0.0
-        self.rows = self.gram.weighed(none)
-        inner, pull = self._eliminated().of_means(c, float(self.unstable[c]))
-        self.rows = self._weighed(self.instability)
-        return gains(inner, pull, np.diag(inner).max())

@@ -62,6 +62,8 @@ class Uncarried:
 
 def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
     """The session with bytes put right that were decoded wrongly, and what was done."""
+    if not session.positions:
+        return session, ()
     faults = [
         fault
         for name, fault in check(session.block, session.about).faults

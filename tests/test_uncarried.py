@@ -1,0 +1,102 @@
+"""What `solve` puts right, and what it says that it does not carry."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from session_folders import places, recorded, write_session
+
+from fieldcal.cli import main
+from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
+from fieldcal.sim_device.vocabulary import effect
+
+FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
+WIDE = [*FACES, (45.0, 0.0), (-45.0, 0.0), (0.0, 45.0), (45.0, 35.0)]
+CALM = Profile(
+    noise=NoiseFigures(acc_instability=(0.0,) * 3, gyr_instability=(0.0,) * 3),
+    temperature=Climate(self_heating_k=0.0),
+    effects=(effect("earth_rate", {}),),
+)
+
+
+def device(*effects: Any) -> Profile:
+    """A device with nothing but some effects."""
+    return replace(CALM, effects=(*CALM.effects, *effects))
+
+
+def solved(
+    profile: Profile, folder: Path, capsys: pytest.CaptureFixture[str], *options: str
+) -> tuple[int, dict[str, Any]]:
+    """Exit code and result.json of a session in ten positions."""
+    held = places(WIDE)
+    write_session(folder, recorded(profile, held), held)
+    code = main(["solve", str(folder), "--json", *options])
+    out: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return code, out
+
+
+def off(said: dict[str, Any], profile: Profile) -> np.ndarray[Any, np.dtype[Any]]:
+    """How far biases and scale factors are from the truth, in stated sigmas."""
+    found = said["parameters"]
+    return np.concatenate(
+        [
+            (np.array(found[name]["value"]) - getattr(profile.truth, name))
+            / np.array(found[name]["sigma"])
+            for name in ("acc_bias", "acc_scale")
+        ]
+    )
+
+
+def test_wrongly_decoded_bytes_are_put_right(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fault = effect("decode_fault", {"channel": "ay", "kind": "low_byte_signed"})
+    profile = device(fault)
+    code, said = solved(profile, tmp_path / "s", capsys)
+    assert code == 0 and said["verdict"] == "good"
+    assert np.abs(off(said, profile)).max() < 4.5
+    assert any("bytes were decoded wrongly" in w for w in said["warnings"])
+    as_printed = solved(profile, tmp_path / "p", capsys, "--method", "joint")[1]
+    assert as_printed["parameters"]["acc_scale"] == said["parameters"]["acc_scale"]
+
+
+@pytest.mark.parametrize("size", [1e-4, -3e-5])
+def test_a_drift_is_said_with_what_it_moves(
+    size: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By as many sigmas as the result really is off, and in that direction."""
+    profile = device(effect("bias_drift", {"ax": size}))
+    code, said = solved(profile, tmp_path / "s", capsys)
+    missing = said["not_carried"]
+    assert "bias_drift" in missing["causes"]
+    assert missing["causes"]["bias_drift"] > 0.9
+    assert code == 1 and said["verdict"] == "bad"
+    worst = max(missing["moved_sigmas"], key=lambda n: abs(missing["moved_sigmas"][n]))
+    assert worst.endswith(".x") and worst.startswith("acc")
+    assert any("does not carry" in w and worst in w for w in said["warnings"])
+    # the bias at the start is what the drift counts from: less, as it rose since
+    assert np.sign(missing["moved_sigmas"]["acc_bias.x"]) == -np.sign(size)
+
+
+def test_nothing_is_said_of_a_device_that_has_nothing_more(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, said = solved(CALM, tmp_path / "s", capsys)
+    assert code == 0
+    assert "not_carried" not in said
+
+
+def test_cross_coupling_that_was_asked_for_is_carried(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    profile = device(effect("cross_coupling", {"k12": 5e-3, "k31": -4e-3}))
+    code, said = solved(profile, tmp_path / "s", capsys, "--cross")
+    assert code == 0
+    assert "not_carried" not in said
+    without = solved(profile, tmp_path / "w", capsys)[1]
+    assert "cross_coupling" in without["not_carried"]["causes"]

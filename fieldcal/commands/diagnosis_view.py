@@ -37,7 +37,8 @@ def show(
 
     console = Console(file=out, highlight=False)
     verdict = diagnosis.verdict.replace("_", " ")
-    console.print(Text(verdict.upper(), style=STYLES[diagnosis.verdict]))
+    head = Text(verdict.upper(), style=STYLES[diagnosis.verdict])
+    console.print(head + Text(f"  probability {sure(diagnosis.probability)}"))
     console.print(diagnosis.says, markup=False)
     if diagnosis.mismatch:
         console.print(_mismatch(diagnosis.mismatch))
@@ -92,15 +93,24 @@ def _rms(names: list[str], rms: float) -> str:
     return "–" if unit is None else f"{rms:.3g} {unit}".strip()
 
 
+def sure(probability: float) -> str:
+    """A probability, without more digits than are worth saying.
+
+    >>> sure(0.873), sure(0.9996)
+    ('0.87', 'above 0.99')
+    """
+    return "above 0.99" if probability > 0.99 else f"{probability:.2f}"
+
+
 def _heading(found: Found) -> str:
     """An effect and what speaks for it."""
     gain = found.evidence.get("held_out_gain", float("nan"))
     squares = found.evidence.get("delta_chi2", float("nan"))
-    about = [f"Left out: {found.id}"]
+    about = [f"Left out: {found.id}, probability {sure(found.probability)}"]
     if abs(squares) < float("inf"):
         about.append(f"Δχ² {squares:.0f}")
     if gain == gain:
-        about.append(f"rms unseen {-100 * gain:+.0f} %")
+        about.append(f"held-out rms {-100 * gain:+.0f} %")
     if found.aliases:
         about.append(f"or else {', '.join(found.aliases)}")
     return "; ".join(about)
@@ -122,7 +132,7 @@ def _fit(diagnosis: Diagnosis) -> object:
     from rich.table import Table
 
     table = Table(title="Agreement", title_justify="left")
-    for name in ("", f"rms {diagnosis.unit}", "χ²/dof", "rms predicted unseen"):
+    for name in ("", f"rms {diagnosis.unit}", "χ²/dof", "held-out rms"):
         table.add_column(name, justify="right" if name else "left")
     for label, q in (("before", diagnosis.before), ("after", diagnosis.after)):
         table.add_row(

@@ -13,7 +13,7 @@ from fieldcal.diagnosis.unknown import Unknown, listed
 from fieldcal.effects import Chain, Scatter, catalogue
 
 LESS_THAN = 3
-"""Positions below which nothing can be predicted unseen."""
+"""Positions below which none can be held out."""
 
 
 def advice(

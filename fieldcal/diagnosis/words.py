@@ -130,11 +130,14 @@ def _how_random(found: Found) -> str:
 
 
 def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
+    """By how much recording and simulation agree better; nothing that did not fall."""
     if not after.held_out_rms < before.held_out_rms:
         return []
+    fell = ""
+    if after.rms < before.rms:
+        fell = f"rms falls from {before.rms:.2g} to {after.rms:.2g} {unit}, and the "
     return [
-        f"With it the rms falls from {before.rms:.2g} to {after.rms:.2g} {unit}, that"
-        f" of what is predicted unseen from {before.held_out_rms:.2g} to"
+        f"With it the {fell}held-out rms falls from {before.held_out_rms:.2g} to"
         f" {after.held_out_rms:.2g} {unit}."
     ]
 

@@ -62,7 +62,9 @@ def diagnosis(material: Material) -> Section | None:
         return None
     verdict = str(found.get("verdict", "unknown"))
     said = str(found.get("says", ""))
-    lead = f"{verdict.replace('_', ' ').capitalize()}. {said}"
+    chance = real(found.get("probability"))
+    sure = f" (probability {chance:.2f})" if math.isfinite(chance) else ""
+    lead = f"{verdict.replace('_', ' ').capitalize()}{sure}. {said}"
     blocks: list[Block] = [Note(lead.strip(), TONES.get(verdict, "warn"))]
     blocks += [Note(str(w)) for w in list_at(found, "warnings")]
     blocks += evidence.next_steps(found)
@@ -136,7 +138,9 @@ def _effects(effects: Sequence[Json]) -> Block:
             rest = weight if i == 0 else ["", "", ""]
             rows.append([lead, str(name), *_quantity(quantity), *rest])
     columns = ("effect", "parameter", ">value", ">± 1σ", "unit")
-    return table("What is left out", (*columns, ">Δχ²", ">rms unseen", "or else"), rows)
+    return table(
+        "What is left out", (*columns, ">Δχ²", ">held-out rms", "or else"), rows
+    )
 
 
 def _quantity(quantity: object) -> tuple[str, str, str]:
@@ -157,7 +161,7 @@ def _fit(fit: Json) -> list[Block]:
     facts = [
         (f"rms, {unit}", "rms", "{:.3g}"),
         ("χ² per degree of freedom", "chi2_per_dof", "{:.2f}"),
-        (f"rms predicted unseen, {unit}", "held_out_rms", "{:.3g}"),
+        (f"held-out rms, {unit}", "held_out_rms", "{:.3g}"),
     ]
     blocks: list[Block] = [
         Text("How well the simulation does before and after the effects are added:"),
@@ -188,7 +192,7 @@ def _by_channel(before: Json, after: Json) -> Chart | None:
     pairs = [f"{c} {real(first[c]):.2g} to {real(then[c]):.2g}" for c in names]
     return Chart(
         "diagnosis-channels",
-        "Predicted unseen, before and after",
+        "Held out, before and after",
         f"From before to after: {', '.join(pairs)} (m/s² and rad/s).",
         Axis("channel", names=tuple(names)),
         Axis("rms, m/s² or rad/s", log=True),

@@ -89,7 +89,7 @@ def _agreement(places: Sequence[Json], name: str) -> Array:
 
 def candidates(found: Sequence[Json]) -> list[Block]:
     """The league table: every effect that was tried, and why it lost."""
-    columns = ("effect", ">Δχ²", ">ΔBIC", ">rms unseen", "why")
+    columns = ("effect", ">Δχ²", ">ΔBIC", ">held-out rms", "why")
     rows: list[list[str | Cell]] = [
         [
             str(c.get("id", "")).replace("_", " "),

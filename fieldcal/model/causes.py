@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -326,12 +327,15 @@ class Dictionary:
     def _axes(
         self, effect: Motion | Sensor, at: tuple[int, ...]
     ) -> list[tuple[int, ...]]:
-        """Parameters that go together: all of them, or those of one output alone."""
+        """Parameters that go together: all, or those of one output or of two alone."""
         if isinstance(effect, Motion) or not at:
             return [at] if at else []
         reach = np.abs(effect.design(self.x, _any(effect))).max(axis=0)[:, at]
         own = [tuple(np.array(at)[reach[c] > 0].tolist()) for c in range(6)]
-        return [at, *dict.fromkeys(o for o in own if o and o != at)]
+        own = [o for o in own if o and o != at]
+        two = [tuple(sorted(set(o + p))) for o, p in combinations(own, 2)]
+        more = [*own, *([] if effect.shapes else two)]
+        return [at, *(o for o in dict.fromkeys(more) if o != at)]
 
     def refined(
         self, cause: Cause, group: Group, values: Sequence[float]

@@ -138,8 +138,10 @@ class Way:
             cov += blocks.reshape(cov.shape)
         sizes = priors.SIZES[list(self.known.sizes.instability)]
         loose = (sizes * self.dictionary.unstable)[:3]
-        same = np.equal.outer(*[np.tile(np.arange(3), len(turn.sd))] * 2)
-        out: Array = cov + same * np.tile(loose**2, len(turn.sd))
+        # what windows are off by for reasons unknown changes with the attitude as well
+        apart = np.subtract.outer(middle, middle) / BUILDS_S
+        course = 1.0 + np.exp(-(apart**2) / 2)
+        out: Array = cov + np.kron(course, np.diag(loose**2))
         return out
 
 

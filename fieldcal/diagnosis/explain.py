@@ -13,7 +13,7 @@ from fieldcal.diagnosis.noise import grain_of
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.frames import EARTH_RATE
-from fieldcal.model.causes import Dictionary
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.fitted import Fitted
 from fieldcal.model.held_out import HeldOut, in_question
 from fieldcal.model.inference import Inference, Inferred

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.diagnosis.reduce import Rows
 from fieldcal.model import priors
-from fieldcal.model.causes import Dictionary
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated
 from fieldcal.model.search import Set
 from fieldcal.model.windows import Linear

@@ -13,7 +13,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.model.causes import FEW, Dictionary
+from fieldcal.model.causes import FEW
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.fitted import Fitted, whole
 from fieldcal.model.search import Search, Set
 from fieldcal.model.system import gram

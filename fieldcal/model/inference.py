@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.effects import FINEST, Motion, Sensor
-from fieldcal.model.causes import Cause, Dictionary, Group
+from fieldcal.model.causes import Cause, Group
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram
 from fieldcal.model.fitted import whole
 from fieldcal.model.search import Search, Set

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.model import priors
-from fieldcal.model.causes import Dictionary
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, Weighed, gains
 from fieldcal.model.pairs import pairs
 from fieldcal.model.sizing import DENSITY, EVEN, Member, Sizes, Sizing, alike

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from fieldcal.model import priors
-from fieldcal.model.causes import Cause, Dictionary, Group
+from fieldcal.model.causes import Cause, Group
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, gained
 from fieldcal.samples import Array
 

@@ -18,8 +18,8 @@ import numpy as np
 from fieldcal.diagnosis.attitude import between, geometry
 from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE
-from fieldcal.model.causes import Dictionary
 from fieldcal.model.columns import Course, General, View
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Index
 from fieldcal.model.search import Set
 from fieldcal.model.state import State, Term

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fieldcal.effects import Experience
 from fieldcal.model import priors
-from fieldcal.model.causes import Dictionary
 from fieldcal.model.columns import Course, View
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Index
 from fieldcal.model.search import Set
 from fieldcal.model.state import State

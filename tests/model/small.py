@@ -11,7 +11,8 @@ import numpy as np
 
 from fieldcal.diagnosis.reduce import Rows
 from fieldcal.effects import Experience
-from fieldcal.model.causes import Cause, Dictionary, Group
+from fieldcal.model.causes import Cause, Group
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram, Index
 from fieldcal.model.search import Search
 from fieldcal.model.state import State

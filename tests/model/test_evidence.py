@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 import fieldcal.diagnosis  # noqa: F401  # model.system cannot be imported before it
 from fieldcal.model import priors
-from fieldcal.model.causes import CLOSURE, Dictionary
+from fieldcal.model.causes import CLOSURE
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, Index, gains
 from fieldcal.model.priors import SIZES
 from fieldcal.model.system import gram

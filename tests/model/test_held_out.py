@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from small import LADDER, dictionary, ladder, nominal, rows_of
 
 from fieldcal.model import priors
-from fieldcal.model.causes import Cause, Dictionary, Group
+from fieldcal.model.causes import Cause, Group
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.fitted import Fitted, whole
 from fieldcal.model.held_out import folds, held_out
 from fieldcal.model.search import Search

@@ -12,7 +12,8 @@ from small import LADDER, dictionary, ladder, rows_of
 from fieldcal.effects import Experience, Motion, Sensor, catalogue
 from fieldcal.frames import earth_rate_home
 from fieldcal.model import priors
-from fieldcal.model.causes import Dictionary, Group
+from fieldcal.model.causes import Group
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.state import State, Term
 from fieldcal.model.system import System, gram
 from fieldcal.samples import Array

@@ -75,6 +75,7 @@ def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Ref
     rows.sd[:] *= rng.uniform(0.5, 2.0, rows.sd.shape)
     values = np.zeros(d.width)
     values[d.bias : d.bias + 3] = rng.normal(0, 1e-2, 3)
+    values[d.aside : d.aside + 2 * d.places] = rng.normal(0, 1e-3, 2 * d.places)
     linear = System(rows, d).linearised(state)
     search = Search(d, gram(linear, d, values))
     fitted = Fitted(rows, d, linear, values, search.evaluated(tuple(members)))
@@ -115,6 +116,8 @@ def test_residuals_are_those_of_a_refit_without_the_position(
     for p in range(len(LADDER)):
         left = one.dictionary.x.position == p
         value, _ = one.without(left)
+        at = one.dictionary.aside + 2 * p + np.arange(2)
+        value[at] = one.fitted.values[at]
         expected = one.dense.y - one.dense.design @ value
         agree(found[left], expected.reshape(ROWS, 6)[left])
 
@@ -128,7 +131,7 @@ def test_a_positions_own_angles_are_sought_in_it(free: tuple[int, ...]) -> None:
         left = d.x.position == p
         value, sizes = one.without(left)
         at = d.aside + 2 * p + np.arange(2)
-        value[at] = 0.0
+        value[at] = one.fitted.values[at]  # from where the state has them
         rest, white = one.dense.y - one.dense.design @ value, one.dense.white
         inside = np.repeat(left, 6)
         wide = np.full(2, priors.ASIDE) if p in free else sizes[at]

@@ -166,3 +166,37 @@ def test_with_sizes_found_estimates_are_as_near_as_they_say() -> None:
         count = sum(len(g.columns) for g in SESSION.dictionary.always)
         away.append(pulls(one.found.state, one.value)[:count])
     assert 0.93 < np.mean(np.abs(np.concatenate(away)) < 1.96) < 0.97
+
+
+@pytest.mark.xfail(
+    reason="what is foretold beside the instability that a cause leaves behind is far"
+    " below what the set with it has in full, and is not looked at (posterior.FAR)"
+)
+def test_what_does_the_same_stands_in_its_place() -> None:
+    """A drift with the time, and one with a temperature that rises steadily."""
+    same = {"bias_drift", "temperature_bias"}
+    session = Session.of(
+        ladder(), ("bias_drift:gyr", "temperature_bias:gyr", *KEYS[:2])
+    )
+    drift = session.dictionary.causes[0].variants[0]
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        rise = drift.typical * 0.3 * rng.choice([-1.0, 1.0], 3)
+        off = session.noise(rng, session.dictionary.unstable)
+        search = session.search(off + session.design[:, :, drift.columns] @ rise)
+        (found,) = Posterior(search, search.run()).standing()
+        assert {found.name, *found.aliases} == same
+        assert found.probability > 0.99
+
+
+def test_probabilities_are_shares_of_the_sets_that_were_visited() -> None:
+    one = draws()[0]
+    posterior = Posterior(one.search, one.best)
+    total = sum(share for _, share in posterior.weights)
+    assert total == pytest.approx(1.0)
+    (best, share), *_ = sorted(posterior.weights, key=lambda w: -w[1])
+    assert best is one.best
+    for other, part in posterior.weights:
+        assert np.log(part / share) == pytest.approx(other.score - best.score, abs=1e-6)
+    with_one = [w for s, w in posterior.weights if KEYS[0] in posterior.names(s)]
+    assert posterior.probability([KEYS[0]]) == pytest.approx(sum(with_one))

@@ -117,7 +117,11 @@ def explain(prepared: Prepared) -> Explanation:
     found = inference.run()
     windows = inference.system.linearised(found.state)
     best = Fitted(
-        prepared.rows, inference.dictionary, windows, found.values, found.best
+        prepared.rows,
+        inference.dictionary,
+        windows,
+        found.values,
+        found.search.reported(found.best),
     )
     return Explanation(
         prepared, found, best, base_of(inference), Posterior(found.search, found.best)

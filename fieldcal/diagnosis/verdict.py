@@ -209,7 +209,8 @@ def calibrated(
     explanation: Explanation, one: Set
 ) -> dict[str, tuple[float, float, float]]:
     """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
-    d, found = explanation.dictionary, one.state
+    d = explanation.dictionary
+    found = explanation.posterior.search.reported(one).state
     nominal = explanation.inferred.inference.nominal
     sigma = np.sqrt(np.diag(found.inverse))
     out = {}

@@ -142,9 +142,15 @@ def _of_sides(sides: Sides) -> Callable[[View], Array]:
 
 
 def _apart(up: Experience, down: Experience, step: float, state: State) -> Array:
-    change = np.hstack([up.f - down.f, up.w - down.w]) / (2 * step)
-    out: Array = change * state.scale
-    return out
+    """Difference of the outputs of two states of what is experienced, per step."""
+    change: Array = np.hstack([up.f - down.f, up.w - down.w]) * state.scale
+    for term in state.terms:
+        if isinstance(term.effect, Sensor):
+            shape = term.shape or NO_SHAPE
+            ends = (term.effect.design(x, shape) for x in (up, down))
+            one, other = (design @ term.values for design in ends)
+            change = change + one - other
+    return change / (2 * step)
 
 
 def _with(plain: Experience, state: State, effect: Effect, more: Array) -> Experience:

@@ -233,6 +233,16 @@ class Search:
                 lost = DENSITY[0] - DENSITY[size]
                 yield 0, state, there.score - there.state.score + state.score + lost
 
+    def reported(self, there: Set) -> Set:
+        """The set as numbers are taken from it.
+
+        A size at its likeliest is no certainty: of a calibration that rows say little
+        about it is the smallest. Before the rows it is known as of devices of its kind.
+        """
+        wide, _ = self._opened(there)
+        before = there.state
+        return replace(there, state=Eliminated.of(before.rows, before.columns, wide))
+
     def _opened(self, there: Set) -> tuple[Array, float]:
         """Sizes with no calibration below what is typical, and what that costs, ln.
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.diagnosis.parts import rms
-from fieldcal.diagnosis.reduce import Rows
 from fieldcal.diagnosis.result import Quality
+from fieldcal.model.reduce import Rows
 from fieldcal.samples import CHANNELS, Array
 
 UNITS = ("m/s^2", "rad/s")

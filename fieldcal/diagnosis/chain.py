@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.reduce import masked, rate_of, spans, table_rate
-from fieldcal.diagnosis.vibration import usual_noise
 from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
 from fieldcal.effects.recording import lsb_of
 from fieldcal.frames import earth_rate_home, force_home
+from fieldcal.model.reduce import masked, rate_of, spans, table_rate
+from fieldcal.model.vibration import usual_noise
 from fieldcal.positions import angles
 from fieldcal.samples import CHANNELS, Array, Block
 from fieldcal.windows.noise import Noise

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from fieldcal.diagnosis.agreement import Agreement
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.parts import averages
-from fieldcal.diagnosis.reduce import Rows
 from fieldcal.diagnosis.result import Mismatch, number
+from fieldcal.model.reduce import Rows
 from fieldcal.samples import CHANNELS, Array
 
 

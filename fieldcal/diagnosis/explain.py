@@ -8,16 +8,16 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.dwell import beginnings
-from fieldcal.diagnosis.noise import grain_of
 from fieldcal.diagnosis.prepare import Prepared
-from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.frames import EARTH_RATE
 from fieldcal.model.dictionary import Dictionary
+from fieldcal.model.dwell import beginnings
 from fieldcal.model.fitted import Fitted
 from fieldcal.model.held_out import HeldOut, in_question
 from fieldcal.model.inference import Inference, Inferred
+from fieldcal.model.noise import grain_of
 from fieldcal.model.posterior import Posterior, Standing
+from fieldcal.model.reduce import Rows, Source, rate_of, spans
 from fieldcal.model.search import Search, Set
 from fieldcal.model.state import State
 from fieldcal.model.system import System

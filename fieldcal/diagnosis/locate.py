@@ -15,10 +15,10 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.following import courses
 from fieldcal.diagnosis.naming import Removed, in_turns
 from fieldcal.diagnosis.parts import averages
-from fieldcal.diagnosis.reduce import spans
 from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import Fault, catalogue
 from fieldcal.model.posterior import Standing
+from fieldcal.model.reduce import spans
 from fieldcal.samples import CHANNELS, Array
 
 CLEAR = 25.0

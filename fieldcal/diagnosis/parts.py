@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.reduce import Rows
+from fieldcal.model.reduce import Rows
 from fieldcal.samples import Array
 
 FEW = 3

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
 from fieldcal.effects import Experience
 from fieldcal.effects.recording import medians
 from fieldcal.frames import turn
+from fieldcal.model.reduce import Rows, Source, rate_of, spans
 from fieldcal.samples import Array
 
 Complex = NDArray[np.complexfloating]

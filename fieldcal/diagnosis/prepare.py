@@ -11,15 +11,15 @@ import numpy as np
 
 from fieldcal.description import Description
 from fieldcal.diagnosis.chain import Checked, check, checked_again
-from fieldcal.diagnosis.dwell import arrivals
-from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.line import Remains, Tone
-from fieldcal.diagnosis.reduce import Rows, Source, spans
 from fieldcal.diagnosis.spectrum import tones, without
-from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Line, Scatter, catalogue
 from fieldcal.errors import InputError
+from fieldcal.model.dwell import arrivals
+from fieldcal.model.hand import rows_of
+from fieldcal.model.reduce import Rows, Source, spans
 from fieldcal.model.state import Term
+from fieldcal.model.thermometer import Thermometer
 from fieldcal.samples import Block
 from fieldcal.solve.observations import ACC, GYR
 

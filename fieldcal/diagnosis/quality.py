@@ -13,13 +13,13 @@ import numpy as np
 
 from fieldcal.diagnosis.agreement import Agreement
 from fieldcal.diagnosis.explain import Explanation, base_of, inference_of
-from fieldcal.diagnosis.hand import rows_of
 from fieldcal.diagnosis.naming import rms_of
 from fieldcal.diagnosis.prepare import Prepared
-from fieldcal.diagnosis.reduce import reduce
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.fitted import Fitted
+from fieldcal.model.hand import rows_of
 from fieldcal.model.held_out import held_out, turn_residual, turns_foretold
+from fieldcal.model.reduce import reduce
 from fieldcal.model.turn_rows import TurnRows
 from fieldcal.samples import Array, Block
 
@@ -61,7 +61,7 @@ def after(explanation: Explanation) -> Agreement:
     remains, best = explanation.prepared.remains, explanation.best
     lines = sum((r.after for r in remains), np.zeros(6))
     foretold = sum((r.held_out for r in remains), np.zeros(6))
-    if not best.set.members:
+    if not best.set.members and not explanation.sees_earth:
         base = explanation.base
         ahead = held_out(base, [base.set])
         return _agreement(base, ahead, lines, foretold, best)

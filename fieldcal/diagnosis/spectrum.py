@@ -25,8 +25,8 @@ from fieldcal.diagnosis.periodogram import (
     stretches,
     take_out,
 )
-from fieldcal.diagnosis.reduce import Rows, Source
 from fieldcal.effects import Line, catalogue
+from fieldcal.model.reduce import Rows, Source
 from fieldcal.samples import Block
 
 STEADY = 0.65

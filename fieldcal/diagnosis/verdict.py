@@ -17,7 +17,6 @@ from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.naming import Removed
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.diagnosis.quality import OF_TURNS, after, before, in_turns, parted
-from fieldcal.diagnosis.reduce import spans
 from fieldcal.diagnosis.result import (
     Diagnosis,
     Found,
@@ -31,6 +30,7 @@ from fieldcal.diagnosis.words import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.posterior import Standing
+from fieldcal.model.reduce import spans
 from fieldcal.model.search import Set
 from fieldcal.samples import Block
 

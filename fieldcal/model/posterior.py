@@ -74,10 +74,12 @@ class Posterior:
         parts = {c.part for c, _ in self.best.members if c.name == name}
         own, near = self.evidence(self.best), 0
         offers = self.search.offers(less)
+        # what is foretold beside what is left is less than the whole: alike for all
+        foretold = max((self._bare(less, o) for o in offers
+                        if o.member[0].name == name), default=own)  # fmt: skip
         for offer in offers:
             cause = offer.member[0]
-            chance = self.search.chance([*less.members, offer.member])
-            if cause.name == name or offer.score - chance < own - FAR:
+            if cause.name == name or self._bare(less, offer) < foretold - FAR:
                 continue
             if (near := near + 1) > LOOKED_AT:
                 break
@@ -86,6 +88,10 @@ class Posterior:
                 if cause.name not in found or there.score > found[cause.name].score:
                     found[cause.name] = there
         return found
+
+    def _bare(self, less: Set, offer: Offer) -> float:
+        """Foretold evidence of a set with an offer, without the chances, ln."""
+        return offer.score - self.search.chance([*less.members, offer.member])
 
     def _whole(
         self, less: Set, offer: Offer, parts: set[str], offers: Sequence[Offer]

@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.reduce import Rows
 from fieldcal.model import priors
 from fieldcal.model.causes import CLOSURE
 from fieldcal.model.columns import Course, View
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram, Index
+from fieldcal.model.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.turn_rows import TurnRows
 from fieldcal.model.windows import Linear

@@ -20,18 +20,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.diagnosis.attitude import (
+from fieldcal.effects import Experience, Motion
+from fieldcal.model.attitude import (
     accelerations,
     astray,
     blur,
     geometry,
     trapezoid_means,
 )
-from fieldcal.diagnosis.course import Course, Leg, divided, integrated
-from fieldcal.diagnosis.motion import moving
-from fieldcal.diagnosis.reduce import Rows, Source, rate_of, spans
-from fieldcal.effects import Experience, Motion
+from fieldcal.model.course import Course, Leg, divided, integrated
 from fieldcal.model.evidence import Index
+from fieldcal.model.motion import moving
+from fieldcal.model.reduce import Rows, Source, rate_of, spans
 from fieldcal.model.state import State
 from fieldcal.samples import Array
 

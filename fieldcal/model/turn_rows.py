@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.diagnosis.attitude import between, geometry
 from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE
+from fieldcal.model.attitude import between, geometry
 from fieldcal.model.columns import Course, General, View
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Index

@@ -21,12 +21,12 @@ from fieldcal.description import Description
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.line import Tone
-from fieldcal.diagnosis.reduce import rate_of
 from fieldcal.diagnosis.result import Found
-from fieldcal.diagnosis.thermometer import Thermometer
 from fieldcal.effects import Chain, Effect, Scatter, catalogue
 from fieldcal.effects.recording import lsb_of
+from fieldcal.model.reduce import rate_of
 from fieldcal.model.state import State, Term
+from fieldcal.model.thermometer import Thermometer
 from fieldcal.samples import CHANNELS, Array
 from fieldcal.sim_device import vocabulary
 from fieldcal.sim_device.profile import (

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.parts import rms
-from fieldcal.diagnosis.reduce import Rows
 from fieldcal.model.fitted import Fitted
+from fieldcal.model.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.turn import Turn, Turning
 from fieldcal.samples import Array, Block

@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.reduce import spans
 from fieldcal.effects import Experience
 from fieldcal.model.fitted import Fitted
+from fieldcal.model.reduce import spans
 from fieldcal.model.state import State
 from fieldcal.model.turn import Turn, only
 from fieldcal.samples import Array

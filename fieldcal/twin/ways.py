@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.diagnosis.attitude import vee
+from fieldcal.model.attitude import vee
 from fieldcal.model.turn import Turn
 from fieldcal.samples import Array, Block
 from fieldcal.sim_device.way import Way

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.diagnosis.reduce import Rows
 from fieldcal.effects import Experience
 from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram, Index
+from fieldcal.model.reduce import Rows
 from fieldcal.model.search import Search
 from fieldcal.model.state import State
 from fieldcal.model.system import System, gram

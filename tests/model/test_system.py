@@ -128,9 +128,6 @@ def test_columns_of_an_effect_are_what_its_parameters_change(
     assert checked
 
 
-@pytest.mark.xfail(
-    reason="columns of what is experienced leave out what the state's terms make of it"
-)
 @pytest.mark.parametrize("name", ["base_tilt", "angle_scale"])
 def test_what_moves_the_force_moves_what_is_coupled_to_it(name: str) -> None:
     coupling = Term(EFFECTS["cross_coupling"], np.linspace(-0.02, 0.02, 6))

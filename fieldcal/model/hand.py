@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.diagnosis.reduce import Rows, Source, averaged, rate_of, reduce, spans
+from fieldcal.model.reduce import Rows, Source, averaged, rate_of, reduce, spans
 from fieldcal.samples import Array
 
 WANDERS = 6.0

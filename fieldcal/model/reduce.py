@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.noise import rounding
-from fieldcal.diagnosis.thermometer import Thermometer
-from fieldcal.diagnosis.vibration import shaking
 from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
+from fieldcal.model.noise import rounding
+from fieldcal.model.thermometer import Thermometer
+from fieldcal.model.vibration import shaking
 from fieldcal.positions import angles, rates
 from fieldcal.samples import Array, Block
 from fieldcal.solve.turntable import going_round

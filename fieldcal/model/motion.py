@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.diagnosis.reduce import Rows, Source, rate_of
+from fieldcal.model.reduce import Rows, Source, rate_of
 from fieldcal.samples import Array
 
 MARGIN_S = 0.6

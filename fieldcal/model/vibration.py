@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.noise import grain_of, noise_of
+from fieldcal.model.noise import grain_of, noise_of
 from fieldcal.samples import Array, Block
 from fieldcal.windows.noise import Noise, short_lag
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.diagnosis.attitude import between
-from fieldcal.diagnosis.reduce import Source, rate_of
 from fieldcal.effects import Experience
+from fieldcal.model.attitude import between
+from fieldcal.model.reduce import Source, rate_of
 from fieldcal.samples import Array
 from fieldcal.solve.rotation import carry, small_turns
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.description import Description
-from fieldcal.diagnosis.reduce import Source, rate_of, spans
+from fieldcal.model.reduce import Source, rate_of, spans
 from fieldcal.samples import Array, Block
 
 PIECE_S = 0.2

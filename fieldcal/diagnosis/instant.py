@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.diagnosis.explain import Explanation
+from fieldcal.effects import Sensor
+from fieldcal.model.causes import Group
 from fieldcal.model.sizing import Member
 from fieldcal.samples import CHANNELS, Array
 
@@ -32,7 +34,7 @@ def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
     part = slice(*np.searchsorted(block.t, [low, np.nextafter(high, np.inf)]))
     t, six = block.t[part], block.six[part]
     change, before = _change(explanation, member)
-    plain = _plain(explanation, change, at, t)
+    plain = _plain(explanation, change, group, t)
     held = _held(explanation, t)[:, None] & explanation.prepared.source.usable[part]
     z = np.where(held, six - plain, np.nan)
     noise = np.where(rows.noise > 0, rows.noise, np.inf)
@@ -69,11 +71,12 @@ def _change(explanation: Explanation, member: Member) -> tuple[Array, float]:
     return change, float(np.median(np.diff(t[:1000]))) / 2
 
 
-def _plain(explanation: Explanation, change: Array, at: float, t: Array) -> Array:
+def _plain(explanation: Explanation, change: Array, group: Group, t: Array) -> Array:
     """What the rows' model makes of samples, without the change, (n, 6)."""
     rows = explanation.rows
     fitted = rows.y - explanation.best.residual()
-    fitted = fitted - change * (rows.x.t >= at)[:, None]
+    if isinstance(group.effect, Sensor):
+        fitted = fitted - group.effect.design(rows.x, group.shape) @ change
     row = np.clip(np.searchsorted(rows.span[:, 1], t), 0, len(rows.x.t) - 1)
     out: Array = fitted[row]
     return out

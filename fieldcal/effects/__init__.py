@@ -66,12 +66,15 @@ Seen = Literal[
 ]
 """What a mismatch depends on."""
 
-POINTS = 8
+POINTS = 16
 """Values of a time constant to try: an exponential changes little from one to the
 next."""
 
 PIECES = 4
 """Instants to try within a window; the best is refined by the samples."""
+
+WITHIN = (0.25, 0.08, 0.025, 0.008)
+"""Parts of a row by which an instant is moved in it, closer and closer."""
 
 FINEST = 1.06
 """Ratio of time constants that are told apart last."""
@@ -135,13 +138,22 @@ class Shape:
 
     @property
     def finer(self) -> tuple[float, ...]:
-        """Ratios to the next values to try, closer and closer."""
-        return (1.0,) if self.kind == "instant" else (1.3, 1.13, FINEST)
+        """Steps to the next values to try, closer and closer: ratios, or `WITHIN`."""
+        return (1.0, *WITHIN) if self.kind == "instant" else (1.3, 1.13, FINEST)
 
     def near(self, x: Experience, here: float, ratio: float) -> Sequence[float]:
-        """Values about one: to either side, or every instant next to it."""
+        """Values about one: to either side, or every instant next to it.
+
+        Of instants those between rows first, then parts of a row to either side.
+        """
         if self.kind != "instant":
             return here / ratio, here * ratio
+        if ratio < 1:
+            k = int(np.argmin(np.abs(x.t - here)))
+            row = float(x.lasts[k])
+            if row == 0 or abs(float(x.t[k]) - here) > 0.6 * row:
+                return []  # between windows: their rows do not tell
+            return [here + part * ratio * row for part in (-2, -1, 1, 2)]
         middle = (x.t[1:] + x.t[:-1]) / 2
         grid = instants(x)
         low = grid[grid < here].max(initial=-np.inf)

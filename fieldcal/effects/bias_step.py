@@ -2,8 +2,8 @@
 
     U_i += s_i (t >= t_0),    W_i += s_i (t >= t_0)
 
-t_0 = at_s, device time, s; s m/s^2 and rad/s. Source: stress released, a supply
-switched, a range changed.
+t_0 = at_s, device time, s; s m/s^2 and rad/s. A mean over the instant has its part.
+Source: stress released, a supply switched, a range changed.
 
 >>> import numpy as np
 >>> x = Experience.at_rest(np.zeros(2), np.zeros(2), 9.8, t=np.array([9.0, 11.0]))
@@ -33,4 +33,8 @@ class BiasStep(Sensor):
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """One from the instant on, on every output."""
-        return np.eye(6) * (x.t >= shape["at_s"])[:, None, None]
+        after = x.t - shape["at_s"]
+        part = after / np.where(x.lasts > 0, x.lasts, 1.0) + 0.5
+        part = np.where(x.lasts > 0, np.clip(part, 0.0, 1.0), after >= 0)
+        out: Array = np.eye(6) * part[:, None, None]
+        return out

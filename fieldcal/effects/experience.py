@@ -35,6 +35,7 @@ class Experience:
     w : (n, 3) rad/s, angular rate in device axes
     w_dot : (n, 3) rad/s^2, angular acceleration in device axes
     t : (n,) s, device time
+    lasts : (n,) s, what each row is a mean over; 0 for samples
     since_start : (n,) s since the session's start
     since_turn : (n,) s since the device was last turned
     warming : (n,) K, temperature less that at the session's start; nan where unknown
@@ -55,6 +56,7 @@ class Experience:
     w: Array
     w_dot: Array
     t: Array
+    lasts: Array
     since_start: Array
     since_turn: Array
     warming: Array
@@ -87,6 +89,7 @@ class Experience:
             "w": known.get("rate", np.zeros((n, 3))) @ known.get("mounting", np.eye(3)),
             "w_dot": np.zeros((n, 3)),
             "t": np.arange(n, dtype=float),
+            "lasts": np.zeros(n),
             "since_start": np.arange(n, dtype=float),
             "since_turn": np.full(n, np.inf),
             "warming": np.zeros(n),

@@ -215,6 +215,7 @@ def averaged(
         about.gravity,
         f=_free_force(about, position, y),
         t=t,
+        lasts=np.diff(bound, axis=1)[:, 0] / rate_of(block),
         since_start=t - block.t[0],
         since_turn=t - source.arrived[position],
         warming=warming,

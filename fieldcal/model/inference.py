@@ -17,7 +17,7 @@ from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram
 from fieldcal.model.fitted import whole
-from fieldcal.model.search import Search, Set
+from fieldcal.model.search import SETTLED, Search, Set
 from fieldcal.model.sizing import Member, Sizes
 from fieldcal.model.state import State, Term
 from fieldcal.model.system import System, gram
@@ -30,6 +30,9 @@ PASSES = 8
 
 NEWTON = 6
 """Steps of Gauss and Newton for one set."""
+
+AFAR = 0.05
+"""An angle whose square shows, rad: half of it is 0.01 m/s^2 of gravity."""
 
 CONVERGED = 0.03
 """Largest step of a column, in standard deviations, that counts as none."""
@@ -81,11 +84,17 @@ class Inference:
         members: tuple[Member, ...] = ()
         start: Array = np.zeros(self.dictionary.width)
         state, values, _ = self.settled(self.nominal, start, ())
-        seen: set[frozenset[str]] = set()
+        seen: set[tuple[tuple[str, int], ...]] = set()
         search = Search(self.dictionary, self.gram(state, values, None))
         found = search.run(members)
+        turned = self.turned
+        far = self._afar(state, values, search)
+        if far is not None and far[2].score > found.score:
+            state, values, found = far
+        else:
+            self.turned = turned
         for _ in range(PASSES):
-            seen.add(found.keys)
+            seen.add(search.key(found.members))
             if found.members != members:
                 state, values, members = self.settled(
                     state, values, found.members, found.sizes
@@ -97,11 +106,35 @@ class Inference:
             search = Search(self.dictionary, self.gram(state, values, found))
             found = search.run(members)
             if found.keys == frozenset(c.key for c, _ in members):
-                found = search.evaluated(members, found.sizes)  # with its own shapes
-                break
-            if found.keys in seen:
+                own = search.evaluated(members, found.sizes)  # with its own shapes
+                if found.score <= own.score + SETTLED:
+                    found = own
+                    break
+            if search.key(found.members) in seen:
                 break
         return Inferred(self, search, found, state, self._padded(values), self.turned)
+
+    def _afar(
+        self, state: State, values: Array, search: Search
+    ) -> tuple[State, Array, Set] | None:
+        """The best set about a position set far from where it is said to be.
+
+        No columns about the one place show the other: what is linear in the angle
+        leaves so much that it loses against whatever has more columns.
+        """
+        nothing = search.evaluated(())
+        for offer in search.offers(nothing):
+            cause, group = offer.member
+            if cause.kind != "position":
+                continue
+            one = search.taken(nothing, offer)
+            there = whole(one.state, self.dictionary)[group.columns]
+            if np.abs(there).max() < AFAR:
+                return None
+            state, values, members = self.settled(state, values, one.members, one.sizes)
+            about = Search(self.dictionary, self.gram(state, values, None))
+            return state, values, about.run(members)
+        return None
 
     def shaped(
         self, state: State, values: Array, members: tuple[Member, ...], sizes: Sizes

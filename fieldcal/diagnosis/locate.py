@@ -140,11 +140,12 @@ def of_unknown(
     """Mismatches that no effect in the catalogue accounts for."""
     for cause, group in standing.members:
         positions = (group.position,) if group.position >= 0 else None
+        triad = np.arange(3, 6) if group.part == "gyr" else np.arange(3)
+        squares = np.nan_to_num(lost.squares[triad])
         channels = (
             [CHANNELS.index(group.part)]
             if group.part in CHANNELS
-            else np.flatnonzero(lost.squares[:3] > CLEAR).tolist()
-            or [int(np.nanargmax(lost.squares[:3]))]
+            else triad[squares > CLEAR].tolist() or [int(triad[squares.argmax()])]
         )
         for c in channels:
             mean, sd, position = averages(explanation.rows, lost.residual)

@@ -70,12 +70,12 @@ class Dictionary:
     def plain(self) -> Dictionary:
         """The same with what a simulation has only, bias and scale factor being free.
 
-        There is no Earth's rate beside its own.
+        There is no Earth's rate beside its own, and nothing random: that foretells.
         """
         out = copy(self)
-        known = (g for g in self.always if g.cause != "earth")
+        known = (g for g in self.always if g.in_state and g.cause != "earth")
         free = float(priors.SIZES[-1])
-        out.always = [replace(g, fixed=free) if g.in_state else g for g in known]
+        out.always = [replace(g, fixed=free) for g in known]
         return out
 
     @cached_property
@@ -414,6 +414,7 @@ class Dictionary:
                     "position", CHANNELS[c], at, np.full(len(at), size * self.unit[c])
                 )
                 self._add_unknown("position", CHANNELS[c], [group])
+        self._together()
         for covariate, of in unknown.covariates(self.span).items():
             if not self._shows(covariate):
                 continue
@@ -426,6 +427,22 @@ class Dictionary:
                     covariate, CHANNELS[c], at, np.full(width, size * self.unit[c])
                 )
                 self._add_unknown(covariate, CHANNELS[c], [group])
+
+    def _together(self) -> None:
+        """The same on all axes of a triad: one cause, not one for each of them."""
+        for part, channels in TRIADS:
+            some = [c for c in channels if c in self.seen]
+            if len(some) < 2:
+                continue
+            size = priors.UNKNOWN_ACC if part == "acc" else priors.UNKNOWN_GYR
+            unit = size * self.unit[some]
+            waves = np.concatenate([self._wave(c) for c in some])
+            groups = [
+                Group("time", part, waves, np.outer(unit, unknown.smooth(span)).ravel(),
+                      shape={"waves": span})
+                for span in unknown.SPANS
+            ]  # fmt: skip
+            self._add_unknown("time", part, groups)
 
     def _add_unknown(self, name: str, part: str, groups: Sequence[Group]) -> None:
         self.causes.append(Cause(name, part, priors.UNKNOWN, tuple(groups), "unknown"))

@@ -25,8 +25,9 @@ from fieldcal.samples import Array
 FOLDS = 12
 """Parts left out at most, one position or several far apart in each."""
 
-STRETCHES = 5
-"""Parts of a session of too few windows."""
+STRETCHES = 24
+"""Parts of each window where there are too few windows: as short as that, since what is
+random foretells for a short time only."""
 
 IN_QUESTION, BEHIND = 6, 20.0
 """Sets among which is chosen again, and how far they are behind the best at most, ln:
@@ -65,7 +66,7 @@ class HeldOut:
                 (search.evaluated(s.members, s.sizes) for s in sets),
                 key=lambda s: s.score,
             )
-            step = self.fitted.values - whole(chosen.state, d)
+            step = self.fitted.values - whole(chosen.state, d) + _wander(chosen, d)
             places = d.held[np.isin(d.held, d.x.position[left])]
             for p in places if len(d.held) >= FEW else ():
                 step[d.aside + 2 * int(p) : d.aside + 2 * int(p) + 2] = 0.0
@@ -130,7 +131,7 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
         for i, part in enumerate(
             np.array_split(np.flatnonzero(d.x.position == p), STRETCHES)
         ):
-            out[part] = i
+            out[part] = i % FOLDS
     return out
 
 
@@ -182,6 +183,16 @@ def _foretold(
             white[part.channel][part.window == j] -= design @ u
     for part in left:
         out[part.rows, part.channel] = white[part.channel] / part.weight
+
+
+def _wander(chosen: Set, d: Dictionary) -> Array:
+    """What the instability within windows is estimated at: it foretells nothing."""
+    out, first = np.zeros(d.width), 0
+    for group in d.always:
+        some = slice(first, first := first + len(group.columns))
+        if not group.in_state:
+            np.add.at(out, group.columns, chosen.state.estimate[some])
+    return out
 
 
 def _own(chosen: Set, d: Dictionary) -> Array:

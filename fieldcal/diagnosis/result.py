@@ -145,7 +145,7 @@ class Quality:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class CalibrationGroup:
     """A group of the calibration in device axes, with its change from nominal.
 
     `value`, `sigma` and `change` are (3,), nan where not determined.
@@ -197,7 +197,7 @@ class Diagnosis:
     unit: str
     before: Quality
     after: Quality
-    calibration: Mapping[str, Group]
+    calibration: Mapping[str, CalibrationGroup]
     warnings: tuple[str, ...]
     says: str
     candidates: tuple[Candidate, ...] = ()

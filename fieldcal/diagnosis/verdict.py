@@ -18,9 +18,9 @@ from fieldcal.diagnosis.naming import Removed
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.diagnosis.quality import OF_TURNS, after, before, in_turns, parted
 from fieldcal.diagnosis.result import (
+    CalibrationGroup,
     Diagnosis,
     Found,
-    Group,
     Mismatch,
     Quality,
     Verdict,
@@ -185,7 +185,7 @@ def _mismatch(
     return sorted(out, key=lambda m: -m.sigma)
 
 
-def _calibration(explanation: Explanation) -> dict[str, Group]:
+def _calibration(explanation: Explanation) -> dict[str, CalibrationGroup]:
     about = explanation.prepared.source.about
     nominal, gauge = about.nominal, about.gauge
     found = calibrated(explanation, explanation.best.set)
@@ -201,7 +201,7 @@ def _calibration(explanation: Explanation) -> dict[str, Group]:
             change = value - nominal[group]
             size, unit = gauge.of(group) or (1.0, unit)
             three = [tuple((size * part).tolist()) for part in (value, sigma, change)]
-            out[group] = Group(three[0], three[1], three[2], unit)
+            out[group] = CalibrationGroup(three[0], three[1], three[2], unit)
     return out
 
 

@@ -87,7 +87,7 @@ class Steps:
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class Integrated:
     """What was integrated.
 
     Attributes
@@ -118,7 +118,7 @@ def divided(leg: Leg) -> Steps | None:
     return Steps(first, t, each, np.arange(count + 1) * each, cut)
 
 
-def integrated(leg: Leg, steps: Steps, rid: Array) -> Course:
+def integrated(leg: Leg, steps: Steps, rid: Array) -> Integrated:
     """Follow a turn; `rid` (m + 1, 3) are errors of the rates that are known, rad/s."""
     x, t, edge = leg.x, steps.t, steps.edge
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
@@ -130,7 +130,7 @@ def integrated(leg: Leg, steps: Steps, rid: Array) -> Course:
         size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
         attitude, done = carry(angle), size / size[-1]
         earth = _between(t, steps.at, between(attitude, done, *ends))
-    return Course(rate, earth, attitude, done)
+    return Integrated(rate, earth, attitude, done)
 
 
 def _between(t: Array, at: Array, values: Array) -> Array:

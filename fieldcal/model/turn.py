@@ -28,7 +28,7 @@ from fieldcal.model.attitude import (
     geometry,
     trapezoid_means,
 )
-from fieldcal.model.course import Course, Leg, divided, integrated
+from fieldcal.model.course import Integrated, Leg, divided, integrated
 from fieldcal.model.evidence import Index
 from fieldcal.model.motion import moving
 from fieldcal.model.reduce import Rows, Source, rate_of, spans
@@ -206,7 +206,7 @@ class Turning:
         ends: Experience,
         t: Array,
         pair: tuple[int, int],
-        way: Course,
+        way: Integrated,
         edge: Index,
     ) -> Experience:
         """What is experienced at the edges of the steps, as the gyroscopes tell."""

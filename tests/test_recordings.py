@@ -20,6 +20,10 @@ UNITS = range(5)
 NORM_RESIDUAL = [0.0017, 0.0022, 0.0022, 0.0015, 0.0032]
 """Norm residual once non-orthogonality is modelled, m/s^2: the README of the data."""
 
+WARMING = 4
+"""The unit with the largest residual: with a warm-up of z its stops are foretold 42 %
+better, and neither the peer's model nor `solve` has one."""
+
 IMPORT = ["--columns", "ax,ay,az,gx,gy,gz", "--rate", "100", "--gravity", "9.81"]
 """9.81 m/s^2 is the gravity that the peer's own cost function takes."""
 
@@ -59,7 +63,10 @@ def solved(folders: list[Path]) -> list[dict[str, Any]]:
 def test_five_mpu9150_leave_no_more_than_the_peer_s_model(
     solved: list[dict[str, Any]], i: int
 ) -> None:
-    assert solved[i]["method"] == "scalar" and solved[i]["verdict"] == "good"
+    assert solved[i]["method"] == "scalar"
+    assert solved[i]["verdict"] == ("bad" if i == WARMING else "good")
+    if i == WARMING:
+        assert "warm_up" in solved[i]["not_carried"]["causes"]
     half_a_digit = 0.00005
     assert solved[i]["fit"]["rms"] <= NORM_RESIDUAL[i] + half_a_digit
 

@@ -78,7 +78,13 @@ def test_neither_the_names_of_axes_nor_the_origin_of_time_matter(
     assert said.after.chi2_per_dof == pytest.approx(plain.after.chi2_per_dof, rel=3e-3)
     (one,), (other,) = said.effects, plain.effects
     assert one.id == other.id == "cross_coupling"
-    for i, j in permutations(range(3), 2):
+    there = [
+        (i, j)
+        for i, j in permutations(range(3), 2)
+        if f"k{turned[i] + 1}{turned[j] + 1}" in other.parameters
+    ]
+    assert len(there) == len(one.parameters) == len(other.parameters) > 0
+    for i, j in there:
         found = one.parameters[f"k{i + 1}{j + 1}"]
         same = other.parameters[f"k{turned[i] + 1}{turned[j] + 1}"]
         assert isinstance(found.value, float) and isinstance(same.value, float)

@@ -19,7 +19,7 @@ from fieldcal.error_growth import TIMES, Growth, growth
 from fieldcal.family import expected
 from fieldcal.level import tilt_is_found, unsaid
 from fieldcal.limits import Limits
-from fieldcal.solve.joint import SUSPECT
+from fieldcal.solve.words import SUSPECT
 from fieldcal.verification import Verification
 
 REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
@@ -175,10 +175,22 @@ def _uncertainty(found: Calibration, limits: Limits) -> list[Check]:
             says = (
                 f"{group} {'xyz'[worst]} is known to ± {sigma[worst]:.2g}"
                 f"{_of(unit)}, {'within' if ok else 'more than'} {limit:.2g}{_of(unit)}"
+                f"{'' if ok or not group.startswith('acc') else _by_angles(found)}"
             )
             value = float(sigma[worst])
             checks.append(Check(f"{group} uncertainty", ok, says, value, limit, unit))
     return checks
+
+
+def _by_angles(found: Calibration) -> str:
+    """What to do about angles that are not set well enough."""
+    angles = float(found.info.get("angle_sigma_deg") or 0.0)
+    if found.method == "scalar" or not angles:
+        return ""
+    return (
+        f"; angles count as set to ± {angles:.2g}°: if they are set better say so"
+        " (--angles), else turn further"
+    )
 
 
 def _level(found: Calibration, about: Description) -> list[Check]:

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Effect, Experience, Motion, Sensor, catalogue
-from fieldcal.effects import columns as effect_columns
+from fieldcal.effects import Effect, Experience, Motion, Sensor, catalogue
+from fieldcal.model import columns
+from fieldcal.model.columns import View
+from fieldcal.model.state import State
 from fieldcal.positions import Position, angles
 from fieldcal.samples import Array
 
@@ -50,11 +52,13 @@ def aliases(positions: Sequence[Position], gravity: float) -> Aliases:
 
     """
     x = Experience.at_rest(*angles(positions), gravity)
-    base = _calibration(x)
+    perfect = State(np.zeros(6), np.ones(6), np.zeros((0, 2)), np.zeros(3))
+    view = View.of(x, np.full((1, len(x)), np.inf), perfect)
+    base = _calibration(view)
     left: dict[str, Array] = {}
     hidden = []
     for name, effect in catalogue().items():
-        seen = _columns(effect, x)
+        seen = _columns(effect, view)
         if seen is None or not np.any(seen):
             continue
         basis = _span(_without(seen, base), np.linalg.norm(seen, axis=0).max())
@@ -65,22 +69,21 @@ def aliases(positions: Sequence[Position], gravity: float) -> Aliases:
     return Aliases(tuple(hidden), tuple(_pairs(left)))
 
 
-def _columns(effect: Effect, x: Experience) -> Array | None:
+def _columns(effect: Effect, view: View) -> Array | None:
     """What an effect does to the six outputs at rest, (6n, k); None if nothing."""
     if effect.shapes or not isinstance(effect, Motion | Sensor) or not effect.params:
         return None
-    seen = effect_columns(effect, x, shape=NO_SHAPE)
+    seen = columns.of_effect(effect, {}, 0).of(view)
     typical = np.array([p.typical for p in effect.params])
     flat: Array = (seen * typical).reshape(-1, len(typical))
     return flat
 
 
-def _calibration(x: Experience) -> Array:
+def _calibration(view: View) -> Array:
     """Columns of bias (both sensors) and scale factor (accelerometers), (6n, 9)."""
-    out = np.zeros((len(x), 6, 9))
-    out[:, range(6), range(6)] = 1.0
-    out[:, range(3), range(6, 9)] = x.f
-    return out.reshape(-1, 9)
+    both = [columns.bias(view), columns.scale(view)[:, :, :3]]
+    out: Array = np.concatenate(both, axis=2).reshape(-1, 9)
+    return out
 
 
 def _without(columns: Array, base: Array) -> Array:

@@ -13,9 +13,9 @@ import numpy as np
 
 from fieldcal.description import Description
 from fieldcal.errors import Moved, SessionError
+from fieldcal.model.turntable import going_round
 from fieldcal.positions import rates
 from fieldcal.samples import Array, Block, Grain
-from fieldcal.solve.turntable import going_round
 from fieldcal.windows import Average, Noise, Window, average
 
 SHORTEST = 5.0

@@ -64,6 +64,7 @@ class Description:
     latitude_deg, height_m, gravity : the site; gravity in m/s^2
     level_deg : how level the base was made, one sigma about each level axis; None where
         nobody said
+    angle_setting_deg : how well each position's angles are set, likewise
     axes : the mounting, procedure axis x, y, z is device axis ...
     nominal : (3,) for each of `TRIADS`: the calibration a simulation starts from
     gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
@@ -83,6 +84,7 @@ class Description:
     height_m: float
     gravity: float
     level_deg: float | None
+    angle_setting_deg: float | None
     axes: tuple[str, ...]
     nominal: Mapping[str, Array]
     gauge: Gauge
@@ -185,7 +187,8 @@ def parse(raw: Mapping[str, Any]) -> Description:
         latitude_deg=latitude,
         height_m=height,
         gravity=checked.positive(site, "site", "gravity") or gravity(latitude, height),
-        level_deg=_level(site),
+        level_deg=_angle(site, "level_deg", "no level base"),
+        angle_setting_deg=_angle(site, "angle_setting_deg", "no setting of an angle"),
         axes=tuple(axes),
         nominal={n: v / gauge.size[n.startswith("gyr")] for n, v in nominal.items()},
         gauge=gauge,
@@ -197,14 +200,15 @@ def parse(raw: Mapping[str, Any]) -> Description:
     )
 
 
-def _level(site: Mapping[str, Any]) -> float | None:
-    level = checked.positive(site, "site", "level_deg")
-    if level is not None and level > STEEPEST:
+def _angle(site: Mapping[str, Any], key: str, what: str) -> float | None:
+    """How well an angle is known, deg; None where nobody said."""
+    sigma = checked.positive(site, "site", key)
+    if sigma is not None and sigma > STEEPEST:
         raise InputError(
-            f"[site] level_deg = {level:g} is no level base: give one sigma in degrees,"
-            f" up to {STEEPEST:g}"
+            f"[site] {key} = {sigma:g} is {what}: give one sigma in degrees, up to"
+            f" {STEEPEST:g}"
         )
-    return level
+    return sigma
 
 
 def _gauge(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal import __version__
+from fieldcal import __version__, limits
 from fieldcal.averaging import table_rate, take, take_on_a_table
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.gauge import SI
 from fieldcal.description import Description
-from fieldcal.errors import FieldcalError, NotObservable, SessionError
-from fieldcal.samples import CHANNELS, Grain
+from fieldcal.errors import FieldcalError, SessionError
+from fieldcal.samples import ACC, CHANNELS, GYR, Grain
 from fieldcal.session import Session
-from fieldcal.solve.observations import ACC, GYR, Observations
+from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, Noise
 
 
@@ -45,6 +45,13 @@ def observations(
         grade="navigation" if about.grade == "navigation" else "tactical",
         nominal=Nominal(**{k: tuple(v.tolist()) for k, v in about.nominal.items()}),
     )
+
+
+def angle_setting(about: Description) -> float:
+    """How well angles are set, deg; the limit of the grade where nobody said."""
+    if about.angle_setting_deg is not None:
+        return about.angle_setting_deg
+    return limits.read(about.grade).angle_setting_deg
 
 
 def with_provenance(calibration: Calibration, about: Description) -> Calibration:
@@ -186,45 +193,6 @@ def _worth(about: Description) -> str:
     if not missing:
         return ""
     return f"; session.toml must say in [nominal] {' and '.join(missing)}"
-
-
-def with_turns_between(
-    calibration: Calibration, session: Session, still: Rests, wanted: bool = False
-) -> Calibration:
-    """Add what the turns between the windows say about the gyroscopes.
-
-    Parameters
-    ----------
-    calibration : from the windows
-    session : the recording
-    still : its windows
-    wanted : add it however uncertain; otherwise only where it is worth having
-
-    Raises
-    ------
-    NotObservable
-        If it is wanted, and no position was held at rest.
-
-    """
-    from fieldcal.solve import turns
-
-    still = still.at_rest(session)
-    if not still.rows:
-        if wanted:
-            raise NotObservable(
-                "no position was held at rest, so there is no turn between two; leave"
-                " out --turns"
-            )
-        return calibration
-    seen = observations(session.about, still.averages, still.rows)
-    if not seen.has_gyr:
-        return calibration
-    if wanted:
-        found = turns.turns(session.block, still.averages, calibration, seen.nominal)
-        return turns.with_turns(calibration, found)
-    if "gyr_scale" in calibration.groups:
-        return calibration
-    return turns.offered(calibration, session.block, still.averages, seen.nominal)
 
 
 def grain_of(session: Session) -> Grain:

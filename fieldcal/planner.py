@@ -25,10 +25,9 @@ from itertools import permutations, product
 import numpy as np
 
 from fieldcal.errors import PlanError
+from fieldcal.model.planned import design, parameters
 from fieldcal.positions import Position, forces
 from fieldcal.samples import Array
-from fieldcal.solve.design import Model, design
-from fieldcal.solve.tilt import Tilt
 
 STARTS = 12
 """Random sets the exchange begins from; the best ends agree long before."""
@@ -87,10 +86,9 @@ class Ladder:
         return [Position.deg(round(a, 3) + 0.0, round(b, 3) + 0.0) for a, b in pairs]
 
 
-def model_for(n: int) -> Model:
+def asked_of(n: int) -> tuple[str, ...]:
     """Parameters that n positions are asked for: the tilt from three on."""
-    tilt: Tilt = "none" if n < 3 else "angle_offset"
-    return Model(tilt)
+    return parameters(*(["angle_offset"] if n >= 3 else []))
 
 
 def expected(
@@ -110,10 +108,10 @@ def expected(
     by full name, in the units of a calibration; what is not determined is absent
 
     """
-    model = model_for(len(positions))
-    jacobian = design(model, positions, gravity).reshape(-1, len(model.names))
+    names = asked_of(len(positions))
+    jacobian = design(names, positions, gravity).reshape(-1, len(names))
     sigma = grade.acc(seconds) * _sigma(jacobian)
-    found = {n: float(s) for n, s in zip(model.names, sigma, strict=True)}
+    found = {n: float(s) for n, s in zip(names, sigma, strict=True)}
     gyr = grade.gyr(seconds) / np.sqrt(len(positions))
     found |= {f"gyr_bias.{axis}": float(gyr) for axis in "xyz"}
     return {name: s for name, s in found.items() if np.isfinite(s)}
@@ -152,14 +150,14 @@ def best_positions(
     """
     if n + len(fixed) < 2:
         raise PlanError(f"{n} positions determine nothing: ask for two or more")
-    model = model_for(n + len(fixed))
+    names = asked_of(n + len(fixed))
     held = {p.degrees for p in fixed}
     candidates = [p for p in ladder.candidates() if p.degrees not in held]
-    rows = design(model, candidates, gravity)
+    rows = design(names, candidates, gravity)
     information = np.einsum("nip,niq->npq", rows, rows)
     given = np.zeros(information.shape[1:])
     if fixed:
-        taken = design(model, fixed, gravity)
+        taken = design(names, fixed, gravity)
         given = np.einsum("nip,niq->pq", taken, taken)
     rng = np.random.default_rng(0)
     starts = [rng.permutation(len(candidates))[:n] for _ in range(STARTS)]

@@ -12,11 +12,12 @@ from fieldcal import description, limits, plan_file
 from fieldcal.calibration import Calibration
 from fieldcal.driver import Driver
 from fieldcal.movers import VirtualDevice
-from fieldcal.observing import rests, with_turns_between
+from fieldcal.observing import rests
 from fieldcal.recorder import Recorder
 from fieldcal.running import Running
 from fieldcal.script import ScriptOperator
 from fieldcal.session import Session
+from fieldcal.solving import solved
 
 GIVE_UP = 90.0
 """Device time after which a position is given up, s."""
@@ -68,4 +69,4 @@ def recalibrate(
         running = Running(task, operator, recorder, once, bounds, 0.0, GIVE_UP)
         found = running.run(driver)
     session = Session.open(folder)
-    return with_turns_between(found, session, rests(session))
+    return solved(session, rests(session), method=found.method)

@@ -20,10 +20,9 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.diagnosis.chain import check
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.verdict import calibrated
 from fieldcal.effects import Scatter, catalogue
-from fieldcal.errors import InputError
 from fieldcal.model.posterior import Standing
 from fieldcal.model.search import Set
 from fieldcal.samples import CHANNELS
@@ -87,15 +86,9 @@ def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
     return right, tuple(said)
 
 
-def uncarried(session: Session, calibration: Calibration) -> Uncarried:
-    """What a recording shows that a calibration of it does not carry.
-
-    Nothing where the recording cannot be diagnosed: too short, or not at rest.
-    """
-    try:
-        explanation = explain(prepare(session.block, session.about))
-    except InputError:
-        return Uncarried({}, {})
+def uncarried(prepared: Prepared, calibration: Calibration) -> Uncarried:
+    """What a recording shows that a calibration of it does not carry."""
+    explanation = explain(prepared)
     out = [s for s in explanation.standing if not _carries(calibration, s)]
     if not out:
         return Uncarried({}, {})
@@ -107,8 +100,8 @@ def _carries(calibration: Calibration, standing: Standing) -> bool:
     effect = catalogue().get(standing.name)
     if effect is None or isinstance(effect, Scatter):
         return True
-    groups = set(calibration.groups)
-    return bool({standing.name, *standing.aliases} & groups)
+    carrying = {standing.name, *standing.aliases, effect.carried_by}
+    return bool(carrying & set(calibration.groups))
 
 
 def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float]:

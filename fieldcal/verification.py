@@ -3,7 +3,7 @@
     r = U - U(x),  S = J C J^T + C_U + (s g)^2 (I - n n^T),  chi2 = r^T S^-1 r
 
 U is the window's mean, (3,) m/s^2 in device axes, U(x) what the calibration x with
-covariance C predicts there (`solve.design`), J its derivative, C_U the window's
+covariance C predicts there (`model.planned`), J its derivative, C_U the window's
 covariance, s how well the angles are set, n the direction of the force. With 3 degrees
 of freedom, chi2 tells a residual from what everything known explains; its length in
 m/s^2 tells whether it matters.
@@ -19,11 +19,9 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.description import Description
+from fieldcal.model.planned import parameters, predicted
 from fieldcal.positions import Position, forces
-from fieldcal.samples import Array
-from fieldcal.solve.design import Model, predict
-from fieldcal.solve.observations import ACC
-from fieldcal.solve.tilt import Tilt
+from fieldcal.samples import ACC, Array
 from fieldcal.windows import Average
 
 
@@ -71,8 +69,8 @@ def verify(
     """
     from scipy.special import gammaincc
 
-    model, x, covariance = _model(calibration, about)
-    u, j = predict(model, [position], about.gravity, about.mounting, x)
+    names, x, covariance = _parameters(calibration, about)
+    u, j = predicted(names, x, [position], about.gravity, about.mounting)
     residual = average.mean[ACC] - u[0]
     n = about.mounting.T @ forces([position], 1.0)[0]
     setting = (angle_sigma * about.gravity) ** 2 * (np.eye(3) - np.outer(n, n))
@@ -82,20 +80,24 @@ def verify(
     return Verification(position, residual, np.sqrt(np.diag(s)), chance)
 
 
-def _model(calibration: Calibration, about: Description) -> tuple[Model, Array, Array]:
-    """Model, parameters and covariance in the model's order; exact where not fitted."""
-    tilts: tuple[Tilt, ...] = ("angle_offset", "base_tilt")
-    tilt: Tilt = next((t for t in tilts if t in calibration.groups), "none")
-    model = Model(tilt, "cross_coupling" in calibration.groups)
+def _parameters(
+    calibration: Calibration, about: Description
+) -> tuple[tuple[str, ...], Array, Array]:
+    """Names, values and covariance of what reaches the accelerometers.
+
+    Exact where it was not fitted.
+    """
+    reach = ("angle_offset", "base_tilt", "cross_coupling")
+    names = parameters(*(g for g in reach if g in calibration.groups))
     nominal = np.concatenate([about.nominal["acc_bias"], about.nominal["acc_scale"]])
-    x = np.zeros(len(model.names))
+    x = np.zeros(len(names))
     x[:6] = nominal
     covariance = np.zeros((len(x), len(x)))
-    known = [i for i, name in enumerate(model.names) if name in calibration.names]
-    rows = [calibration.names.index(model.names[i]) for i in known]
+    known = [i for i, name in enumerate(names) if name in calibration.names]
+    rows = [calibration.names.index(names[i]) for i in known]
     x[known] = calibration.values[rows]
     covariance[np.ix_(known, known)] = calibration.covariance[np.ix_(rows, rows)]
-    return model, x, covariance
+    return names, x, covariance
 
 
 def planned(about: Description) -> Position | None:

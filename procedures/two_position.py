@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from fieldcal.calibration import Calibration
 from fieldcal.description import Description
-from fieldcal.observing import observations
+from fieldcal.observing import angle_setting, observations
 from fieldcal.plan import Plan
 from fieldcal.positions import TWO, Position
 from fieldcal.procedures.holding import hold_each, with_left_out
@@ -25,5 +25,10 @@ def plan(
     """Hold the positions of `about` for `seconds` each and solve."""
     held = yield from hold_each(about.positions, seconds, sigma)
     seen = observations(about, list(held.values()), list(held))
-    found = solve(seen, method="two_position", level_sigma_deg=about.level_deg)
+    found = solve(
+        seen,
+        method="two_position",
+        level_sigma_deg=about.level_deg,
+        angle_sigma_deg=angle_setting(about),
+    )
     return with_left_out(found, about.positions, held)

@@ -5,7 +5,7 @@ import pytest
 
 from fieldcal.frames import turn
 from fieldcal.samples import Array
-from fieldcal.solve.rotation import carry, small_turns
+from fieldcal.model.rotation import carry, small_turns
 
 SECONDS = 4.0
 ALPHA, BETA = np.deg2rad([120.0, -75.0])

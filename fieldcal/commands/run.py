@@ -98,6 +98,12 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
         metavar="DEG",
         help="how level the base is, 1σ about each axis; two positions cannot see it",
     )
+    add(
+        "--angles",
+        type=float,
+        metavar="DEG",
+        help="how well each position's angles are set, 1σ (default: the grade's limit)",
+    )
     add("--verify", action="store_true", help="one more position, which is not fitted")
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
     add("--history", type=Path, metavar="FILE", help="instead of the usual history")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,30 +14,30 @@ if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.history import History
     from fieldcal.limits import Limits
-    from fieldcal.observing import Rests
     from fieldcal.session import Session
 
 
 def concluded(
-    found: Calibration, session: Session, still: Rests, bounds: Limits, history: History
+    session: Session, bounds: Limits, history: History, method: str = "auto"
 ) -> Calibration:
-    """Add what the turns say, decide, write it down and keep it.
+    """Solve what was recorded, decide, write it down and keep it.
 
     Parameters
     ----------
-    found : what the windows say
-    session, still : its session, and the windows
+    session : the recording
     bounds : limits of the device's grade
     history : where it is kept, if the device has a serial number
+    method : of the procedure
 
     """
     from fieldcal.assessing import assess, remember
     from fieldcal.commands.installing import with_installed
-    from fieldcal.observing import with_provenance, with_turns_between
+    from fieldcal.observing import rests
     from fieldcal.session import RESULT
+    from fieldcal.solving import solved
 
-    found = with_turns_between(found, session, still)
-    found = with_installed(with_provenance(found, session.about), session)
+    still = rests(session)
+    found = with_installed(solved(session, still, method=method), session)
     found = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
     if said := remember(history, session, found):
@@ -50,38 +49,26 @@ def first_result(
     found: Calibration, folder: Path, bounds: Limits, history: History
 ) -> Calibration:
     """Result of the device that was led through the procedure."""
-    from fieldcal.observing import rests
     from fieldcal.session import Session
 
-    session = Session.open(folder)
-    return concluded(found, session, rests(session), bounds, history)
+    return concluded(Session.open(folder), bounds, history, found.method)
 
 
 def further_results(
     others: Sequence[Beside], bounds: Limits, history: History
 ) -> dict[str, Calibration]:
     """Results of the further devices that were heard to the end, by folder."""
+    from fieldcal.session import Session
+
     found = {}
     for other in others:
         if other.failed is None:
             try:
-                found[other.folder.name] = _solved(other.folder, bounds, history)
+                session = Session.open(other.folder)
+                found[other.folder.name] = concluded(session, bounds, history)
             except FieldcalError as fault:
                 other.failed = fault
     return found
-
-
-def _solved(folder: Path, bounds: Limits, history: History) -> Calibration:
-    from fieldcal.observing import observations, rests
-    from fieldcal.session import Session
-    from fieldcal.solve import solve
-
-    session = Session.open(folder)
-    still = rests(session)
-    seen = observations(session.about, still.averages, still.rows)
-    found = solve(seen, level_sigma_deg=session.about.level_deg)
-    found = replace(found, warnings=(*still.warnings, *found.warnings))
-    return concluded(found, session, still, bounds, history)
 
 
 def check_heard(others: Sequence[Beside]) -> None:

@@ -15,6 +15,12 @@ from fieldcal.errors import InputError
 if TYPE_CHECKING:
     from fieldcal.plan_file import Task
 
+EXACT_DEG = 0.001
+"""How well a virtual fixture sets its angles, deg: as it turns them, to rounding."""
+
+OFF = "angle"
+"""What is in the name of every effect that makes it stand elsewhere."""
+
 
 def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
     """What is to be done, and the folder it is recorded into.
@@ -37,7 +43,7 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         name, tables = "the options", _tables_of_options(args)
     else:
         name, tables = args.procedure, _tables_of_file(args)
-    task = plan_file.task(over(tables, _level(args)), name)
+    task = plan_file.task(over(tables, _site(args)), name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
 
@@ -55,7 +61,7 @@ def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
         )
     session, tables = resumed(args.resume)
     tables["run"] = {**tables["run"], **_given(args)}
-    tables = over(tables, _level(args))
+    tables = over(tables, _site(args))
     return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder
 
 
@@ -80,9 +86,17 @@ def _tables_of_file(args: argparse.Namespace) -> dict[str, Any]:
     return tables
 
 
-def _level(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
-    """How level the base is, if an option says it."""
-    return {} if args.level is None else {"site": {"level_deg": args.level}}
+def _site(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """How level the base is and how well angles are set, as far as options say it.
+
+    A virtual fixture stands where it is told, unless it is to be off.
+    """
+    angles = args.angles
+    if angles is None and args.virtual is not None and OFF not in args.virtual:
+        angles = EXACT_DEG
+    said = {"level_deg": args.level, "angle_setting_deg": angles}
+    site = {key: value for key, value in said.items() if value is not None}
+    return {"site": site} if site else {}
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:

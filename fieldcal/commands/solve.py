@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     for option, what in (
         ("--level", "how level the base was made, 1σ about each axis"),
-        ("--angles", "how well each position's angles were set, 1σ"),
+        ("--angles", "how well each position's angles were set, 1σ; else the grade's"),
         ("--heading", "how well z points north, 1σ; for the gyroscopes"),
     ):
         add(option, type=float, metavar="DEG", help=what)
@@ -65,18 +65,17 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
-    from fieldcal.observing import rests, with_provenance
+    from fieldcal.observing import rests
     from fieldcal.session import RESULT, Session
-    from fieldcal.uncarried import mended, told, uncarried
+    from fieldcal.uncarried import mended
 
     session = Session.open(args.session)
     if not args.as_printed:
         session, repaired = mended(session)
     still = rests(session)
-    found = with_provenance(_solved(args, session, still), session.about)
+    found = _solved(args, session, still)
     if not args.as_printed:
         found = replace(found, warnings=(*repaired, *found.warnings))
-        found = told(found, uncarried(session, found))
     found = with_installed(found, session)
     found = _decided(args, found, session, still)
     path = session.write_json(RESULT, found.to_json())
@@ -94,23 +93,20 @@ def run(args: argparse.Namespace) -> int:
 
 def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibration:
     """What windows and turns say, estimated as the options want it."""
-    from fieldcal.observing import observations, with_turns_between
-    from fieldcal.solve import solve
+    from fieldcal.solving import solved
 
-    level = session.about.level_deg if args.level is None else args.level
-    found = solve(
-        observations(session.about, still.averages, still.rows),
+    return solved(
+        session,
+        still,
+        args.turns,
         method=args.method,
         tilt=args.tilt,
         cross=args.cross,
         as_printed=args.as_printed,
-        level_sigma_deg=level,
+        level_sigma_deg=args.level,
         heading_sigma_deg=args.heading,
-        angle_sigma_deg=args.angles or 0.0,
+        angle_sigma_deg=args.angles,
     )
-    if args.turns != "no" and not args.as_printed:
-        found = with_turns_between(found, session, still, args.turns == "yes")
-    return replace(found, warnings=(*still.warnings, *found.warnings))
 
 
 def _decided(

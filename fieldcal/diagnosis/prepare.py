@@ -20,8 +20,7 @@ from fieldcal.model.hand import rows_of
 from fieldcal.model.reduce import Rows, Source, spans
 from fieldcal.model.state import Term
 from fieldcal.model.thermometer import Thermometer
-from fieldcal.samples import Block
-from fieldcal.solve.observations import ACC, GYR
+from fieldcal.samples import ACC, GYR, Block
 
 SHORTEST = 20
 """Samples of a window from which it can be used."""

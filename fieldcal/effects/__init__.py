@@ -56,7 +56,6 @@ __all__ = [
     "Shape",
     "Values",
     "catalogue",
-    "columns",
     "six",
 ]
 
@@ -182,6 +181,9 @@ class Effect(ABC):
     shapes: ClassVar[tuple[Shape, ...]] = ()
     covariate: ClassVar[str]
     seen_in: ClassVar[Seen] = "position"
+    carried_by: ClassVar[str] = ""
+    """Group of a calibration that has it in it, beside one of its own name."""
+
     like_calibration: ClassVar[bool] = False
     """Whether bias and scale factor do the same, so that it is only ever possible."""
 
@@ -310,27 +312,3 @@ def six(unit_acc: str, acc: float, unit_gyr: str, gyr: float) -> tuple[Param, ..
     return tuple(Param(f"a{i}", unit_acc, acc) for i in "xyz") + tuple(
         Param(f"g{i}", unit_gyr, gyr) for i in "xyz"
     )
-
-
-def columns(
-    effect: Motion | Sensor,
-    x: Experience,
-    scale: Values = (1.0,) * 6,
-    shape: Mapping[str, float] = NO_SHAPE,
-) -> Array:
-    """Differentiate the six outputs by an effect's parameters, (n, 6, k).
-
-    Motion effects are differentiated about zero, by central differences of a thousandth
-    of the typical size; `scale` are the sensors' scale factors, which what they
-    experience is multiplied with.
-    """
-    if isinstance(effect, Sensor):
-        return effect.design(x, shape)
-    out = np.zeros((len(x), 6, len(effect.params)))
-    for j, param in enumerate(effect.params):
-        step = np.zeros(len(effect.params))
-        step[j] = 1e-3 * param.typical
-        up, down = effect.change(x, step), effect.change(x, -step)
-        change = np.hstack([up.f - down.f, up.w - down.w]) / (2 * step[j])
-        out[:, :, j] = change * np.asarray(scale)
-    return out

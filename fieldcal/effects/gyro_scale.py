@@ -27,6 +27,7 @@ class GyroScale(Sensor):
     """Scale factor of the gyroscopes."""
 
     params = tuple(Param(f"s{i}", "1", 3e-2) for i in (1, 2, 3))
+    carried_by = "gyr_scale"
     covariate = "angle turned"
     decided_by = "a turn about each axis in turn, by 90° or more"
     source = "Avrutov et al. 2017, (3.1); MEMS data sheets state 0.1 to 3 %"

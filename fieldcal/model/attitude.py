@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from fieldcal.effects import Experience
 from fieldcal.frames import turn
+from fieldcal.model.rotation import carry, small_turns
 from fieldcal.samples import Array
-from fieldcal.solve.rotation import carry, small_turns
 
 SMOOTH_S = 0.1
 """Means that the angular acceleration is taken from."""

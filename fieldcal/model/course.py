@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from fieldcal.effects import Experience
 from fieldcal.model.attitude import between
 from fieldcal.model.reduce import Source, rate_of
+from fieldcal.model.rotation import carry, small_turns
 from fieldcal.samples import Array
-from fieldcal.solve.rotation import carry, small_turns
 
 FINE_S = 0.02
 """Step of the integration at high sampling rates."""

@@ -23,6 +23,9 @@ STEEP = 8.0
 BIAS_ACC, BIAS_GYR, SCALE = 0.3, 2e-2, 1e-2
 """Typical change from nominal: 30 mg, 1 deg/s, 1 %; what consumer grade reaches."""
 
+FREE = 30.0
+"""Size of what a calibration is to find, in typical ones: it decides nothing there."""
+
 INSTABILITY_ACC, INSTABILITY_GYR = 1e-3, 3e-5
 """Typical scatter of a bias from window to window, m/s^2 and rad/s: 0.1 mg, 6 deg/h."""
 
@@ -41,6 +44,9 @@ MISSET_DEG = 3.0
 
 ASIDE = 1.0
 """Turns of a position whose orientation nobody knows, rad: any."""
+
+BAD = 5e-3
+"""Chance that a given window is disturbed in a way that it does not show itself."""
 
 PRESENT = 0.01
 """Chance that a session has an effect for which its file states no other."""

@@ -18,10 +18,10 @@ from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.model.noise import rounding
 from fieldcal.model.thermometer import Thermometer
+from fieldcal.model.turntable import going_round
 from fieldcal.model.vibration import shaking
 from fieldcal.positions import angles, rates
 from fieldcal.samples import Array, Block
-from fieldcal.solve.turntable import going_round
 
 ROWS = 360
 """Rows aimed at, over all windows."""
@@ -176,12 +176,6 @@ def reduce(source: Source) -> Rows:
     return replace(out, common=off)
 
 
-def recounted(rows: Rows, arrived: Array) -> Rows:
-    """Rows with the time since the turn counted from other arrivals, (p,) s."""
-    since = rows.x.t - arrived[rows.x.position]
-    return replace(rows, x=replace(rows.x, since_turn=since))
-
-
 def averaged(
     source: Source,
     bound: NDArray[np.intp],
@@ -213,7 +207,7 @@ def averaged(
     x = Experience.at_rest(
         *_angles(about, position),
         about.gravity,
-        f=_free_force(about, position, y),
+        f=_force_of(about, position, y),
         t=t,
         lasts=np.diff(bound, axis=1)[:, 0] / rate_of(block),
         since_start=t - block.t[0],
@@ -305,11 +299,16 @@ def table_rate(about: Description, position: NDArray[np.intp]) -> Array:
     return out
 
 
-def _free_force(about: Description, position: NDArray[np.intp], y: Array) -> Array:
-    """Force of length g along what the accelerometers read in each position."""
-    out = np.zeros((len(position), 3))
+def _force_of(about: Description, position: NDArray[np.intp], y: Array) -> Array:
+    """Force along what the accelerometers read in each position."""
     apart = (y[:, :3] - about.nominal["acc_bias"]) / about.nominal["acc_scale"]
+    return free_force(about.gravity, position, apart)
+
+
+def free_force(gravity: float, position: NDArray[np.intp], f: Array) -> Array:
+    """Force of length g along what is read in each position, (n, 3)."""
+    out = np.zeros((len(position), 3))
     for p in np.unique(position):
-        mean = np.nanmean(np.nan_to_num(apart[position == p]), axis=0)
-        out[position == p] = about.gravity * mean / max(np.linalg.norm(mean), 1e-12)
+        mean = np.nanmean(np.nan_to_num(f[position == p]), axis=0)
+        out[position == p] = gravity * mean / max(np.linalg.norm(mean), 1e-12)
     return out

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.calibration import COMPONENTS, Calibration, Nominal
-from fieldcal.effects import NO_SHAPE, Experience, Motion, Sensor, catalogue
+from fieldcal.calibration import Calibration
+from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE, angles_of, earth_rate_home, lasting, turn
+from fieldcal.model.planned import state_of
 from fieldcal.observing import observations
 from fieldcal.positions import rates
 from fieldcal.report.gather import Material
@@ -67,37 +68,17 @@ def predicted(found: Calibration, seen: Observations) -> Array:
     )
     if seen.grade == "navigation" and seen.latitude is not None:
         x = x.turned(base_rate=earth_rate_home(seen.latitude))
-    effects = catalogue()
-    extra = [g for g in found.groups if g not in COMPONENTS and g in effects]
-    for group in extra:
-        effect = effects[group]
-        if isinstance(effect, Motion):
-            x = effect.change(x, _full(found, group, effect))
-    bias, scale = _base(found, seen.nominal)
-    out: Array = bias + scale * np.hstack([x.f, x.w])
-    for group in extra:
-        effect = effects[group]
-        if isinstance(effect, Sensor):
-            out = out + effect.design(x, NO_SHAPE) @ _full(found, group, effect)
+    nominal = seen.nominal
+    state = state_of(
+        found.names,
+        found.values,
+        (np.array([*nominal.acc_bias, *nominal.gyr_bias]),
+         np.array([*nominal.acc_scale, *nominal.gyr_scale])),
+    )  # fmt: skip
+    out = state.output(state.experienced(x), np.full((1, len(x)), np.inf))
     if seen.grade != "navigation":
         out[:, 3:] += _earth(seen, seen.mean[:, 3:] - out[:, 3:])
     return out
-
-
-def _base(found: Calibration, nominal: Nominal) -> tuple[Array, Array]:
-    (acc_bias, acc), (gyr_bias, gyr) = (
-        found.accelerometers(nominal),
-        found.gyroscopes(nominal),
-    )
-    scale = np.concatenate([np.diag(acc), np.diag(gyr)])
-    return np.concatenate([acc_bias, gyr_bias]), scale
-
-
-def _full(found: Calibration, group: str, effect: Motion | Sensor) -> Array:
-    """Values of an effect's parameters, 0 where not determined."""
-    values = [found.value(f"{group}.{p.name}") for p in effect.params]
-    known: Array = np.nan_to_num(np.array(values))
-    return known
 
 
 def _earth(seen: Observations, left: Array) -> Array:

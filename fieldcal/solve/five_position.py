@@ -29,20 +29,21 @@ axes inside, device axes outside. Source: Avrutov and Pozniak 2023.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from fieldcal.errors import InputError, NotObservable
-from fieldcal.samples import Array
-from fieldcal.solve import linear, scatter
-from fieldcal.solve.design import Model, ladder_remedy, predict
-from fieldcal.solve.estimate import Estimate, not_determined
-from fieldcal.solve.observations import ACC, Observations
-from fieldcal.solve.tilt import RAD, Tilt
+from fieldcal.samples import ACC, Array
+from fieldcal.solve.closed import Closed
+from fieldcal.solve.given import Tilt
+from fieldcal.solve.observations import Observations
+from fieldcal.solve.rank import determined
 
 Found = dict[str, Array]
+
+RAD = np.pi / 180
 
 STEP = 1e-30
 """Imaginary step of the derivatives; exact to the machine, since nothing cancels."""
@@ -86,8 +87,8 @@ def axis_estimates(
     p = observations.mounting
     outputs = observations.mean[:, ACC] @ p.T
     noise = p @ observations.covariance[:, ACC, ACC] @ p.T
-    solved = [linear.decompose(f)[:2] for f in expansion(observations, tilt)]
-    usable = [bool(determined.all()) for _, determined in solved]
+    tables = expansion(observations, tilt)
+    usable = [bool(determined(f)[0].all()) for f in tables]
     if tilt == "base_tilt":
         usable[0] &= usable[1]
     if not any(usable):
@@ -99,7 +100,7 @@ def axis_estimates(
     rows = [np.zeros((0, *outputs.shape))] * 3
     for axis in range(3):
         if usable[axis]:
-            rows[axis] = solved[axis][0][:, :, None] * np.eye(3)[axis]
+            rows[axis] = np.linalg.pinv(tables[axis])[:, :, None] * np.eye(3)[axis]
     by_output = np.concatenate(rows)
     coefficients = np.einsum("knc,nc->k", by_output, outputs)
     limits = np.cumsum([0, *(len(r) for r in rows)])
@@ -114,11 +115,10 @@ def axis_estimates(
 
 def five_position(
     observations: Observations, tilt: Tilt = "angle_offset", as_printed: bool = False
-) -> Estimate:
+) -> Closed:
     """Bias, scale factor and tilt of the accelerometers from five positions or more.
 
-    Parameters as in `axis_estimates`. chi2 and dof are those of the whole model: what
-    of the means no parameter can explain.
+    Parameters as in `axis_estimates`.
 
     Raises
     ------
@@ -126,25 +126,9 @@ def five_position(
         If no axis is determined.
 
     """
-    return scatter.absorb(
-        lambda seen: _estimate(seen, tilt, as_printed), observations, ACC, "positions"
-    )
-
-
-def _estimate(observations: Observations, tilt: Tilt, as_printed: bool) -> Estimate:
     each = axis_estimates(observations, tilt, as_printed)
     pick, names = _picked(each, tilt, observations.mounting)
-    values = pick @ each.values
-    gain = np.einsum("pq,qnc->pnc", pick, each.gain) @ observations.mounting
-    covariance = pick @ each.covariance @ pick.T
-    out = Estimate(
-        names, values, covariance, gain=gain,
-        warnings=_warnings(observations, each, tilt, as_printed),
-        extra={"axis_estimates": _each(each)},
-    )  # fmt: skip
-    if each.missing or as_printed:
-        return out
-    return _judged(out, observations, tilt)
+    return Closed(names, pick @ each.values, pick @ each.covariance @ pick.T)
 
 
 def expansion(observations: Observations, tilt: Tilt) -> tuple[Array, Array, Array]:
@@ -249,45 +233,3 @@ def _picked(
             name = part if tilt == "angle_offset" else parts[part]
             picked[f"{tilt}.{name}"] = weight @ units[rows] / weight.sum()
     return np.array(list(picked.values())), tuple(picked)
-
-
-def _judged(out: Estimate, observations: Observations, tilt: Tilt) -> Estimate:
-    """Add chi2 and rms: of the residual only what no parameter could have taken."""
-    model = Model(tilt)
-    x = out.values[[out.names.index(n) for n in model.names]]
-    u, slope = predict(
-        model, observations.positions, observations.gravity, observations.mounting, x
-    )
-    y = observations.mean[:, ACC] - u
-    fit = linear.fit(slope, y, linear.whitener(observations.covariance[:, ACC, ACC]))
-    return replace(
-        out, chi2=fit.chi2, dof=fit.dof, rms=float(np.sqrt(np.mean(y**2)))
-    )  # fmt: skip
-
-
-def _warnings(
-    observations: Observations, each: AxisEstimates, tilt: Tilt, as_printed: bool
-) -> tuple[str, ...]:
-    notes = []
-    if each.missing:
-        wanted = np.ones(len(Model(tilt).names), dtype=bool)
-        notes.append(
-            not_determined(
-                [f"bias and scale of procedure axis {axis}" for axis in each.missing],
-                ladder_remedy(observations, wanted, Model(tilt)),
-                "these positions with an unknown tilt",
-            )
-        )
-    if as_printed:
-        notes.append("as printed: (23) is inverted, (22), (30), (34) lose the sign")
-    return tuple(notes)
-
-
-def _each(each: AxisEstimates) -> dict[str, dict[str, float]]:
-    """Angles that each axis gives by itself, for the report."""
-    sigma = np.sqrt(np.diag(each.covariance))
-    return {
-        name: {"value": float(value), "sigma": float(s)}
-        for name, value, s in zip(each.names, each.values, sigma, strict=True)
-        if name.endswith("_deg")
-    }

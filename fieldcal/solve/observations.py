@@ -18,16 +18,14 @@ from fieldcal.calibration import Nominal
 from fieldcal.errors import InputError
 from fieldcal.frames import force
 from fieldcal.positions import Position, angles, rates
-from fieldcal.samples import CHANNELS, UNITS, Array
-from fieldcal.solve.linear import Mask
+from fieldcal.samples import ACC, CHANNELS, GYR, UNITS, Array
 from fieldcal.windows import Average
 
 Grade = Literal["tactical", "navigation"]
 Index = NDArray[np.integer[Any]]
+Mask = NDArray[np.bool_]
 SINGULAR = 1e-6
 """Least eigenvalue of a correlation matrix that is taken as known."""
-
-ACC, GYR = slice(0, 3), slice(3, 6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,12 +120,6 @@ class Observations:
             temperature=self.temperature[rows],
             time=self.time[rows],
         )
-
-    def scattered(self, channels: slice, spread: float) -> Observations:
-        """Return the same with variance spread^2 added to some channels."""
-        covariance = self.covariance.copy()
-        covariance[:, channels, channels] += spread**2 * np.eye(3)
-        return replace(self, covariance=covariance)
 
     @property
     def has_acc(self) -> bool:

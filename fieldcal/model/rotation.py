@@ -12,53 +12,16 @@ in steps from edge a to edge b of T seconds, with samples every h seconds in the
 (2) is the mean of the rate from one sample to the next, of the fourth order in even
 steps, where it is (13 (w_k + w_k+1) - w_k-1 - w_k+2) / 24; w' are differences over two
 steps. The last term of (3) is what two axes turning in turn (coning) leave after a
-cycle. A change dw of the rates turns the result by
-
-    du = u x s,   s = sum_k B_k dw_k h,   B_k = F(end) F(k)^T                      (4)
-
-w rad/s, device axes. Source: rule of Euler and Maclaurin (2); Magnus 1954, for rates
-that change evenly within a step (3); P. G. Savage 1998, for coning.
+cycle. w rad/s, device axes. Source: rule of Euler and Maclaurin (2); Magnus 1954, for
+rates that change evenly within a step (3); P. G. Savage 1998, for coning.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.samples import Array
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """What happened between two instants.
-
-    Attributes
-    ----------
-    whole : (3, 3) F, from components before to components after
-    later : (k, 3, 3) B, from each step to the end
-    rate : (k, 3) mean rate of each step, rad/s
-    step : (k,) s
-
-    """
-
-    whole: Array
-    later: Array
-    rate: Array
-    step: Array
-
-
-def integrate(t: Array, w: Array) -> Turn:
-    """Integrate rates (k + 1, 3) at instants t (k + 1,), s."""
-    every = np.arange(len(t))
-    angle, h = small_turns(t, w, every), np.diff(t)
-    until = carry(angle)[1:]
-    whole = until[-1]
-    # to the middle of a step, since that is where its mean rate acts
-    half = until @ exponential(angle / 2)
-    later = whole @ np.swapaxes(half, -1, -2)  # (4)
-    return Turn(whole, later, mean_rates(t, w), h)
 
 
 def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:

@@ -1,0 +1,200 @@
+"""How well the means of windows agree with a given set.
+
+    S = D + Phi_r L Phi_r^T,   chi2 = min_x (y - Phi x)^T S^-1 (y - Phi x)
+    K = (S + Phi V Phi^T)^-1,  r_p = K_pp^-1 (K y)_p                               (1)
+
+D is the noise of the means and rounding, Phi_r what is random with its sizes L (how
+angles were set, the turns of a position whose orientation nobody knows), Phi what is
+estimated, V its size before; for r_p what windows wander by is in D. chi2 is that of
+the stated noise, so that a misfit remains visible; r_p is the residual of a window by a
+fit without it. Source: Rasmussen and Williams 2006, 5.4.2, for (1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.model import priors
+from fieldcal.model.evidence import Gram, Index
+from fieldcal.samples import Array
+from fieldcal.solve.given import Given
+from fieldcal.solve.mixture import Mixture
+from fieldcal.solve.observations import Mask
+
+ROUNDED = 1e-9
+"""Share of the longest column below which rounding alone is left of one."""
+
+UNIT = 1e-6
+"""Largest share of what is estimated in a direction that windows do not show."""
+
+UNCHECKED = 1.0
+"""Variance, (m/s^2)^2, of what is foretold of a window that no other one checks: the
+wide sizes of what is estimated show."""
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Of one triad.
+
+    Attributes
+    ----------
+    chi2, dof : of the stated noise, and means less what they determine
+    rms : root mean square residual, weighted by the windows' noise
+    left_out : the same of windows that the fit did not see; nan where none could be
+    rows : (p, 3) residuals, nan where nothing was measured; of a position whose
+        orientation nobody knows only along the force
+
+    """
+
+    chi2: float
+    dof: int
+    rms: float
+    left_out: float
+    rows: Array
+
+
+def agreement(
+    gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...], known: Array
+) -> Agreement:
+    """How well the means of a triad agree, by the columns of the estimate.
+
+    `known` (p, 6) are the variances of the means as their windows alone tell: what
+    wanders within a window is in them, and then it is no misfit.
+    """
+    p = len(d.held)
+    at = np.ix_(np.arange(p), np.array(channels))
+    info, off = gram.info[at], gram.off[at]
+    used = (info > 0).ravel()
+    if not used.any():
+        return Agreement(0.0, 0, np.nan, np.nan, np.full((p, 3), np.nan))
+    index = gram.index[found.columns]
+    means = gram.means[:p, list(channels)][:, :, index].reshape(-1, len(index))[used]
+    y = off.ravel()[used]
+    random = _random(d, found)
+    noise = (1 / info.ravel()[used]) + gram.shared[at].ravel()[used] ** 2
+    noise = np.fmax(noise, known[:, list(channels)].ravel()[used])
+    loose = _loose(gram, p, channels)[used]
+    wide = means[:, random] * _sizes(d, found)[random]
+    known = np.diag(noise) + wide @ wide.T
+    stated = known + loose @ loose.T
+    free = means[:, ~random]
+    # turns that nobody knows hide what they can make
+    loose = loose[:, np.any(loose != 0.0, axis=0)]
+    chi2, rank = _least(known, np.hstack([free, loose]), y)
+    seen = _Seen(gram, d, channels, used)
+    residual = seen.along(y - free @ found.mean[~random])
+    wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
+    sizes = free * _sizes(d, found)[~random]
+    alone = seen.along(*_left_out(stated + wander, sizes, y, seen))
+    return Agreement(
+        chi2, int(used.sum()) - rank, seen.rms(residual), seen.rms(alone), residual
+    )
+
+
+def _random(d: Given, found: Mixture) -> Mask:
+    """Which columns of the estimate are of a known size, (k,)."""
+    names = [*d.always, *(g for _, g in d.members)]
+    fixed = [np.full(len(g.columns), g.fixed != priors.FREE) for g in names]
+    return np.concatenate(fixed)
+
+
+def _sizes(d: Given, found: Mixture) -> Array:
+    """Sizes of the columns before the rows are seen, (k,)."""
+    groups = [*d.always, *(g for _, g in d.members)]
+    return np.concatenate([g.sizes(g.fixed or 1.0) for g in groups])
+
+
+def _loose(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:
+    """Turns of positions whose orientation nobody knows, (3 p, 2 p)."""
+    some = gram.loose[:p, list(channels)]
+    out = np.zeros((p, 3, p, 2))
+    out[np.arange(p), :, np.arange(p)] = some
+    return out.reshape(3 * p, 2 * p)
+
+
+def _least(stated: Array, free: Array, y: Array) -> tuple[float, int]:
+    """Least chi2, and how many directions of what is free the means determine."""
+    root = np.linalg.cholesky(stated)
+    white = np.linalg.solve(root, np.column_stack([free, y]))
+    a, b = white[:, :-1], white[:, -1]
+    length = np.linalg.norm(a, axis=0)
+    length = np.where(length > ROUNDED * length.max(initial=0.0), length, np.inf)
+    x, _, rank, _ = np.linalg.lstsq(a / length, b, rcond=UNIT)
+    rest = b - a / length @ x
+    return float(rest @ rest), int(rank)
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """The means of a triad that were measured.
+
+    Attributes
+    ----------
+    gram, d, channels : of which windows
+    used : (3 p,) whether each mean was
+
+    """
+
+    gram: Gram
+    d: Given
+    channels: tuple[int, ...]
+    used: Mask
+
+    @property
+    def window(self) -> Index:
+        """Number of the window of each mean."""
+        return np.repeat(np.arange(len(self.d.held)), 3)[self.used]
+
+    def along(self, values: Array, unsure: Array | None = None) -> Array:
+        """Residuals of the means as a table, (p, 3).
+
+        Of a position whose orientation nobody knows there is one, along the force. One
+        whose variance says that no other window checks it is nan.
+        """
+        out = np.full((len(self.d.held), 3), np.nan)
+        out[np.nonzero(self.used.reshape(-1, 3))] = values
+        if 0 not in self.channels:
+            return out
+        for i in np.flatnonzero(self.d.free).tolist():
+            out[i] = [self._normal(i) @ np.nan_to_num(out[i]), np.nan, np.nan]
+        if unsure is not None:
+            for i in range(len(out)):
+                n = self._normal(i)[None] if self.d.free[i] else np.eye(3)
+                if np.trace(n @ unsure[i] @ n.T) > UNCHECKED * self.d.unit[0] ** 2:
+                    out[i] = np.nan
+        return out
+
+    def _normal(self, i: int) -> Array:
+        """What takes outputs to the force along itself, whatever the turns, (3,)."""
+        d = self.d
+        one, two = self.gram.loose[i][list(self.channels)].T
+        f = d.x.f[int(np.argmax(d.x.position == d.held[i]))]
+        across = np.cross(one, two)
+        out: Array = across / (across @ (d.unit[:3] * f / np.linalg.norm(f)))
+        return out
+
+    def rms(self, rows: Array) -> float:
+        """Root mean square, weighted by the noise of the windows."""
+        weight = self.gram.info[: len(rows), list(self.channels)].copy()
+        if 0 in self.channels:
+            free = np.flatnonzero(self.d.free)
+            weight[free, 0] = weight[free].mean(axis=1)
+        known = np.isfinite(rows)
+        if not known.any():
+            return float("nan")
+        return float(np.sqrt(np.average(rows[known] ** 2, weights=weight[known])))
+
+
+def _left_out(stated: Array, wide: Array, y: Array, seen: _Seen) -> tuple[Array, Array]:
+    """Residual of each mean by a fit without its window, (1); their covariances."""
+    inverse = np.linalg.inv(stated + wide @ wide.T)
+    pull, window = inverse @ y, seen.window
+    out, unsure = np.zeros(len(y)), np.zeros((len(seen.d.held), 3, 3))
+    for i in np.unique(window):
+        own = np.flatnonzero(window == i)
+        block = np.linalg.inv(inverse[np.ix_(own, own)])
+        out[own] = block @ pull[own]
+        unsure[i, : len(own), : len(own)] = block
+    return out, unsure

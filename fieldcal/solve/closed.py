@@ -1,0 +1,47 @@
+"""What a printed formula gives: parameters that are linear in the means."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.samples import Array
+from fieldcal.solve.observations import Mask, Observations
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """Parameters with the windows' covariance carried through.
+
+    Attributes
+    ----------
+    names : (p,) full names, ``group.component``
+    values, covariance : (p,), (p, p)
+
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+
+    @classmethod
+    def of(
+        cls, names: Sequence[str], gain: Array, seen: Observations, channels: slice
+    ) -> Closed:
+        """Values by their derivatives (p, n, 3) by the means of a triad."""
+        noise = seen.covariance[:, channels, channels]
+        values = np.einsum("pnc,nc->p", gain, seen.mean[:, channels])
+        covariance = np.einsum("pnc,ncd,qnd->pq", gain, noise, gain)
+        return cls(tuple(names), values, covariance)
+
+    def only(self, kept: Mask) -> Closed:
+        """Keep some of the parameters, (p,) bool."""
+        rows = np.flatnonzero(kept)
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in rows),
+            values=self.values[rows],
+            covariance=self.covariance[np.ix_(rows, rows)],
+        )

@@ -1,0 +1,226 @@
+"""A given set fitted to rows: relinearised until it stays, then mixed.
+
+The state is moved to the estimate of the set (`model.inference`), turns between windows
+are followed about it, and the answer is taken there (`mixture`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.model.causes import CLOSURE
+from fieldcal.model.evidence import Gram
+from fieldcal.model.inference import Inference
+from fieldcal.model.reduce import Rows, Source
+from fieldcal.model.search import Search
+from fieldcal.model.state import State
+from fieldcal.model.system import System
+from fieldcal.model.turn import Turning
+from fieldcal.model.turn_rows import TurnRows, Turns
+from fieldcal.samples import Array
+from fieldcal.solve.agreement import Agreement, agreement
+from fieldcal.solve.given import Given, Wanted
+from fieldcal.solve.mixture import Mixing, Mixture
+from fieldcal.solve.words import SUSPECT
+
+OPEN = 0.25
+"""Part of a variance before the rows from which they determined nothing."""
+
+
+NO_WEIGHT = 1e5
+"""Times its noise that a bad window is given where it must not bend the state."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """Rows of the windows, and the samples between them.
+
+    Attributes
+    ----------
+    rows : of the windows
+    since : (o, n) s since the turn
+    source : the samples of turns that are to be followed
+    known : (p, 6) variances of the windows' means as each by itself tells
+
+    """
+
+    rows: Rows
+    since: Array
+    source: Source | None = None
+    known: Array | None = None
+
+    def turning(self) -> Turning | None:
+        """Whoever follows the turns, if there are any."""
+        if self.source is None:
+            return None
+        found = Turning(self.source, self.rows, self.since)
+        return found if found.legs else None
+
+
+@dataclass(frozen=True, slots=True)
+class Estimated:
+    """A given set, estimated.
+
+    Attributes
+    ----------
+    given : the set
+    names : (k,) parameters that the rows determine
+    values, covariance : (k,), (k, k)
+    prior : (k,) sizes before
+    missing : parameters that they do not determine
+    found : the mixture
+    acc, gyr : how well the windows agree
+    turns : rows of the turns
+
+    """
+
+    given: Given
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    missing: tuple[str, ...]
+    found: Mixture
+    acc: Agreement
+    gyr: Agreement
+    turns: tuple[TurnRows, ...]
+
+    def mixed_with(self, one: Estimated, other: Estimated, weight: float) -> Estimated:
+        """The same, with what another model of the tilt differs by in the uncertainty.
+
+        `one` is this model fitted to what `other` is fitted to.
+        alpha0 turns about z and beta0 about x: the same angles in the other order.
+        """
+        twin = {"angle_offset.alpha0_deg": "base_tilt.about_z_deg",
+                "angle_offset.beta0_deg": "base_tilt.about_x_deg"}  # fmt: skip
+        twin |= {b: a for a, b in twin.items()}
+        ours, theirs = (dict(zip(e.names, e.values, strict=True)) for e in (one, other))
+        apart = np.zeros(len(self.names))
+        for i, name in enumerate(self.names):
+            if name in ours and twin.get(name, name) in theirs:
+                apart[i] = theirs[twin.get(name, name)] - ours[name]
+        return replace(
+            self, covariance=self.covariance + weight * np.outer(apart, apart)
+        )
+
+    @property
+    def bad(self) -> Array:
+        """Probability that each window is bad, (n,) in the order of the positions."""
+        out = np.zeros(int(self.given.held.max()) + 1)
+        out[self.given.held] = self.found.bad
+        return out
+
+    @property
+    def closures(self) -> tuple[float, int]:
+        """Sum of squares of the turns' closures, and how many there are."""
+        full = np.zeros(self.given.width)
+        np.add.at(full, self.found.columns, self.found.mean)
+        off = [
+            (t.closure - t.design @ full[t.columns]) ** 2 * t.info for t in self.turns
+        ]
+        white = np.concatenate([np.zeros(0), *off])
+        return float(white.sum()), len(white)
+
+
+def estimated(
+    recorded: Recorded, turning: Turning | None, nominal: State, wanted: Wanted
+) -> Estimated:
+    """Fit a set.
+
+    Parameters
+    ----------
+    recorded : rows
+    turning : of the same, if turns are to be used
+    nominal : the state that is started from
+    wanted : what the set is made of
+
+    """
+    rows, since = recorded.rows, recorded.since
+    given = Given(rows, np.abs(nominal.scale), since, turning is not None, wanted)
+    turns = None if turning is None else Turns(turning, given, False)
+    inference = Inference(System(rows, given), nominal, turns)
+    gram = inference.gram(*_settled(inference, given), None)
+    found = _mixed(given, gram)
+    if found.bad.max(initial=0.0) > SUSPECT:
+        # a gross error bends the state so far that nothing is linear about it
+        left = rows.x.position == given.held[int(found.bad.argmax())]
+        sd = np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd)
+        others = Inference(System(replace(rows, sd=sd), given), nominal, turns)
+        gram = inference.gram(*_settled(others, given), None)
+        found = _mixed(given, gram)
+    names, values, covariance, missing = _named(given, found, nominal)
+    known: Array = np.zeros((len(given.held), 6))
+    if recorded.known is not None:
+        known = recorded.known[given.held]
+    return Estimated(
+        given, names, values, covariance, missing, found,
+        agreement(gram, given, found, (0, 1, 2), known),
+        agreement(gram, given, found, (3, 4, 5), known),
+        tuple(inference.turned),
+    )  # fmt: skip
+
+
+def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
+    """The state where the set has settled, and the columns' values in it."""
+    start: Array = np.zeros(given.width)
+    state, values, _ = inference.settled(inference.nominal, start, given.members)
+    if inference.turns is not None:
+        inference.gram(state, values, None)
+        state, values, _ = inference.settled(state, values, given.members)
+    return state, values
+
+
+def _mixed(given: Given, gram: Gram) -> Mixture:
+    """The set at all its sizes, with each window perhaps being bad."""
+    search = Search(given, gram)
+    there = search.evaluated(given.members)
+    return Mixing(given, gram, there, search.unstable).run()
+
+
+def _named(
+    given: Given, found: Mixture, nominal: State
+) -> tuple[tuple[str, ...], Array, Array, tuple[str, ...]]:
+    """Parameters that are determined, and the names of those that are not."""
+    base = {}
+    for c in range(6):
+        sensor, axis = ("acc", "gyr")[c // 3], "xyz"[c % 3]
+        base[f"{sensor}_bias.{axis}"] = float(nominal.bias[c])
+        base[f"{sensor}_scale.{axis}"] = float(nominal.scale[c])
+    groups = [*given.always, *(g for _, g in given.members)]
+    before = np.concatenate([g.sizes(g.fixed or 1.0) for g in groups])
+    at = [np.flatnonzero(found.columns == given.place(n)[0])[0] for n in given.names]
+    told = np.sqrt(np.diag(found.covariance))
+    limits = USEFUL | ({"gyr_scale": TURNED} if given.wanted.turned else {})
+    useful = [limits.get(n.partition(".")[0], np.inf) for n in given.names]
+    known = [
+        i for i, (k, worst) in enumerate(zip(at, useful, strict=True))
+        if told[k] ** 2 < OPEN * before[k] ** 2 and told[k] < worst
+    ]  # fmt: skip
+    rows = [at[i] for i in known]
+    names = tuple(given.names[i] for i in known)
+    values = found.mean[rows] + [base.get(n, 0.0) for n in names]
+    missing = tuple(n for i, n in enumerate(given.names) if i not in known)
+    return names, values, found.covariance[np.ix_(rows, rows)], missing
+
+
+USEFUL = {
+    "acc_bias": 1.0, "cross_coupling": 0.1, "gyr_scale": 0.1,
+    "gyro_cross_coupling": 0.01, "angle_offset": 3.0, "base_tilt": 3.0,
+}  # fmt: skip
+"""Standard uncertainty from which a parameter is worse than a guess: no bias is a tenth
+of gravity, an axis is put in by hand to some hundredths, and an eye sees a tilt of
+three degrees."""
+
+TURNED = 0.01
+"""The same of the scale factor of gyroscopes where turns give it: makers do better."""
+
+
+def scatter_of(found: Mixture, channels: tuple[int, ...]) -> float:
+    """Rms of what windows of a triad are off by beside their noise; outputs."""
+    return float(np.sqrt(np.mean(found.scatter[list(channels)] ** 2)))
+
+
+def turns_scatter(found: Mixture) -> float:
+    """The same of turns' closures, rad."""
+    return float(found.scatter[CLOSURE])

@@ -1,0 +1,256 @@
+"""The set that `solve` is given: what a device is to be described by.
+
+It is a set of the one model (`fieldcal.model`) like any other, only that nobody
+searches for it. What is estimated has a size so wide that it decides nothing; how level
+the base is, how well angles are set and what is not known of the Earth's rate have the
+size that is said of them. How well an angle is set has two parts of equal variance: a
+fixture repeats one (the same detent is off by the same each time), the other is new in
+each position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from fieldcal.effects import Effect, Experience, Motion, Sensor, catalogue
+from fieldcal.frames import EARTH_RATE, earth_rate_home
+from fieldcal.model import columns, priors
+from fieldcal.model.causes import FEW, Cause, Group
+from fieldcal.model.columns import General
+from fieldcal.model.dictionary import Dictionary
+from fieldcal.model.evidence import Index
+from fieldcal.model.reduce import Rows
+from fieldcal.model.sizing import Member
+from fieldcal.samples import CHANNELS, Array
+from fieldcal.solve.observations import Mask
+
+Tilt = Literal["none", "angle_offset", "base_tilt"]
+
+NOT_SHOWN = ("k21", "k31", "k32")
+"""Couplings that a common rotation makes of the others: where no orientation is known,
+the z accelerometer's axis is the z axis of the frame, and that of y lies in its y z
+plane."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is to be estimated beside bias and scale factor, and what is known.
+
+    Attributes
+    ----------
+    tilt : how the base is tilted
+    cross, gyro_cross : cross-coupling of the accelerometers, of the gyroscopes
+    gyr_scale : whether the scale factor of the gyroscopes is
+    level_deg : how level the base is, about each level axis; None where nobody said
+    angles_deg : how well each angle is set
+    earth : (3,) rad/s, what is not known of the Earth's rate in base axes
+    turned : whether turns between positions were recorded
+
+    """
+
+    tilt: Tilt = "none"
+    cross: bool = False
+    gyro_cross: bool = False
+    gyr_scale: bool = False
+    level_deg: float | None = None
+    angles_deg: float = 0.0
+    earth: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turned: bool = False
+
+
+class Given(Dictionary):
+    """The columns of a given set, and those by which a window may be off by itself.
+
+    Parameters
+    ----------
+    rows : of the windows
+    unit : (6,) outputs per SI unit
+    since : (o, n) s since the turn, by origin
+    turns : whether the way between positions is seen
+    wanted : what the set is made of
+
+    """
+
+    def __init__(
+        self, rows: Rows, unit: Array, since: Array, turns: bool, wanted: Wanted
+    ) -> None:
+        self.wanted = wanted
+        self.members: tuple[Member, ...] = ()
+        held = np.unique(rows.x.position)
+        common = np.array([rows.common[rows.x.position == p][0] for p in held])
+        super().__init__(rows.x, rows.used, since, common, unit, turns)
+
+    # -- what is in it
+
+    def _calibration(self, used: Mask) -> None:
+        super()._calibration(used)
+        kept = [g for g in self.always if g.cause != "earth"]
+        if self.wanted.gyr_scale and not any(
+            g.cause == "scale" and g.part == "gyr" for g in kept
+        ):
+            at = np.intersect1d((3, 4, 5), self.seen)
+            size = priors.SCALE * self.unit[at]
+            kept.append(Group("scale", "gyr", self.scale + at, size, in_state=True))
+        if not self.wanted.gyr_scale:
+            kept = [g for g in kept if (g.cause, g.part) != ("scale", "gyr")]
+        self.always = [replace(g, fixed=priors.FREE) for g in kept]
+
+    def _effects(self) -> None:
+        """What was asked for of the catalogue."""
+        w, some = self.wanted, bool(self.x.oriented.any())
+        if w.tilt != "none" and some:
+            self._estimated(w.tilt, known=w.level_deg)
+        if w.cross:
+            self._estimated("cross_coupling", () if some else NOT_SHOWN)
+        if w.gyro_cross:
+            self._estimated("gyro_cross_coupling")
+        if any(w.earth) and some:
+            if self.earth < 0:
+                sides = columns.earth_sides
+                basis = General("earth", columns.earth, sides=sides)
+                self.earth = self._add(basis, 3)
+            at, size = self.earth + np.arange(3), np.array(w.earth)
+            kept = size > 0
+            self._has("earth", Group("earth", "", at[kept], size[kept], fixed=1.0,
+                                     in_state=True))  # fmt: skip
+
+    def _estimated(
+        self, name: str, left: Sequence[str] = (), known: float | None = None
+    ) -> None:
+        """An effect with all its parameters but some, free or of a known size."""
+        effect = catalogue()[name]
+        if not isinstance(effect, Motion | Sensor):
+            return
+        some = [j for j, p in enumerate(effect.params) if p.name not in left]
+        at = self._columns(effect, [({}, 0)])[0][some]
+        typical = np.array([effect.params[j].typical for j in some])
+        size, fixed = typical * self._unit(effect), priors.FREE
+        if known is not None:
+            size, fixed = np.full(len(some), known), 1.0
+        group = Group(name, "", at, size, effect, params=tuple(some), in_state=True,
+                      fixed=fixed)  # fmt: skip
+        self._has(name, group)
+
+    def _random(self) -> None:
+        """How well angles are set, and how a bias wanders within a window."""
+        from fieldcal.model import unknown
+
+        self._waves = self._course("waves", self.span.waves, unknown.WAVES, True)
+        if len(self.held) < FEW < len(self.x):
+            self._flicker()
+        oriented = [p for p in self.held if self.x.oriented[self.x.position == p].all()]
+        if not self.wanted.angles_deg or not oriented:
+            return
+        size = np.deg2rad(self.wanted.angles_deg) / np.sqrt(2.0)
+        own = (self.aside + 2 * np.array(oriented)[:, None] + [0, 1]).ravel()
+        self._has("angle_setting", Group(
+            "angle_setting", "own", own, np.full(len(own), size), fixed=1.0,
+            in_state=True,
+        ))  # fmt: skip
+        shared = repeated(self.x, oriented)
+        if shared.shape[1]:
+            basis = General("detents", lambda v: columns.aside(v) @ shared)
+            first = self._add(basis, shared.shape[1])
+            at = first + np.arange(shared.shape[1])
+            self._has("detents", Group(
+                "angle_setting", "repeated", at, np.full(len(at), size), fixed=1.0
+            ))  # fmt: skip
+
+    def _unknown(self) -> None:
+        """Nothing that no physics makes: what that leaves is said by `diagnose`."""
+
+    def _has(self, name: str, group: Group) -> None:
+        cause = Cause(name, group.part, 1.0, (group,), "given")
+        self.causes.append(cause)
+        self.members = (*self.members, (cause, group))
+
+    # -- where it stands
+
+    def place(self, name: str) -> Index:
+        """Columns of a parameter by its full name; none if it is not in the set."""
+        group, _, part = name.partition(".")
+        if group in ("acc_bias", "gyr_bias", "acc_scale", "gyr_scale"):
+            kind = group.partition("_")[2]
+            channel = "xyz".index(part) + 3 * group.startswith("gyr")
+            every = [c for g in self.always if g.cause == kind for c in g.columns]
+            at = (self.bias if kind == "bias" else self.scale) + channel
+            return np.array([at] if at in every else [], dtype=np.intp)
+        for cause, one in self.members:
+            if cause.name == group and isinstance(one.effect, Effect):
+                names = [one.effect.params[j].name for j in one.params]
+                if part in names:
+                    return one.columns[[names.index(part)]]
+        return np.empty(0, dtype=np.intp)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of all parameters, in the order of results."""
+        sensors = [("acc", (0, 1, 2), "cross_coupling"),
+                   ("gyr", (3, 4, 5), "gyro_cross_coupling")]  # fmt: skip
+        out: list[str] = []
+        for sensor, channels, cross in sensors:
+            axes = [CHANNELS[c][-1] for c in channels if c in self.seen]
+            groups = [f"{sensor}_bias", f"{sensor}_scale"]
+            out += [f"{g}.{a}" for g in groups for a in axes]
+            out += self._of(cross)
+            if sensor == "acc":
+                out += self._of(self.wanted.tilt)
+        return tuple(n for n in out if len(self.place(n)))
+
+    def _of(self, name: str) -> list[str]:
+        return [
+            f"{name}.{one.effect.params[j].name}"
+            for cause, one in self.members
+            if cause.name == name and isinstance(one.effect, Effect)
+            for j in one.params
+        ]
+
+
+def repeated(x: Experience, oriented: Sequence[int]) -> Array:
+    """Which turns of the positions go together, (2 p, m): those of the same angle.
+
+    Home is no detent, and an angle that is set once repeats nothing that its own error
+    has not.
+    """
+    places = int(x.position.max()) + 1
+    out = []
+    for joint, angle in enumerate((x.alpha, x.beta)):
+        first = [float(angle[int(np.argmax(x.position == p))]) for p in oriented]
+        for value in sorted(set(np.round(first, 9)) - {0.0}):
+            column = np.zeros(2 * places)
+            same = [p for p, a in zip(oriented, first, strict=True)
+                    if abs(a - value) < 1e-8]  # fmt: skip
+            column[2 * np.array(same) + joint] = 1.0
+            out.append(column)
+    return np.array(out).reshape(-1, 2 * places).T
+
+
+def earth_known(
+    latitude: float | None, navigation: bool, heading: float | None
+) -> tuple[Array, tuple[float, float, float]]:
+    """What is known of the Earth's rate in base axes, and how uncertain it is, rad/s.
+
+    The vertical part by the latitude, the level part by the heading of z from north,
+    rad; tactical grade has it pointing anywhere where nobody says, and navigation grade
+    exactly north.
+    """
+    if latitude is None:
+        free = EARTH_RATE / float(np.sqrt(3.0))
+        return np.zeros(3), (free, free, free)
+    level = EARTH_RATE * float(np.cos(latitude))
+    home = earth_rate_home(latitude)
+    if navigation and heading is None:
+        heading = 0.0
+    if heading is not None:
+        return home, (level * heading, 0.0, 0.0)
+    anywhere = level / float(np.sqrt(2.0))
+    return home * [0.0, 1.0, 0.0], (anywhere, 0.0, anywhere)
+
+
+def seen_by(rows: Rows, base_rate: Array) -> Rows:
+    """Rows on a base that turns with the Earth."""
+    return replace(rows, x=rows.x.turned(base_rate=base_rate))

@@ -1,0 +1,113 @@
+"""The paper's formulas as they stand in print, with its misprints, to compare.
+
+Tactical gyroscopes: the mean output is the bias, (36). Navigation: bias and scale
+factor from the Earth's rate, (42)-(48), with +sin phi in (39)-(41), -sin phi for cos
+phi in the third line of (40), and sin alpha for cos alpha in the third line of (41). On
+a rate table: least squares, (3.3), the Earth's rate left in. Nothing here is for use.
+Source: Avrutov and Pozniak 2023; Avrutov, Sapegin, Stefanishin, Tsisarzh 2017.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.calibration import Calibration
+from fieldcal.errors import InputError, NotObservable
+from fieldcal.frames import EARTH_RATE
+from fieldcal.samples import GYR, Array
+from fieldcal.solve import least_squares
+from fieldcal.solve.assumed import Asked
+from fieldcal.solve.closed import Closed
+from fieldcal.solve.closed_form import two_position
+from fieldcal.solve.five_position import five_position
+from fieldcal.solve.observations import Observations
+from fieldcal.solve.rank import determined
+from fieldcal.solve.result import UNITS
+
+METHODS = ("two_position", "five_position")
+
+
+def solve(seen: Observations, asked: Asked) -> Calibration:
+    """Everything that the print gives.
+
+    Raises
+    ------
+    InputError
+        If the method is none that is printed.
+
+    """
+    if asked.method not in ("auto", *METHODS):
+        raise InputError(
+            f"the paper prints no {asked.method} method: as printed are two_position"
+            " and five_position"
+        )
+    still = np.flatnonzero(~seen.rotating)
+    parts, said = [], []
+    method = asked.method
+    if len(still) and seen.has_acc:
+        two = len(still) == 2 if method == "auto" else method == "two_position"
+        method = "two_position" if two else "five_position"
+        if two:
+            parts.append(two_position(seen[still], as_printed=True))
+            said.append(
+                "as printed: the sign of (5) makes the scale factor of z negative"
+            )
+        else:
+            parts.append(five_position(seen[still], as_printed=True))
+            said.append("as printed: (23) is inverted, (22), (30), (34) lose the sign")
+    if seen.has_gyr:
+        parts.append(_gyroscopes(seen))
+    if not parts:
+        raise NotObservable("no sensor was measured; the print gives nothing")
+    names = tuple(n for p in parts for n in p.names)
+    covariance = np.zeros((len(names), len(names)))
+    first = 0
+    for part in parts:
+        there = slice(first, first := first + len(part.names))
+        covariance[there, there] = part.covariance
+    return Calibration(
+        method="least_squares" if method == "auto" else method,
+        names=names,
+        values=np.concatenate([p.values for p in parts]),
+        covariance=covariance,
+        units=tuple(UNITS[n.partition(".")[0]] for n in names),
+        chi2=0.0,
+        dof=0,
+        rms=float("nan"),
+        warnings=tuple(said),
+    )
+
+
+def _gyroscopes(seen: Observations) -> Closed:
+    """Bias, and what the positions or rates give besides."""
+    n = len(seen)
+    if seen.rotating.any():
+        return least_squares.gyroscopes(seen)
+    if seen.grade == "navigation" and seen.latitude is not None and n > 1:
+        return _by_the_earth(seen)
+    gain = np.tile(np.eye(3)[:, None] / n, (1, n, 1))  # (36)
+    return Closed.of([f"gyr_bias.{a}" for a in "xyz"], gain, seen, GYR)
+
+
+def _by_the_earth(seen: Observations) -> Closed:
+    """Bias and scale factor, (42)-(48), channel by channel."""
+    w = printed_earth_rate(seen) @ seen.mounting
+    gain = np.zeros((6, len(seen), 3))
+    kept = np.ones(6, dtype=bool)
+    for axis in range(3):
+        design = np.column_stack([np.ones(len(seen)), w[:, axis]])  # (42)
+        known, _ = determined(design)
+        kept[[axis, 3 + axis]] = known
+        gain[axis, :, axis], gain[3 + axis, :, axis] = np.linalg.pinv(design)
+    names = [f"gyr_{kind}.{a}" for kind in ("bias", "scale") for a in "xyz"]
+    return Closed.of(names, gain, seen, GYR).only(kept)
+
+
+def printed_earth_rate(observations: Observations) -> Array:
+    """Reference (40), (41) as printed, in procedure axes, (n, 3) rad/s; not for use."""
+    a, b = observations.angles
+    up, north = (EARTH_RATE * f(observations.known_latitude) for f in (np.sin, np.cos))
+    third = -up * np.sin(a) * np.sin(b) + north * np.cos(b)  # (41), sin for cos alpha
+    third = np.where((a == 0) & (b == 0), -up, third)  # (40)
+    second = up * np.cos(a) * np.cos(b) + north * np.sin(b)
+    return np.stack([up * np.sin(a), second, third], axis=1)

@@ -1,0 +1,94 @@
+"""What a design determines, and which further positions would determine the rest.
+
+Columns are scaled to length one, so that the rank does not depend on units; directions
+whose singular value is below `RCOND` of the largest are not determined, nor is a
+parameter with a component along one. Source: G. H. Golub and C. F. Van Loan, Matrix
+Computations, 5.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.model.planned import design
+from fieldcal.positions import Position
+from fieldcal.samples import Array
+from fieldcal.solve.observations import Observations
+
+Mask = NDArray[np.bool_]
+
+RCOND = 1e-7
+"""Ratio of singular values below which a direction counts as not determined."""
+
+ROUNDING = 1e-12
+"""Length of a column, as a share of the longest, that counts as zero."""
+
+LEAK = 1e-4
+"""Share of a null direction above which a parameter counts as not determined."""
+
+MOST = 4
+"""Positions that are proposed; of more, another procedure is the answer."""
+
+LADDER = tuple(
+    Position.deg(a, b)
+    for a, b in [(45, 5), (-45, 5), (45, -5), (45, 0), (0, 5), (22.5, 2.5), (90, 0),
+                 (0, 90), (180, 0), (45, 45)]
+)  # fmt: skip
+"""Positions that can be proposed: first within a small ladder, then beyond it."""
+
+
+def determined(rows: Array) -> tuple[Mask, int]:
+    """Which parameters (p,) a design (m, p) determines, and its rank."""
+    scale = np.linalg.norm(rows, axis=0)
+    # sin(180°) is not quite zero: what is left of such a column is rounding
+    scale = np.where(scale > ROUNDING * scale.max(initial=0.0), scale, np.inf)
+    _, s, vt = np.linalg.svd(rows / scale, full_matrices=True)
+    rank = int((s > RCOND * max(float(s.max(initial=0.0)), 1e-300)).sum())
+    known: Mask = (np.abs(vt[rank:]) < LEAK).all(axis=0)
+    return known, rank
+
+
+def remedy(
+    rows: Callable[[Sequence[Position]], Array],
+    taken: Sequence[Position],
+    candidates: Sequence[Position],
+) -> list[Position]:
+    """Further positions that would determine everything, fewest first.
+
+    Parameters
+    ----------
+    rows : design of positions, (n, c, p)
+    taken : the positions there are
+    candidates : positions that could be added
+
+    """
+    extra: list[Position] = []
+
+    def count(places: Sequence[Position]) -> tuple[int, int]:
+        table = rows(places)
+        known, rank = determined(table.reshape(-1, table.shape[-1]))
+        return int(known.sum()), rank  # ties go to what raises the rank
+
+    everything = rows(taken).shape[-1]
+    have = count(taken)
+    while have[0] < everything:
+        if len(extra) == MOST:
+            return []
+        found = [count([*taken, *extra, c]) for c in candidates]
+        best = max(range(len(found)), key=found.__getitem__)
+        if found[best] <= have:
+            return []
+        have, extra = found[best], [*extra, candidates[best]]
+    return extra
+
+
+def ladder_remedy(seen: Observations, names: Sequence[str]) -> list[str]:
+    """Names of the fewest positions of `LADDER` that would determine parameters."""
+
+    def rows(places: Sequence[Position]) -> Array:
+        return design(names, places, seen.gravity, seen.mounting)
+
+    return [p.name for p in remedy(rows, seen.positions, LADDER)]

@@ -1,0 +1,244 @@
+"""A given set, estimated, as a calibration with what the user must know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration import Calibration, Method
+from fieldcal.calibration.gauge import GROUPS
+from fieldcal.errors import NotObservable
+from fieldcal.samples import UNITS as CHANNEL_UNITS
+from fieldcal.solve import words
+from fieldcal.solve.assumed import Asked
+from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
+from fieldcal.solve.observations import Observations
+from fieldcal.solve.rank import ladder_remedy
+
+UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
+UNITS |= {"angle_offset": "deg", "base_tilt": "deg"}
+"""Unit of each group's components."""
+
+WRONG = 9.0
+"""chi2 per degree of freedom from which the model, not the noise, is at fault."""
+
+TURNED = 5
+"""Degrees of freedom of the turns from which their residual says something."""
+
+
+def calibration(
+    method: Method,
+    seen: Observations,
+    asked: Asked,
+    found: Estimated,
+    notes: Sequence[str],
+) -> Calibration:
+    """Put an estimate into a calibration.
+
+    Raises
+    ------
+    NotObservable
+        If it has no parameter, or the accelerometers were at rest and none of theirs
+        is determined.
+
+    """
+    names = _offered(found, seen)
+    rows = [found.names.index(n) for n in names]
+    values, covariance = found.values[rows], found.covariance[np.ix_(rows, rows)]
+    said = [*_open(method, seen, found), *notes, *_level(method, asked, seen)]
+    if not names or _blind(found, seen):
+        raise NotObservable("these positions determine nothing: " + "; ".join(said))
+    sigma = np.sqrt(np.diag(covariance))
+    odd = words.senseless(names, values, sigma, seen.nominal)
+    acc = found.acc if any(n.startswith("acc") for n in names) else found.gyr
+    good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < WRONG)
+    said += [
+        *_few(method, found),
+        words.bad_window(seen, found.bad),
+        *_scattered(found),
+    ]
+    return Calibration(
+        method=method,
+        names=names,
+        values=values,
+        covariance=covariance,
+        units=tuple(UNITS[n.partition(".")[0]] for n in names),
+        chi2=acc.chi2,
+        dof=acc.dof,
+        rms=found.acc.rms,
+        warnings=tuple(dict.fromkeys(w for w in [*odd, *said] if w)),
+        good=good,
+        info=_info(method, seen, asked, found),
+    )
+
+
+def _offered(found: Estimated, seen: Observations) -> tuple[str, ...]:
+    """Parameters that are worth having: of two positions no tilt that was only said."""
+    return found.names if seen.has_gyr else tuple(
+        n for n in found.names if not n.startswith("gyr")
+    )  # fmt: skip
+
+
+def _blind(found: Estimated, seen: Observations) -> bool:
+    """Whether the accelerometers at rest gave nothing, and no table turned."""
+    if not seen.has_acc or seen.rotating.any():
+        return False
+    return not any(n.startswith("acc") for n in found.names)
+
+
+def _open(method: Method, seen: Observations, found: Estimated) -> list[str]:
+    """Parameters that the rows leave open, and which positions would give them."""
+    said = []
+    acc = [
+        n for n in found.missing if n.startswith(("acc_", "cross_", "angle", "base"))
+    ]
+    if acc and found.given.wanted.level_deg is not None:
+        acc = [n for n in acc if not n.startswith("base_tilt")]
+    if acc:
+        said.append(
+            _scalar(acc, found, len(seen))
+            if method == "scalar"
+            else words.not_determined(acc, _remedy(seen, found), "these positions")
+        )
+    gyr = [n for n in found.missing if n.startswith("gyr_scale")]
+    cross = [n for n in found.missing if n.startswith("gyro_cross")]
+    if not found.given.wanted.gyr_scale and seen.has_gyr:
+        said.append(
+            "gyr_scale is not determined: the Earth's rate gives it only with two "
+            "known positions and the latitude"
+            if seen.grade == "navigation"
+            else words.NO_SCALE
+        )
+    elif gyr or cross:
+        said.append(_turning(gyr, cross, seen, found))
+    return said
+
+
+def _remedy(seen: Observations, found: Estimated) -> list[str]:
+    names = [n for n in found.given.names if not n.startswith("gyr")]
+    if any(n in found.missing for n in names) and not seen.rotating.any():
+        return ladder_remedy(seen, names)
+    return []
+
+
+def _turning(
+    gyr: Sequence[str], cross: Sequence[str], seen: Observations, found: Estimated
+) -> str:
+    """What of the gyroscopes turns or rates leave open."""
+    missing = [*gyr] + ([f"{len(cross)} of 6 gyro_cross_coupling"] if cross else [])
+    if not found.given.wanted.turned and not seen.rotating.any():
+        return (
+            f"{words.join(missing)} {'are' if missing[1:] else 'is'} left out: the"
+            " Earth's rate gives it only roughly in these windows; average longer, or"
+            " integrate turns between the positions"
+        )
+    about = sorted({"xyz"[int(n[-1]) - 1] for n in cross} | {n[-1] for n in gyr})
+    if seen.rotating.any():
+        return words.not_determined(
+            missing, [f"a rate of 20°/s about device axis {a}" for a in about],
+            "this schedule",
+        )  # fmt: skip
+    level = f"turns about device axis {words.join(about)} while that axis is level"
+    return words.not_determined(missing, [level], "these turns")
+
+
+def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
+    """What lengths of the force leave open."""
+    hidden = [m for m in missing if m.startswith("cross")]
+    if len(hidden) < len(missing):
+        return words.not_determined(
+            missing, ["positions with each axis up and down"], "these orientations"
+        )
+    pairs = [f"{'xyz'[int(h[-2]) - 1]} and {'xyz'[int(h[-1]) - 1]}" for h in hidden]
+    why = "axes held up and down alone cannot show it"
+    if n < 9:
+        why = f"{n} norms cannot carry 9 parameters"
+    elif found.acc.dof in words.FEW:
+        why += f" (and all nine would leave {words.FEW[found.acc.dof]})"
+    return (
+        f"{words.join(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
+        f" add positions with gravity half way between {words.join(pairs)}"
+    )
+
+
+def _few(method: Method, found: Estimated) -> list[str]:
+    """What so few windows cannot check."""
+    if np.isnan(found.acc.rms):
+        return []
+    if found.acc.dof <= 0:
+        return [words.NO_DOF]
+    if method == "scalar" and found.acc.dof in words.FEW:
+        return [
+            f"{words.FEW[found.acc.dof]}: the residual says nothing about the fit; add"
+            " positions in other orientations"
+        ]
+    return []
+
+
+def _level(method: Method, asked: Asked, seen: Observations) -> list[str]:
+    if method != "two_position" or asked.level_deg:
+        return []
+    moved = seen.gravity * np.deg2rad(0.1)
+    return [
+        "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to "
+        f"{moved:.3f} m/s^2 unseen; take five positions, or say how level it is"
+        " (--level)"
+    ]
+
+
+def _scattered(found: Estimated) -> list[str]:
+    """Scatter beyond the noise."""
+    what = "norms" if found.given.free.all() else "positions"
+    said = []
+    for name, agreed, channels in (
+        (what, found.acc, (0, 1, 2)), ("gyroscopes' means", found.gyr, (3, 4, 5)),
+    ):  # fmt: skip
+        if not np.isnan(agreed.rms):
+            spread, unit = scatter_of(found.found, channels), CHANNEL_UNITS[channels[0]]
+            said.append(words.excess(name, agreed.chi2, agreed.dof, spread, unit))
+    chi2, dof = _turns(found)
+    if dof >= TURNED:
+        said.append(words.excess("turns", chi2, dof, turns_scatter(found.found), "rad"))
+    return said
+
+
+def _turns(found: Estimated) -> tuple[float, int]:
+    """chi2 of the closures, and how many are left over."""
+    chi2, count = found.closures
+    spent = sum(n.startswith(("gyr_scale", "gyro_cross")) for n in found.names)
+    return chi2, max(0, count - spent)
+
+
+def _info(
+    method: Method, seen: Observations, asked: Asked, found: Estimated
+) -> dict[str, Any]:
+    known = seen.temperature[np.isfinite(seen.temperature)]
+    latitude = seen.latitude
+    out: dict[str, Any] = {
+        "conditions": {
+            "positions": len(seen),
+            "gravity": seen.gravity,
+            "latitude_deg": None if latitude is None else float(np.rad2deg(latitude)),
+            "temperature_degc": float(known.mean()) if len(known) else None,
+            "grade": seen.grade,
+        },
+        "bad_position": [round(float(p), 4) for p in found.bad],
+        "extra_scatter": scatter_of(found.found, (0, 1, 2)),
+        "angle_sigma_deg": asked.angles_deg,
+    }
+    if np.isfinite(found.acc.left_out):
+        out["left_out_rms"] = found.acc.left_out
+    if method == "two_position" and asked.level_deg:
+        out["level_sigma_deg"] = asked.level_deg
+    if seen.has_gyr:
+        gyr = found.gyr
+        out["gyroscopes"] = {
+            "chi2": gyr.chi2, "dof": gyr.dof, "rms": gyr.rms, "unit": "rad/s",
+            "extra_scatter": scatter_of(found.found, (3, 4, 5)),
+        }  # fmt: skip
+    if found.turns:
+        chi2, dof = _turns(found)
+        out["turns"] = {"chi2": chi2, "dof": dof}
+    return out

@@ -96,7 +96,7 @@ class Turns:
         out: list[TurnRows] = []
         self.scale, self.known = state.scale, known if self.way else None
         if self.dictionary.free.any():
-            self.means = _first_rows(windows, self.dictionary)
+            self.means = _means(windows, self.dictionary)
         out += [self._rows(t, state, values) for t in self.turning.turns(state)]
         return _steadied(out)
 
@@ -122,6 +122,10 @@ class Turns:
         at, closing, general = [], [], []
         for first, one in d.bases:
             if isinstance(one, Course):
+                if d.free.any():  # it turns the force that is seen at the ends
+                    width = 3 * one.width
+                    at.append(first + np.arange(width))
+                    closing.append(np.zeros((3, width)))
                 if not one.timed:
                     continue
                 table = one.of(view)
@@ -223,13 +227,15 @@ def _plane(across: Array) -> Array:
     return rows
 
 
-def _first_rows(windows: Sequence[Linear], d: Dictionary) -> Array:
-    """Columns of the accelerometers in the first row of each window, (p, 3, k)."""
+def _means(windows: Sequence[Linear], d: Dictionary) -> Array:
+    """Columns of the accelerometers in the mean of each window, (p, 3, k)."""
     out = np.zeros((len(d.held), 3, d.width))
     for part in windows:
         if part.channel < 3:
             first = np.flatnonzero(np.diff(part.window, prepend=-1))
-            table = part.design[first] / part.weight[first, None]
+            weight = part.weight[:, None]
+            table = np.add.reduceat(part.design * weight, first, axis=0)
+            table /= np.add.reduceat(weight**2, first, axis=0)
             out[part.window[first][:, None], part.channel, part.columns] = table
     return out
 

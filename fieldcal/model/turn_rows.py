@@ -97,6 +97,7 @@ class Turns:
         self.scale, self.known = state.scale, known if self.way else None
         if self.dictionary.free.any():
             self.means = _means(windows, self.dictionary)
+            self.spread = _spread(windows, self.dictionary)
         out += [self._rows(t, state, values) for t in self.turning.turns(state)]
         return _steadied(out)
 
@@ -117,7 +118,6 @@ class Turns:
         since = self.turning.after(turn.x.t, turn.positions[1])
         view = View(turn.x, turn.x, since, state)
         _, seen, across = geometry(turn.ends, turn.positions, turn.attitude, turn.done)
-        basis = _plane(across)
         weights = turn.weights(state.scale[3:])
         at, closing, general = [], [], []
         for first, one in d.bases:
@@ -141,21 +141,25 @@ class Turns:
                 kept = on_the_way(columns, d, self.known)
                 general.append((columns[kept], outputs[:, :, kept]))
         index, close = np.concatenate(at), np.concatenate(closing, axis=1)
-        if d.free.any():
-            close = close - self._of_loose_ends(turn, index)
+        ends: Array = np.zeros((3, 3))
+        for p, bent in self._loose_ends(turn) if d.free.any() else ():
+            close = close - bent @ self.means[p][:, index]
+            ends += (bent * self.spread[p]) @ bent.T
+            ends += (bent @ bent.T) * self.rows.wander**2
         there = np.abs(close).max(axis=0) > 0
         for columns, outputs in general:
             there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
         index = index[there]
-        close = basis @ close[:, there]
-        closure = basis @ seen + close @ values[index]
         spread = self.rows.noise[3:] / np.abs(state.scale[3:]) * np.sqrt(turn.interval)
         length = float(np.ptp(turn.x.t))
         wide = float(np.sqrt((spread**2).mean())) * np.sqrt(length)
         fading = settling(state, turn.x, since)[3:] / np.abs(state.scale[3:])
         unsure = BUILT_UP * length * float(np.abs(fading).max())
         earth = EARTH_RATE / 3**0.5 * length if d.free.any() else 0.0
-        info = np.full(len(basis), 1 / (wide**2 + turn.blur**2 + unsure**2 + earth**2))
+        alike = wide**2 + turn.blur**2 + unsure**2 + earth**2
+        basis, info = _plane(across, ends, alike)
+        close = basis @ close[:, there]
+        closure = basis @ seen + close @ values[index]
         way: Array = np.zeros(0)
         design: Array = np.zeros((0, len(index)))
         if self.known is not None:
@@ -163,20 +167,18 @@ class Turns:
             way, design = seen_by.rows(general, values, index)
         return TurnRows(turn.positions, closure, index, close, info, way, design)
 
-    def _of_loose_ends(self, turn: Turn, index: Index) -> Array:
-        """How the closure moves with the directions that outputs are taken for, (3, k).
+    def _loose_ends(self, turn: Turn) -> Iterator[tuple[int, Array]]:
+        """How the closure moves with what is added to the accelerometers at its ends.
 
-        Of a position of unknown orientation, what is added to the accelerometers turns
-        the force that they are taken to see: df = -(1 - n n^T) dU / k.
+        Of a position of unknown orientation, that turns the force that they are taken
+        to see: df = -(1 - n n^T) dU / k. Numbers of the two windows, (3, 3) each.
         """
-        out = np.zeros((3, len(index)))
         ends = turn.ends
         for p in turn.positions:
             row = int(np.argmax(ends.position == p))
             f = ends.f[row]
             up = f / np.linalg.norm(f)
             across = (np.eye(3) - np.outer(up, up)) / self.scale[:3]
-            moved = -across @ self.means[int(np.searchsorted(self.dictionary.held, p))]
             bent = np.zeros((3, 3))
             for j, step in enumerate(1e-4 * np.linalg.norm(f) * np.eye(3)):
                 sides = []
@@ -185,8 +187,7 @@ class Turns:
                     g[ends.position == p] = f + sign * step
                     sides.append(self._at_ends(turn, replace(ends, f=g))[1])
                 bent[:, j] = (sides[0] - sides[1]) / (2 * step[j])
-            out += bent @ moved[:, index]
-        return out
+            yield int(np.searchsorted(self.dictionary.held, p)), -bent @ across
 
     def _of_basis(
         self, turn: Turn, state: State, view: View, one: General
@@ -220,11 +221,20 @@ class Turns:
         return f, closure
 
 
-def _plane(across: Array) -> Array:
-    """Orthonormal rows that span what is known of a closure, (2 or 3, 3)."""
+def _plane(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:
+    """What is known of a closure: orthonormal rows, (2 or 3, 3), and information.
+
+    Parameters
+    ----------
+    across : (3, 3) projection on it
+    ends : (3, 3) covariance of what the forces at both ends leave of it, rad^2
+    alike : variance besides, rad^2
+
+    """
     values, axes = np.linalg.eigh(across)
-    rows: Array = axes[:, values > 0.5].T
-    return rows
+    plane: Array = axes[:, values > 0.5].T
+    spread, turned = np.linalg.eigh(plane @ ends @ plane.T)
+    return turned.T @ plane, 1 / (np.maximum(spread, 0.0) + alike)
 
 
 def _means(windows: Sequence[Linear], d: Dictionary) -> Array:
@@ -237,6 +247,17 @@ def _means(windows: Sequence[Linear], d: Dictionary) -> Array:
             table = np.add.reduceat(part.design * weight, first, axis=0)
             table /= np.add.reduceat(weight**2, first, axis=0)
             out[part.window[first][:, None], part.channel, part.columns] = table
+    return out
+
+
+def _spread(windows: Sequence[Linear], d: Dictionary) -> Array:
+    """Variance of the accelerometers' mean in each window, (p, 3)."""
+    out = d.common[:, :3] ** 2
+    for part in windows:
+        if part.channel < 3:
+            first = np.flatnonzero(np.diff(part.window, prepend=-1))
+            info = np.add.reduceat(part.weight**2, first)
+            out[part.window[first], part.channel] += 1 / info
     return out
 
 

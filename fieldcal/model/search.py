@@ -292,11 +292,22 @@ class Search:
         """The best of the set with one or two more, with one less, or with one else."""
         best = self._followed(there, there.score)
         if best is there:
-            best = self._paired(there)
+            best = self._paired(there, there.score)
         for i in range(len(best.members)):
             less = self.without(best, i)
-            best = max([best, less, self._followed(less, best.score)], key=_score)
+            best = max([best, less, *self._instead(less, best.score)], key=_score)
         return best
+
+    def _instead(self, less: Set, level: float) -> Iterator[Set]:
+        """The best sets with one, two or three causes in the place of one.
+
+        A function of many columns does for what several causes make together, of which
+        none alone is worth as much.
+        """
+        yield self._followed(less, level)
+        two = self._paired(less, level)
+        if two is not less:
+            yield self._followed(two, level)
 
     def _followed(self, there: Set, level: float) -> Set:
         """The best set with one more; the set itself if none comes near a level."""
@@ -307,26 +318,30 @@ class Search:
                 found.append(self.taken(there, offer))
         return max(found, key=_score)
 
-    def _paired(self, there: Set) -> Set:
-        """The best set with two more, of which neither is worth it alone."""
+    def _paired(self, there: Set, level: float) -> Set:
+        """The best set with two more, of which neither is worth it alone.
+
+        The set itself if none comes near a level.
+        """
         tried: dict[tuple[str, str], tuple[float, Offer, Offer]] = {}
         for table in self.tables(there):
             if not table.down:
                 continue
             known = [o for o in table.offers if o.member[0].kind != "unknown"]
-            some = known[:PROMISING]
+            some = list(_widened(known[:PROMISING]))
             groups, sizes = [o.member[1] for o in some], [o.size for o in some]
             for gain, (i, j), (u, v) in pairs(table.state, groups, sizes):
                 one, two = replace(some[i], size=u), replace(some[j], size=v)
                 key = (one.member[0].key, two.member[0].key)
+                if key[0] == key[1]:
+                    continue
                 total = table.score + gain + self._more(there, one, two)
                 if key not in tried or total > tried[key][0]:
                     tried[key] = (total, one, two)
-        found = [there]
-        for score, one, two in sorted(tried.values(), key=lambda t: -t[0])[:FOLLOWED]:
-            if score > there.score - 2 * SLACK:
-                found.append(self.taken(there, one, two))
-        return max(found, key=_score)
+        near = sorted(tried.values(), key=lambda t: -t[0])[:FOLLOWED]
+        near = [t for t in near if t[0] > level - 2 * SLACK]
+        found = [self.taken(there, one, two) for _, one, two in near]
+        return max(found, key=_score, default=there)
 
     def _more(self, there: Set, one: Offer, two: Offer) -> float:
         """Chance of two more causes beside those of a set, ln."""
@@ -362,6 +377,16 @@ LEAST = 0.5
 
 LOST = -12.0
 """Worth of an offer that no pair makes up for, ln."""
+
+
+def _widened(offers: Iterable[Offer]) -> Iterator[Offer]:
+    """Offers, each with all parameters as well: beside another it may need them."""
+    for offer in offers:
+        yield offer
+        cause, group = offer.member
+        whole = cause.variants[0]
+        if not group.shape and group.params != whole.params:
+            yield replace(offer, member=(cause, whole))
 
 
 def _score(one: Set) -> float:

@@ -44,6 +44,7 @@ class TurnRows:
     columns : (k,) of the dictionary
     design : (s, k) of the closure
     info : (s,) information, 1/rad^2
+    bent : (s, 3) by what it is off for accelerometers that are each off at both ends
     way, way_design : (r,), (r, k) whitened rows of the accelerometers on the way
 
     """
@@ -53,6 +54,7 @@ class TurnRows:
     columns: Index
     design: Array
     info: Array
+    bent: Array
     way: Array
     way_design: Array
 
@@ -142,10 +144,10 @@ class Turns:
                 general.append((columns[kept], outputs[:, :, kept]))
         index, close = np.concatenate(at), np.concatenate(closing, axis=1)
         ends: Array = np.zeros((3, 3))
-        for p, bent in self._loose_ends(turn) if d.free.any() else ():
+        loose = dict(self._loose_ends(turn)) if d.free.any() else {}
+        for p, bent in loose.items():
             close = close - bent @ self.means[p][:, index]
-            ends += (bent * self.spread[p]) @ bent.T
-            ends += (bent @ bent.T) * self.rows.wander**2
+            ends += (bent * (self.spread[p] + self.rows.wander**2)) @ bent.T
         there = np.abs(close).max(axis=0) > 0
         for columns, outputs in general:
             there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
@@ -160,12 +162,14 @@ class Turns:
         basis, info = _plane(across, ends, alike)
         close = basis @ close[:, there]
         closure = basis @ seen + close @ values[index]
+        off = [(basis @ bent) ** 2 for bent in loose.values()]
+        bent = np.sqrt(sum(off, np.zeros((len(basis), 3))))
         way: Array = np.zeros(0)
         design: Array = np.zeros((0, len(index)))
         if self.known is not None:
             seen_by = Way(turn, view, d, self.known, self.rows.noise)
             way, design = seen_by.rows(general, values, index)
-        return TurnRows(turn.positions, closure, index, close, info, way, design)
+        return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
 
     def _loose_ends(self, turn: Turn) -> Iterator[tuple[int, Array]]:
         """How the closure moves with what is added to the accelerometers at its ends.

@@ -295,19 +295,21 @@ class Search:
             best = self._paired(there, there.score)
         for i in range(len(best.members)):
             less = self.without(best, i)
-            best = max([best, less, *self._instead(less, best.score)], key=_score)
-        return best
+            best = max([best, less, self._followed(less, best.score)], key=_score)
+        others = [self._instead(best, i) for i in range(len(best.members))]
+        return max([best, *others], key=_score)
 
-    def _instead(self, less: Set, level: float) -> Iterator[Set]:
-        """The best sets with one, two or three causes in the place of one.
+    def _instead(self, there: Set, i: int) -> Set:
+        """The best set with two or three causes in the place of one without physics.
 
-        A function of many columns does for what several causes make together, of which
-        none alone is worth as much.
+        A function of many columns does for what several effects make
+        together, of which none alone is worth as much.
         """
-        yield self._followed(less, level)
-        two = self._paired(less, level)
-        if two is not less:
-            yield self._followed(two, level)
+        if there.members[i][0].kind != "unknown":
+            return there
+        less = self.without(there, i)
+        two = self._paired(less, there.score)
+        return there if two is less else self._followed(two, there.score)
 
     def _followed(self, there: Set, level: float) -> Set:
         """The best set with one more; the set itself if none comes near a level."""
@@ -327,14 +329,8 @@ class Search:
         for table in self.tables(there):
             if not table.down:
                 continue
-            known = [o for o in table.offers if o.member[0].kind != "unknown"]
-            some = list(_widened(known[:PROMISING]))
-            groups, sizes = [o.member[1] for o in some], [o.size for o in some]
-            for gain, (i, j), (u, v) in pairs(table.state, groups, sizes):
-                one, two = replace(some[i], size=u), replace(some[j], size=v)
+            for one, two, gain in _pairs(table):
                 key = (one.member[0].key, two.member[0].key)
-                if key[0] == key[1]:
-                    continue
                 total = table.score + gain + self._more(there, one, two)
                 if key not in tried or total > tried[key][0]:
                     tried[key] = (total, one, two)
@@ -379,14 +375,27 @@ LOST = -12.0
 """Worth of an offer that no pair makes up for, ln."""
 
 
-def _widened(offers: Iterable[Offer]) -> Iterator[Offer]:
-    """Offers, each with all parameters as well: beside another it may need them."""
-    for offer in offers:
-        yield offer
-        cause, group = offer.member
-        whole = cause.variants[0]
-        if not group.shape and group.params != whole.params:
-            yield replace(offer, member=(cause, whole))
+def _pairs(table: Table) -> Iterator[tuple[Offer, Offer, float]]:
+    """Every two offers of a table with their gain.
+
+    Each with all its parameters as well: beside the other it may need them.
+    """
+    known = [o for o in table.offers if o.member[0].kind != "unknown"][:PROMISING]
+    wide = [_widened(o) for o in known]
+    for some in (known, wide) if wide != known else (known,):
+        groups, sizes = [o.member[1] for o in some], [o.size for o in some]
+        for gain, (i, j), (u, v) in pairs(table.state, groups, sizes):
+            if some is known or some[i] != known[i] or some[j] != known[j]:
+                yield replace(some[i], size=u), replace(some[j], size=v), gain
+
+
+def _widened(offer: Offer) -> Offer:
+    """An offer with all the parameters that its cause has."""
+    cause, group = offer.member
+    whole = cause.variants[0]
+    if group.shape or group.params == whole.params:
+        return offer
+    return replace(offer, member=(cause, whole))
 
 
 def _score(one: Set) -> float:

@@ -178,6 +178,7 @@ def test_each_mean_has_the_information_that_the_rest_of_its_window_leaves(
         there = one.info[p] > 0
         cov = one.loose[p][there] @ one.loose[p][there].T
         spread = one.shared[p] ** 2 + TAU[one.kind[p]] ** 2
+        spread += one.bent[p] ** 2 @ TAU[:6] ** 2
         cov += np.diag(1 / one.info[p][there] + spread[there])
         agree(weight[there], np.diag(np.linalg.inv(cov)))
         assert not weight[~there].any()

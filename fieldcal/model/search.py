@@ -296,20 +296,20 @@ class Search:
         for i in range(len(best.members)):
             less = self.without(best, i)
             best = max([best, less, self._followed(less, best.score)], key=_score)
-        others = [self._instead(best, i) for i in range(len(best.members))]
-        return max([best, *others], key=_score)
+        return self._instead(best) if best is there else best
 
-    def _instead(self, there: Set, i: int) -> Set:
+    def _instead(self, there: Set) -> Set:
         """The best set with two or three causes in the place of one without physics.
 
-        A function of many columns does for what several effects make
-        together, of which none alone is worth as much.
+        A function of many columns does for what several effects make together, of which
+        none alone is worth as much: that of the most columns, when nothing else helps.
         """
-        if there.members[i][0].kind != "unknown":
+        width = [len(g.columns) * (c.kind == "unknown") for c, g in there.members]
+        if max(width, default=0) <= 1:
             return there
-        less = self.without(there, i)
+        less = self.without(there, int(np.argmax(width)))
         two = self._paired(less, there.score)
-        return there if two is less else self._followed(two, there.score)
+        return max([there, two, self._followed(two, there.score)], key=_score)
 
     def _followed(self, there: Set, level: float) -> Set:
         """The best set with one more; the set itself if none comes near a level."""

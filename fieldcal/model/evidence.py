@@ -54,6 +54,7 @@ class Gram:
     shared : (p, 6) standard deviation of what windows certainly share
     loose : (p, 6, 2) A_p
     kind : (p, 6) index of the instability of each mean; turns' closures have their own
+    bent : (p, 6, 6) by what a closure is off for an instability of one, by channel
     index : (all,) where each column of the dictionary stands here, -1 where it does not
 
     """
@@ -68,6 +69,7 @@ class Gram:
     shared: Array
     loose: Array
     kind: Index
+    bent: Array
     index: Index
 
     def only(self, columns: Index) -> Gram:
@@ -91,7 +93,7 @@ class Gram:
 
     def weighed(self, tau: Array) -> Weighed:
         """With instabilities by kind."""
-        spread = self.shared**2 + tau[self.kind] ** 2
+        spread = self.shared**2 + tau[self.kind] ** 2 + self.bent**2 @ tau[:6] ** 2
         if self.loose.any():
             return self._loosely(spread)
         weight = self.info / (1 + self.info * spread)
@@ -180,13 +182,16 @@ class Weighed:
     def shared(self, kind: int) -> Array:
         """Whitened columns of each mean of a kind by itself, (6 p, m)."""
         gram = self.gram
-        rows, slots = np.nonzero((gram.kind == kind) & (gram.info > 0))
+        size = (gram.kind == kind).astype(float)
+        if kind < 6:
+            size += gram.bent[:, :, kind]
+        rows, slots = np.nonzero((size > 0) & (gram.info > 0))
         out = np.zeros((len(self.weight), 6, len(rows)))
-        at = np.arange(len(rows))
+        at, by = np.arange(len(rows)), size[rows, slots]
         if self.root.size:
-            out[rows, :, at] = self.root[rows, :, slots]
+            out[rows, :, at] = self.root[rows, :, slots] * by[:, None]
         else:
-            out[rows, slots, at] = np.sqrt(self.weight[rows, slots])
+            out[rows, slots, at] = np.sqrt(self.weight[rows, slots]) * by
         return out.reshape(-1, len(rows))
 
 

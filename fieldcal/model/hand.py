@@ -44,7 +44,8 @@ def rows_of(source: Source) -> Rows:
     unsteady = np.sqrt(2.0) * angle / one.length
     one.sd[:, 3:] = np.hypot(one.sd[:, 3:], unsteady[:, None])
     first = np.searchsorted(rows.x.position, held)
-    return replace(one, common=rows.common[first])
+    force = angle * source.about.gravity * np.abs(source.about.nominal["acc_scale"])
+    return replace(one, common=rows.common[first], wander=float(force.mean()))
 
 
 def wander(rows: Rows) -> float:

@@ -51,6 +51,7 @@ class Rows:
     length : (n,) s
     noise : (6,) standard deviation of one sample
     span : (n, 2) instants of the first and the last sample, s
+    wander : rms of what a hand adds to the force across it within windows, m/s^2
 
     """
 
@@ -61,6 +62,7 @@ class Rows:
     length: Array
     noise: Array
     span: Array
+    wander: float = 0.0
 
     @property
     def used(self) -> NDArray[np.bool_]:

@@ -292,11 +292,24 @@ class Search:
         """The best of the set with one or two more, with one less, or with one else."""
         best = self._followed(there, there.score)
         if best is there:
-            best = self._paired(there)
+            best = self._paired(there, there.score)
         for i in range(len(best.members)):
             less = self.without(best, i)
             best = max([best, less, self._followed(less, best.score)], key=_score)
-        return best
+        return self._instead(best) if best is there else best
+
+    def _instead(self, there: Set) -> Set:
+        """The best set with two or three causes in the place of one without physics.
+
+        A function of many columns does for what several effects make together, of which
+        none alone is worth as much: that of the most columns, when nothing else helps.
+        """
+        width = [len(g.columns) * (c.kind == "unknown") for c, g in there.members]
+        if max(width, default=0) <= 1:
+            return there
+        less = self.without(there, int(np.argmax(width)))
+        two = self._paired(less, there.score)
+        return max([there, two, self._followed(two, there.score)], key=_score)
 
     def _followed(self, there: Set, level: float) -> Set:
         """The best set with one more; the set itself if none comes near a level."""
@@ -307,26 +320,24 @@ class Search:
                 found.append(self.taken(there, offer))
         return max(found, key=_score)
 
-    def _paired(self, there: Set) -> Set:
-        """The best set with two more, of which neither is worth it alone."""
+    def _paired(self, there: Set, level: float) -> Set:
+        """The best set with two more, of which neither is worth it alone.
+
+        The set itself if none comes near a level.
+        """
         tried: dict[tuple[str, str], tuple[float, Offer, Offer]] = {}
         for table in self.tables(there):
             if not table.down:
                 continue
-            known = [o for o in table.offers if o.member[0].kind != "unknown"]
-            some = known[:PROMISING]
-            groups, sizes = [o.member[1] for o in some], [o.size for o in some]
-            for gain, (i, j), (u, v) in pairs(table.state, groups, sizes):
-                one, two = replace(some[i], size=u), replace(some[j], size=v)
+            for one, two, gain in _pairs(table):
                 key = (one.member[0].key, two.member[0].key)
                 total = table.score + gain + self._more(there, one, two)
                 if key not in tried or total > tried[key][0]:
                     tried[key] = (total, one, two)
-        found = [there]
-        for score, one, two in sorted(tried.values(), key=lambda t: -t[0])[:FOLLOWED]:
-            if score > there.score - 2 * SLACK:
-                found.append(self.taken(there, one, two))
-        return max(found, key=_score)
+        near = sorted(tried.values(), key=lambda t: -t[0])[:FOLLOWED]
+        near = [t for t in near if t[0] > level - 2 * SLACK]
+        found = [self.taken(there, one, two) for _, one, two in near]
+        return max(found, key=_score, default=there)
 
     def _more(self, there: Set, one: Offer, two: Offer) -> float:
         """Chance of two more causes beside those of a set, ln."""
@@ -362,6 +373,29 @@ LEAST = 0.5
 
 LOST = -12.0
 """Worth of an offer that no pair makes up for, ln."""
+
+
+def _pairs(table: Table) -> Iterator[tuple[Offer, Offer, float]]:
+    """Every two offers of a table with their gain.
+
+    Each with all its parameters as well: beside the other it may need them.
+    """
+    known = [o for o in table.offers if o.member[0].kind != "unknown"][:PROMISING]
+    wide = [_widened(o) for o in known]
+    for some in (known, wide) if wide != known else (known,):
+        groups, sizes = [o.member[1] for o in some], [o.size for o in some]
+        for gain, (i, j), (u, v) in pairs(table.state, groups, sizes):
+            if some is known or some[i] != known[i] or some[j] != known[j]:
+                yield replace(some[i], size=u), replace(some[j], size=v), gain
+
+
+def _widened(offer: Offer) -> Offer:
+    """An offer with all the parameters that its cause has."""
+    cause, group = offer.member
+    whole = cause.variants[0]
+    if group.shape or group.params == whole.params:
+        return offer
+    return replace(offer, member=(cause, whole))
 
 
 def _score(one: Set) -> float:

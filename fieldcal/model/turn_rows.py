@@ -44,6 +44,7 @@ class TurnRows:
     columns : (k,) of the dictionary
     design : (s, k) of the closure
     info : (s,) information, 1/rad^2
+    bent : (s, 3) by what it is off for accelerometers that are each off at both ends
     way, way_design : (r,), (r, k) whitened rows of the accelerometers on the way
 
     """
@@ -53,6 +54,7 @@ class TurnRows:
     columns: Index
     design: Array
     info: Array
+    bent: Array
     way: Array
     way_design: Array
 
@@ -96,7 +98,8 @@ class Turns:
         out: list[TurnRows] = []
         self.scale, self.known = state.scale, known if self.way else None
         if self.dictionary.free.any():
-            self.means = _first_rows(windows, self.dictionary)
+            self.means = _means(windows, self.dictionary)
+            self.spread = _spread(windows, self.dictionary)
         out += [self._rows(t, state, values) for t in self.turning.turns(state)]
         return _steadied(out)
 
@@ -117,11 +120,14 @@ class Turns:
         since = self.turning.after(turn.x.t, turn.positions[1])
         view = View(turn.x, turn.x, since, state)
         _, seen, across = geometry(turn.ends, turn.positions, turn.attitude, turn.done)
-        basis = _plane(across)
         weights = turn.weights(state.scale[3:])
         at, closing, general = [], [], []
         for first, one in d.bases:
             if isinstance(one, Course):
+                if d.free.any():  # it turns the force that is seen at the ends
+                    width = 3 * one.width
+                    at.append(first + np.arange(width))
+                    closing.append(np.zeros((3, width)))
                 if not one.timed:
                     continue
                 table = one.of(view)
@@ -137,42 +143,46 @@ class Turns:
                 kept = on_the_way(columns, d, self.known)
                 general.append((columns[kept], outputs[:, :, kept]))
         index, close = np.concatenate(at), np.concatenate(closing, axis=1)
-        if d.free.any():
-            close = close - self._of_loose_ends(turn, index)
+        ends: Array = np.zeros((3, 3))
+        loose = dict(self._loose_ends(turn)) if d.free.any() else {}
+        for p, bent in loose.items():
+            close = close - bent @ self.means[p][:, index]
+            ends += (bent * (self.spread[p] + self.rows.wander**2)) @ bent.T
         there = np.abs(close).max(axis=0) > 0
         for columns, outputs in general:
             there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
         index = index[there]
-        close = basis @ close[:, there]
-        closure = basis @ seen + close @ values[index]
         spread = self.rows.noise[3:] / np.abs(state.scale[3:]) * np.sqrt(turn.interval)
         length = float(np.ptp(turn.x.t))
         wide = float(np.sqrt((spread**2).mean())) * np.sqrt(length)
         fading = settling(state, turn.x, since)[3:] / np.abs(state.scale[3:])
         unsure = BUILT_UP * length * float(np.abs(fading).max())
         earth = EARTH_RATE / 3**0.5 * length if d.free.any() else 0.0
-        info = np.full(len(basis), 1 / (wide**2 + turn.blur**2 + unsure**2 + earth**2))
+        alike = wide**2 + turn.blur**2 + unsure**2 + earth**2
+        basis, info = _plane(across, ends, alike)
+        close = basis @ close[:, there]
+        closure = basis @ seen + close @ values[index]
+        off = [(basis @ bent) ** 2 for bent in loose.values()]
+        bent = np.sqrt(sum(off, np.zeros((len(basis), 3))))
         way: Array = np.zeros(0)
         design: Array = np.zeros((0, len(index)))
         if self.known is not None:
             seen_by = Way(turn, view, d, self.known, self.rows.noise)
             way, design = seen_by.rows(general, values, index)
-        return TurnRows(turn.positions, closure, index, close, info, way, design)
+        return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
 
-    def _of_loose_ends(self, turn: Turn, index: Index) -> Array:
-        """How the closure moves with the directions that outputs are taken for, (3, k).
+    def _loose_ends(self, turn: Turn) -> Iterator[tuple[int, Array]]:
+        """How the closure moves with what is added to the accelerometers at its ends.
 
-        Of a position of unknown orientation, what is added to the accelerometers turns
-        the force that they are taken to see: df = -(1 - n n^T) dU / k.
+        Of a position of unknown orientation, that turns the force that they are taken
+        to see: df = -(1 - n n^T) dU / k. Numbers of the two windows, (3, 3) each.
         """
-        out = np.zeros((3, len(index)))
         ends = turn.ends
         for p in turn.positions:
             row = int(np.argmax(ends.position == p))
             f = ends.f[row]
             up = f / np.linalg.norm(f)
             across = (np.eye(3) - np.outer(up, up)) / self.scale[:3]
-            moved = -across @ self.means[int(np.searchsorted(self.dictionary.held, p))]
             bent = np.zeros((3, 3))
             for j, step in enumerate(1e-4 * np.linalg.norm(f) * np.eye(3)):
                 sides = []
@@ -181,8 +191,7 @@ class Turns:
                     g[ends.position == p] = f + sign * step
                     sides.append(self._at_ends(turn, replace(ends, f=g))[1])
                 bent[:, j] = (sides[0] - sides[1]) / (2 * step[j])
-            out += bent @ moved[:, index]
-        return out
+            yield int(np.searchsorted(self.dictionary.held, p)), -bent @ across
 
     def _of_basis(
         self, turn: Turn, state: State, view: View, one: General
@@ -216,21 +225,43 @@ class Turns:
         return f, closure
 
 
-def _plane(across: Array) -> Array:
-    """Orthonormal rows that span what is known of a closure, (2 or 3, 3)."""
+def _plane(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:
+    """What is known of a closure: orthonormal rows, (2 or 3, 3), and information.
+
+    Parameters
+    ----------
+    across : (3, 3) projection on it
+    ends : (3, 3) covariance of what the forces at both ends leave of it, rad^2
+    alike : variance besides, rad^2
+
+    """
     values, axes = np.linalg.eigh(across)
-    rows: Array = axes[:, values > 0.5].T
-    return rows
+    plane: Array = axes[:, values > 0.5].T
+    spread, turned = np.linalg.eigh(plane @ ends @ plane.T)
+    return turned.T @ plane, 1 / (np.maximum(spread, 0.0) + alike)
 
 
-def _first_rows(windows: Sequence[Linear], d: Dictionary) -> Array:
-    """Columns of the accelerometers in the first row of each window, (p, 3, k)."""
+def _means(windows: Sequence[Linear], d: Dictionary) -> Array:
+    """Columns of the accelerometers in the mean of each window, (p, 3, k)."""
     out = np.zeros((len(d.held), 3, d.width))
     for part in windows:
         if part.channel < 3:
             first = np.flatnonzero(np.diff(part.window, prepend=-1))
-            table = part.design[first] / part.weight[first, None]
+            weight = part.weight[:, None]
+            table = np.add.reduceat(part.design * weight, first, axis=0)
+            table /= np.add.reduceat(weight**2, first, axis=0)
             out[part.window[first][:, None], part.channel, part.columns] = table
+    return out
+
+
+def _spread(windows: Sequence[Linear], d: Dictionary) -> Array:
+    """Variance of the accelerometers' mean in each window, (p, 3)."""
+    out = d.common[:, :3] ** 2
+    for part in windows:
+        if part.channel < 3:
+            first = np.flatnonzero(np.diff(part.window, prepend=-1))
+            info = np.add.reduceat(part.weight**2, first)
+            out[part.window[first], part.channel] += 1 / info
     return out
 
 

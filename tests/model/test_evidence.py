@@ -108,8 +108,9 @@ def turn(rng: np.random.Generator, width: int) -> TurnRows:
     at = np.sort(rng.permutation(width)[:6])
     draw = rng.standard_normal
     return TurnRows(
-        (0, 1), draw(2), at, draw((2, 6)), rng.uniform(1, 4, 2), draw(3), draw((3, 6))
-    )
+        (0, 1), draw(2), at, draw((2, 6)), rng.uniform(1, 4, 2),
+        rng.uniform(0, 1, (2, 3)), draw(3), draw((3, 6)),
+    )  # fmt: skip
 
 
 def beside(windows: Dense, turns: list[TurnRows], tau: Array) -> Dense:
@@ -122,7 +123,8 @@ def beside(windows: Dense, turns: list[TurnRows], tau: Array) -> Dense:
         y += [one.closure, one.way]
         design.append(whole)
         white += [1 / np.sqrt(one.info), np.ones(len(one.way))]
-        spread += [np.full(len(one.closure), tau[CLOSURE]), np.zeros(len(one.way))]
+        ends = np.sqrt(tau[CLOSURE] ** 2 + one.bent**2 @ tau[:3] ** 2)
+        spread += [ends, np.zeros(len(one.way))]
     n, sd = len(windows.y), np.concatenate(white)
     cov = np.diag(sd**2)
     cov[:n, :n] = windows.cov
@@ -176,6 +178,7 @@ def test_each_mean_has_the_information_that_the_rest_of_its_window_leaves(
         there = one.info[p] > 0
         cov = one.loose[p][there] @ one.loose[p][there].T
         spread = one.shared[p] ** 2 + TAU[one.kind[p]] ** 2
+        spread += one.bent[p] ** 2 @ TAU[:6] ** 2
         cov += np.diag(1 / one.info[p][there] + spread[there])
         agree(weight[there], np.diag(np.linalg.inv(cov)))
         assert not weight[~there].any()

@@ -17,7 +17,7 @@ from fieldcal.model.search import Search, Set
 from fieldcal.model.state import Term
 from fieldcal.model.system import gram
 from fieldcal.model.turn_rows import TurnRows
-from fieldcal.samples import Array
+from fieldcal.samples import Array, Block
 from fieldcal.sim_device.profile import (
     ONE,
     ZERO,
@@ -28,7 +28,7 @@ from fieldcal.sim_device.profile import (
     Truth,
 )
 from fieldcal.sim_device.replay import Window, simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import Effect, effect
 
 PLACES = ((0.0, 0.0), (60.0, 0.0), (60.0, -40.0), (-30.0, -40.0), (-30.0, 20.0),
           (20.0, 50.0))  # fmt: skip
@@ -74,8 +74,8 @@ class Ride:
     turns: list[TurnRows]
 
 
-@cache
-def ride(name: str) -> Ride:
+def recorded(*errors: Effect) -> tuple[Block, list[Window]]:
+    """A device with some errors in all places."""
     starts = SPACING_S * np.arange(len(PLACES)) + 1.0
     angles = np.deg2rad(PLACES)
     windows = [
@@ -87,8 +87,14 @@ def ride(name: str) -> Ride:
         noise=QUIET,
         temperature=Climate(self_heating_k=0.0),
         sampling=Sampling(100.0),
-        effects=(effect(name, ERRORS[name]),),
+        effects=errors,
     )
+    return simulate(device, windows, seed=3), windows
+
+
+@cache
+def ride(name: str) -> Ride:
+    block, windows = recorded(effect(name, ERRORS[name]))
     places = [
         {"alpha_deg": a, "beta_deg": b, "start_s": w.start, "end_s": w.end}
         for (a, b), w in zip(PLACES, windows, strict=True)
@@ -97,7 +103,7 @@ def ride(name: str) -> Ride:
         "format": 1, "device": {"name": "turned"}, "position": places,
         "site": {"latitude_deg": 50.45, "height_m": 170.0},
     })  # fmt: skip
-    prepared = prepare(simulate(device, windows, seed=3), about)
+    prepared = prepare(block, about)
     inference = inference_of(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)
@@ -194,3 +200,27 @@ def test_the_time_since_a_turn_counts_from_where_it_ends() -> None:
     since = turning.after(np.array([ended[0] - 0.5, ended[0], ended[0] + 2.0]), 2)
     np.testing.assert_allclose(since[0], [np.inf, 0.0, 2.0], atol=1e-9)
     assert abs(ended[0] - (2 * SPACING_S)) < 0.7
+
+
+def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
+    """Without known angles a closure begins and ends at the forces that are seen."""
+    block, windows = recorded()
+    places = [{"start_s": w.start, "end_s": w.end} for w in windows]
+    prepared = prepare(block, parse({"format": 1, "position": places}))
+    inference = inference_of(prepared.source, prepared.rows, prepared)
+    d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
+    linear = inference.system.linearised(inference.nominal)
+    assert inference.turns is not None and d.free.all()
+    turns = inference.turns.linearised(inference.nominal, at_rest, linear, None)
+    assert len(turns) > 3
+    for turn in turns:
+        whole = np.zeros((len(turn.closure), d.width))
+        whole[:, turn.columns] = turn.design
+        for c in range(3):
+            each = whole[:, d.windows + c * len(d.held) + np.arange(len(d.held))]
+            assert np.flatnonzero(each.any(axis=0)).tolist() == list(turn.positions)
+            for found, expected in (
+                (each.sum(axis=1), whole[:, d.bias + c]),
+                (np.linalg.norm(each, axis=1), turn.bent[:, c]),
+            ):
+                np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9)

@@ -8,7 +8,7 @@ positions whose orientation nobody knows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -165,6 +165,11 @@ class Dictionary(Table):
         self.causes = [more if c is cause else c for c in self.causes]
         self._changed()
         return more
+
+    def joined(self, causes: Iterable[Cause]) -> None:
+        """Take in causes that are made of what others leave."""
+        self.causes = [*self.causes, *causes]
+        self._changed()
 
     def _changed(self) -> None:
         """Forget what was made of the causes as they were."""

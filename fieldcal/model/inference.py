@@ -17,6 +17,7 @@ from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram
 from fieldcal.model.fitted import whole
+from fieldcal.model.proportion import in_proportion
 from fieldcal.model.search import SETTLED, Search, Set
 from fieldcal.model.sizing import Member, Sizes
 from fieldcal.model.state import State, Term
@@ -93,6 +94,8 @@ class Inference:
             state, values, found = far
         else:
             self.turned = turned
+        about = dict.fromkeys([found, search.evaluated(())])
+        self.dictionary.joined(in_proportion(self.dictionary, list(about)))
         for _ in range(PASSES):
             seen.add(search.key(found.members))
             if found.members != members:
@@ -235,6 +238,7 @@ class Inference:
 
     def gram(self, state: State, values: Array, known: Set | None) -> Gram:
         """What all rows say of all columns about a state."""
+        values = self._padded(values)
         linear = self.system.linearised(state)
         if self.turns is not None:
             self.turned = self.turns.linearised(state, values, linear, known)

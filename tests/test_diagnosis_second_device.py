@@ -70,10 +70,6 @@ def test_angles_set_by_hand_say_nothing_of_the_gyroscopes(tmp_path: Path) -> Non
     agrees(said, "angle_setting", {"sigma_deg": 0.2})
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the waves that carry a walk are too few for one this far above the noise",
-)
 def test_a_walk_beyond_the_noise_of_a_second(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, walk)
     assert named(said) == ["random_walk"]

@@ -26,6 +26,7 @@ from fieldcal.model.evidence import Index
 from fieldcal.model.random_causes import flicker, of_chance
 from fieldcal.model.table import Table
 from fieldcal.model.unknown_causes import of_no_effect
+from fieldcal.model.wander import Wander
 from fieldcal.samples import Array
 
 
@@ -40,6 +41,7 @@ class Dictionary(Table):
     common : (p, 6) standard deviation of an error that all rows of a window share
     unit : (6,) outputs per SI unit
     turns : whether the way between positions is seen
+    wander : how the biases wander inside windows
 
     """
 
@@ -51,8 +53,9 @@ class Dictionary(Table):
         common: Array,
         unit: Array,
         turns: bool,
+        wander: Wander,
     ) -> None:
-        super().__init__(x, used, since, unit)
+        super().__init__(x, used, since, unit, wander)
         self.common, self.turns = common, turns
         self.earth = -1
         self.always: list[Group] = list(self._calibration())

@@ -57,14 +57,15 @@ def _walks(
     share: float,
 ) -> Cause:
     """Walks of some channels together, or of one of them."""
-    shape = table.span.walk()
+    shape, modes = table.span.walk(), table.wander.modes
     groups = tuple(
         Group(
             effect.id, "".join(CHANNELS[c] for c in some),
-            np.concatenate([table.wave(c) for c in some]),
-            np.concatenate(
-                [shape * effect.params[c].typical * table.unit[c] for c in some]
-            ),
+            np.concatenate([table.wave(c, modes[c]) for c in some]),
+            np.concatenate([
+                shape[: modes[c]] * effect.params[c].typical * table.unit[c]
+                for c in some
+            ]),
             effect,
             params=tuple(some),
         )

@@ -68,7 +68,8 @@ class System:
         out = []
         for c in self.dictionary.seen:
             use = np.flatnonzero(used[:, c])
-            weight = 1 / rows.sd[use, c]
+            left = self.dictionary.wander.left(rows.length[use], int(c))
+            weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
             design = np.hstack([table[use] for _, table in parts[c]]) * weight[:, None]
             columns = np.concatenate([at for at, _ in parts[c]])
             window = np.searchsorted(self.dictionary.held, rows.x.position[use])

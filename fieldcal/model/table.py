@@ -12,6 +12,7 @@ from fieldcal.model import columns, unknown
 from fieldcal.model.causes import Basis
 from fieldcal.model.columns import Course, General
 from fieldcal.model.evidence import Index
+from fieldcal.model.wander import Wander
 from fieldcal.samples import Array
 
 
@@ -24,6 +25,7 @@ class Table:
     used : (n, 6) rows that say something, by channel
     since : (o, n) s since the turn, by origin
     unit : (6,) outputs per SI unit
+    wander : how the biases wander inside windows
 
     Attributes
     ----------
@@ -36,13 +38,19 @@ class Table:
     """
 
     def __init__(
-        self, x: Experience, used: NDArray[np.bool_], since: Array, unit: Array
+        self,
+        x: Experience,
+        used: NDArray[np.bool_],
+        since: Array,
+        unit: Array,
+        wander: Wander,
     ) -> None:
         self.x, self.used, self.since, self.unit = x, used, since, unit
         self.seen = np.flatnonzero(np.any(used, axis=0))
         self.held = np.unique(x.position)
         self.places = int(x.position.max()) + 1
-        self.span = unknown.Span(x.t)
+        self.wander = wander
+        self.span = unknown.Span(x.t, int(wander.modes.max()))
         self.bases: list[tuple[int, Basis]] = []
         self.width = 0
         self.bias = self.add(General("bias", columns.bias), 6)
@@ -50,7 +58,7 @@ class Table:
         turns = General("aside", columns.aside, sides=columns.aside_sides)
         self.aside = self.add(turns, 2 * self.places)
         self.windows = self.course("window", self._inside, len(self.held), False)
-        self.waves = self.course("waves", self.span.waves, unknown.WAVES, True)
+        self.waves = self.course("waves", self.span.waves, self.span.count, True)
 
     def add(self, basis: Basis, width: int) -> int:
         """Append a basis; back comes its first column."""
@@ -68,9 +76,9 @@ class Table:
         """
         return self.add(Course(name, lambda v: of(v.x), width, timed), 6 * width)
 
-    def wave(self, channel: int) -> Index:
-        """Columns of a channel's cosines, (WAVES,)."""
-        at: Index = self.waves + channel * unknown.WAVES + np.arange(unknown.WAVES)
+    def wave(self, channel: int, count: int = unknown.WAVES) -> Index:
+        """Columns of a channel's first cosines, (count,)."""
+        at: Index = self.waves + channel * self.span.count + np.arange(count)
         return at
 
     def window(self, channel: int) -> Index:

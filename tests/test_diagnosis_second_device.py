@@ -105,10 +105,6 @@ def test_a_drift_is_no_noise(tmp_path: Path) -> None:
     agrees(said, "bias_drift", {"ax": 1e-4, "ay": -8e-5})
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the model takes the smoothed temperature and its rate to be exact",
-)
 def test_a_temperature_that_rises_once_leaves_it_open(tmp_path: Path) -> None:
     """Towards an end at an even pace: its rate is as good as itself, or as time."""
     said = diagnosed(tmp_path / "s", TACTICAL, heating)

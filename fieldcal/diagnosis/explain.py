@@ -124,9 +124,10 @@ def explain(prepared: Prepared) -> Explanation:
         found.values,
         found.search.reported(found.best),
     )
-    return Explanation(
-        prepared, found, best, base_of(inference), Posterior(found.search, found.best)
+    posterior = Posterior(
+        found.search, found.best, lambda there: inference.beside(found, there)
     )
+    return Explanation(prepared, found, best, base_of(inference), posterior)
 
 
 def inference_of(source: Source, rows: Rows, prepared: Prepared) -> Inference:

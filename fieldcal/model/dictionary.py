@@ -76,6 +76,12 @@ class Dictionary(Table):
         out.always = [replace(g, fixed=free) for g in known]
         return out
 
+    def apart(self) -> Dictionary:
+        """The same, of which columns that are added are its own."""
+        out = copy(self)
+        out.bases = list(self.bases)
+        return out
+
     @cached_property
     def by_width(self) -> list[tuple[Index, Array, Index, Index]]:
         """Groups of causes, those alike in width together.

@@ -148,6 +148,25 @@ class Inference:
                 members = self._refined(state, values, members, i, sizes)
         return members
 
+    def beside(self, found: Inferred, there: Set) -> Set:
+        """A set with its shapes refined, but for those that what was found has.
+
+        What that takes of columns is not in the dictionary afterwards.
+        """
+        own = Inference(self.system.apart(), self.nominal)
+        own.turned = list(found.turned)
+        members, known = there.members, [g for _, g in found.best.members]
+        for i, (_, group) in enumerate(members):
+            if group.shape and group.effect is not None and group not in known:
+                members = own._refined(
+                    found.state, found.values, members, i, there.sizes
+                )
+        values = own._padded(found.values)
+        wanted = own.wanted(members) | (values != 0)
+        linear = own.system.linearised(found.state, wanted)
+        search = Search(own.dictionary, own.gram_of(linear, values, wanted))
+        return search.evaluated(members, there.sizes)
+
     def _refined(
         self,
         state: State,

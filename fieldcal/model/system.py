@@ -44,6 +44,10 @@ class System:
     def __init__(self, rows: Rows, dictionary: Dictionary) -> None:
         self.rows, self.dictionary = rows, dictionary
 
+    def apart(self) -> System:
+        """The same rows with a dictionary of their own, as it is now."""
+        return System(self.rows, self.dictionary.apart())
+
     def linearised(
         self, state: State, wanted: NDArray[np.bool_] | None = None
     ) -> list[Linear]:

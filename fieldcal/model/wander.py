@@ -83,20 +83,29 @@ class Wander:
 
     def left(self, length: Array, channel: int) -> Array:
         """Variance that its cosines leave of means over some lengths, (n,)."""
-        whole = self.length / (np.pi**2 * self.modes[channel])
-        out: Array = self.speed[channel] ** 2 * np.maximum(whole - length / 6, 0.0)
-        return out  # (2)
-
-    def apart(self, t: Array, length: Array, channel: int) -> Array:
-        """Covariance of what its cosines leave of means about some instants, (n, n)."""
-        count = int(self.modes[channel])
-        x = np.pi * np.abs(np.subtract.outer(t, t)) / max(self.length, 1e-9)
-        k = np.arange(1, count + 1)
-        taken = np.cos(np.multiply.outer(x, k)) @ (1 / k**2)
-        left = np.pi**2 / 6 - np.pi * x / 2 + x**2 / 4 - taken  # (3)
-        out: Array = self.speed[channel] ** 2 * self.length / np.pi**2 * left
-        out.flat[:: len(t) + 1] = self.left(length, channel)
+        part = _left(self.length, length, int(self.modes[channel]))
+        out: Array = self.speed[channel] ** 2 * part
         return out
+
+    def apart(self, t: Array, length: Array) -> Array:
+        """Covariance that they leave of means about some instants, (6, n, n)."""
+        x = np.pi * np.abs(np.subtract.outer(t, t)) / max(self.length, 1e-9)
+        shares = {}
+        for count in np.unique(self.modes).tolist():
+            k = np.arange(1, count + 1)
+            taken = np.cos(np.multiply.outer(x, k)) @ (1 / k**2)
+            left = np.pi**2 / 6 - np.pi * x / 2 + x**2 / 4 - taken
+            shares[count] = self.length / np.pi**2 * left  # (3)
+            shares[count].flat[:: len(t) + 1] = _left(self.length, length, count)
+        every = np.stack([shares[count] for count in self.modes.tolist()])
+        out: Array = self.speed[:, None, None] ** 2 * every
+        return out
+
+
+def _left(whole: float, length: Array, count: int) -> Array:
+    """Variance that cosines leave of means of a walk of 1 per sqrt(s), (n,)."""
+    left: Array = np.maximum(whole / (np.pi**2 * count) - length / 6, 0.0)  # (2)
+    return left
 
 
 def _speed(rows: Rows, unit: Array) -> Array:

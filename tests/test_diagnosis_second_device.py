@@ -70,10 +70,6 @@ def test_angles_set_by_hand_say_nothing_of_the_gyroscopes(tmp_path: Path) -> Non
     agrees(said, "angle_setting", {"sigma_deg": 0.2})
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the waves that carry a walk are too few for one this far above the noise",
-)
 def test_a_walk_beyond_the_noise_of_a_second(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, walk)
     assert named(said) == ["random_walk"]
@@ -86,13 +82,7 @@ def test_a_line_that_shakes_three_windows(tmp_path: Path) -> None:
     agrees(said, "vibration_rectification", {"x": 5e-3, "y": -4e-3, "z": 3e-3})
 
 
-IN_STEP = pytest.mark.xfail(
-    strict=True,
-    reason="the model has no random part that all axes follow in one proportion",
-)
-
-
-@pytest.mark.parametrize("fault", [pytest.param(play, marks=IN_STEP), course])
+@pytest.mark.parametrize("fault", [play, course])
 def test_axes_that_go_together_do_not_wander(tmp_path: Path, fault: Fault) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, fault)
     assert said.verdict == "unexplained" and "random_walk" not in named(said)
@@ -115,10 +105,6 @@ def test_a_drift_is_no_noise(tmp_path: Path) -> None:
     agrees(said, "bias_drift", {"ax": 1e-4, "ay": -8e-5})
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the model takes the smoothed temperature and its rate to be exact",
-)
 def test_a_temperature_that_rises_once_leaves_it_open(tmp_path: Path) -> None:
     """Towards an end at an even pace: its rate is as good as itself, or as time."""
     said = diagnosed(tmp_path / "s", TACTICAL, heating)

@@ -23,6 +23,7 @@ from fieldcal.model.state import State
 from fieldcal.model.system import System
 from fieldcal.model.turn import Turning
 from fieldcal.model.turn_rows import Turns
+from fieldcal.model.wander import Wander
 from fieldcal.samples import Array
 
 ROUGH = 0.7
@@ -123,9 +124,10 @@ def explain(prepared: Prepared) -> Explanation:
         found.values,
         found.search.reported(found.best),
     )
-    return Explanation(
-        prepared, found, best, base_of(inference), Posterior(found.search, found.best)
+    posterior = Posterior(
+        found.search, found.best, lambda there: inference.beside(found, there)
     )
+    return Explanation(prepared, found, best, base_of(inference), posterior)
 
 
 def inference_of(source: Source, rows: Rows, prepared: Prepared) -> Inference:
@@ -136,9 +138,11 @@ def inference_of(source: Source, rows: Rows, prepared: Prepared) -> Inference:
     held = np.unique(rows.x.position)
     common = np.array([rows.common[rows.x.position == p][0] for p in held])
     nominal = nominal_of(about, int(rows.x.position.max()) + 1, prepared)
+    unit = np.abs(nominal.scale)
     dictionary = Dictionary(
-        rows.x, rows.used, origins(source, rows), common, np.abs(nominal.scale), turned
-    )
+        rows.x, rows.used, origins(source, rows), common, unit, turned,
+        Wander.of(rows, unit),
+    )  # fmt: skip
     grain = grain_of(source.block, spans(source.block, about))
     rough = bool((grain[:3] > ROUGH * rows.noise[:3]).any())
     turning = Turning(source, rows, dictionary.since)

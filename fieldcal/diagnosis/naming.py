@@ -21,7 +21,7 @@ from fieldcal.model.fitted import Fitted
 from fieldcal.model.held_out import turns_foretold
 from fieldcal.model.posterior import Standing
 from fieldcal.model.search import Set
-from fieldcal.model.sizing import Member
+from fieldcal.model.sizing import Member, likeliest
 from fieldcal.model.way import ARRIVAL_S
 from fieldcal.samples import CHANNELS, Array
 
@@ -149,26 +149,30 @@ def shape_of(explanation: Explanation, member: Member) -> tuple[float, float]:
 
 def estimates(found: Set, columns: Index) -> tuple[Array, Array, Array]:
     """Values, sigmas and sizes before the rows of some columns of a set."""
-    at = np.array([int(np.flatnonzero(found.state.columns == c)[-1]) for c in columns])
+    at = _places(found, columns)
     value, sigma = found.state.estimate[at], np.sqrt(np.diag(found.state.inverse)[at])
     return value, sigma, found.state.sizes[at]
+
+
+def _places(found: Set, columns: Index) -> Index:
+    """Where columns stand in a set; a member's come last."""
+    return np.array(
+        [int(np.flatnonzero(found.state.columns == c)[-1]) for c in columns]
+    )
 
 
 def sizes(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
     """Sizes of what is random, with their uncertainty from the information on ln v."""
     best, out = explanation.best.set, {}
+    effect = catalogue()[standing.name]
     for member in standing.members:
         group = member[1]
-        effect = catalogue()[standing.name]
-        i = best.members.index(member)
-        v = float(priors.SIZES[best.sizes.members[i]])
-        _, sigma, wide = estimates(best, group.columns)
-        known = 2 * float(((1 - (sigma / wide) ** 2) ** 2).sum())
-        part = 1 / np.sqrt(max(known, 0.1))
+        tried = float(priors.SIZES[best.sizes.members[best.members.index(member)]])
+        v, part = likeliest(best.state, _places(best, group.columns), tried)
         names = [effect.params[c] for c in group.params] or list(effect.params)
         for param in names:
             size = v * param.typical
-            out[param.name] = Quantity(size, size * float(part), param.unit)
+            out[param.name] = Quantity(size, size * part, param.unit)
     return out
 
 

@@ -8,25 +8,29 @@ positions whose orientation nobody knows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Effect, Experience, Motion, Scatter, Sensor, catalogue
+from fieldcal.effects import Experience
 from fieldcal.frames import EARTH_RATE
-from fieldcal.model import columns, priors, unknown
-from fieldcal.model.causes import CLOSURE, FEW, TRIADS, Basis, Cause, Group, Point
-from fieldcal.model.columns import Course, General
+from fieldcal.model import columns, priors
+from fieldcal.model.causes import CLOSURE, FEW, TRIADS, Cause, Group
+from fieldcal.model.columns import General
+from fieldcal.model.effect_causes import at_points, of_effects
 from fieldcal.model.evidence import Index
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.model.random_causes import flicker, of_chance
+from fieldcal.model.table import Table
+from fieldcal.model.unknown_causes import of_no_effect
+from fieldcal.model.wander import Wander
+from fieldcal.samples import Array
 
 
-class Dictionary:
+class Dictionary(Table):
     """All columns of a session, and the groups made of them.
 
     Parameters
@@ -37,6 +41,7 @@ class Dictionary:
     common : (p, 6) standard deviation of an error that all rows of a window share
     unit : (6,) outputs per SI unit
     turns : whether the way between positions is seen
+    wander : how the biases wander inside windows
 
     """
 
@@ -48,24 +53,17 @@ class Dictionary:
         common: Array,
         unit: Array,
         turns: bool,
-        known: Sequence[str] = (),
+        wander: Wander,
     ) -> None:
-        self.x, self.used, self.since, self.unit = x, used, since, unit
-        self.seen = np.flatnonzero(np.any(used, axis=0))
-        self.held = np.unique(x.position)
-        self.places = int(x.position.max()) + 1
-        self.span = unknown.Span(x.t)
-        self.rated, self.turns = bool(x.rate.any()), turns
-        self.bases: list[tuple[int, Basis]] = []
-        self.width, self.earth = 0, -1
-        self.always: list[Group] = []
-        self.causes: list[Cause] = []
-        self._calibration(used)
-        self.common = common
+        super().__init__(x, used, since, unit, wander)
+        self.common, self.turns = common, turns
+        self.earth = -1
+        self.always: list[Group] = list(self._calibration())
+        self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
-        self._effects()
-        self._random()
-        self._unknown()
+        if len(self.held) < FEW:
+            self.always += flicker(self)
+        self.causes = [*of_effects(self), *of_chance(self), *of_no_effect(self)]
 
     def plain(self) -> Dictionary:
         """The same with what a simulation has only, bias and scale factor being free.
@@ -76,6 +74,12 @@ class Dictionary:
         known = (g for g in self.always if g.in_state and g.cause != "earth")
         free = float(priors.SIZES[-1])
         out.always = [replace(g, fixed=free) for g in known]
+        return out
+
+    def apart(self) -> Dictionary:
+        """The same, of which columns that are added are its own."""
+        out = copy(self)
+        out.bases = list(self.bases)
         return out
 
     @cached_property
@@ -117,148 +121,41 @@ class Dictionary:
         """Columns that windows show; filled in by the first linearisation."""
         return np.zeros(self.width, dtype=bool)
 
-    def _add(self, basis: Basis, width: int) -> int:
-        """Append a basis; back comes its first column."""
-        start = self.width
-        self.bases.append((start, basis))
-        self.width += width
-        return start
-
-    def _course(
-        self,
-        name: str,
-        of: Callable[[Experience], Array],
-        width: int,
-        timed: bool,
-    ) -> int:
-        return self._add(Course(name, lambda v: of(v.x), width, timed), 6 * width)
-
-    def _calibration(self, used: NDArray[np.bool_]) -> None:
-        """Bias, scale factor, Earth's rate, unknown orientations."""
-        first = self._add(General("bias", columns.bias), 6)
-        self.bias = first
-        sizes = np.array([priors.BIAS_ACC] * 3 + [priors.BIAS_GYR] * 3) * self.unit
+    def _calibration(self) -> Iterator[Group]:
+        """Bias, scale factor, Earth's rate."""
+        sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
         for part, channels in TRIADS:
             at = np.intersect1d(channels, self.seen)
             if len(at):
-                self.always.append(
-                    Group("bias", part, first + at, sizes[at], in_state=True)
-                )
-        first = self.scale = self._add(General("scale", columns.scale), 6)
+                yield Group("bias", part, self.bias + at, sizes[at], in_state=True)
+        rated = bool(self.x.rate.any())
         for part, channels in TRIADS:
             at = np.intersect1d(channels, self.seen)
-            if len(at) and (part == "acc" or self.rated):
-                typical = priors.SCALE * self.unit[at]
-                self.always.append(
-                    Group(
-                        "scale",
-                        part,
-                        first + at,
-                        typical,
-                        in_state=True,
-                        in_step=True,
-                    )
-                )
-        self.free = np.array(
-            [
-                bool(used[self.x.position == p, :3].any())
-                and not self.x.oriented[self.x.position == p].all()
-                for p in self.held
-            ]
-        )
-        turns = General("aside", columns.aside, sides=columns.aside_sides)
-        self.aside = self._add(turns, 2 * self.places)
+            if len(at) and (part == "acc" or rated):
+                yield Group(
+                    "scale", part, self.scale + at, priors.SCALE * self.unit[at],
+                    in_state=True, in_step=True,
+                )  # fmt: skip
         gyro = bool(len(np.intersect1d(self.seen, (3, 4, 5))))
         if gyro and self.x.oriented.any() and not self.x.base_rate.any():
-            first = self.earth = self._add(
-                General("earth", columns.earth, sides=columns.earth_sides), 3
-            )
+            earth = General("earth", columns.earth, sides=columns.earth_sides)
+            self.earth = self.add(earth, 3)
             size = np.full(3, EARTH_RATE)
-            at = first + np.arange(3)
-            self.always.append(Group("earth", "", at, size, fixed=1.0, in_state=True))
+            at = self.earth + np.arange(3)
+            yield Group("earth", "", at, size, fixed=1.0, in_state=True)
+
+    def _is_free(self, p: int) -> bool:
+        """Whether nobody knows the orientation of a position that shows a force."""
+        there = self.x.position == p
+        return bool(self.used[there, :3].any() and not self.x.oriented[there].all())
 
     def _instability(self) -> None:
         """What each window is off by for itself, by channel."""
-        self.windows = self._course("window", self._inside, len(self.held), False)
         self.unstable = np.zeros(7)
         if len(self.held) >= FEW:
-            typical = [priors.INSTABILITY_ACC] * 3 + [priors.INSTABILITY_GYR] * 3
-            self.unstable[:6] = np.array(typical) * self.unit * self.used.any(axis=0)
+            typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3)
+            self.unstable[:6] = typical * self.unit * self.used.any(axis=0)
             self.unstable[CLOSURE] = priors.CLOSURE * self.turns
-
-    def _inside(self, x: Experience) -> Array:
-        inside: Array = np.equal.outer(x.position, self.held).astype(float)
-        return inside
-
-    def _effects(self) -> None:
-        """Every effect of the catalogue that has columns here."""
-        for effect in catalogue().values():
-            if not isinstance(effect, Motion | Sensor) or not effect.params:
-                continue
-            if effect.applies(self.x) and (grid := list(self._grid(effect))):
-                self._of_effect(effect, grid)
-
-    def _of_effect(self, effect: Motion | Sensor, grid: Sequence[Point]) -> None:
-        """The causes that an effect is: one, or one a triad."""
-        places = self._columns(effect, grid)
-        for part, at in self._parts(effect):
-            variants = tuple(
-                self._group(effect, part, some, point, columns)
-                for some in self._axes(effect, at)
-                for point, columns in zip(grid, places, strict=True)
-            )
-            if variants:
-                chance = effect.chance(self.x)
-                self.causes.append(Cause(effect.id, part, chance, variants))
-
-    def _group(
-        self, effect: Effect, part: str, some: tuple[int, ...], point: Point, at: Index
-    ) -> Group:
-        """Some parameters of an effect at one point of its grid."""
-        sizes = np.array([effect.params[j].typical for j in some]) * self._unit(effect)
-        shape, origin = point
-        return Group(
-            effect.id, part, at[list(some)], sizes, effect, shape, origin, some,
-            in_state=True,
-        )  # fmt: skip
-
-    def _columns(self, effect: Motion | Sensor, grid: Sequence[Point]) -> list[Index]:
-        """Append the columns of an effect: those of its parameters, for each point."""
-        count = len(effect.params)
-        if isinstance(effect, Sensor) and _of_channels(effect, self.x):
-            course = columns.of_channels(effect, grid)
-            start = self._add(course, 6 * len(grid))
-            channel = np.array([CHANNELS.index(p.name) for p in effect.params])
-            return [start + channel * len(grid) + i for i in range(len(grid))]
-        return [
-            self._add(columns.of_effect(effect, *point), count) + np.arange(count)
-            for point in grid
-        ]
-
-    def _parts(self, effect: Effect) -> list[tuple[str, tuple[int, ...]]]:
-        """Parameters that go together: those of a triad, where they are by channel."""
-        names = [p.name for p in effect.params]
-        if not set(names) <= set(CHANNELS):
-            return [("", tuple(range(len(names))))]
-        seen = {CHANNELS[c] for c in self.seen}
-        return [
-            (part, tuple(j for j, n in enumerate(names)
-                         if CHANNELS.index(n) in at and n in seen))
-            for part, at in TRIADS
-        ]  # fmt: skip
-
-    def _axes(
-        self, effect: Motion | Sensor, at: tuple[int, ...]
-    ) -> list[tuple[int, ...]]:
-        """Parameters that go together: all, or those of one output or of two alone."""
-        if isinstance(effect, Motion) or not at:
-            return [at] if at else []
-        reach = np.abs(effect.design(self.x, _any(effect))).max(axis=0)[:, at]
-        own = [tuple(np.array(at)[reach[c] > 0].tolist()) for c in range(6)]
-        own = [o for o in own if o and o != at]
-        two = [tuple(sorted(set(o + p))) for o, p in combinations(own, 2)]
-        more = [*own, *([] if effect.shapes else two)]
-        return [at, *(o for o in dict.fromkeys(more) if o != at)]
 
     def refined(
         self, cause: Cause, group: Group, values: Sequence[float]
@@ -268,208 +165,23 @@ class Dictionary:
         `group` is one of an effect with an equation.
         """
         (name,) = group.shape
-        grid: list[Point] = [({name: float(v)}, group.origin) for v in values]
-        effect, parts = group.effect, group.params
-        if not isinstance(effect, Motion | Sensor):
-            return cause, []
-        places = self._columns(effect, grid) if grid else []
-        new = [
-            self._group(effect, group.part, parts, point, at)
-            for point, at in zip(grid, places, strict=True)
-        ]
+        new = at_points(self, group, [({name: float(v)}, group.origin) for v in values])
         return self.exchanged(cause, (*cause.variants, *new)), new
 
     def exchanged(self, cause: Cause, variants: tuple[Group, ...]) -> Cause:
         """A cause with other variants, in the place of the one that was."""
         more = replace(cause, variants=variants)
         self.causes = [more if c is cause else c for c in self.causes]
+        self._changed()
+        return more
+
+    def joined(self, causes: Iterable[Cause]) -> None:
+        """Take in causes that are made of what others leave."""
+        self.causes = [*self.causes, *causes]
+        self._changed()
+
+    def _changed(self) -> None:
+        """Forget what was made of the causes as they were."""
         self.shown = np.pad(self.shown, (0, self.width - len(self.shown)))
         for cached in ("by_width", "chances", "typical"):
             self.__dict__.pop(cached, None)
-        return more
-
-    def _unit(self, effect: Effect) -> float:
-        """Outputs per SI unit, for what adds to outputs in counts or volts."""
-        if isinstance(effect, Motion):
-            return 1.0
-        gyro = all(p.unit.startswith(("rad", "(rad")) for p in effect.params)
-        return float(np.abs(self.unit[3 if gyro else 0]))
-
-    def _grid(self, effect: Effect) -> Iterator[tuple[dict[str, float], int]]:
-        """Values of the shape parameters to try, with the origin of times."""
-        if not effect.shapes:
-            yield {}, 0
-        for shape in effect.shapes:
-            for value, origin in shape.grid(self.x, self.since):
-                yield {shape.name: value}, origin
-
-    def _random(self) -> None:
-        """Random effects: walks, and angles set by hand."""
-        self._waves = self._course("waves", self.span.waves, unknown.WAVES, True)
-        if len(self.held) < FEW:
-            self._flicker()
-        for effect in catalogue().values():
-            if isinstance(effect, Scatter) and effect.applies(self.x):
-                self._of_scatter(effect)
-        oriented = self.held[
-            [bool(self.x.oriented[self.x.position == p].all()) for p in self.held]
-        ]
-        if len(oriented) == len(self.held) > 3:
-            size = np.full(2, np.deg2rad(priors.MISSET_DEG))
-            groups = tuple(
-                Group("misset", "", self.aside + 2 * p + np.arange(2), size,
-                      position=int(p), in_state=True)
-                for p in oriented
-            )  # fmt: skip
-            self.causes.append(Cause("misset", "", priors.PRESENT, groups, "position"))
-
-    def _of_scatter(self, effect: Scatter) -> None:
-        """A random effect by the kind of its parameters."""
-        names = [p.name for p in effect.params]
-        if not set(names) <= set(CHANNELS):  # of the positions' angles
-            if len(self.held) < 3 or not self.x.oriented.all():
-                return
-            at = (self.aside + 2 * self.held[:, None] + [0, 1]).ravel()
-            size = np.full(len(at), np.deg2rad(effect.params[0].typical))
-            group = Group(effect.id, "", at, size, effect, in_state=True)
-            self.causes.append(
-                Cause(effect.id, "", effect.chance(self.x), (group,), "random")
-            )
-            return
-        for part, channels in TRIADS:
-            some = [c for c in channels if c in self.seen]
-            if some:
-                self._walks(effect, part, [some], 1.0)
-                each = [[c] for c in some]
-                self._walks(effect, f"{part}, one axis", each, priors.ALONE)
-
-    def _walks(
-        self, effect: Scatter, part: str, sets: Sequence[Sequence[int]], share: float
-    ) -> None:
-        """Walks of some channels together, or of one of them."""
-        shape = self.span.walk()
-        if sets[0]:
-            groups = tuple(
-                Group(
-                    effect.id, "".join(CHANNELS[c] for c in some),
-                    np.concatenate([self._wave(c) for c in some]),
-                    np.concatenate(
-                        [shape * effect.params[c].typical * self.unit[c] for c in some]
-                    ),
-                    effect,
-                    params=tuple(some),
-                )
-                for some in sets
-            )  # fmt: skip
-            chance = share * effect.chance(self.x)
-            self.causes.append(Cause(effect.id, part, chance, groups, "random"))
-
-    def _flicker(self) -> None:
-        """Instability within the windows, where there are too few to have it between.
-
-        Of equal power in every octave: a cosine k has a variance as 1/k.
-        """
-        shape = 1 / np.sqrt(np.arange(1, unknown.WAVES + 1))
-        for part, channels in TRIADS:
-            at = [c for c in channels if c in self.seen]
-            if at:
-                size = (
-                    priors.INSTABILITY_ACC
-                    if part == "acc"
-                    else (priors.INSTABILITY_GYR)
-                )
-                columns = np.concatenate([self._wave(c) for c in at])
-                sizes = np.concatenate([shape * size * self.unit[c] for c in at])
-                self.always.append(Group("flicker", part, columns, sizes))
-
-    def _wave(self, channel: int) -> Index:
-        at: Index = self._waves + channel * unknown.WAVES + np.arange(unknown.WAVES)
-        return at
-
-    def _unknown(self) -> None:
-        """Functions that no effect makes, on each channel."""
-        for c in self.seen.tolist():
-            size = priors.UNKNOWN_ACC if c < 3 else priors.UNKNOWN_GYR
-            size = size * self.unit[c]
-            name = CHANNELS[c]
-            groups = [
-                Group("time", name, self._wave(c), size * unknown.smooth(span),
-                      shape={"waves": span})
-                for span in unknown.SPANS
-            ]  # fmt: skip
-            self._add_unknown("time", name, groups)
-            if len(self.held) > 3:
-                groups = [
-                    Group("window", name,
-                          np.array([self.windows + c * len(self.held) + i]),
-                          np.array([size]), position=int(p))
-                    for i, p in enumerate(self.held)
-                ]  # fmt: skip
-                self._add_unknown("window", name, groups)
-        if len(self.held) > FEW:
-            for c in self.seen.tolist():
-                size = priors.UNKNOWN_ACC if c < 3 else priors.UNKNOWN_GYR
-                at = self.windows + c * len(self.held) + np.arange(len(self.held))
-                group = Group(
-                    "position", CHANNELS[c], at, np.full(len(at), size * self.unit[c])
-                )
-                self._add_unknown("position", CHANNELS[c], [group])
-        self._together()
-        for covariate, of in unknown.covariates(self.span).items():
-            if not self._shows(covariate):
-                continue
-            width = of(self.x).shape[1]
-            first = self._course(covariate, of, width, False)
-            for c in self.seen.tolist():
-                size = priors.UNKNOWN_ACC if c < 3 else priors.UNKNOWN_GYR
-                at = first + c * width + np.arange(width)
-                group = Group(
-                    covariate, CHANNELS[c], at, np.full(width, size * self.unit[c])
-                )
-                self._add_unknown(covariate, CHANNELS[c], [group])
-
-    def _together(self) -> None:
-        """The same on all axes of a triad: one cause, not one for each of them."""
-        for part, channels in TRIADS:
-            some = [c for c in channels if c in self.seen]
-            if len(some) < 2:
-                continue
-            size = priors.UNKNOWN_ACC if part == "acc" else priors.UNKNOWN_GYR
-            unit = size * self.unit[some]
-            waves = np.concatenate([self._wave(c) for c in some])
-            groups = [
-                Group("time", part, waves, np.outer(unit, unknown.smooth(span)).ravel(),
-                      shape={"waves": span})
-                for span in unknown.SPANS
-            ]  # fmt: skip
-            self._add_unknown("time", part, groups)
-
-    def _add_unknown(self, name: str, part: str, groups: Sequence[Group]) -> None:
-        self.causes.append(Cause(name, part, priors.UNKNOWN, tuple(groups), "unknown"))
-
-    def _shows(self, covariate: str) -> bool:
-        x = self.x
-        if covariate in ("alpha", "beta", "joints"):
-            return bool(x.oriented.all()) and len(self.held) > 3
-        if covariate == "temperature":
-            return x.warms
-        if covariate == "force and time":
-            return len(self.held) > FEW
-        if covariate == "since turn":
-            return bool(np.isfinite(x.since_turn).all())
-        return len(self.held) > 3
-
-
-def _of_channels(effect: Sensor, x: Experience) -> bool:
-    """Whether an effect does the same to every output, each by its own parameter."""
-    if {p.name for p in effect.params} != set(CHANNELS):
-        return False
-    design = effect.design(x, _any(effect))
-    return bool((design == np.eye(6) * design[:, :1, :1]).all())
-
-
-def _any(effect: Effect) -> dict[str, float]:
-    """Some shape, where only which output has a column is asked."""
-    return {
-        s.name: max(s.low, 1.0) if np.isfinite(s.low) else 0.0 for s in effect.shapes
-    }

@@ -259,9 +259,9 @@ def gains(inner: Array, pull: Array, own: Array | float) -> Array:
     return gained(strength, power)
 
 
-def gained(strength: Array, power: Array) -> Array:
-    """Gain (3) over `SIZES` of lambda and q^2, (..., k) each."""
-    load = SIZES[:, None] ** 2 * strength[..., None, :]
-    taken = SIZES[:, None] ** 2 * power[..., None, :] / (1 + load)
+def gained(strength: Array, power: Array, sizes: Array = SIZES) -> Array:
+    """Gain (3) over some sizes of lambda and q^2, (..., k) each."""
+    load = sizes[:, None] ** 2 * strength[..., None, :]
+    taken = sizes[:, None] ** 2 * power[..., None, :] / (1 + load)
     gain: Array = 0.5 * (taken - np.log1p(load)).sum(axis=-1)
     return gain

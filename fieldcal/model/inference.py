@@ -17,6 +17,7 @@ from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram
 from fieldcal.model.fitted import whole
+from fieldcal.model.proportion import in_proportion
 from fieldcal.model.search import SETTLED, Search, Set
 from fieldcal.model.sizing import Member, Sizes
 from fieldcal.model.state import State, Term
@@ -93,6 +94,8 @@ class Inference:
             state, values, found = far
         else:
             self.turned = turned
+        about = dict.fromkeys([found, search.evaluated(())])
+        self.dictionary.joined(in_proportion(self.dictionary, list(about)))
         for _ in range(PASSES):
             seen.add(search.key(found.members))
             if found.members != members:
@@ -144,6 +147,25 @@ class Inference:
             if len(group.shape) == 1 and group.effect is not None:
                 members = self._refined(state, values, members, i, sizes)
         return members
+
+    def beside(self, found: Inferred, there: Set) -> Set:
+        """A set with its shapes refined, but for those that what was found has.
+
+        What that takes of columns is not in the dictionary afterwards.
+        """
+        own = Inference(self.system.apart(), self.nominal)
+        own.turned = list(found.turned)
+        members, known = there.members, [g for _, g in found.best.members]
+        for i, (_, group) in enumerate(members):
+            if group.shape and group.effect is not None and group not in known:
+                members = own._refined(
+                    found.state, found.values, members, i, there.sizes
+                )
+        values = own._padded(found.values)
+        wanted = own.wanted(members) | (values != 0)
+        linear = own.system.linearised(found.state, wanted)
+        search = Search(own.dictionary, own.gram_of(linear, values, wanted))
+        return search.evaluated(members, there.sizes)
 
     def _refined(
         self,
@@ -235,6 +257,7 @@ class Inference:
 
     def gram(self, state: State, values: Array, known: Set | None) -> Gram:
         """What all rows say of all columns about a state."""
+        values = self._padded(values)
         linear = self.system.linearised(state)
         if self.turns is not None:
             self.turned = self.turns.linearised(state, values, linear, known)

@@ -8,13 +8,14 @@ counts the sets with an alias of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from fieldcal.model import priors
+from fieldcal.model.causes import Group
 from fieldcal.model.search import Offer, Search, Set
 from fieldcal.model.sizing import Member
 from fieldcal.samples import Array
@@ -51,11 +52,15 @@ class Posterior:
     ----------
     search : with the sets that it visited
     best : of them
+    refined : a set with the time constants of what others have not where they fit best
 
     """
 
-    def __init__(self, search: Search, best: Set) -> None:
-        self.search, self.best = search, best
+    def __init__(
+        self, search: Search, best: Set, refined: Callable[[Set], Set] | None = None
+    ) -> None:
+        self.search, self.best, self._refined = search, best, refined
+        self._nearer: list[Set] = []
         self.instead = {name: self._instead(name) for name in self.names(best)}
 
     @staticmethod
@@ -84,10 +89,23 @@ class Posterior:
             if (near := near + 1) > LOOKED_AT:
                 break
             there = self._whole(less, offer, parts, offers)
-            if self.evidence(there) > own - priors.SAME:
+            if self._at_best(there, own) > own - priors.SAME:
                 if cause.name not in found or there.score > found[cause.name].score:
                     found[cause.name] = there
         return found
+
+    def _at_best(self, there: Set, own: float) -> float:
+        """Evidence of a set, between the points of its grids if on them it is no alias.
+
+        What was found has been refined: beside it a grid is too coarse.
+        """
+        at_points = self.evidence(there)
+        if self._refined is None or at_points > own - priors.SAME:
+            return at_points
+        if not any(_fades(m[1]) for m in there.members if m not in self.best.members):
+            return at_points
+        self._nearer.append(self._refined(there))
+        return max(at_points, self.evidence(self._nearer[-1]))
 
     def _bare(self, less: Set, offer: Offer) -> float:
         """Foretold evidence of a set with an offer, without the chances, ln."""
@@ -119,7 +137,7 @@ class Posterior:
     @cached_property
     def weights(self) -> list[tuple[Set, float]]:
         """Sets visited, with their probabilities."""
-        sets = list(self.search.visited.values())
+        sets = [*self.search.visited.values(), *self._nearer]
         score: Array = np.array([s.score for s in sets])
         share = np.exp(score - np.logaddexp.reduce(score))
         return list(zip(sets, share.tolist(), strict=True))
@@ -142,6 +160,12 @@ class Posterior:
                 members = tuple(m for m in self.best.members if m[0].name == name)
                 out.append(Standing(name, members, probability, tuple(names)))
         return out
+
+
+def _fades(group: Group) -> bool:
+    """Whether a group has a time constant."""
+    shapes = group.effect.shapes if group.effect else ()
+    return any(s.kind in ("session", "turn") for s in shapes)
 
 
 LOOKED_AT = 8

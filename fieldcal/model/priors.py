@@ -39,6 +39,10 @@ UNLIKE = 0.3
 UNKNOWN_ACC, UNKNOWN_GYR = 2e-2, 1e-3
 """Typical size of what no effect makes, m/s^2 and rad/s: that of the effects."""
 
+MOST_WAVES = 160
+"""Cosines of a walk at most: one for some seconds of a session of minutes. What they
+leave of one that is far above the noise is as good as white."""
+
 MISSET_DEG = 3.0
 """Typical error of a position that was set at another angle than is said, deg."""
 

@@ -19,7 +19,7 @@ import numpy as np
 from fieldcal.model import priors
 from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
-from fieldcal.model.evidence import Eliminated, Gram, gained
+from fieldcal.model.evidence import Eliminated, Gram, Index, gained
 from fieldcal.samples import Array
 
 DENSITY = np.log(priors.density())
@@ -31,6 +31,12 @@ EVEN = int(np.argmin(np.abs(np.log(priors.SIZES))))
 
 STEP = float(np.log(priors.SIZES[1] / priors.SIZES[0]))
 """From one size to the next, ln."""
+
+FINER = 129
+"""Sizes that are tried between one size's neighbours, once it is to be told."""
+
+PRIOR_INFO = 0.1
+"""Information on ln v that there is at least."""
 
 ROUNDS = 5
 """Times that every size is sought beside the others."""
@@ -72,6 +78,29 @@ def alike(instability: Sequence[int] | Array, unstable: Array) -> Any:
             apart = (some - middle[..., None]) * (STEP / priors.UNLIKE)
             total -= 0.5 * (apart**2).sum(axis=-1)
     return total if total.ndim else float(total)
+
+
+def _told(state: Eliminated, at: Index, v: float) -> tuple[Array, Array]:
+    """What (3) needs of a group, some columns of a set in which its size is v."""
+    wide = state.sizes[at]
+    cov = state.inverse[np.ix_(at, at)] / wide / wide[:, None]
+    part, axes = np.linalg.eigh(cov)
+    part = np.clip(part, LEAST, 1.0)
+    power = ((axes.T @ (state.estimate[at] / wide)) / (part * v)) ** 2
+    return (1 / part - 1) / v**2, power
+
+
+def likeliest(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
+    """The likeliest size of a group between those tried, and what ln v is uncertain by.
+
+    The information on ln v is that of the shares lambda v^2 / (1 + lambda v^2).
+    """
+    strength, power = _told(state, at, v)
+    near = v * np.exp(np.linspace(-STEP, STEP, FINER))
+    before = np.interp(np.log(near), np.log(priors.SIZES), DENSITY)
+    best = float(near[np.argmax(gained(strength, power, near) + before)])
+    share = best**2 * strength / (1 + best**2 * strength)
+    return best, float(np.maximum(2 * (share**2).sum(), PRIOR_INFO) ** -0.5)
 
 
 class Sizing:
@@ -154,14 +183,10 @@ class Sizing:
 
     def _group(self, i: int) -> Array:
         """F over the sizes of one group, and its size at the top."""
-        state, at = self.eliminated(), self.places[i]
-        wide = state.sizes[at]
-        part, axes = np.linalg.eigh(state.inverse[at, at] / wide / wide[:, None])
-        part = np.clip(part, LEAST, 1.0)
+        state = self.eliminated()
         v = float(priors.SIZES[self.sizes[i]])
-        strength = (1 / part - 1) / v**2
-        power = ((axes.T @ (state.estimate[at] / wide)) / (part * v)) ** 2
-        gain = gained(strength, power)
+        every = np.arange(len(self.every))
+        gain = gained(*_told(state, every[self.places[i]], v))
         profile: Array = state.score + gain - gain[self.sizes[i]] + DENSITY
         self.sizes[i] = int(np.argmax(profile))
         return profile

@@ -44,6 +44,10 @@ class System:
     def __init__(self, rows: Rows, dictionary: Dictionary) -> None:
         self.rows, self.dictionary = rows, dictionary
 
+    def apart(self) -> System:
+        """The same rows with a dictionary of their own, as it is now."""
+        return System(self.rows, self.dictionary.apart())
+
     def linearised(
         self, state: State, wanted: NDArray[np.bool_] | None = None
     ) -> list[Linear]:
@@ -68,7 +72,8 @@ class System:
         out = []
         for c in self.dictionary.seen:
             use = np.flatnonzero(used[:, c])
-            weight = 1 / rows.sd[use, c]
+            left = self.dictionary.wander.left(rows.length[use], int(c))
+            weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
             design = np.hstack([table[use] for _, table in parts[c]]) * weight[:, None]
             columns = np.concatenate([at for at, _ in parts[c]])
             window = np.searchsorted(self.dictionary.held, rows.x.position[use])

@@ -1,13 +1,15 @@
 """The temperature that the device reports, smoothed, and its rate.
 
 Over a span of some seconds about each instant a straight line is fitted to the means
-over a second; its value and its slope are taken. So the noise and the steps of a
+over a second, and its value is taken; the rate is the slope of a parabola, over the
+longest span that flattens nothing. So little of the noise and the steps of a
 thermometer do not enter the hypotheses as if they were temperature.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
@@ -17,11 +19,20 @@ VALUE_S = 12.0
 """Half span of the line for the value."""
 
 SLOPES_S = (6.0, 10.0, 16.0, 25.0, 40.0)
-"""Half spans of the line for the rate, of which the first that noise allows is taken:
-a longer one flattens what changes faster than it."""
+"""Half spans of the line for the rate: a longer one has less noise, and flattens what
+changes faster than it."""
 
 PLAIN = 0.05
 """Noise of the rate, of the rate's spread, that is allowed."""
+
+ALIKE = 1.5
+"""Noise of the shorter span's rate that a longer one's may differ by; more is flat."""
+
+MEDIAN = 0.6745
+"""Of the absolute value of what is normal."""
+
+LEAST = 1e-9
+"""Of a fit's own information, added where too few means lie in a span."""
 
 STEPS = 3600
 
@@ -57,9 +68,9 @@ class Thermometer:
         step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
         line = _line(t, mean, count, max(VALUE_S, 4 * step))
         noise = float(np.std(mean - line[0]))
-        slope = _sharpest(t, mean, count, noise)
+        slope = _rate(t, mean, count, noise)
         start = line[0][0] - line[1][0] * (t[0] - block.t[0])
-        return cls(t, line[0] - start, slope[1], float(start), noise)
+        return cls(t, line[0] - start, slope, float(start), noise)
 
     @property
     def changes(self) -> bool:
@@ -73,16 +84,27 @@ class Thermometer:
         return np.interp(t, self.t, self.warming), np.interp(t, self.t, self.heating)
 
 
-def _sharpest(t: Array, mean: Array, count: Array, noise: float) -> tuple[Array, Array]:
-    """Lines over the shortest span whose slopes are no noise."""
+def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:
+    """Slopes over the longest span that flattens nothing.
+
+    The shortest whose slopes are no noise is the measure: longer ones, of less noise,
+    are taken while they differ from it by no more than its noise makes.
+    """
     step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-    for half in SLOPES_S[:-1]:
+    measure = best = np.zeros_like(t)
+    allowed = 0.0
+    for half in SLOPES_S:
         half = max(half, 4 * step)
-        line = _line(t, mean, count, half)
-        error = noise * np.sqrt(12 * step / (2 * half) ** 3)
-        if error < PLAIN * float(np.std(line[1])):
-            return line
-    return _line(t, mean, count, max(SLOPES_S[-1], 4 * step))
+        slope = _slope(t, mean, count, half)
+        if allowed == 0.0:
+            measure = best = slope
+            error = noise * float(np.sqrt(12 * step / (2 * half) ** 3))
+            allowed = ALIKE * error if error < PLAIN * float(np.std(slope)) else 0.0
+            continue
+        if float(np.median(np.abs(slope - measure))) / MEDIAN > allowed:
+            break
+        best = slope
+    return best
 
 
 def _means(t: Array, values: Array) -> tuple[Array, Array, Array]:
@@ -112,3 +134,26 @@ def _line(t: Array, y: Array, weight: Array, half: float) -> tuple[Array, Array]
     spread = b - a * a / n
     slope = np.where(spread > 0, (d - a * c / n) / np.where(spread > 0, spread, 1), 0.0)
     return c / n + slope * (s - a / n) + y[0], slope
+
+
+def _slope(t: Array, y: Array, weight: Array, half: float) -> Array:
+    """Slopes of local parabolas, by running sums: at an end a line has another's."""
+    s = t - t[len(t) // 2]
+    powers = s[:, None] ** np.arange(5)
+    terms = np.hstack([powers, powers[:, :3] * (y - y[0])[:, None]])
+    sums = np.vstack([np.zeros(8), np.cumsum(weight[:, None] * terms, axis=0)])
+    low = np.searchsorted(t, t - half, side="left")
+    high = np.searchsorted(t, t + half, side="right")
+    near = sums[high] - sums[low]
+    about = np.zeros((len(t), 5, 5))  # moments about each instant of those about none
+    for k in range(5):
+        for j in range(k + 1):
+            about[:, k, j] = comb(k, j) * (-s) ** (k - j)
+    moments = (about @ near[:, :5, None])[..., 0]
+    right = about[:, :3, :3] @ near[:, 5:, None]
+    scale = half ** np.add.outer(np.arange(3), np.arange(3))
+    left = moments[:, np.add.outer(np.arange(3), np.arange(3))] / scale
+    left += LEAST * left[:, :1, :1] * np.eye(3)
+    found = np.linalg.solve(left, right / half ** np.arange(3)[:, None])
+    out: Array = found[:, 1, 0] / half
+    return out

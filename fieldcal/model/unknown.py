@@ -8,7 +8,7 @@ nearest. Each is a short series with smaller and smaller terms; a course in time
 
 with a_k ~ N(0, exp(-(k / w)^2 / 2)) for a smooth one of w half waves. A random walk is
 the same series with a_k of standard deviation q sqrt(2 T) / (pi k) (Karhunen-Loeve, but
-for its mean, which is the bias').
+for its mean, which is the bias'); far above the noise it takes more of them (`wander`).
 """
 
 from __future__ import annotations
@@ -30,15 +30,23 @@ LONG_S = 1e4
 
 
 class Span:
-    """The stretch of time that a session's courses are drawn over."""
+    """The stretch of time that a session's courses are drawn over.
 
-    def __init__(self, t: Array) -> None:
+    Parameters
+    ----------
+    t : (n,) s, instants of the rows
+    count : cosines of the time
+
+    """
+
+    def __init__(self, t: Array, count: int = WAVES) -> None:
         self.start, self.length = float(t[0]), max(float(np.ptp(t)), 1e-9)
+        self.count = count
 
     def waves(self, x: Experience) -> Array:
-        """Cosines of the time, (n, WAVES)."""
+        """Cosines of the time, (n, count)."""
         part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
-        out: Array = np.cos(np.pi * np.outer(part, np.arange(1, WAVES + 1)))
+        out: Array = np.cos(np.pi * np.outer(part, np.arange(1, self.count + 1)))
         return out
 
     def fading(self, x: Experience) -> Array:
@@ -50,8 +58,9 @@ class Span:
         return out
 
     def walk(self) -> Array:
-        """Standard deviation of each cosine in a walk of 1 per sqrt(s), (WAVES,)."""
-        sizes: Array = np.sqrt(2 * self.length) / (np.pi * np.arange(1, WAVES + 1))
+        """Standard deviation of each cosine in a walk of 1 per sqrt(s), (count,)."""
+        k = np.arange(1, self.count + 1)
+        sizes: Array = np.sqrt(2 * self.length) / (np.pi * k)
         return sizes
 
 

@@ -141,6 +141,9 @@ class Way:
         # what windows are off by for reasons unknown changes with the attitude as well
         apart = np.subtract.outer(middle, middle) / BUILDS_S
         course = 1.0 + np.exp(-(apart**2) / 2)
+        walks = self.dictionary.wander.apart(middle, np.diff(x.t[turn.cut]))
+        for c in range(3):
+            cov[c::3, c::3] += walks[c]
         out: Array = cov + np.kron(course, np.diag(loose**2))
         return out
 

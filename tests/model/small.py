@@ -17,6 +17,7 @@ from fieldcal.model.reduce import Rows
 from fieldcal.model.search import Search
 from fieldcal.model.state import State
 from fieldcal.model.system import System, gram
+from fieldcal.model.wander import Wander
 from fieldcal.model.windows import Linear
 from fieldcal.samples import Array
 
@@ -52,7 +53,7 @@ def dictionary(x: Experience, common: float = 0.0) -> Dictionary:
     held = len(np.unique(x.position))
     return Dictionary(
         x, np.ones((len(x), 6), bool), np.array([x.since_turn]),
-        np.full((held, 6), common), np.ones(6), False,
+        np.full((held, 6), common), np.ones(6), False, Wander.none(),
     )  # fmt: skip
 
 

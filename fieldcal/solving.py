@@ -22,6 +22,7 @@ from fieldcal.observing import Rests, angle_setting, observations, with_provenan
 from fieldcal.session import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.rows import variances, widened
 from fieldcal.uncarried import told, uncarried
 
 Turns = Literal["auto", "yes", "no"]
@@ -84,8 +85,8 @@ class Laid:
         for c in np.flatnonzero(measured):
             sd[:, 3 * c : 3 * c + 3] = rows.sd[:, 3 * c : 3 * c + 3]
         rows = replace(rows, sd=sd)
-        known = np.einsum("nii->ni", self.seen.covariance)
-        return Recorded(rows, origins(source, rows), source if turns else None, known)
+        rows = widened(rows, variances(self.seen))
+        return Recorded(rows, origins(source, rows), source if turns else None)
 
 
 def solved(

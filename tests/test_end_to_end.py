@@ -62,10 +62,9 @@ def test_solving_the_recorded_session_gives_the_same_numbers(
     again = json.loads(capsys.readouterr().out)
     for group, found in result["parameters"].items():
         other = again["parameters"][group]
-        np.testing.assert_allclose(
-            other["value"], found["value"], rtol=1e-9, atol=1e-12
-        )
-        np.testing.assert_allclose(other["sigma"], found["sigma"], rtol=1e-6)
+        for key, close in (("value", 1e-9), ("sigma", 1e-6)):
+            one, two = (np.array(f[key], float) for f in (other, found))
+            np.testing.assert_allclose(one, two, rtol=close, atol=1e-12)
 
 
 def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:

@@ -204,7 +204,12 @@ def run(folder: Path, device: VirtualDevice, fails: str, junit: Path) -> int:
     call = script(folder, CALLER.format(control=device.control, fails=fails))
     mover = {"kind": "command", "command": call, "timeout_s": 30.0}
     tables = {
-        "site": {"latitude_deg": 50.45, "height_m": 170.0, "level_deg": 0.001},
+        "site": {
+            "latitude_deg": 50.45,
+            "height_m": 170.0,
+            "level_deg": 0.001,
+            "angle_setting_deg": 0.001,
+        },
         **plan(
             seconds=8.0,
             device=f"serial:{device.port}?format=witmotion",

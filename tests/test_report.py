@@ -43,7 +43,7 @@ def unquantised(packed: dict[str, str]) -> Array:
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = five_positions(tmp_path_factory.mktemp("report") / "bench-7")
-    assert main(["solve", str(folder)]) == 0
+    assert main(["solve", str(folder), "--angles", "0.001"]) == 0
     return folder
 
 

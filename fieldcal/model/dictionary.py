@@ -63,7 +63,7 @@ class Dictionary(Table):
         self._instability()
         if len(self.held) < FEW:
             self.always += flicker(self)
-        self.causes = [*of_effects(self), *of_chance(self), *of_no_effect(self)]
+        self.causes: list[Cause] = list(self._causes())
 
     def plain(self) -> Dictionary:
         """The same with what a simulation has only, bias and scale factor being free.
@@ -120,6 +120,12 @@ class Dictionary(Table):
     def shown(self) -> NDArray[np.bool_]:
         """Columns that windows show; filled in by the first linearisation."""
         return np.zeros(self.width, dtype=bool)
+
+    def _causes(self) -> Iterator[Cause]:
+        """Everything that may be there."""
+        yield from of_effects(self)
+        yield from of_chance(self)
+        yield from of_no_effect(self)
 
     def _calibration(self) -> Iterator[Group]:
         """Bias, scale factor, Earth's rate."""

@@ -28,7 +28,7 @@ def _of_effect(
     table: Table, effect: Motion | Sensor, grid: Sequence[Point]
 ) -> Iterator[Cause]:
     """The causes that an effect is: one, or one a triad."""
-    places = _columns(table, effect, grid)
+    places = effect_columns(table, effect, grid)
     for part, at in _parts(table, effect):
         variants = tuple(
             _group(table, effect, part, some, point, columns)
@@ -46,7 +46,7 @@ def at_points(table: Table, group: Group, grid: Sequence[Point]) -> list[Group]:
         return []
     return [
         _group(table, effect, group.part, group.params, point, at)
-        for point, at in zip(grid, _columns(table, effect, grid), strict=True)
+        for point, at in zip(grid, effect_columns(table, effect, grid), strict=True)
     ]
 
 
@@ -59,7 +59,7 @@ def _group(
     at: Index,
 ) -> Group:
     """Some parameters of an effect at one point of its grid."""
-    sizes = np.array([effect.params[j].typical for j in some]) * _unit(table, effect)
+    sizes = np.array([effect.params[j].typical for j in some]) * unit_of(table, effect)
     shape, origin = point
     return Group(
         effect.id, part, at[list(some)], sizes, effect, shape, origin, some,
@@ -67,7 +67,7 @@ def _group(
     )  # fmt: skip
 
 
-def _columns(
+def effect_columns(
     table: Table, effect: Motion | Sensor, grid: Sequence[Point]
 ) -> list[Index]:
     """Append the columns of an effect: those of its parameters, for each point."""
@@ -110,7 +110,7 @@ def _axes(
     return [at, *(o for o in dict.fromkeys(more) if o != at)]
 
 
-def _unit(table: Table, effect: Effect) -> float:
+def unit_of(table: Table, effect: Effect) -> float:
     """Outputs per SI unit, for what adds to outputs in counts or volts."""
     if isinstance(effect, Motion):
         return 1.0

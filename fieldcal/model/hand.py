@@ -35,7 +35,7 @@ def rows_of(source: Source) -> Rows:
         return rows
     samples = rows.length[:, None] * rate_of(source.block)
     level = [
-        np.median((rows.sd * np.sqrt(samples))[rows.x.position == p], axis=0)
+        np.nanmedian((rows.sd * np.sqrt(samples))[rows.x.position == p], axis=0)
         for p in held
     ]
     bound = spans(source.block, source.about)[held]

@@ -56,13 +56,9 @@ class Agreement:
 
 
 def agreement(
-    gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...], known: Array
+    gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]
 ) -> Agreement:
-    """How well the means of a triad agree, by the columns of the estimate.
-
-    `known` (p, 6) are the variances of the means as their windows alone tell: what
-    wanders within a window is in them, and then it is no misfit.
-    """
+    """How well the means of a triad agree, by the columns of the estimate."""
     p = len(d.held)
     at = np.ix_(np.arange(p), np.array(channels))
     info, off = gram.info[at], gram.off[at]
@@ -74,15 +70,14 @@ def agreement(
     y = off.ravel()[used]
     random = _random(d, found)
     noise = (1 / info.ravel()[used]) + gram.shared[at].ravel()[used] ** 2
-    noise = np.fmax(noise, known[:, list(channels)].ravel()[used])
     loose = _loose(gram, p, channels)[used]
     wide = means[:, random] * _sizes(d, found)[random]
-    known = np.diag(noise) + wide @ wide.T
-    stated = known + loose @ loose.T
+    plain = np.diag(noise) + wide @ wide.T
+    stated = plain + loose @ loose.T
     free = means[:, ~random]
     # turns that nobody knows hide what they can make
     loose = loose[:, np.any(loose != 0.0, axis=0)]
-    chi2, rank = _least(known, np.hstack([free, loose]), y)
+    chi2, rank = _least(plain, np.hstack([free, loose]), y)
     seen = _Seen(gram, d, channels, used)
     residual = seen.along(y - free @ found.mean[~random])
     wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
@@ -95,15 +90,13 @@ def agreement(
 
 def _random(d: Given, found: Mixture) -> Mask:
     """Which columns of the estimate are of a known size, (k,)."""
-    names = [*d.always, *(g for _, g in d.members)]
-    fixed = [np.full(len(g.columns), g.fixed != priors.FREE) for g in names]
+    fixed = [np.full(len(g.columns), g.fixed != priors.FREE) for g in d.groups]
     return np.concatenate(fixed)
 
 
 def _sizes(d: Given, found: Mixture) -> Array:
     """Sizes of the columns before the rows are seen, (k,)."""
-    groups = [*d.always, *(g for _, g in d.members)]
-    return np.concatenate([g.sizes(g.fixed or 1.0) for g in groups])
+    return np.concatenate([g.sizes(g.fixed or 1.0) for g in d.groups])
 
 
 def _loose(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:

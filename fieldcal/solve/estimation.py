@@ -42,14 +42,12 @@ class Recorded:
     rows : of the windows
     since : (o, n) s since the turn
     source : the samples of turns that are to be followed
-    known : (p, 6) variances of the windows' means as each by itself tells
 
     """
 
     rows: Rows
     since: Array
     source: Source | None = None
-    known: Array | None = None
 
     def turning(self) -> Turning | None:
         """Whoever follows the turns, if there are any."""
@@ -150,13 +148,10 @@ def estimated(
         gram = inference.gram(*_settled(others, given), None)
         found = _mixed(given, gram)
     names, values, covariance, missing = _named(given, found, nominal)
-    known: Array = np.zeros((len(given.held), 6))
-    if recorded.known is not None:
-        known = recorded.known[given.held]
     return Estimated(
         given, names, values, covariance, missing, found,
-        agreement(gram, given, found, (0, 1, 2), known),
-        agreement(gram, given, found, (3, 4, 5), known),
+        agreement(gram, given, found, (0, 1, 2)),
+        agreement(gram, given, found, (3, 4, 5)),
         tuple(inference.turned),
     )  # fmt: skip
 
@@ -187,8 +182,7 @@ def _named(
         sensor, axis = ("acc", "gyr")[c // 3], "xyz"[c % 3]
         base[f"{sensor}_bias.{axis}"] = float(nominal.bias[c])
         base[f"{sensor}_scale.{axis}"] = float(nominal.scale[c])
-    groups = [*given.always, *(g for _, g in given.members)]
-    before = np.concatenate([g.sizes(g.fixed or 1.0) for g in groups])
+    before = np.concatenate([g.sizes(g.fixed or 1.0) for g in given.groups])
     at = [np.flatnonzero(found.columns == given.place(n)[0])[0] for n in given.names]
     told = np.sqrt(np.diag(found.covariance))
     limits = USEFUL | ({"gyr_scale": TURNED} if given.wanted.turned else {})

@@ -10,7 +10,7 @@ each position.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -19,14 +19,15 @@ import numpy as np
 from fieldcal.effects import Effect, Experience, Motion, Sensor, catalogue
 from fieldcal.frames import EARTH_RATE, earth_rate_home
 from fieldcal.model import columns, priors
-from fieldcal.model.causes import FEW, Cause, Group
+from fieldcal.model.causes import TRIADS, Cause, Group
 from fieldcal.model.columns import General
 from fieldcal.model.dictionary import Dictionary
+from fieldcal.model.effect_causes import effect_columns, unit_of
 from fieldcal.model.evidence import Index
 from fieldcal.model.reduce import Rows
 from fieldcal.model.sizing import Member
+from fieldcal.model.wander import Wander
 from fieldcal.samples import CHANNELS, Array
-from fieldcal.solve.observations import Mask
 
 Tilt = Literal["none", "angle_offset", "base_tilt"]
 
@@ -79,94 +80,92 @@ class Given(Dictionary):
         self, rows: Rows, unit: Array, since: Array, turns: bool, wanted: Wanted
     ) -> None:
         self.wanted = wanted
-        self.members: tuple[Member, ...] = ()
         held = np.unique(rows.x.position)
         common = np.array([rows.common[rows.x.position == p][0] for p in held])
-        super().__init__(rows.x, rows.used, since, common, unit, turns)
+        wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
+        super().__init__(rows.x, rows.used, since, common, unit, turns, wander)
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """The set."""
+        return tuple((c, c.variants[0]) for c in self.causes)
+
+    @property
+    def groups(self) -> list[Group]:
+        """All groups, those that are always in first."""
+        return [*self.always, *(g for _, g in self.members)]
 
     # -- what is in it
 
-    def _calibration(self, used: Mask) -> None:
-        super()._calibration(used)
-        kept = [g for g in self.always if g.cause != "earth"]
-        if self.wanted.gyr_scale and not any(
-            g.cause == "scale" and g.part == "gyr" for g in kept
-        ):
-            at = np.intersect1d((3, 4, 5), self.seen)
-            size = priors.SCALE * self.unit[at]
-            kept.append(Group("scale", "gyr", self.scale + at, size, in_state=True))
-        if not self.wanted.gyr_scale:
-            kept = [g for g in kept if (g.cause, g.part) != ("scale", "gyr")]
-        self.always = [replace(g, fixed=priors.FREE) for g in kept]
+    def _calibration(self) -> Iterator[Group]:
+        """Bias and scale factor, free."""
+        sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
+        for part, channels in TRIADS:
+            at = np.intersect1d(channels, self.seen)
+            if not len(at):
+                continue
+            yield Group("bias", part, self.bias + at, sizes[at], fixed=priors.FREE,
+                        in_state=True)  # fmt: skip
+            if part == "acc" or self.wanted.gyr_scale:
+                size = priors.SCALE * self.unit[at]
+                yield Group("scale", part, self.scale + at, size, fixed=priors.FREE,
+                            in_state=True)  # fmt: skip
 
-    def _effects(self) -> None:
-        """What was asked for of the catalogue."""
-        w, some = self.wanted, bool(self.x.oriented.any())
-        if w.tilt != "none" and some:
-            self._estimated(w.tilt, known=w.level_deg)
+    def _causes(self) -> Iterator[Cause]:
+        """What was asked for, and how well the rest is known."""
+        w, oriented = self.wanted, bool(self.x.oriented.any())
+        if w.tilt != "none" and oriented:
+            yield self._estimated(w.tilt, known=w.level_deg)
         if w.cross:
-            self._estimated("cross_coupling", () if some else NOT_SHOWN)
+            yield self._estimated("cross_coupling", () if oriented else NOT_SHOWN)
         if w.gyro_cross:
-            self._estimated("gyro_cross_coupling")
-        if any(w.earth) and some:
-            if self.earth < 0:
-                sides = columns.earth_sides
-                basis = General("earth", columns.earth, sides=sides)
-                self.earth = self._add(basis, 3)
-            at, size = self.earth + np.arange(3), np.array(w.earth)
-            kept = size > 0
-            self._has("earth", Group("earth", "", at[kept], size[kept], fixed=1.0,
-                                     in_state=True))  # fmt: skip
+            yield self._estimated("gyro_cross_coupling")
+        if any(w.earth) and oriented:
+            yield self._earth(np.array(w.earth))
+        if w.angles_deg:
+            yield from self._angles(float(np.deg2rad(w.angles_deg)))
 
     def _estimated(
         self, name: str, left: Sequence[str] = (), known: float | None = None
-    ) -> None:
+    ) -> Cause:
         """An effect with all its parameters but some, free or of a known size."""
         effect = catalogue()[name]
         if not isinstance(effect, Motion | Sensor):
-            return
+            raise TypeError(f"{name} has no equation")
         some = [j for j, p in enumerate(effect.params) if p.name not in left]
-        at = self._columns(effect, [({}, 0)])[0][some]
+        at = effect_columns(self, effect, [({}, 0)])[0][some]
         typical = np.array([effect.params[j].typical for j in some])
-        size, fixed = typical * self._unit(effect), priors.FREE
+        size, fixed = typical * unit_of(self, effect), priors.FREE
         if known is not None:
             size, fixed = np.full(len(some), known), 1.0
         group = Group(name, "", at, size, effect, params=tuple(some), in_state=True,
                       fixed=fixed)  # fmt: skip
-        self._has(name, group)
+        return _given(group)
 
-    def _random(self) -> None:
-        """How well angles are set, and how a bias wanders within a window."""
-        from fieldcal.model import unknown
+    def _earth(self, size: Array) -> Cause:
+        """What is not known of the Earth's rate."""
+        sides = columns.earth_sides
+        self.earth = self.add(General("earth", columns.earth, sides=sides), 3)
+        kept = np.flatnonzero(size)
+        return _given(
+            Group("earth", "", self.earth + kept, size[kept], fixed=1.0, in_state=True)
+        )
 
-        self._waves = self._course("waves", self.span.waves, unknown.WAVES, True)
-        if len(self.held) < FEW < len(self.x):
-            self._flicker()
+    def _angles(self, sigma: float) -> Iterator[Cause]:
+        """How well angles are set: anew in each position, and wherever repeated."""
         oriented = [p for p in self.held if self.x.oriented[self.x.position == p].all()]
-        if not self.wanted.angles_deg or not oriented:
+        if not oriented:
             return
-        size = np.deg2rad(self.wanted.angles_deg) / np.sqrt(2.0)
+        size = sigma / np.sqrt(2.0)
         own = (self.aside + 2 * np.array(oriented)[:, None] + [0, 1]).ravel()
-        self._has("angle_setting", Group(
-            "angle_setting", "own", own, np.full(len(own), size), fixed=1.0,
-            in_state=True,
-        ))  # fmt: skip
+        wide = np.full(len(own), size)
+        yield _given(Group("angle_setting", "own", own, wide, fixed=1.0, in_state=True))
         shared = repeated(self.x, oriented)
         if shared.shape[1]:
             basis = General("detents", lambda v: columns.aside(v) @ shared)
-            first = self._add(basis, shared.shape[1])
-            at = first + np.arange(shared.shape[1])
-            self._has("detents", Group(
-                "angle_setting", "repeated", at, np.full(len(at), size), fixed=1.0
-            ))  # fmt: skip
-
-    def _unknown(self) -> None:
-        """Nothing that no physics makes: what that leaves is said by `diagnose`."""
-
-    def _has(self, name: str, group: Group) -> None:
-        cause = Cause(name, group.part, 1.0, (group,), "given")
-        self.causes.append(cause)
-        self.members = (*self.members, (cause, group))
+            at = self.add(basis, shared.shape[1]) + np.arange(shared.shape[1])
+            wide = np.full(len(at), size)
+            yield _given(Group("angle_setting", "repeated", at, wide, fixed=1.0))
 
     # -- where it stands
 
@@ -208,6 +207,10 @@ class Given(Dictionary):
             if cause.name == name and isinstance(one.effect, Effect)
             for j in one.params
         ]
+
+
+def _given(group: Group) -> Cause:
+    return Cause(group.cause, group.part, 1.0, (group,), "given")
 
 
 def repeated(x: Experience, oriented: Sequence[int]) -> Array:

@@ -6,6 +6,8 @@ while a procedure is under way, the means with their covariances are all there i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fieldcal.effects import Experience
@@ -14,7 +16,7 @@ from fieldcal.model.reduce import Rows, free_force
 from fieldcal.positions import rates
 from fieldcal.samples import ACC, Array
 from fieldcal.solve.estimation import Recorded
-from fieldcal.solve.observations import Mask, Observations
+from fieldcal.solve.observations import Observations
 
 
 def of_means(seen: Observations) -> Recorded:
@@ -22,15 +24,12 @@ def of_means(seen: Observations) -> Recorded:
     n, nominal = len(seen), seen.nominal
     index = np.arange(n)
     y = seen.mean.copy()
-    variance = np.einsum("nii->ni", seen.covariance)
-    sd = np.sqrt(np.where(variance > 0, variance, np.nan))
-    apart = (y[:, :3] - nominal.acc_bias) / np.array(nominal.acc_scale)
-    # any direction will do where the accelerometers say nothing
-    apart[~np.isfinite(apart).all(axis=1)] = force_home(seen.gravity)
+    told = variances(seen)
+    sd = np.sqrt(np.where(told > 0, told, np.nan))
     x = Experience.at_rest(
         *seen.angles,
         seen.gravity,
-        f=free_force(seen.gravity, index, apart),
+        f=_force(seen),
         t=np.where(np.isfinite(seen.time), seen.time, index),
         position=index,
         rate=rates(seen.positions),
@@ -39,7 +38,6 @@ def of_means(seen: Observations) -> Recorded:
         latitude=np.nan if seen.latitude is None else seen.latitude,
     )
     sd[~x.force_known, :3] = np.nan
-    _along(seen, x.f, ~x.oriented, sd)
     common = np.zeros_like(sd)
     common[~x.oriented, 3:] = unseen_earth(nominal.gyr_scale) * (n > 1)
     level = np.median(sd, axis=0)
@@ -48,15 +46,46 @@ def of_means(seen: Observations) -> Recorded:
     return Recorded(rows, np.full((1, n), np.inf))
 
 
-def _along(seen: Observations, f: Array, free: Mask, sd: Array) -> None:
-    """Of windows (n,) whose orientation is free, the noise along the force alone.
+def variances(seen: Observations) -> Array:
+    """Of the means, (n, 6); of windows whose orientation is free along the force alone.
 
     A device that turns a little at rest, as in a hand, is unsteady across it, and that
     its free orientation takes up.
     """
-    up = f[free] / np.linalg.norm(f[free], axis=1, keepdims=True)
+    out: Array = np.einsum("nii->ni", seen.covariance).copy()
+    free = ~seen.oriented & np.isfinite(seen.mean[:, ACC]).all(axis=1)
+    f = _force(seen)[free]
+    up = f / np.linalg.norm(f, axis=1, keepdims=True)
     along = np.einsum("ni,nij,nj->n", up, seen.covariance[free, ACC, ACC], up)
-    sd[free, :3] = np.where(np.isfinite(sd[free, :3]), np.sqrt(along)[:, None], np.nan)
+    out[free, ACC] = along[:, None]
+    return out
+
+
+def widened(rows: Rows, known: Array) -> Rows:
+    """Rows whose windows' means are as uncertain as each window's spectrum says.
+
+    `known` (p, 6) are the variances; what they are beyond white noise all rows of a
+    window share.
+    """
+    common = rows.common.copy()
+    for p in np.unique(rows.x.position):
+        at = rows.x.position == p
+        told = np.where(rows.used[at], 1 / rows.sd[at] ** 2, 0.0).sum(axis=0)
+        white = 1 / np.maximum(told, 1e-300)
+        beyond = np.maximum(np.nan_to_num(known[p]) - white, 0.0)
+        common[at] = np.maximum(common[at], np.sqrt(beyond))
+    return replace(rows, common=common)
+
+
+def _force(seen: Observations) -> Array:
+    """Force along what the accelerometers read, (n, 3) m/s^2.
+
+    Any direction will do where they say nothing.
+    """
+    nominal = seen.nominal
+    apart = (seen.mean[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
+    apart[~np.isfinite(apart).all(axis=1)] = force_home(seen.gravity)
+    return free_force(seen.gravity, np.arange(len(seen)), apart)
 
 
 def unseen_earth(scale: Array | tuple[float, ...]) -> Array:

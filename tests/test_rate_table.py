@@ -14,12 +14,13 @@ from session_folders import NINE, places, recorded, write_session
 from fieldcal.calibration import Calibration
 from fieldcal.diagnosis import diagnose
 from fieldcal.errors import NotObservable
-from fieldcal.observing import observe, rests, with_turns_between
+from fieldcal.observing import observe, rests
 from fieldcal.samples import Block
 from fieldcal.session import Session
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse
 from fieldcal.solve import solve
+from fieldcal.solving import solved
 
 Array = NDArray[np.float64]
 
@@ -137,10 +138,11 @@ def test_windows_on_a_table_are_no_rests_between_turns(tmp_path: Path) -> None:
     opened = session(tmp_path, 1e-4, 1)
     still = rests(opened)
     assert not still.at_rest(opened).rows
-    found = solve(observe(opened)[0])
-    assert with_turns_between(found, opened, still) is found
+    found = solved(opened, still)
+    assert found.method == "least_squares" and "turns" not in found.info
+    assert (np.abs(pulls(found)) < 4).all()
     with pytest.raises(NotObservable, match="no position was held at rest"):
-        with_turns_between(found, opened, still, wanted=True)
+        solved(opened, still, "yes")
 
 
 @pytest.mark.parametrize(

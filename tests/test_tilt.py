@@ -63,7 +63,7 @@ def test_navigation_gyroscopes_on_a_tilted_base(
 ) -> None:
     rng = np.random.default_rng(3)
     pulls, chi2 = [], []
-    for _ in range(120):
+    for _ in range(25 if len(places) > 5 else 40):
         found = solve(navigation(rng, places, tilt), tilt=tilt)  # type: ignore[arg-type]
         bias, bias_sigma = found.vector("gyr_bias")
         scale, scale_sigma = found.vector("gyr_scale")
@@ -71,8 +71,9 @@ def test_navigation_gyroscopes_on_a_tilted_base(
         gyroscopes = found.info["gyroscopes"]
         chi2.append(gyroscopes["chi2"] / gyroscopes["dof"])
     flat = np.concatenate(pulls)
-    assert np.std(flat) == pytest.approx(1, abs=0.12)
-    assert abs(np.mean(flat)) < 0.2
+    # of instability it is only known that it is no larger than the noise
+    assert 0.75 < np.std(flat) < 1.1
+    assert abs(np.mean(flat)) < 0.25
     assert np.mean(chi2) == pytest.approx(1, abs=0.1)
 
 
@@ -80,9 +81,10 @@ def test_a_base_known_to_be_nearly_level_is_in_the_gyroscopes_uncertainty() -> N
     rng = np.random.default_rng(7)
     two = (Position.deg(0, 0), Position.deg(45, 5))
     pulls = []
-    for _ in range(300):
+    for _ in range(60):
         x, z = 0.2 * rng.standard_normal(2)
         gyr = GYR_BIAS + rates(two, "base_tilt", [x, z])
+        gyr = gyr + 1e-8 * rng.standard_normal((2, 3))
         seen = observe(
             two, outputs(two, base_deg=(x, z)), gyr=gyr, sigma_gyr=1e-8,
             latitude=LATITUDE, grade="navigation",
@@ -90,4 +92,4 @@ def test_a_base_known_to_be_nearly_level_is_in_the_gyroscopes_uncertainty() -> N
         found = solve(seen, level_sigma_deg=0.2)
         bias, sigma = found.vector("gyr_bias")
         pulls.append((bias - GYR_BIAS)[[0, 2]] / sigma[[0, 2]])
-    assert np.std(pulls) == pytest.approx(1, abs=0.12)
+    assert np.std(pulls) == pytest.approx(1, abs=0.2)

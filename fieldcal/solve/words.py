@@ -55,7 +55,7 @@ def chance(chi2: float, dof: int) -> float:
 
 def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
     """Tell of scatter beyond the noise; nothing where there is none."""
-    if chance(chi2, dof) >= UNLIKELY:
+    if chi2 <= dof or chance(chi2, dof) >= UNLIKELY:
         return ""
     few = "; of so few degrees of freedom it is itself uncertain" if dof < 5 else ""
     cause = "diagnosis can say where it comes from"

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fieldcal.frames import turn
-from fieldcal.samples import Array
 from fieldcal.model.rotation import carry, small_turns
+from fieldcal.samples import Array
 
 SECONDS = 4.0
 ALPHA, BETA = np.deg2rad([120.0, -75.0])

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.calibration.parameters import Nominal
+from fieldcal.calibration.plausible import senseless
 from fieldcal.description import Description
 from fieldcal.diagnosis import locate, naming
 from fieldcal.diagnosis.advice import advice
@@ -64,7 +66,8 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     first, then = before(block, explanation), after(explanation)
     effects = _effects(explanation, lost, then)
     strange = _strange(explanation, lost)
-    verdict = _verdict(explanation, effects, strange)
+    odd = _odd(explanation)
+    verdict = _verdict(explanation, effects, strange, odd)
     # so far positions were counted as they were held, from here on as they are listed
     numbered = explanation.prepared.source.about.numbered
 
@@ -76,7 +79,7 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     quality = _quality(explanation, lost, first, then)
     words = paragraph(
         verdict, effects, mismatch, strange, quality, explanation,
-        notes(explanation, _open(explanation)),
+        notes(explanation, _open(explanation)), odd,
     )  # fmt: skip
     return Diagnosis(
         verdict=verdict,
@@ -87,7 +90,7 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
         before=quality[0],
         after=quality[1],
         calibration=_calibration(explanation),
-        warnings=_warnings(explanation),
+        warnings=(*odd, *_warnings(explanation)),
         says=words,
         candidates=candidates(explanation, effects),
         curves=tuple(curves(explanation, mismatch, first, then)),
@@ -138,13 +141,28 @@ def _strange(explanation: Explanation, lost: Mapping[str, Removed]) -> list[Unkn
 
 
 def _verdict(
-    explanation: Explanation, effects: Sequence[Found], strange: Sequence[Unknown]
+    explanation: Explanation,
+    effects: Sequence[Found],
+    strange: Sequence[Unknown],
+    odd: Sequence[str],
 ) -> Verdict:
-    if strange:
+    if strange or odd:
         return "unexplained"
     if any(_is_open(explanation, one) for one in explanation.standing):
         return "ambiguous"
     return "left_out" if effects else "consistent"
+
+
+def _odd(explanation: Explanation) -> list[str]:
+    """Bias and scale factors that no sensor has: a fact of the recording is wrong."""
+    found = calibrated(explanation, explanation.best.set)
+    nominal = explanation.prepared.source.about.nominal
+    return senseless(
+        tuple(found),
+        np.array([value for value, _, _ in found.values()]),
+        np.array([sigma for _, sigma, _ in found.values()]),
+        Nominal(**{k: tuple(v.tolist()) for k, v in nominal.items()}),
+    )
 
 
 def _is_open(explanation: Explanation, one: Standing) -> bool:

@@ -62,9 +62,15 @@ def paragraph(
     quality: tuple[Quality, Quality, str],
     explanation: Explanation,
     notes: Sequence[str],
+    odd: Sequence[str] = (),
 ) -> str:
-    """Say verdict, effects, improvement, doubts and what to do next."""
-    out = [_opening(verdict, effects, mismatch)]
+    """Say verdict, effects, improvement, doubts and what to do next.
+
+    `odd` are facts of the recording that cannot be.
+    """
+    out = [_wrong(odd)] if odd else []
+    if mismatch or not odd:
+        out.append(_opening(verdict, effects, mismatch))
     out += [_how_random(f) for f in effects if _is_random(f)]
     if verdict in ("left_out", "ambiguous") and effects:
         out += _improvement(*quality)
@@ -73,6 +79,10 @@ def paragraph(
             out.append(_deciding(explanation, one.id, other))
     out += dict.fromkeys(_unexplained(u, unknown) for u in unknown)
     return " ".join([*filter(None, out), *notes])
+
+
+def _wrong(odd: Sequence[str]) -> str:
+    return f"Something that the recording says of itself is wrong: {'; '.join(odd)}."
 
 
 def _opening(

@@ -61,7 +61,7 @@ class Dictionary(Table):
         self.always: list[Group] = list(self._calibration())
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
-        if len(self.held) < FEW:
+        if len(self.held) < FEW < len(x):
             self.always += flicker(self)
         self.causes: list[Cause] = list(self._causes())
 

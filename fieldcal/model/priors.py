@@ -26,6 +26,10 @@ BIAS_ACC, BIAS_GYR, SCALE = 0.3, 2e-2, 1e-2
 FREE = 30.0
 """Size of what a calibration is to find, in typical ones: it decides nothing there."""
 
+COUPLED = 2.5
+"""The same of the cross-coupling of gyroscopes: 0.05. Two turns do not show all of it,
+and what it may be is in the scale factors; no gyroscope is further off."""
+
 INSTABILITY_ACC, INSTABILITY_GYR = 1e-3, 3e-5
 """Typical scatter of a bias from window to window, m/s^2 and rad/s: 0.1 mg, 6 deg/h."""
 
@@ -48,6 +52,11 @@ MISSET_DEG = 3.0
 
 ASIDE = 1.0
 """Turns of a position whose orientation nobody knows, rad: any."""
+
+LOOSE, LOOSEST = 0.2, 100.0
+"""Chance that something beside the device scatters the windows of a given set, a
+fixture that does not return or an effect that is left out, and by up to so many typical
+instabilities: 0.1 m/s^2, a joint that comes back to half a degree."""
 
 BAD = 5e-3
 """Chance that a given window is disturbed in a way that it does not show itself."""
@@ -73,6 +82,13 @@ to 1, beyond which nobody would ask."""
 
 OPEN = 0.1
 """Probability of what may stand in its place from which a cause is ambiguous."""
+
+
+def loosely() -> Array:
+    """Probability of each of `SIZES` of instability where nobody looks for causes."""
+    wide = (SIZES > 1) & (SIZES <= LOOSEST)
+    share: Array = (1 - LOOSE) * density(STEEP) + LOOSE * wide / wide.sum()
+    return share
 
 
 def density(tail: float = TAIL) -> Array:

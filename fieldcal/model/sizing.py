@@ -63,10 +63,13 @@ class Sizes:
     members: tuple[int, ...] = ()
 
 
-def alike(instability: Sequence[int] | Array, unstable: Array) -> Any:
+def alike(
+    instability: Sequence[int] | Array, unstable: Array, density: Array = UNSTEADY
+) -> Any:
     """How likely instabilities (..., 7) are, ln: those of a triad's axes are alike.
 
-    `unstable` (7,) is their typical size, 0 where there is none.
+    `unstable` (7,) is their typical size, 0 where there is none; `density` is ln of how
+    likely each of `priors.SIZES` is.
     """
     sizes = np.asarray(instability, dtype=float)
     total = np.zeros(sizes.shape[:-1])
@@ -74,7 +77,7 @@ def alike(instability: Sequence[int] | Array, unstable: Array) -> Any:
         if on := [c for c in triad if unstable[c] > 0]:
             some = sizes[..., on]
             middle = some.mean(axis=-1)
-            total = total + np.interp(middle, np.arange(len(UNSTEADY)), UNSTEADY)
+            total = total + np.interp(middle, np.arange(len(density)), density)
             apart = (some - middle[..., None]) * (STEP / priors.UNLIKE)
             total -= 0.5 * (apart**2).sum(axis=-1)
     return total if total.ndim else float(total)

@@ -6,8 +6,8 @@
 D is the noise of the means and rounding, Phi_r what is random with its sizes L (how
 angles were set, the turns of a position whose orientation nobody knows), Phi what is
 estimated, V its size before; for r_p what windows wander by is in D. chi2 is that of
-the stated noise, so that a misfit remains visible; r_p is the residual of a window by a
-fit without it. Source: Rasmussen and Williams 2006, 5.4.2, for (1).
+the stated noise, and of windows that are not certainly bad; r_p is the residual of a
+window by a fit without it. Source: Rasmussen and Williams 2006, 5.4.2, for (1).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from fieldcal.samples import Array
 from fieldcal.solve.given import Given
 from fieldcal.solve.mixture import Mixture
 from fieldcal.solve.observations import Mask
+from fieldcal.solve.words import CERTAIN
 
 ROUNDED = 1e-9
 """Share of the longest column below which rounding alone is left of one."""
@@ -76,15 +77,17 @@ def agreement(
     stated = plain + loose @ loose.T
     free = means[:, ~random]
     # turns that nobody knows hide what they can make
-    loose = loose[:, np.any(loose != 0.0, axis=0)]
-    chi2, rank = _least(plain, np.hstack([free, loose]), y)
     seen = _Seen(gram, d, channels, used)
+    good = (found.bad <= CERTAIN)[seen.window] | (0 not in channels)
+    columns = np.hstack([free, loose])[good]
+    columns = columns[:, np.any(columns != 0.0, axis=0)]
+    chi2, rank = _least(plain[np.ix_(good, good)], columns, y[good])
     residual = seen.along(y - free @ found.mean[~random])
     wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
     sizes = free * _sizes(d, found)[~random]
     alone = seen.along(*_left_out(stated + wander, sizes, y, seen))
     return Agreement(
-        chi2, int(used.sum()) - rank, seen.rms(residual), seen.rms(alone), residual
+        chi2, int(good.sum()) - rank, seen.rms(residual), seen.rms(alone), residual
     )
 
 

@@ -23,7 +23,8 @@ from fieldcal.samples import Array
 from fieldcal.solve.agreement import Agreement, agreement
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.mixture import Mixing, Mixture
-from fieldcal.solve.words import SUSPECT
+from fieldcal.solve.observations import Mask
+from fieldcal.solve.words import CERTAIN, SUSPECT
 
 OPEN = 0.25
 """Part of a variance before the rows from which they determined nothing."""
@@ -137,16 +138,24 @@ def estimated(
     rows, since = recorded.rows, recorded.since
     given = Given(rows, np.abs(nominal.scale), since, turning is not None, wanted)
     turns = None if turning is None else Turns(turning, given, False)
-    inference = Inference(System(rows, given), nominal, turns)
-    gram = inference.gram(*_settled(inference, given), None)
-    found = _mixed(given, gram)
-    if found.bad.max(initial=0.0) > SUSPECT:
-        # a gross error bends the state so far that nothing is linear about it
-        left = rows.x.position == given.held[int(found.bad.argmax())]
-        sd = np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd)
-        others = Inference(System(replace(rows, sd=sd), given), nominal, turns)
-        gram = inference.gram(*_settled(others, given), None)
+    bad = np.zeros(len(given.held), dtype=bool)
+    # one bad window of six can be told from scatter, two of six cannot
+    for _ in range(1 + max(1, len(bad) // 6)):
+        inference = Inference(System(_without(rows, given, bad), given), nominal, turns)
+        gram = inference.gram(*_settled(inference, given), None)
         found = _mixed(given, gram)
+        worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
+        if worst.any() and (found.bad[worst] > SUSPECT).all():
+            # a gross error bends the state so far that nothing is linear about it
+            others = System(_without(rows, given, bad | worst), given)
+            beside = Inference(others, nominal, turns)
+            gram = inference.gram(*_settled(beside, given), None)
+            found = _mixed(given, gram)
+        worst &= (found.bad > CERTAIN) & ~bad
+        if not worst.any() or bad.sum() >= max(1, len(bad) // 6):
+            break
+        bad |= worst
+    found = replace(found, bad=np.where(bad, 1.0, found.bad))
     names, values, covariance, missing = _named(given, found, nominal)
     return Estimated(
         given, names, values, covariance, missing, found,
@@ -154,6 +163,12 @@ def estimated(
         agreement(gram, given, found, (3, 4, 5)),
         tuple(inference.turned),
     )  # fmt: skip
+
+
+def _without(rows: Rows, given: Given, bad: Mask) -> Rows:
+    """Rows of which some windows (p,) have no weight."""
+    left = np.isin(rows.x.position, given.held[bad])
+    return replace(rows, sd=np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd))
 
 
 def _settled(inference: Inference, given: Given) -> tuple[State, Array]:

@@ -119,14 +119,18 @@ class Given(Dictionary):
         if w.cross:
             yield self._estimated("cross_coupling", () if oriented else NOT_SHOWN)
         if w.gyro_cross:
-            yield self._estimated("gyro_cross_coupling")
+            yield self._estimated("gyro_cross_coupling", free=priors.COUPLED)
         if any(w.earth) and oriented:
             yield self._earth(np.array(w.earth))
         if w.angles_deg:
             yield from self._angles(float(np.deg2rad(w.angles_deg)))
 
     def _estimated(
-        self, name: str, left: Sequence[str] = (), known: float | None = None
+        self,
+        name: str,
+        left: Sequence[str] = (),
+        known: float | None = None,
+        free: float = priors.FREE,
     ) -> Cause:
         """An effect with all its parameters but some, free or of a known size."""
         effect = catalogue()[name]
@@ -135,7 +139,7 @@ class Given(Dictionary):
         some = [j for j, p in enumerate(effect.params) if p.name not in left]
         at = effect_columns(self, effect, [({}, 0)])[0][some]
         typical = np.array([effect.params[j].typical for j in some])
-        size, fixed = typical * unit_of(self, effect), priors.FREE
+        size, fixed = typical * unit_of(self, effect), free
         if known is not None:
             size, fixed = np.full(len(some), known), 1.0
         group = Group(name, "", at, size, effect, params=tuple(some), in_state=True,
@@ -216,14 +220,13 @@ def _given(group: Group) -> Cause:
 def repeated(x: Experience, oriented: Sequence[int]) -> Array:
     """Which turns of the positions go together, (2 p, m): those of the same angle.
 
-    Home is no detent, and an angle that is set once repeats nothing that its own error
-    has not.
+    An angle that is set once has both parts of its error for itself.
     """
     places = int(x.position.max()) + 1
     out = []
     for joint, angle in enumerate((x.alpha, x.beta)):
         first = [float(angle[int(np.argmax(x.position == p))]) for p in oriented]
-        for value in sorted(set(np.round(first, 9)) - {0.0}):
+        for value in sorted(set(np.round(first, 9))):
             column = np.zeros(2 * places)
             same = [p for p, a in zip(oriented, first, strict=True)
                     if abs(a - value) < 1e-8]  # fmt: skip

@@ -30,6 +30,9 @@ from fieldcal.solve.given import Given
 KEPT = 4.0
 """Evidence behind the best, ln, from which a hypothesis no longer counts: 50 to 1."""
 
+UNSTEADY = np.log(priors.loosely())
+"""How likely each size of instability is, ln: with whatever else scatters windows."""
+
 SHOWS = 0.2
 """Part of a mean's noise from which what windows wander by beside it can be seen."""
 
@@ -109,7 +112,7 @@ class Mixing:
             if sum(h.score for h in parts) > best - KEPT
         ]
         score = np.array([s for s, _, _ in every])
-        score += alike(self.there.sizes.instability, self.unstable)
+        score += alike(self.there.sizes.instability, self.unstable, UNSTEADY)
         total = float(np.logaddexp.reduce(score))
         weight = np.exp(score - total)
         means = np.array([e.estimate[: len(self.columns)] for _, e, _ in every])
@@ -173,8 +176,8 @@ class Mixing:
                   for c, m in enumerate(mode))
             for s in range(-middle, top + 1 - middle)
         ]  # fmt: skip
-        chance = np.array([alike(sizes, self.unstable) for sizes in moved])
-        chance -= alike(mode, self.unstable)
+        chance = np.array([alike(sizes, self.unstable, UNSTEADY) for sizes in moved])
+        chance -= alike(mode, self.unstable, UNSTEADY)
         first = max(0, self._showing(triad) - 1)
         chance[first] = np.logaddexp.reduce(chance[: first + 1])
         for sizes, known in zip(moved[first:], chance[first:].tolist(), strict=True):

@@ -9,6 +9,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.gauge import GROUPS
+from fieldcal.calibration.plausible import senseless
 from fieldcal.errors import NotObservable
 from fieldcal.samples import UNITS as CHANNEL_UNITS
 from fieldcal.solve import words
@@ -51,7 +52,7 @@ def calibration(
     if not names or _blind(found, seen):
         raise NotObservable("these positions determine nothing: " + "; ".join(said))
     sigma = np.sqrt(np.diag(covariance))
-    odd = words.senseless(names, values, sigma, seen.nominal)
+    odd = senseless(names, values, sigma, seen.nominal)
     acc = found.acc if any(n.startswith("acc") for n in names) else found.gyr
     good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < WRONG)
     said += [

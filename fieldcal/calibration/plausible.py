@@ -1,0 +1,74 @@
+"""Numbers that no sensor can have, in the axes and units that were declared.
+
+A scale factor far from nominal is another unit or full scale, a bias of half a g a
+device or a driver that takes its mean out, a scale factor of the other sign an axis
+that points the other way: facts that are wrong, however well everything else agrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fieldcal.calibration.parameters import Nominal
+from fieldcal.samples import Array
+
+LEAST, UNSEEN = 0.1, 5.0
+"""Share of the nominal scale factor, and standard deviations: less is none."""
+
+UNREAL = {"acc_scale": 0.3, "gyr_scale": 0.3, "acc_bias": 5.0, "gyr_bias": 0.5}
+"""Change from nominal that no sensor has: 30 %; half a g; 30 deg/s."""
+
+
+def senseless(
+    names: Sequence[str], values: Array, sigma: Array, nominal: Nominal
+) -> list[str]:
+    """Numbers that no sensor in the declared axes and units can have."""
+    said = []
+    for name, value, s in zip(names, values, sigma, strict=True):
+        group, _, axis = name.partition(".")
+        if group not in UNREAL:
+            continue
+        usual = getattr(nominal, group)["xyz".index(axis)]
+        if group.endswith("scale"):
+            said += _scale(name, float(value), float(s), usual)
+        else:
+            said += _bias(name, float(value), float(s), usual, nominal)
+    return said
+
+
+def _scale(name: str, value: float, sigma: float, usual: float) -> list[str]:
+    if abs(value) < min(UNSEEN * sigma, LEAST * abs(usual)):
+        return [
+            f"{name} is {value:.2g} ± {sigma:.2g}: the output does not follow at"
+            " all; was the device turned as session.toml says?"
+        ]
+    if value / usual < 0 and abs(value) > UNSEEN * sigma:
+        return [
+            f"{name} is {value:.3g}, nominal {usual:.3g}: the axis points"
+            " the other way; mend [frame] mounting, or the signs of the angles or"
+            " rates"
+        ]
+    group = name.partition(".")[0]
+    if abs(value / usual - 1) - UNSEEN * sigma / abs(usual) > UNREAL[group]:
+        return [
+            f"{name} is {value:.3g} ± {sigma:.2g}, nominal {usual:.3g}: no sensor is"
+            " that far off; the unit or full scale of the recording is another than"
+            f" [nominal] says ({value / usual:.4g} times it fits)"
+        ]
+    return []
+
+
+def _bias(
+    name: str, value: float, sigma: float, usual: float, nominal: Nominal
+) -> list[str]:
+    group = name.partition(".")[0]
+    unit = abs(getattr(nominal, group.replace("bias", "scale"))["xyz".index(name[-1])])
+    off = abs(value - usual) - UNSEEN * sigma
+    if off <= UNREAL[group] * unit:
+        return []
+    si = "m/s^2" if group.startswith("acc") else "rad/s"
+    return [
+        f"{name} is {(value - usual) / unit:+.3g} {si} from nominal: no sensor is that"
+        " far off; either the device or its driver takes its mean out, or the offset"
+        " in [nominal] is another"
+    ]

@@ -1,0 +1,176 @@
+"""How well windows agree: explicit least squares, and fits without each window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from observed import BIAS, SCALE, G, observe, outputs
+
+from fieldcal.model import priors
+from fieldcal.model.state import State
+from fieldcal.positions import Position
+from fieldcal.samples import Array
+from fieldcal.solve.estimation import Estimated, estimated
+from fieldcal.solve.given import Wanted, seen_by
+from fieldcal.solve.observations import Index
+from fieldcal.solve.rows import of_means
+
+SIZE = np.array([1e-3, 2e-3, 0.7e-3])
+PLACES = tuple(
+    Position.deg(a, b)
+    for a, b in [(0, 0), (45, 5), (45, -40), (-45, 5), (120, 60), (0, 5), (-100, -40)]
+)
+HAND = Position("by hand")
+WIDE = priors.FREE * np.array([priors.BIAS_ACC] * 3 + [priors.SCALE] * 3)
+STEP = 1e-4
+
+
+def found(places: tuple[Position, ...], u: Array, degrees: float = 0.0) -> Estimated:
+    seen = observe(places, u)
+    seen.covariance[:, range(3), range(3)] = SIZE**2
+    recorded = of_means(seen)
+    rows = seen_by(recorded.rows, np.zeros(3))
+    nominal = State(np.zeros(6), np.ones(6), np.zeros((len(places), 2)), np.zeros(3))
+    wanted = Wanted(angles_deg=degrees)
+    return estimated(type(recorded)(rows, recorded.since), None, nominal, wanted)
+
+
+@dataclass(frozen=True)
+class Explicit:
+    """Means y less those of a perfect device, their design and stated covariance."""
+
+    y: Array
+    design: Array
+    stated: Array
+
+    def fitted(self, rows: Index) -> tuple[Array, Array]:
+        """Generalised least squares with what is known before, of some rows."""
+        a, s = self.design[rows], self.stated[np.ix_(rows, rows)]
+        inner = a.T @ np.linalg.solve(s, a) + np.diag(WIDE**-2.0)
+        x = np.linalg.solve(inner, a.T @ np.linalg.solve(s, self.y[rows]))
+        return x, self.y[rows] - a @ x
+
+    def without(self, rows: Index) -> Array:
+        """Residual of some rows by a fit that did not see them."""
+        rest = np.setdiff1d(np.arange(len(self.y)), rows)
+        x, off = self.fitted(rest)
+        shared = self.stated[np.ix_(rows, rest)]
+        foretold = shared @ np.linalg.solve(self.stated[np.ix_(rest, rest)], off)
+        return np.asarray(self.y[rows] - self.design[rows] @ x - foretold)
+
+
+def explicit(places: tuple[Position, ...], u: Array, degrees: float = 0.0) -> Explicit:
+    """By differences of outputs; angles are off by their own and by their detent's."""
+    n = len(places)
+    perfect = outputs(places, bias=np.zeros(3), scale=np.ones(3))
+    design = np.zeros((n, 3, 6))
+    for c in range(3):
+        design[:, c, c], design[:, c, 3 + c] = 1.0, perfect[:, c]
+    stated = np.diag(np.tile(SIZE**2, n))
+    columns: dict[object, Array] = {}
+    for i, p in enumerate(places):
+        for joint, angle in enumerate(p.degrees or ()):
+            moved = np.zeros((n, 3))
+            ends = []
+            for sign in (1, -1):
+                at = list(p.degrees or ())
+                at[joint] += sign * np.rad2deg(STEP)
+                ends.append(outputs([Position.deg(at[0], at[1])])[0])
+            moved[i] = (ends[0] - ends[1]) / (2 * STEP)
+            columns[i, joint] = moved
+            same = "detent", joint, angle
+            columns[same] = columns.get(same, np.zeros((n, 3))) + moved
+    for column in columns.values():
+        stated += np.deg2rad(degrees) ** 2 / 2 * np.outer(column, column)
+    return Explicit((u - perfect).ravel(), design.reshape(-1, 6), stated)
+
+
+def noisy(places: tuple[Position, ...], seed: int = 1) -> Array:
+    rng = np.random.default_rng(seed)
+    return outputs(places) + SIZE * rng.standard_normal((len(places), 3))
+
+
+@pytest.mark.parametrize("degrees", [0.0, 0.02])
+def test_chi2_is_that_of_generalised_least_squares(degrees: float) -> None:
+    u = noisy(PLACES)
+    one, plain = found(PLACES, u, degrees).acc, explicit(PLACES, u, degrees)
+    _, off = plain.fitted(np.arange(21))
+    chi2 = off @ np.linalg.solve(plain.stated, off)
+    assert one.chi2 == pytest.approx(chi2, rel=2e-3)
+    assert one.dof == 21 - 6
+
+
+@pytest.mark.parametrize("degrees", [0.0, 0.02])
+def test_what_is_left_out_is_foretold_by_the_others(degrees: float) -> None:
+    u = noisy(PLACES, 2)
+    one, plain = found(PLACES, u, degrees).acc, explicit(PLACES, u, degrees)
+    off = np.array([plain.without(3 * i + np.arange(3)) for i in range(len(PLACES))])
+    weight = np.tile(SIZE**-2.0, (len(PLACES), 1))
+    expected = np.sqrt(np.average(off**2, weights=weight))
+    assert one.left_out == pytest.approx(expected, rel=2e-3)
+    assert one.left_out > 1.1 * one.rms
+
+
+def test_residuals_are_what_the_estimate_leaves() -> None:
+    u = noisy(PLACES, 3)
+    whole = found(PLACES, u)
+    b, k = whole.values[:3], whole.values[3:6]
+    perfect = outputs(PLACES, bias=np.zeros(3), scale=np.ones(3))
+    np.testing.assert_allclose(whole.acc.rows, u - b - k * perfect, atol=1e-9)
+    weight = np.tile(SIZE**-2.0, (len(PLACES), 1))
+    rms = np.sqrt(np.average(whole.acc.rows**2, weights=weight))
+    assert whole.acc.rms == pytest.approx(rms)
+    assert np.isnan(whole.gyr.rms) and whole.gyr.dof == 0
+
+
+def test_a_misfit_stays_visible_whatever_the_scatter_that_is_found() -> None:
+    u = outputs(PLACES)
+    u += 30 * SIZE * np.random.default_rng(4).standard_normal(u.shape)
+    plain = explicit(PLACES, u)
+    _, off = plain.fitted(np.arange(21))
+    chi2 = off @ np.linalg.solve(plain.stated, off)
+    assert chi2 > 5000 and found(PLACES, u).acc.chi2 == pytest.approx(chi2, rel=1e-3)
+
+
+def by_hand(n: int, seed: int = 6) -> Array:
+    rng = np.random.default_rng(seed)
+    f = rng.standard_normal((n, 3))
+    f *= G / np.linalg.norm(f, axis=1, keepdims=True)
+    return BIAS + SCALE * f + SIZE * rng.standard_normal((n, 3))
+
+
+def norms(u: Array, x: Array) -> tuple[Array, Array]:
+    """Length of the force less gravity, and its standard deviation."""
+    f = (u - x[:3]) / x[3:6]
+    length = np.linalg.norm(f, axis=1)
+    slope = f / length[:, None] / x[3:6]
+    return length - G, np.sqrt(((slope * SIZE) ** 2).sum(axis=1))
+
+
+@pytest.mark.parametrize("n", [8, 14])
+def test_of_an_unknown_orientation_the_length_is_one_degree_of_freedom(n: int) -> None:
+    u = by_hand(n)
+    whole = found((HAND,) * n, u)
+    off, sd = norms(u, whole.values)
+    assert whole.acc.dof == n - 6
+    assert whole.acc.chi2 == pytest.approx(float(((off / sd) ** 2).sum()), rel=0.02)
+    assert np.isnan(whole.acc.rows[:, 1:]).all()
+    np.testing.assert_allclose(whole.acc.rows[:, 0], off, rtol=0.01, atol=1e-6)
+
+
+def test_known_and_unknown_orientations_count_together() -> None:
+    places = (*PLACES, *[HAND] * 5)
+    u = np.vstack([noisy(PLACES, 7), by_hand(5, 8)])
+    assert found(places, u).acc.dof == 21 + 5 - 6
+
+
+def test_directions_that_nothing_shows_take_no_degree_of_freedom() -> None:
+    faces = np.vstack([np.eye(3), -np.eye(3)])
+    u = BIAS + SCALE * G * np.vstack([faces, faces])
+    seen = observe((HAND,) * 12, u)
+    recorded = of_means(seen)
+    nominal = State(np.zeros(6), np.ones(6), np.zeros((12, 2)), np.zeros(3))
+    crossed = estimated(recorded, None, nominal, Wanted(cross=True))
+    assert crossed.acc.dof == 12 - 6

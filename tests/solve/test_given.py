@@ -1,0 +1,224 @@
+"""The set that is given: its names and places, detents, and the Earth's rate."""
+
+import numpy as np
+import pytest
+from observed import GYR_BIAS, OMEGA, carried, observe, outputs
+
+from fieldcal.effects import Experience
+from fieldcal.model import priors
+from fieldcal.positions import FIVE, SIX_FACES, Position, angles
+from fieldcal.samples import Array
+from fieldcal.solve import Observations, solve
+from fieldcal.solve.given import (
+    NOT_SHOWN,
+    Given,
+    Wanted,
+    earth_known,
+    repeated,
+    seen_by,
+)
+from fieldcal.solve.rows import of_means
+
+HAND = Position("by hand")
+ACC = [f"acc_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
+GYR = [f"gyr_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
+
+
+def seen(places: tuple[Position, ...], gyr: bool = False) -> Observations:
+    acc = outputs([p if p.oriented else FIVE[3] for p in places])
+    return observe(
+        places, acc, gyr=np.tile(GYR_BIAS, (len(places), 1)) if gyr else None
+    )
+
+
+def given(places: tuple[Position, ...], wanted: Wanted, gyr: bool = False) -> Given:
+    recorded = of_means(seen(places, gyr))
+    rows = seen_by(recorded.rows, np.zeros(3))
+    return Given(rows, np.ones(6), recorded.since, wanted.turned, wanted)
+
+
+def experience(places: tuple[Position, ...]) -> Experience:
+    return Experience.at_rest(*angles(places), 9.81, position=np.arange(len(places)))
+
+
+# --- detents
+
+
+def together(places: tuple[Position, ...]) -> set[tuple[tuple[int, int], ...]]:
+    """Which turns share an error: pairs of position and joint."""
+    oriented = [i for i, p in enumerate(places) if p.oriented]
+    table = repeated(experience(places), oriented)
+    assert table.shape[0] == 2 * len(places) and set(np.unique(table)) <= {0.0, 1.0}
+    return {
+        tuple((int(i) // 2, int(i) % 2) for i in np.flatnonzero(column))
+        for column in table.T
+    }
+
+
+def test_positions_at_the_same_angle_of_a_joint_share_its_detent() -> None:
+    places = tuple(
+        Position.deg(a, b) for a, b in [(0, 0), (45, 5), (45, -5), (0, 5), (-45, 45)]
+    )
+    assert together(places) == {
+        ((0, 0), (3, 0)),  # alpha = 0, which a detent may miss as well
+        ((0, 1),),
+        ((1, 0), (2, 0)),  # alpha = 45
+        ((4, 0),),  # alpha = -45
+        ((1, 1), (3, 1)),  # beta = 5
+        ((2, 1),),
+        ((4, 1),),  # beta = 45 is not alpha = 45
+    }
+
+
+def test_what_nobody_set_has_no_detent() -> None:
+    assert together((Position.deg(0, 0), HAND, Position.deg(9, 0))) == {
+        ((0, 0),),
+        ((2, 0),),
+        ((0, 1), (2, 1)),
+    }
+
+
+def test_a_repeated_angle_is_off_by_the_same_in_half_of_the_variance() -> None:
+    places = (Position.deg(0, 0), *[Position.deg(20, 0)] * 4, Position.deg(30, 0))
+    d = given(places, Wanted(angles_deg=0.3))
+    size = np.deg2rad(0.3) / np.sqrt(2)
+    parts = {g.part: g for _, g in d.members}
+    assert set(parts) == {"own", "repeated"}
+    assert len(parts["own"].columns) == 2 * 6 and len(parts["repeated"].columns) == 4
+    for group in parts.values():
+        assert group.fixed == 1.0
+        np.testing.assert_allclose(group.typical, size)
+
+
+def test_repeating_an_angle_helps_against_half_of_the_variance_only() -> None:
+    def sigma(places: tuple[Position, ...]) -> float:
+        found = solve(
+            observe(places, outputs(places), sigma=1e-6), tilt="none",
+            angle_sigma_deg=0.1,
+        )  # fmt: skip
+        return found.uncertainty("acc_bias.x")
+
+    home, away = Position.deg(0, 0), Position.deg(180, 0)
+    # of bias x, each place says g times the error of its detent and the mean of its own
+    one = 9.81 * np.deg2rad(0.1) / np.sqrt(2)
+    for n in (2, 9):
+        expected = one / np.sqrt(1 / 2 + 1 / (1 + 1 / n))
+        assert sigma((home, *[away] * n)) == pytest.approx(expected, rel=0.02)
+
+
+# --- the Earth's rate
+
+
+def test_the_earth_is_known_by_latitude_and_heading() -> None:
+    phi = 0.7
+    home = OMEGA * np.array([0, -np.sin(phi), np.cos(phi)])
+    level = OMEGA * np.cos(phi)
+    base, unsure = earth_known(phi, True, None)
+    np.testing.assert_allclose(base, home)
+    assert unsure == (0.0, 0.0, 0.0)
+    for navigation in (False, True):
+        base, unsure = earth_known(phi, navigation, 0.02)
+        np.testing.assert_allclose(base, home)
+        np.testing.assert_allclose(unsure, [0.02 * level, 0, 0])
+    base, unsure = earth_known(phi, False, None)
+    np.testing.assert_allclose(base, [0, home[1], 0])
+    np.testing.assert_allclose(unsure, [level / np.sqrt(2), 0, level / np.sqrt(2)])
+    # as far as it may be in any direction: its mean square is that of the rate
+    base, unsure = earth_known(None, False, None)
+    assert not base.any()
+    assert np.sum(np.square(unsure)) == pytest.approx(OMEGA**2)
+
+
+@pytest.mark.parametrize("heading_deg", [None, 0.0, 3.0])
+def test_what_is_known_of_the_earth_is_in_the_gyroscopes_bias(
+    heading_deg: float | None,
+) -> None:
+    phi = 0.8
+    home = [0.0, -OMEGA * np.sin(phi), OMEGA * np.cos(phi)]
+    rates = np.array([carried(p.alpha or 0, p.beta or 0, home) for p in FIVE])
+    nothing = np.full((5, 3), np.nan)
+    noise = 1e-4 if heading_deg is None else 1e-7
+    found = solve(
+        observe(FIVE, nothing, gyr=GYR_BIAS + rates, sigma_gyr=noise, latitude=phi),
+        tilt="none", heading_sigma_deg=heading_deg,
+    )  # fmt: skip
+    bias, sigma = found.vector("gyr_bias")
+    if heading_deg is None:
+        assert (np.abs(bias - GYR_BIAS) < 2.5 * sigma).all()
+        assert sigma.max() > 0.3 * OMEGA * np.cos(phi)
+    else:
+        assert (np.abs(bias - GYR_BIAS) < 0.1 * sigma).all()
+        level = OMEGA * np.cos(phi) * np.deg2rad(heading_deg)
+        assert sigma.max() < level + 2e-7
+
+
+# --- names and places
+
+
+@pytest.mark.parametrize(
+    ("wanted", "names"),
+    [
+        (Wanted(), ACC),
+        (Wanted("base_tilt"), [*ACC, "base_tilt.about_x_deg", "base_tilt.about_z_deg"]),
+        (Wanted("angle_offset", cross=True),
+         [*ACC, *(f"cross_coupling.k{i}" for i in ("12", "13", "21", "23", "31", "32")),
+          "angle_offset.alpha0_deg", "angle_offset.beta0_deg"]),
+    ],
+)  # fmt: skip
+def test_names_are_in_the_order_of_results(wanted: Wanted, names: list[str]) -> None:
+    d = given(SIX_FACES, wanted)
+    assert list(d.names) == names
+    places = np.concatenate([d.place(n) for n in names])
+    assert len(set(places.tolist())) == len(names)
+    columns = {c for g in d.always for c in g.columns.tolist()}
+    columns |= {c for _, g in d.members for c in g.columns.tolist()}
+    assert set(places.tolist()) == columns
+
+
+def test_gyroscopes_have_a_scale_factor_if_it_is_wanted() -> None:
+    plain = given(FIVE, Wanted(), gyr=True)
+    assert list(plain.names) == [*ACC, *GYR[:3]]
+    assert len(plain.place("gyr_scale.x")) == 0
+    scaled = given(FIVE, Wanted(gyr_scale=True, gyro_cross=True), gyr=True)
+    assert list(scaled.names[:12]) == [*ACC, *GYR]
+    assert [n[-3:] for n in scaled.names[12:]] == [
+        "s12", "s13", "s21", "s23", "s31", "s32",
+    ]  # fmt: skip
+    sizes = [g.typical for g in scaled.always if (g.cause, g.part) == ("scale", "gyr")]
+    np.testing.assert_allclose(sizes, [[priors.SCALE] * 3])
+
+
+def test_where_nobody_knows_an_orientation_a_common_rotation_is_left_out() -> None:
+    d = given((HAND,) * 12, Wanted("base_tilt", cross=True))
+    kept = [n for n in d.names if n.startswith("cross")]
+    assert kept == [f"cross_coupling.k{i}" for i in ("12", "13", "23")]
+    assert not set(NOT_SHOWN) & {n[-3:] for n in d.names}
+    assert not any("tilt" in n for n in d.names)
+
+
+@pytest.mark.parametrize("name", ["acc_bias.x", "acc_scale.z", "gyr_bias.y"])
+def test_a_column_in_its_place_is_what_the_parameter_does(name: str) -> None:
+    d = given(FIVE, Wanted(), gyr=True)
+    (at,) = d.place(name)
+    start = d.bias if "bias" in name else d.scale
+    channel = "xyz".index(name[-1]) + 3 * name.startswith("gyr")
+    assert at == start + channel
+
+
+def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
+    free = given(FIVE, Wanted("base_tilt"))
+    assert all(g.fixed == priors.FREE for g in free.always)
+    (tilt,) = [g for c, g in free.members if c.name == "base_tilt"]
+    assert tilt.fixed == priors.FREE
+    level = given(FIVE, Wanted("base_tilt", level_deg=0.2))
+    (tilt,) = [g for c, g in level.members if c.name == "base_tilt"]
+    sizes: Array = tilt.sizes(tilt.fixed or 0.0)
+    np.testing.assert_allclose(sizes, [0.2, 0.2])
+
+
+def test_no_unknown_function_and_no_cause_is_searched_for() -> None:
+    d = given(FIVE, Wanted("base_tilt", cross=True, angles_deg=0.1))
+    assert {c.kind for c in d.causes} == {"given"}
+    assert {c.name for c in d.causes} - {"detents"} == {
+        "base_tilt", "cross_coupling", "angle_setting",
+    }  # fmt: skip

@@ -1,0 +1,76 @@
+"""What a design determines, and what is proposed where it does not."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from observed import BIAS, SCALE, G, observe, outputs
+
+from fieldcal.model.planned import design, parameters
+from fieldcal.positions import FIVE, TWO, Position
+from fieldcal.samples import Array
+from fieldcal.solve import solve
+from fieldcal.solve.rank import LADDER, MOST, determined, ladder_remedy, remedy
+
+TILTED = parameters("angle_offset")
+
+
+def test_a_parameter_with_a_part_in_a_hidden_direction_is_not_determined() -> None:
+    rows = np.array([[1.0, 1, 0], [2, 2, 0], [0, 0, 1]])
+    known, rank = determined(rows)
+    assert known.tolist() == [False, False, True] and rank == 2
+
+
+def test_units_do_not_matter() -> None:
+    rng = np.random.default_rng(1)
+    rows = rng.standard_normal((6, 4)) * [1e-4, 1.0, 1e4, 1.0]
+    known, rank = determined(rows)
+    assert known.all() and rank == 4
+    rows[:, 3] = rows[:, 0] / 1e-4 + rows[:, 2] / 1e4
+    known, rank = determined(rows)
+    assert known.tolist() == [False, True, False, False] and rank == 3
+
+
+def test_fewer_rows_than_parameters_leave_all_that_share_them_open() -> None:
+    known, rank = determined(np.array([[1.0, 0, 0], [0, 1, 1]]))
+    assert known.tolist() == [True, False, False] and rank == 2
+
+
+def test_what_is_left_of_a_sine_by_rounding_is_nothing() -> None:
+    rows = np.column_stack([[1.0, 1, 1], np.sin(np.pi * np.arange(3)), [1.0, 2, 4]])
+    known, rank = determined(rows)
+    assert known.tolist() == [True, False, True] and rank == 2
+
+
+@pytest.mark.parametrize("taken", [TWO, TWO[:1], (*TWO, TWO[1])])
+def test_what_is_proposed_is_enough_and_none_of_it_is_too_much(
+    taken: tuple[Position, ...],
+) -> None:
+    def rows(places: tuple[Position, ...]) -> Array:
+        return design(TILTED, places, G)
+
+    extra = remedy(lambda p: rows(tuple(p)), taken, LADDER)
+    assert 0 < len(extra) <= MOST
+    for left in [None, *extra]:
+        kept = [p for p in extra if p is not left]
+        table = rows((*taken, *kept)).reshape(-1, len(TILTED))
+        assert determined(table)[0].all() == (left is None)
+
+
+def test_nothing_is_proposed_where_nothing_is_missing_or_nothing_helps() -> None:
+    def rows(places: Sequence[Position]) -> Array:
+        return np.ones((len(places), 1, 2))
+
+    assert remedy(lambda p: design(TILTED, p, G), FIVE, LADDER) == []
+    assert remedy(rows, TWO, LADDER) == []
+
+
+def test_the_proposed_positions_mend_what_solve_leaves_open() -> None:
+    places = (Position.deg(0, 0), Position.deg(45, 0), Position.deg(20, 0))
+    seen = observe(places, outputs(places))
+    assert "acc_scale.z" not in solve(seen, tilt="none").names
+    extra = ladder_remedy(seen, parameters())
+    more = (*places, *(p for p in LADDER if p.name in extra))
+    assert len(more) == len(places) + len(extra)
+    found = solve(observe(more, outputs(more)), tilt="none")
+    np.testing.assert_allclose(found.values, [*BIAS, *SCALE], atol=1e-5)

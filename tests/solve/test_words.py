@@ -1,0 +1,112 @@
+"""What is said of numbers that cannot be, of bad windows and of scatter."""
+
+import numpy as np
+import pytest
+from observed import BIAS, COUPLING, G, observe, outputs
+from scipy.stats import chi2 as chi_square
+
+from fieldcal.calibration import Nominal
+from fieldcal.calibration.plausible import senseless
+from fieldcal.positions import FIVE, WIDE, Position
+from fieldcal.samples import Array
+from fieldcal.solve import solve, words
+
+NINE = (*WIDE, *FIVE[1:])
+
+
+def noisy(seed: int = 1, size: float = 1e-3, **known: Array) -> Array:
+    u = outputs(NINE, **known)  # type: ignore[arg-type]
+    return u + size * np.random.default_rng(seed).standard_normal(u.shape)
+
+
+def test_a_good_device_has_nothing_said_of_it() -> None:
+    found = solve(observe(NINE, noisy()), tilt="none")
+    assert found.good and not found.warnings
+
+
+def test_a_recording_in_g_is_said_to_be_in_another_unit() -> None:
+    found = solve(observe(NINE, noisy() / 9.80665, sigma=1e-4), tilt="none")
+    assert not found.good
+    said = [w for w in found.warnings if "unit or full scale" in w]
+    assert [w.partition(" ")[0] for w in said] == [f"acc_scale.{x}" for x in "xyz"]
+    assert "(0.1024 times it fits)" in said[0]
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_bias_of_most_of_a_gravity_is_said(axis: int) -> None:
+    bias = BIAS + 0.9 * G * np.eye(3)[axis]
+    found = solve(observe(NINE, noisy(bias=bias)), tilt="none")
+    assert not found.good
+    (said,) = [w for w in found.warnings if "takes its mean out" in w]
+    assert said.startswith(f"acc_bias.{'xyz'[axis]}")
+    # and not where [nominal] says so
+    known = Nominal(acc_bias=tuple(bias.tolist()))
+    said_so = solve(observe(NINE, noisy(bias=bias), nominal=known), tilt="none")
+    assert said_so.good and not said_so.warnings
+
+
+def test_an_axis_that_does_not_follow_is_said() -> None:
+    found = solve(observe(NINE, noisy(scale=np.array([1.0, 1.0, 1e-4]))), tilt="none")
+    assert not found.good
+    assert any(w.startswith("acc_scale.z") and "not follow" in w
+               for w in found.warnings)  # fmt: skip
+
+
+def test_numbers_are_only_called_senseless_when_they_are_sure() -> None:
+    names, plain = ["acc_scale.x", "acc_bias.y", "gyr_scale.z"], Nominal()
+    values = np.array([1.4, 6.0, 0.05])
+    sure = senseless(names, values, np.full(3, 1e-3), plain)
+    assert [s.partition(" ")[0] for s in sure] == names
+    unsure = senseless(names[:2], values[:2], np.array([0.05, 0.5]), plain)
+    assert unsure == []
+    assert senseless(["base_tilt.about_x_deg"], values[1:2], values[1:2], plain) == []
+
+
+@pytest.mark.parametrize(("chi2", "dof"), [(3.0, 1), (12.0, 7), (60.0, 20)])
+def test_chance_is_that_of_a_larger_chi2(chi2: float, dof: int) -> None:
+    assert words.chance(chi2, dof) == pytest.approx(chi_square.sf(chi2, dof), rel=1e-9)
+    assert words.chance(chi2, 0) == 1.0
+
+
+def test_scatter_is_told_from_one_in_a_hundred_on() -> None:
+    limit = chi_square.isf(words.UNLIKELY, 10)
+    assert words.excess("positions", 0.99 * limit, 10, 0.01, "m/s^2") == ""
+    said = words.excess("positions", 1.01 * limit, 10, 0.01, "m/s^2")
+    assert "dof 10" in said and "0.01 m/s^2" in said and "0.06°" in said
+    assert "itself uncertain" not in said
+    assert "itself uncertain" in words.excess("norms", 90.0, 4, 0.01, "m/s^2")
+
+
+@pytest.mark.parametrize(
+    ("bad", "says"),
+    [(0.05, ""), (0.4, "probability 40 %"), (0.995, "was given no weight")],
+)
+def test_a_bad_window_is_named(bad: float, says: str) -> None:
+    doubt = np.zeros(len(NINE))
+    doubt[2] = bad
+    said = words.bad_window(observe(NINE, outputs(NINE)), doubt)
+    assert said == "" if not says else says in said and NINE[2].name in said
+
+
+def test_an_effect_left_out_is_said_to_be_scatter() -> None:
+    u = noisy(coupling=COUPLING)
+    found = solve(observe(NINE, u), tilt="none")
+    assert not found.good
+    assert any("beyond their windows' noise" in w for w in found.warnings)
+
+
+def test_lists_read_as_sentences() -> None:
+    assert words.join(["a"]) == "a" and words.join(["a", "b", "c"]) == "a, b and c"
+    assert words.not_determined(["p"], [], "these") == "p is not determined by these"
+    assert words.not_determined(["p", "q"], ["r"], "these").endswith(
+        "p and q are not determined by these: add r"
+    )
+
+
+def test_two_positions_of_the_same_kind_say_what_a_tilt_would_do() -> None:
+    places = (Position.deg(0, 0), Position.deg(45, 5))
+    found = solve(observe(places, outputs(places)))
+    assert any("0.017 m/s^2 unseen" in w for w in found.warnings)
+    assert words.NO_DOF in found.warnings
+    level = solve(observe(places, outputs(places)), level_sigma_deg=0.1)
+    assert not any("unseen" in w for w in level.warnings)

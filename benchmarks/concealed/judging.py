@@ -31,6 +31,8 @@ class Outcome:
     before, after : held-out rms
     seconds : that the diagnosis took
     where : channels and kinds of the largest mismatches
+    claims : probability of the verdict and of each effect that was named, with whether
+        it is so
 
     """
 
@@ -47,6 +49,7 @@ class Outcome:
     after: float = np.nan
     seconds: float = np.nan
     where: tuple[str, ...] = ()
+    claims: tuple[tuple[float, bool], ...] = ()
 
 
 def judged(session: Session, seed: int, told: Diagnosis, seconds: float) -> Outcome:
@@ -69,7 +72,16 @@ def judged(session: Session, seed: int, told: Diagnosis, seconds: float) -> Outc
         told.after.held_out_rms,
         seconds,
         where,
+        ((told.probability, right), *_claims(session, told)),
     )
+
+
+def _claims(session: Session, told: Diagnosis) -> Iterator[tuple[float, bool]]:
+    """Probability of each effect that is named by evidence, and whether it is there."""
+    truth = set(session.concealed) | ALWAYS
+    for one in told.effects:
+        if one.id not in ALWAYS:
+            yield one.probability, bool(truth & {one.id, *one.aliases})
 
 
 def _right(

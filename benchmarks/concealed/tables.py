@@ -27,7 +27,7 @@ NORMAL = 1.96
 
 def printed(found: Sequence[Outcome]) -> None:
     """Print every table."""
-    for table in (groups, confusion, power, numbers):
+    for table in (groups, confusion, power, reliability, numbers):
         print(table(found), end="\n\n")
 
 
@@ -77,6 +77,23 @@ def power(found: Sequence[Outcome]) -> str:
             name = f"{low:g} to {high:g}" if np.isfinite(high) else f"from {low:g}"
             right = sum(o.right for o in some)
             lines.append(f"| {name} | {len(some)} | {_part(right, some)} |")
+    return "\n".join(lines)
+
+
+def reliability(found: Sequence[Outcome]) -> str:
+    """Of what is said with a probability, how much is so; and the log score."""
+    claims = np.array([c for o in found for c in o.claims], dtype=float)
+    lines = ["| said with P | how often | mean P | is so |", "|---|---|---|---|"]
+    for low in np.arange(0.5, 1.0, 0.1):
+        top = 1.0 + 1e-9 if low > 0.85 else low + 0.1
+        some = claims[(claims[:, 0] >= low - 1e-9) & (claims[:, 0] < top)]
+        if len(some):
+            lines.append(
+                f"| {low:.1f} to {min(top, 1.0):.1f} | {len(some)} |"
+                f" {100 * some[:, 0].mean():.1f} % | {100 * some[:, 1].mean():.1f} % |"
+            )
+    sure = np.clip(np.where(claims[:, 1] > 0, claims[:, 0], 1 - claims[:, 0]), 1e-6, 1)
+    lines.append(f"\nlog score {float(np.log(sure).mean()):.3f} a claim")
     return "\n".join(lines)
 
 

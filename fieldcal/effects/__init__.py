@@ -249,11 +249,10 @@ class Sensor(Effect):
 
 
 class Scatter(Effect):
-    """A random effect: the covariance of the outputs is value^2 F F^T."""
+    """A random effect: no equation but a size, which its parameters are.
 
-    @abstractmethod
-    def factor(self, x: Experience, name: str) -> Array:
-        """Return F of a parameter, (n, 6, m), per unit of the parameter."""
+    Those of every output are walks of the biases; others are of the positions' angles.
+    """
 
 
 class Line(Effect):

@@ -23,7 +23,7 @@ from fieldcal.session import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.rows import variances, widened
-from fieldcal.uncarried import told, uncarried
+from fieldcal.uncarried import misread, told, uncarried
 
 Turns = Literal["auto", "yes", "no"]
 
@@ -122,7 +122,8 @@ def solved(
     found = _listed(with_provenance(found, about), laid.order)
     if printed or laid.prepared is None:
         return found
-    return told(found, uncarried(laid.prepared, found))
+    found = told(found, uncarried(laid.prepared, found))
+    return misread(laid.prepared, found)
 
 
 def _insist(found: Calibration, session: Session, still: Rests) -> None:

@@ -22,7 +22,7 @@ from fieldcal.diagnosis.chain import check
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.verdict import calibrated
-from fieldcal.effects import Scatter, catalogue
+from fieldcal.effects import Chain, Scatter, catalogue
 from fieldcal.model.posterior import Standing
 from fieldcal.model.search import Set
 from fieldcal.samples import CHANNELS
@@ -117,6 +117,23 @@ def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float
         for name in now
         if name in before and before[name][1] > 0 and np.isfinite(now[name][0])
     }
+
+
+def misread(prepared: Prepared, calibration: Calibration) -> Calibration:
+    """The calibration, not to be used where session.toml is found to be wrong."""
+    said = []
+    for name, fault in prepared.checked.faults:
+        effect = catalogue()[name]
+        if isinstance(effect, Chain) and effect.misread:
+            values = ", ".join(f"{k} = {v}" for k, v in fault.values.items())
+            said.append(
+                f"session.toml is wrong about the {name} ({values}): mend it and solve"
+                " again; the numbers are those of samples that were put right"
+            )
+    if not said:
+        return calibration
+    warnings = (*said, *calibration.warnings)
+    return replace(calibration, warnings=warnings, good=False)
 
 
 def told(calibration: Calibration, missing: Uncarried) -> Calibration:

@@ -277,6 +277,10 @@ class Chain(Effect):
     kind = "chain"
     seen_in: ClassVar[Seen] = "samples"
 
+    misread: ClassVar[bool] = False
+    """Whether session.toml is wrong and not the samples: a calibration of samples that
+    are put right is none of those that the device sends."""
+
     @abstractmethod
     def find(self, recording: Recording) -> list[Fault]:
         """Look for it in the samples."""

@@ -79,6 +79,7 @@ def _odds(measured: Array, f: Array) -> tuple[float, float]:
 class Mounting(Chain):
     """Wrong axes or a wrong unit."""
 
+    misread = True
     covariate = "force at rest is not where it should be"
     decided_by = "the drawing on the device, and its data sheet"
     source = "model of this project"

@@ -96,7 +96,8 @@ class Turns:
         say; None where that is still to be sought, and the way is not looked at.
         """
         out: list[TurnRows] = []
-        self.scale, self.known = state.scale, known if self.way else None
+        seen = self.way and known is not None and not _strange(known)
+        self.scale, self.known = state.scale, known if seen else None
         if self.dictionary.free.any():
             self.means = _means(windows, self.dictionary)
             self.spread = _spread(windows, self.dictionary)
@@ -223,6 +224,17 @@ class Turns:
     def _at_ends(turn: Turn, x: Experience) -> tuple[Array, Array]:
         f, closure, _ = geometry(x, turn.positions, turn.attitude, turn.done)
         return f, closure
+
+
+def _strange(known: Set) -> bool:
+    """Whether something that no physics makes acts on accelerometers at rest.
+
+    What it does while the device is turned, nobody can say.
+    """
+    return any(
+        cause.kind == "unknown" and not group.part.startswith("g")
+        for cause, group in known.members
+    )
 
 
 def _plane(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:

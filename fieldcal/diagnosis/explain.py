@@ -18,6 +18,7 @@ from fieldcal.model.inference import Inference, Inferred
 from fieldcal.model.noise import grain_of
 from fieldcal.model.posterior import Posterior, Standing
 from fieldcal.model.reduce import Rows, Source, rate_of, spans
+from fieldcal.model.reported import reported
 from fieldcal.model.search import Search, Set
 from fieldcal.model.state import State
 from fieldcal.model.system import System
@@ -122,7 +123,7 @@ def explain(prepared: Prepared) -> Explanation:
         inference.dictionary,
         windows,
         found.values,
-        found.search.reported(found.best),
+        reported(found.search, found.best),
     )
     posterior = Posterior(
         found.search, found.best, lambda there: inference.beside(found, there)

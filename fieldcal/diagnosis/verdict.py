@@ -33,6 +33,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.posterior import Standing
 from fieldcal.model.reduce import spans
+from fieldcal.model.reported import reported
 from fieldcal.model.search import Set
 from fieldcal.samples import Block
 
@@ -228,7 +229,7 @@ def calibrated(
 ) -> dict[str, tuple[float, float, float]]:
     """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
     d = explanation.dictionary
-    found = explanation.posterior.search.reported(one).state
+    found = reported(explanation.posterior.search, one).state
     nominal = explanation.inferred.inference.nominal
     sigma = np.sqrt(np.diag(found.inverse))
     out = {}

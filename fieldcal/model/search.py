@@ -214,7 +214,7 @@ class Search:
         base = there.score - there.state.score
         base -= self.alike(sizes.instability)
         columns, wide = there.state.columns, there.state.sizes
-        ways = [(wide, 0.0), self._opened(there)]
+        ways = [(wide, 0.0), self.opened(there)]
         for down in LEVELS if self.unstable.any() else LEVELS[:1]:
             less = tuple(max(i - down, 0) for i in sizes.instability)
             rows = self.weighed(less)
@@ -233,17 +233,7 @@ class Search:
                 lost = DENSITY[0] - DENSITY[size]
                 yield 0, state, there.score - there.state.score + state.score + lost
 
-    def reported(self, there: Set) -> Set:
-        """The set as numbers are taken from it.
-
-        A size at its likeliest is no certainty: of a calibration that rows say little
-        about it is the smallest. Before the rows it is known as of devices of its kind.
-        """
-        wide, _ = self._opened(there)
-        before = there.state
-        return replace(there, state=Eliminated.of(before.rows, before.columns, wide))
-
-    def _opened(self, there: Set) -> tuple[Array, float]:
+    def opened(self, there: Set) -> tuple[Array, float]:
         """Sizes with no calibration below what is typical, and what that costs, ln.
 
         Held against an instability that makes up for everything, a calibration seems to

@@ -62,7 +62,7 @@ class Way:
         columns = np.concatenate([c for c, _ in general])
         design = self._seen(np.concatenate([o for _, o in general], axis=2))
         flat = design.reshape(-1, len(columns))
-        own = ~d.shown[columns]
+        own = ~d.shown[columns] & np.isin(columns, index)
         output = self.state.output(turn.x, self.view.since)
         off = turn.acc - turn.means(output[:, :3])
         z = off.ravel() + flat[:, own] @ values[columns[own]]

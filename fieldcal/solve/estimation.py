@@ -13,6 +13,7 @@ import numpy as np
 from fieldcal.model.causes import CLOSURE
 from fieldcal.model.evidence import Gram
 from fieldcal.model.inference import Inference
+from fieldcal.model.mixture import Mixing, Mixture
 from fieldcal.model.reduce import Rows, Source
 from fieldcal.model.search import Search
 from fieldcal.model.state import State
@@ -22,7 +23,6 @@ from fieldcal.model.turn_rows import TurnRows, Turns
 from fieldcal.samples import Array
 from fieldcal.solve.agreement import Agreement, agreement
 from fieldcal.solve.given import Given, Wanted
-from fieldcal.solve.mixture import Mixing, Mixture
 from fieldcal.solve.observations import Mask
 from fieldcal.solve.words import CERTAIN, SUSPECT
 

@@ -18,6 +18,7 @@ from fieldcal.model import priors
 from fieldcal.model.evidence import Eliminated
 from fieldcal.model.posterior import Posterior
 from fieldcal.model.priors import SIZES
+from fieldcal.model.reported import reported
 from fieldcal.model.search import Search, Set
 from fieldcal.samples import Array
 
@@ -160,7 +161,7 @@ def test_with_sizes_found_estimates_are_as_near_as_they_say() -> None:
     away = []
     for one in draws():
         count = sum(len(g.columns) for g in SESSION.dictionary.always)
-        state = one.search.reported(one.found).state
+        state = reported(one.search, one.found).state
         away.append(pulls(state, one.value)[:count])
     assert 0.93 < np.mean(np.abs(np.concatenate(away)) < 1.96) < 0.97
 

@@ -1,4 +1,4 @@
-"""What a given set is estimated at, whatever its sizes and whichever window is bad.
+"""What a set is estimated at, whatever its sizes and whichever window is bad.
 
 How much biases wander from window to window is known by the scatter of few windows
 only, and any window may be disturbed in a way that it does not show itself. Both are
@@ -21,17 +21,20 @@ from itertools import product
 import numpy as np
 
 from fieldcal.model import priors
+from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, Index, gains
 from fieldcal.model.search import Set
 from fieldcal.model.sizing import DENSITY, TRIADS, Sizing, alike
 from fieldcal.samples import Array
-from fieldcal.solve.given import Given
 
 KEPT = 4.0
 """Evidence behind the best, ln, from which a hypothesis no longer counts: 50 to 1."""
 
 UNSTEADY = np.log(priors.loosely())
 """How likely each size of instability is, ln: with whatever else scatters windows."""
+
+DEVICES = np.log(priors.density(priors.STEEP))
+"""The same where everything else is a cause of its own."""
 
 SHOWS = 0.2
 """Part of a mean's noise from which what windows wander by beside it can be seen."""
@@ -81,23 +84,31 @@ class Mixture:
 
 
 class Mixing:
-    """Hypotheses about a given set.
+    """Hypotheses about a set.
 
     Parameters
     ----------
     dictionary, gram : what the rows say about the set's own state
     there : the set, its sizes at their likeliest
     unstable : (7,) typical instability, 0 where there is none
+    given : whether nobody looked for causes: then windows may be bad, or scattered by
+        more than the device
 
     """
 
     def __init__(
-        self, dictionary: Given, gram: Gram, there: Set, unstable: Array
+        self,
+        dictionary: Dictionary,
+        gram: Gram,
+        there: Set,
+        unstable: Array,
+        given: bool = True,
     ) -> None:
         self.dictionary, self.there, self.unstable = dictionary, there, unstable
+        self.density = UNSTEADY if given else DEVICES
         sizing = Sizing(dictionary, gram, unstable, there.members, there.sizes)
         self.columns, self.wide = sizing.every, there.state.sizes
-        self.doubted = self._doubted()
+        self.doubted = self._doubted() if given else []
         more = [at for _, at in self.doubted]
         self.gram = gram.only(np.concatenate([self.columns, *more]))
         self.bad = np.zeros(len(dictionary.held))
@@ -112,7 +123,7 @@ class Mixing:
             if sum(h.score for h in parts) > best - KEPT
         ]
         score = np.array([s for s, _, _ in every])
-        score += alike(self.there.sizes.instability, self.unstable, UNSTEADY)
+        score += alike(self.there.sizes.instability, self.unstable, self.density)
         total = float(np.logaddexp.reduce(score))
         weight = np.exp(score - total)
         means = np.array([e.estimate[: len(self.columns)] for _, e, _ in every])
@@ -176,8 +187,10 @@ class Mixing:
                   for c, m in enumerate(mode))
             for s in range(-middle, top + 1 - middle)
         ]  # fmt: skip
-        chance = np.array([alike(sizes, self.unstable, UNSTEADY) for sizes in moved])
-        chance -= alike(mode, self.unstable, UNSTEADY)
+        chance = np.array(
+            [alike(sizes, self.unstable, self.density) for sizes in moved]
+        )
+        chance -= alike(mode, self.unstable, self.density)
         first = max(0, self._showing(triad) - 1)
         chance[first] = np.logaddexp.reduce(chance[: first + 1])
         for sizes, known in zip(moved[first:], chance[first:].tolist(), strict=True):

@@ -10,13 +10,13 @@ from observed import observe, outputs
 
 from fieldcal.model import priors
 from fieldcal.model.inference import Inference
+from fieldcal.model.mixture import Mixing, Mixture
 from fieldcal.model.search import Search
 from fieldcal.model.state import State
 from fieldcal.model.system import System
 from fieldcal.positions import TWO, Position
 from fieldcal.samples import Array
 from fieldcal.solve.given import Given, Wanted, seen_by
-from fieldcal.solve.mixture import Mixing, Mixture
 from fieldcal.solve.rows import of_means
 
 SD = 1e-3

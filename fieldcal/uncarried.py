@@ -24,7 +24,7 @@ from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.verdict import calibrated
 from fieldcal.effects import Chain, Scatter, catalogue
 from fieldcal.model.posterior import Standing
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.samples import CHANNELS
 from fieldcal.session import Session
 

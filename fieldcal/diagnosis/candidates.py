@@ -13,7 +13,8 @@ from fieldcal.diagnosis.parts import rms
 from fieldcal.diagnosis.result import Found, number
 from fieldcal.effects import Scatter, catalogue
 from fieldcal.model.held_out import held_out
-from fieldcal.model.search import Offer, Set
+from fieldcal.model.offers import Offer
+from fieldcal.model.sets import Set
 
 LARGEST = 40.0
 """Odds are not said beyond e to this."""

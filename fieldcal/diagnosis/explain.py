@@ -19,7 +19,8 @@ from fieldcal.model.noise import grain_of
 from fieldcal.model.posterior import Posterior, Standing
 from fieldcal.model.reduce import Rows, Source, rate_of, spans
 from fieldcal.model.reported import reported
-from fieldcal.model.search import Search, Set
+from fieldcal.model.search import Search
+from fieldcal.model.sets import Set
 from fieldcal.model.state import State
 from fieldcal.model.system import System
 from fieldcal.model.turn import Turning

@@ -20,7 +20,7 @@ from fieldcal.model.evidence import Index
 from fieldcal.model.fitted import Fitted
 from fieldcal.model.held_out import turns_foretold
 from fieldcal.model.posterior import Standing
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.model.sizing import Member, likeliest
 from fieldcal.model.way import ARRIVAL_S
 from fieldcal.samples import CHANNELS, Array

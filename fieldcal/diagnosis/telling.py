@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.effects import Experience, catalogue
 from fieldcal.frames import turn
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.model.state import State
 from fieldcal.samples import Array
 

@@ -34,7 +34,7 @@ from fieldcal.model import priors
 from fieldcal.model.posterior import Standing
 from fieldcal.model.reduce import spans
 from fieldcal.model.reported import reported
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.samples import Block
 
 GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}

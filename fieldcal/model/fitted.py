@@ -11,7 +11,7 @@ from fieldcal.model import priors
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated
 from fieldcal.model.reduce import Rows
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.model.windows import Linear
 from fieldcal.samples import Array
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from fieldcal.model.causes import FEW
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.fitted import Fitted, whole
-from fieldcal.model.search import Search, Set
+from fieldcal.model.search import Search
+from fieldcal.model.sets import Set
 from fieldcal.model.system import gram
 from fieldcal.model.turn_rows import TurnRows
 from fieldcal.model.windows import Linear

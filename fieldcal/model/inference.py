@@ -18,7 +18,8 @@ from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram
 from fieldcal.model.fitted import whole
 from fieldcal.model.proportion import in_proportion
-from fieldcal.model.search import SETTLED, Search, Set
+from fieldcal.model.search import SETTLED, Search
+from fieldcal.model.sets import Set
 from fieldcal.model.sizing import Member, Sizes
 from fieldcal.model.state import State, Term
 from fieldcal.model.system import System, gram

@@ -23,7 +23,7 @@ import numpy as np
 from fieldcal.model import priors
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, Index, gains
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.model.sizing import DENSITY, TRIADS, Sizing, alike
 from fieldcal.samples import Array
 

@@ -16,7 +16,9 @@ import numpy as np
 
 from fieldcal.model import priors
 from fieldcal.model.causes import Group
-from fieldcal.model.search import Offer, Search, Set
+from fieldcal.model.offers import Offer
+from fieldcal.model.search import Search
+from fieldcal.model.sets import Set
 from fieldcal.model.sizing import Member
 from fieldcal.samples import Array
 

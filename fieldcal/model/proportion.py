@@ -26,7 +26,7 @@ from fieldcal.model.causes import FEW, TRIADS, Cause, Group
 from fieldcal.model.columns import General, View
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.model.unknown_causes import typical
 from fieldcal.samples import Array
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from fieldcal.model.evidence import Eliminated
 from fieldcal.model.mixture import Mixing
-from fieldcal.model.search import Search, Set
+from fieldcal.model.search import Search
+from fieldcal.model.sets import Set
 
 
 def reported(search: Search, there: Set) -> Set:

@@ -21,7 +21,7 @@ from fieldcal.model.attitude import between, geometry
 from fieldcal.model.columns import Course, General, View
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Index
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.model.state import State, Term
 from fieldcal.model.turn import Turn, Turning, moved, only
 from fieldcal.model.way import BUILT_UP, Way, on_the_way, settling

@@ -19,7 +19,7 @@ from fieldcal.model import priors
 from fieldcal.model.columns import Course, View
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Index
-from fieldcal.model.search import Set
+from fieldcal.model.sets import Set
 from fieldcal.model.state import State
 from fieldcal.model.turn import Turn
 from fieldcal.samples import Array

@@ -19,7 +19,8 @@ from fieldcal.model.evidence import Eliminated
 from fieldcal.model.posterior import Posterior
 from fieldcal.model.priors import SIZES
 from fieldcal.model.reported import reported
-from fieldcal.model.search import Search, Set
+from fieldcal.model.search import Search
+from fieldcal.model.sets import Set
 from fieldcal.samples import Array
 
 ODDS, DRAWS = 0.5, 220

@@ -16,7 +16,8 @@ from fieldcal.model.evidence import Eliminated
 from fieldcal.model.pairs import pairs
 from fieldcal.model.posterior import Posterior
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search import Search, Set
+from fieldcal.model.search import Search
+from fieldcal.model.sets import Set
 from fieldcal.samples import Array
 
 DENSITY = np.log(priors.density())

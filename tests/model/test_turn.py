@@ -13,7 +13,8 @@ from fieldcal.diagnosis.explain import inference_of
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.model.causes import Group
 from fieldcal.model.inference import Inference
-from fieldcal.model.search import Search, Set
+from fieldcal.model.search import Search
+from fieldcal.model.sets import Set
 from fieldcal.model.state import Term
 from fieldcal.model.system import gram
 from fieldcal.model.turn_rows import TurnRows

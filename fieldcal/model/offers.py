@@ -1,0 +1,191 @@
+"""What a set may be given: every other cause, with what it is worth.
+
+A cause is offered at its best variant and size, beside the set's instability as it is
+and smaller, since what it explains is instability no longer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.model import priors
+from fieldcal.model.dictionary import Dictionary
+from fieldcal.model.evidence import Eliminated, Gram, gains
+from fieldcal.model.sets import Set, Sets
+from fieldcal.model.sizing import DENSITY, EVEN, Member, Sizes
+from fieldcal.samples import Array
+
+LEVELS = (0, 3, 6, 9, 40)
+"""Steps in size by which instability may fall when something is explained."""
+
+LEAST = 0.5
+"""Gain of ln L below which an offer is none."""
+
+LOST = -12.0
+"""Worth of an offer that no pair makes up for, ln."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Offer:
+    """A member that a set may be given.
+
+    Attributes
+    ----------
+    member : cause and variant
+    score : of the set with it, foretold
+    size : index of its likeliest size
+    level : by how much the instability is less beside it
+
+    """
+
+    member: Member
+    score: float
+    size: int
+    level: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """What may be added to a set beside one instability.
+
+    Attributes
+    ----------
+    down : by how much its instability is less
+    state, score : of the set
+    offers : the best first
+
+    """
+
+    down: int
+    state: Eliminated
+    score: float
+    offers: list[Offer]
+
+
+class Offers(Sets):
+    """What sets may be given."""
+
+    def __init__(self, dictionary: Dictionary, gram: Gram) -> None:
+        super().__init__(dictionary, gram)
+        self._tables: dict[tuple[tuple[str, int], ...], list[Table]] = {}
+
+    def offers(self, there: Set) -> list[Offer]:
+        """Every cause that a set has not, at its best variant, the best one first."""
+        best: dict[str, Offer] = {}
+        for table in self.tables(there):
+            for offer in table.offers:
+                name = offer.member[0].key
+                if name not in best or offer.score > best[name].score:
+                    best[name] = offer
+        return sorted(best.values(), key=lambda o: -o.score)
+
+    def tables(self, there: Set) -> list[Table]:
+        """What a set may be given, beside each of some instabilities."""
+        key = self.key(there.members)
+        if key not in self._tables:
+            self._tables[key] = [
+                Table(down, state, score, self._at_level(there, state, score, down))
+                for down, state, score in self._levels(there)
+            ]
+        return self._tables[key]
+
+    def _at_level(
+        self, there: Set, state: Eliminated, score: float, down: int
+    ) -> list[Offer]:
+        """Every cause that a set has not, beside one instability, the best first."""
+        d, chances = self.dictionary, self._chances(there)
+        best: dict[int, tuple[float, int, int]] = {}
+        for (_, _, at, variant), gain in zip(
+            d.by_width, self._screen(state), strict=True
+        ):
+            profile = gain + DENSITY
+            size = profile.argmax(axis=1)
+            worth = np.logaddexp.reduce(profile, axis=1) + chances[at]
+            worth[np.take_along_axis(gain, size[:, None], 1)[:, 0] < LEAST] = -np.inf
+            for m in np.flatnonzero(worth > LOST + chances[at].min()).tolist():
+                if int(at[m]) not in best or worth[m] > best[int(at[m])][0]:
+                    best[int(at[m])] = float(worth[m]), int(variant[m]), int(size[m])
+        offers = [
+            Offer((c, c.variants[v]), score + worth, size, down)
+            for c, (worth, v, size) in ((d.causes[i], b) for i, b in best.items())
+            if c.key not in there.keys
+        ]
+        return sorted(offers, key=lambda o: -o.score)
+
+    def _chances(self, there: Set) -> Array:
+        """Of every cause beside a set, by its number, ln."""
+        names = {c.name for c, _ in there.members if c.kind == "effect"}
+        out = self.dictionary.chances.copy()
+        for i, cause in enumerate(self.dictionary.causes):
+            if cause.name in names and cause.kind == "effect":
+                out[i] += np.log(priors.AGAIN / cause.chance)
+        return out
+
+    def _levels(self, there: Set) -> Iterator[tuple[int, Eliminated, float]]:
+        """The set with its instability as it is and smaller, and its score then."""
+        sizes = there.sizes
+        base = there.score - there.state.score
+        base -= self.alike(sizes.instability)
+        columns, wide = there.state.columns, there.state.sizes
+        ways = [(wide, 0.0), self.opened(there)]
+        for down in LEVELS if self.unstable.any() else LEVELS[:1]:
+            less = tuple(max(i - down, 0) for i in sizes.instability)
+            rows = self.weighed(less)
+            for before, cost in ways if down and ways[1][1] else ways[:1]:
+                state = Eliminated.of(rows, columns, before)
+                yield down, state, base + cost + state.score + self.alike(less)
+        first, rows = 0, self.weighed(sizes.instability)
+        for group, size in zip(
+            self.dictionary.always, sizes.calibration, strict=True
+        ):  # what a device has anyway, with next to no change from nominal
+            some = slice(first, first := first + len(group.columns))
+            if group.in_step:
+                small = wide.copy()
+                small[some] = group.sizes(float(priors.SIZES[0]))
+                state = Eliminated.of(rows, columns, small)
+                lost = DENSITY[0] - DENSITY[size]
+                yield 0, state, there.score - there.state.score + state.score + lost
+
+    def opened(self, there: Set) -> tuple[Array, float]:
+        """Sizes with no calibration below what is typical, and what that costs, ln.
+
+        Held against an instability that makes up for everything, a calibration seems to
+        stay where it was.
+        """
+        wide, first, cost = there.state.sizes.copy(), 0, 0.0
+        pairs = zip(self.dictionary.always, there.sizes.calibration, strict=True)
+        for group, size in pairs:
+            some = slice(first, first := first + len(group.columns))
+            if group.fixed is None and size < EVEN:
+                wide[some] = group.sizes(float(priors.SIZES[EVEN]))
+                cost += float(DENSITY[EVEN] - DENSITY[size])
+        return wide, cost
+
+    def _screen(self, state: Eliminated) -> Iterator[Array]:
+        """Gains over sizes of every variant of every cause, (m, sizes) by width."""
+        rows = state.rows
+        shared, own = (
+            rows.matrix(state.columns, None),
+            rows.diagonals([at for at, *_ in self.dictionary.by_width]),
+        )
+        half = np.linalg.cholesky(state.inverse).T @ shared
+        pull = rows.pull(None) - shared.T @ state.estimate
+        for (at, typical, _, _), block in zip(
+            self.dictionary.by_width, own, strict=True
+        ):
+            part = np.moveaxis(half[:, at], 0, 1)  # (m, a, k)
+            inner = block - np.swapaxes(part, 1, 2) @ part
+            inner *= typical[:, :, None] * typical[:, None, :]
+            top = (np.diagonal(block, 0, 1, 2) * typical**2).max(axis=-1)
+            yield gains(inner, pull[at] * typical, top)
+
+    def taken(self, there: Set, *offers: Offer) -> Set:
+        """The set with what was offered."""
+        sizes, down = there.sizes, max(o.level for o in offers)
+        less = tuple(max(i - down, 0) for i in sizes.instability)
+        more = (o.size for o in offers)
+        start = Sizes(sizes.calibration, less, (*sizes.members, *more))
+        return self.evaluated((*there.members, *(o.member for o in offers)), start)

@@ -100,3 +100,20 @@ def test_cross_coupling_that_was_asked_for_is_carried(
     assert "not_carried" not in said
     without = solved(profile, tmp_path / "w", capsys)[1]
     assert "cross_coupling" in without["not_carried"]["causes"]
+
+
+@pytest.mark.parametrize("unit", ["deg/s"])
+def test_rates_in_another_unit_are_never_solved_as_good(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], unit: str
+) -> None:
+    """At rest nothing shows it: the turns between positions do."""
+    profile = device(effect("mounting", {"unit": unit}))
+    code, said = solved(profile, tmp_path / "s", capsys)
+    assert (code, said["verdict"]) == (1, "bad")
+    assert f"wrong about the mounting (unit = {unit})" in said["warnings"][0]
+    # the accelerometers are as they were
+    assert (np.abs(off(said, profile)) < 4).all()
+    assert main(["diagnose", str(tmp_path / "s"), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)["effects"]
+    assert [e["id"] for e in found] == ["mounting"]
+    assert found[0]["parameters"]["unit"]["value"] == unit

@@ -18,7 +18,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes import Group
 from fieldcal.model.evidence import Index
 from fieldcal.model.fitted import Fitted
-from fieldcal.model.held_out import turns_foretold
+from fieldcal.model.held_out import turn_residual, turns_foretold
 from fieldcal.model.posterior import Standing
 from fieldcal.model.sets import Set
 from fieldcal.model.sizing import Member, likeliest
@@ -42,17 +42,20 @@ class Removed:
     set : without it
     residual : (n, 6) of that
     squares : (6,) by how much the whitened squares of each channel rise
+    turned : by how much those of the turns do
 
     """
 
     set: Set
     residual: Array
     squares: Array
+    turned: float
 
 
 def in_turns(lost: Removed) -> bool:
-    """Whether windows lose nothing with a cause: then turns do."""
-    return float(np.nan_to_num(lost.squares).max()) < SHOWS
+    """Whether windows lose nothing with a cause, or less than turns do."""
+    windows = float(np.nan_to_num(lost.squares).max())
+    return windows < SHOWS or windows < lost.turned
 
 
 def rms_of(values: Array) -> float:
@@ -67,7 +70,15 @@ def removed(explanation: Explanation, standing: Standing) -> Removed:
     there = Fitted(best.rows, best.dictionary, best.linear, best.values, less)
     residual = there.residual(there.certain)
     now = best.squares_of(best.residual(best.certain))
-    return Removed(less, residual, best.squares_of(residual) - now)
+    turned = _of_turns(explanation, there) - _of_turns(explanation, best)
+    return Removed(less, residual, best.squares_of(residual) - now, turned)
+
+
+def _of_turns(explanation: Explanation, fitted: Fitted) -> float:
+    """Whitened squares of all turns."""
+    values = fitted.estimate
+    parts = (turn_residual(t, values) for t in explanation.inferred.turned)
+    return float(sum(part @ part for part in parts))
 
 
 def of_rows(

@@ -3,7 +3,13 @@
     U = b + diag(k) S u f,    S one of the 48 signed permutations, u a ratio of units
 
 At rest f is known in every position, so the S and u under which bias and scale factor
-stay near the nominal ones are found by trying them all. Source: model of this project.
+stay near the nominal ones are found by trying them all. Between two positions the force
+turns by an angle that the gyroscopes must at least turn through:
+
+    r = integral |W - W_rest| dt / angle(f_p, f_q)
+
+which is 1 to about 2, and 57.3 times that where deg/s are taken for rad/s. Source:
+model of this project.
 
 >>> import numpy as np
 >>> f = np.array([[0, -9.8, 0], [-6.9, -6.9, 0], [0, -6.9, 6.9]])
@@ -14,8 +20,8 @@ stay near the nominal ones are found by trying them all. Source: model of this p
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import permutations, product
+from collections.abc import Iterator, Sequence
+from itertools import pairwise, permutations, product
 
 import numpy as np
 
@@ -34,6 +40,14 @@ FITS = 10.0
 
 UNITS = {"g": G0, "mg": 1e-3 * G0, "m/s^2 read as g": 1 / G0, "deg/s": np.pi / 180}
 NEAR = 0.05
+
+RATES = {"deg/s": np.pi / 180, "mrad/s": 1e-3, "rad/s read as deg/s": 180 / np.pi}
+USUAL, AROUND = 1.5, 4.0
+"""Angle turned over the least that it can be, and by what factor that may be off: units
+are 17 apart and more."""
+
+LEAST = np.deg2rad(10.0)
+"""Least turn of the force that tells, rad."""
 
 
 def signed_axes() -> Iterator[tuple[str, ...]]:
@@ -76,6 +90,45 @@ def _odds(measured: Array, f: Array) -> tuple[float, float]:
     return total - 0.5 * squares, squares
 
 
+def rate_unit(recording: Recording, held: Sequence[int]) -> str:
+    """Unit of the gyroscopes, if it is not the declared one; empty if it is.
+
+    Of the turns between windows by number; those that are too small say nothing.
+    """
+    block, ratios = recording.block, []
+    for p, q in pairwise(held):
+        one, two = recording.x.f[p], recording.x.f[q]
+        cosine = one @ two / np.linalg.norm(one) / np.linalg.norm(two)
+        angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        gap = slice(recording.windows[p, 1], recording.windows[q, 0])
+        if not angle > LEAST or gap.stop - gap.start < 2:
+            continue
+        rest = block.gyr[slice(*recording.windows[p])].mean(axis=0)
+        rate = np.linalg.norm((block.gyr[gap] - rest) / recording.scale[3:], axis=1)
+        ratios.append(float(np.trapezoid(rate, block.t[gap])) / angle)
+    if not ratios or not np.isfinite(ratios).all():
+        return ""
+    for name, size in RATES.items():
+        if abs(np.log(np.median(ratios) * size / USUAL)) < np.log(AROUND):
+            return name
+    return ""
+
+
+def _of_rates(recording: Recording, name: str) -> Fault:
+    """Gyroscopes in another unit."""
+    six = recording.block.six
+    six[:, 3:] *= RATES[name]
+    return Fault(
+        channel="gx",
+        values={"unit": name},
+        sigmas={},
+        from_s=float(recording.block.t[0]),
+        to_s=float(recording.block.t[-1]),
+        size=1.0,
+        mended=six,
+    )
+
+
 class Mounting(Chain):
     """Wrong axes or a wrong unit."""
 
@@ -96,6 +149,8 @@ class Mounting(Chain):
         unit = self._unit(acc, recording.x.gravity)
         if unit:
             return [self._fault(recording, {"unit": unit}, UNITS[unit], np.eye(3))]
+        if rate := rate_unit(recording, held):
+            return [_of_rates(recording, rate)]
         oriented = recording.x.oriented[held]
         if oriented.sum() < 2:
             return []

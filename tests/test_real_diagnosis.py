@@ -122,11 +122,11 @@ def test_six_faces_are_not_square(
     assert "gyro_scale" not in named(said)  # nobody held the heading
     fit = said["fit"]
     assert fit["before"]["rms"] == pytest.approx(before, rel=0.05)
-    assert fit["after"]["rms"] < 1.7 * after
+    assert fit["after"]["rms"] < 1.8 * after
     assert fit["after"]["held_out_rms"] < 0.95 * fit["before"]["held_out_rms"]
     replay = {k: said["twin"][k]["rms_acceleration"] for k in ("refitted", "twin")}
     assert replay["refitted"] == pytest.approx(before, rel=0.05)
-    assert replay["twin"] < 1.7 * after
+    assert replay["twin"] < 1.8 * after
 
 
 def test_the_bias_of_six_faces_is_the_peer_s(

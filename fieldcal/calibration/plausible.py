@@ -15,8 +15,9 @@ from fieldcal.samples import Array
 LEAST, UNSEEN = 0.1, 5.0
 """Share of the nominal scale factor, and standard deviations: less is none."""
 
-UNREAL = {"acc_scale": 0.3, "gyr_scale": 0.3, "acc_bias": 5.0, "gyr_bias": 0.5}
-"""Change from nominal that no sensor has: 30 %; half a g; 30 deg/s."""
+UNREAL = {"acc_scale": 0.1, "gyr_scale": 0.1, "acc_bias": 5.0, "gyr_bias": 0.5}
+"""Change from nominal that no sensor has: 10 %, three times what consumer grade is sold
+with; half a g; 30 deg/s."""
 
 
 def senseless(
@@ -53,7 +54,8 @@ def _scale(name: str, value: float, sigma: float, usual: float) -> list[str]:
         return [
             f"{name} is {value:.3g} ± {sigma:.2g}, nominal {usual:.3g}: no sensor is"
             " that far off; the unit or full scale of the recording is another than"
-            f" [nominal] says ({value / usual:.4g} times it fits)"
+            f" [nominal] says ({value / usual:.4g} times it fits), or the"
+            " angles or turns are others than it says"
         ]
     return []
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.description import Description
-from fieldcal.diagnosis.explain import origins
+from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
 from fieldcal.errors import InputError, NotObservable
 from fieldcal.observing import Rests, angle_setting, observations, with_provenance
@@ -23,7 +23,7 @@ from fieldcal.session import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.rows import variances, widened
-from fieldcal.uncarried import misread, told, uncarried
+from fieldcal.uncarried import angles_set, misread, told, uncarried
 
 Turns = Literal["auto", "yes", "no"]
 
@@ -114,16 +114,31 @@ def solved(
     if asked.get("angle_sigma_deg") is None:
         asked["angle_sigma_deg"] = angle_setting(about)
     printed = bool(asked.get("as_printed"))
+    shown = None if printed or laid.prepared is None else explain(laid.prepared)
+    asked, said = _as_shown(asked, shown)
     recorded = None if printed else laid.recorded(turns != "no")
     found = solve(laid.seen, recorded=recorded, **asked)
     if turns == "yes":
         _insist(found, session, still)
-    found = replace(found, warnings=(*still.warnings, *found.warnings))
+    found = replace(found, warnings=(*still.warnings, *said, *found.warnings))
     found = _listed(with_provenance(found, about), laid.order)
-    if printed or laid.prepared is None:
+    if shown is None:
         return found
-    found = told(found, uncarried(laid.prepared, found))
-    return misread(laid.prepared, found)
+    return misread(shown.prepared, told(found, uncarried(shown, found)))
+
+
+def _as_shown(
+    asked: dict[str, Any], shown: Explanation | None
+) -> tuple[dict[str, Any], list[str]]:
+    """What is asked for, with angles that the recording shows to be set less well."""
+    if shown is None or not (angles := angles_set(shown)) > asked["angle_sigma_deg"]:
+        return asked, []
+    said = (
+        f"the recording shows that angles are set to ± {angles:.2g}° only, not"
+        f" ± {asked['angle_sigma_deg']:.2g}°: the uncertainties are for that; mend the"
+        " fixture, or write down the angles that it really sets"
+    )
+    return asked | {"angle_sigma_deg": angles}, [said]
 
 
 def _insist(found: Calibration, session: Session, still: Rests) -> None:

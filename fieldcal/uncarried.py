@@ -19,7 +19,8 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.diagnosis.chain import check
-from fieldcal.diagnosis.explain import Explanation, explain
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.naming import sizes
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.verdict import calibrated
 from fieldcal.effects import Chain, Scatter, catalogue
@@ -86,9 +87,19 @@ def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
     return right, tuple(said)
 
 
-def uncarried(prepared: Prepared, calibration: Calibration) -> Uncarried:
+def angles_set(explanation: Explanation) -> float:
+    """How well a recording shows that angles are set, deg; 0 if it shows nothing."""
+    found = [0.0]
+    for one in explanation.standing:
+        effect = catalogue().get(one.name)
+        if isinstance(effect, Scatter) and {p.unit for p in effect.params} == {"deg"}:
+            told = sizes(explanation, one).values()
+            found += [q.value for q in told if isinstance(q.value, float)]
+    return max(found)
+
+
+def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
     """What a recording shows that a calibration of it does not carry."""
-    explanation = explain(prepared)
     out = [s for s in explanation.standing if not _carries(calibration, s)]
     if not out:
         return Uncarried({}, {})

@@ -117,3 +117,28 @@ def test_rates_in_another_unit_are_never_solved_as_good(
     found = json.loads(capsys.readouterr().out)["effects"]
     assert [e["id"] for e in found] == ["mounting"]
     assert found[0]["parameters"]["unit"]["value"] == unit
+
+
+LADDER = [
+    *[(0.0, 0.0), (22.5, 0.0), (45.0, 0.0), (45.0, 5.0), (22.5, 5.0), (0.0, 5.0)],
+    *[(-22.5, 2.5), (-45.0, 5.0), (-45.0, 0.0)],
+]
+
+
+@pytest.mark.parametrize("missed", [0.2, 0.6])
+def test_a_rest_of_the_ladder_that_is_off_is_never_a_good_result_that_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], missed: float
+) -> None:
+    """By the same each time: only the turns show it, and the scale factor of z has it.
+
+    It is an angle that is set badly, or a gauge that is stretched; each is said.
+    """
+    there = places([(a, b + missed * (b == 5)) for a, b in LADDER])
+    write_session(tmp_path, recorded(CALM, there), places(LADDER))
+    main(["solve", str(tmp_path), "--json"])
+    out: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert "angle" in out["warnings"][0]
+    if out["verdict"] == "good":
+        assert (np.abs(off(out, CALM)) < 4).all() and out["angle_sigma_deg"] > 0.05
+    else:
+        assert out["not_carried"]["moved_sigmas"]["acc_scale.z"] < -5

@@ -106,10 +106,11 @@ def rate_unit(recording: Recording, held: Sequence[int]) -> str:
         rest = block.gyr[slice(*recording.windows[p])].mean(axis=0)
         rate = np.linalg.norm((block.gyr[gap] - rest) / recording.scale[3:], axis=1)
         ratios.append(float(np.trapezoid(rate, block.t[gap])) / angle)
-    if not ratios or not np.isfinite(ratios).all():
+    ratio = float(np.median(ratios)) if ratios else 0.0
+    if not 0.0 < ratio < np.inf:  # gyroscopes that say nothing
         return ""
     for name, size in RATES.items():
-        if abs(np.log(np.median(ratios) * size / USUAL)) < np.log(AROUND):
+        if abs(np.log(ratio * size / USUAL)) < np.log(AROUND):
             return name
     return ""
 

@@ -13,7 +13,7 @@ from fieldcal.samples import concat
 from fieldcal.solve import Observations, solve
 from fieldcal.windows import Average, average
 
-POSITIONS = [Position.deg(*angles) for angles in ((0, 0), (45, 5), (-45, -5))]
+POSITIONS = [Position.deg(*angles) for angles in ((0, 0), (45, 5), (-45, -5), (45, -5))]
 GRAVITY = 9.8111
 
 

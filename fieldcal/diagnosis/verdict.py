@@ -229,7 +229,9 @@ def calibrated(
 ) -> dict[str, tuple[float, float, float]]:
     """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
     d = explanation.dictionary
-    found = reported(explanation.posterior.search, one).state
+    found = one.state  # of what was found the numbers are taken already
+    if one is not explanation.best.set:
+        found = reported(explanation.posterior.search, one).state
     nominal = explanation.inferred.inference.nominal
     sigma = np.sqrt(np.diag(found.inverse))
     out = {}

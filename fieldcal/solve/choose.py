@@ -19,7 +19,6 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.calibration import Calibration, Method
-from fieldcal.errors import NotObservable
 from fieldcal.model.planned import parameters
 from fieldcal.model.state import State
 from fieldcal.solve import printed
@@ -207,6 +206,3 @@ def _shows(found: Estimated) -> bool:
     if not found.acc.dof and not found.acc.chi2 and not found.names:
         return False
     return not any(n.startswith(("acc_", *TILTED)) for n in found.missing)
-
-
-__all__ = ["NotObservable", "solve"]

@@ -67,7 +67,6 @@ class Estimated:
     given : the set
     names : (k,) parameters that the rows determine
     values, covariance : (k,), (k, k)
-    prior : (k,) sizes before
     missing : parameters that they do not determine
     found : the mixture
     acc, gyr : how well the windows agree

@@ -45,9 +45,7 @@ def calibration(
         is determined.
 
     """
-    names = _offered(found, seen)
-    rows = [found.names.index(n) for n in names]
-    values, covariance = found.values[rows], found.covariance[np.ix_(rows, rows)]
+    names, values, covariance = found.names, found.values, found.covariance
     said = [*_open(method, seen, found), *notes, *_level(method, asked, seen)]
     if not names or _blind(found, seen):
         raise NotObservable("these positions determine nothing: " + "; ".join(said))
@@ -73,13 +71,6 @@ def calibration(
         good=good,
         info=_info(method, seen, asked, found),
     )
-
-
-def _offered(found: Estimated, seen: Observations) -> tuple[str, ...]:
-    """Parameters that are worth having: of two positions no tilt that was only said."""
-    return found.names if seen.has_gyr else tuple(
-        n for n in found.names if not n.startswith("gyr")
-    )  # fmt: skip
 
 
 def _blind(found: Estimated, seen: Observations) -> bool:

@@ -175,17 +175,18 @@ def _uncertainty(found: Calibration, limits: Limits) -> list[Check]:
             says = (
                 f"{group} {'xyz'[worst]} is known to ± {sigma[worst]:.2g}"
                 f"{_of(unit)}, {'within' if ok else 'more than'} {limit:.2g}{_of(unit)}"
-                f"{'' if ok or not group.startswith('acc') else _by_angles(found)}"
             )
+            if not ok and group.startswith("acc"):
+                says += _by_angles(found, limits)
             value = float(sigma[worst])
             checks.append(Check(f"{group} uncertainty", ok, says, value, limit, unit))
     return checks
 
 
-def _by_angles(found: Calibration) -> str:
-    """What to do about angles that are not set well enough."""
+def _by_angles(found: Calibration, limits: Limits) -> str:
+    """What to do about angles that nobody said are set better than the grade asks."""
     angles = float(found.info.get("angle_sigma_deg") or 0.0)
-    if found.method == "scalar" or not angles:
+    if found.method == "scalar" or angles < limits.angle_setting_deg:
         return ""
     return (
         f"; angles count as set to ± {angles:.2g}°: if they are set better say so"

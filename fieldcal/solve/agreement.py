@@ -36,7 +36,7 @@ wide sizes of what is estimated show."""
 
 
 @dataclass(frozen=True, slots=True)
-class Agreement:
+class Fit:
     """Of one triad.
 
     Attributes
@@ -56,16 +56,14 @@ class Agreement:
     rows: Array
 
 
-def agreement(
-    gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]
-) -> Agreement:
+def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -> Fit:
     """How well the means of a triad agree, by the columns of the estimate."""
     p = len(d.held)
     at = np.ix_(np.arange(p), np.array(channels))
     info, off = gram.info[at], gram.off[at]
     used = (info > 0).ravel()
     if not used.any():
-        return Agreement(0.0, 0, np.nan, np.nan, np.full((p, 3), np.nan))
+        return Fit(0.0, 0, np.nan, np.nan, np.full((p, 3), np.nan))
     index = gram.index[found.columns]
     means = gram.means[:p, list(channels)][:, :, index].reshape(-1, len(index))[used]
     y = off.ravel()[used]
@@ -86,7 +84,7 @@ def agreement(
     wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
     sizes = free * _sizes(d, found)[~random]
     alone = seen.along(*_left_out(stated + wander, sizes, y, seen))
-    return Agreement(
+    return Fit(
         chi2, int(good.sum()) - rank, seen.rms(residual), seen.rms(alone), residual
     )
 

@@ -21,7 +21,7 @@ from fieldcal.model.system import System
 from fieldcal.model.turn import Turning
 from fieldcal.model.turn_rows import TurnRows, Turns
 from fieldcal.samples import Array
-from fieldcal.solve.agreement import Agreement, agreement
+from fieldcal.solve.agreement import Fit, agreement
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask
 from fieldcal.solve.words import CERTAIN, SUSPECT
@@ -80,8 +80,8 @@ class Estimated:
     covariance: Array
     missing: tuple[str, ...]
     found: Mixture
-    acc: Agreement
-    gyr: Agreement
+    acc: Fit
+    gyr: Fit
     turns: tuple[TurnRows, ...]
 
     def mixed_with(self, one: Estimated, other: Estimated, weight: float) -> Estimated:

@@ -22,8 +22,9 @@ from fieldcal import description
 from fieldcal.description import Description
 from fieldcal.frames import angles_of
 from fieldcal.gravity import G0
+from fieldcal.importers import open_recording
 from fieldcal.importing import bring_in
-from fieldcal.recording import Wanted, open_recording
+from fieldcal.recording import Wanted
 from fieldcal.samples import Array, Block
 from fieldcal.session import Session
 

@@ -21,7 +21,8 @@ CHILD = """
 import sys
 from pathlib import Path
 from fieldcal.importing import bring_in
-from fieldcal.recording import Wanted, open_recording
+from fieldcal.importers import open_recording
+from fieldcal.recording import Wanted
 names = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 recording = open_recording(Path(sys.argv[1]), Wanted(names))
 name = recording.streams()[0].name

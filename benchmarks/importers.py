@@ -20,8 +20,9 @@ from tempfile import TemporaryDirectory
 from time import process_time
 
 from benchmarks._logs import COLUMNS, ROWS, Log, samples, write_all, write_tables
+from fieldcal.importers import open_recording
 from fieldcal.importing import bring_in
-from fieldcal.recording import Wanted, open_recording
+from fieldcal.recording import Wanted
 from fieldcal.samples import Block
 
 RUNS = 5

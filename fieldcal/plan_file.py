@@ -19,13 +19,11 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from fieldcal import description
+from fieldcal import description, procedures
 from fieldcal.description import Description
 from fieldcal.errors import InputError, PlanError
 from fieldcal.positions import Position, forces
 from fieldcal.verification import planned
-
-PROCEDURES = ("two_position", "five_position", "positions")
 
 SECONDS, WARM_UP, TURN = 30.0, 300.0, 120.0
 """Averaging time, longest wait for a device that warms up, longest turn, s."""
@@ -88,10 +86,24 @@ class Task:
 
 @cache
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a plan."""
+    """Return the JSON Schema of a plan, with the procedures that there are."""
     text = files("fieldcal").joinpath("schemas/plan.schema.json").read_text("utf-8")
     found: dict[str, Any] = json.loads(text)
+    procedure = found["properties"]["run"]["properties"]["procedure"]
+    procedure["enum"] = list(procedures.names())
+    procedure["description"] = f"write one of {', '.join(procedures.names())}"
     return found
+
+
+def positions_of(procedure: str) -> list[dict[str, Any]]:
+    """Tables ``[[position]]`` that a procedure takes unless others are said."""
+    taken = procedures.procedure(procedure).POSITIONS
+    return [_table(p.name, p.degrees or (0.0, 0.0)) for p in taken]
+
+
+def _table(name: str, degrees: tuple[float, float]) -> dict[str, Any]:
+    alpha, beta = degrees
+    return {"name": name, "alpha_deg": round(alpha, 9), "beta_deg": round(beta, 9)}
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -106,8 +118,9 @@ def read(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
+        known = ", ".join(procedures.names())
         raise InputError(
-            f"{path}: is neither a procedure ({', '.join(PROCEDURES)}) nor a plan file"
+            f"{path}: is neither a procedure ({known}) nor a plan file"
         ) from error
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: is no plan file: {error}") from error
@@ -118,7 +131,7 @@ def task(tables: Mapping[str, Any], name: str) -> Task:
 
     Parameters
     ----------
-    tables : of the plan
+    tables : of the plan; a plan without positions takes those of its procedure
     name : what errors call it: its file
 
     Raises
@@ -128,11 +141,13 @@ def task(tables: Mapping[str, Any], name: str) -> Task:
 
     """
     _check_schema(tables, name)
+    run = tables.get("run", {})
+    if "position" not in tables and "procedure" in run:
+        tables = {**tables, "position": positions_of(run["procedure"])}
     try:
         about = description.parse(tables)
     except InputError as error:
         raise PlanError(f"{name}: {error}") from error
-    run = tables.get("run", {})
     _check_positions(about, name)
     _check_further(about, run, name)
     made = Task(tables, about, run, planned(about))

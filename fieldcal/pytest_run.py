@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -41,20 +40,15 @@ def recalibrate(
 
     """
     truth = device.truth
-    module = import_module(f"fieldcal.procedures.{procedure}")
     known = {
         "device": {"name": "virtual device", "grade": truth["grade"]},
         "site": {"latitude_deg": latitude_deg, "gravity": truth["gravity"]},
         "frame": {"mounting": truth["mounting"]},
     }
-    positions = [
-        dict(zip(("alpha_deg", "beta_deg"), p.degrees or (0.0, 0.0), strict=True))
-        for p in module.POSITIONS
-    ]
     whole = {
         "format": description.FORMAT,
         **known,
-        "position": positions,
+        "position": plan_file.positions_of(procedure),
         "run": {"procedure": procedure, "seconds": seconds},
         **tables,
     }

@@ -1,4 +1,4 @@
-"""What a recording from elsewhere is, and which format a file has.
+"""What a recording from elsewhere is.
 
 A recording holds the samples of one or several IMUs, each a stream with a name. They
 come piece by piece, so that a log may be as long as it likes.
@@ -9,16 +9,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import Any
 
 from fieldcal.description import ACC_UNITS, GYR_UNITS
 from fieldcal.errors import InputError
-from fieldcal.packed import PIECE, head, pieces
+from fieldcal.packed import PIECE, pieces
 from fieldcal.samples import Block
 
 ROWS = 1 << 15
@@ -28,9 +25,6 @@ MOST = 12
 """Faults of a file that are listed one by one."""
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-
-LAST = ("csv_like", "wire")
-"""Formats without a mark of their own, tried last, in this order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,46 +178,3 @@ class Recording(ABC):
             return
         self._more += 1
         self.mended[MOST:] = [f"{self._more} more damaged places, left out"]
-
-
-@cache
-def formats() -> tuple[str, ...]:
-    """Names of the formats there are, those with a mark of their own first."""
-    from fieldcal import importers
-
-    names = sorted(module.name for module in iter_modules(importers.__path__))
-    return (*(n for n in names if n not in LAST), *LAST)
-
-
-def open_recording(
-    path: Path, wanted: Wanted, name: str = "", repair: bool = False
-) -> Recording:
-    """Open a file by its content.
-
-    Parameters
-    ----------
-    path : also .gz
-    wanted : what the user says of it
-    name : its format, if it is not to be found
-    repair : whether damaged places are left out and said, or refused
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or nothing knows its format.
-
-    """
-    if name and name not in formats():
-        raise InputError(f"no format {name!r}: there are {', '.join(formats())}")
-    first = head(path)
-    if not first:
-        raise InputError(f"{path}: is empty; copy it again from where it came")
-    for some in [name] if name else formats():
-        module = import_module(f"fieldcal.importers.{some}")
-        if name or module.recognises(first, path):
-            opened: Recording = module.File(path, wanted, repair)
-            return opened
-    raise InputError(
-        f"{path}: is of no format that is known by its content: name one with --format"
-        f" {'|'.join(formats())}"
-    )

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
+from fieldcal import procedures
 from fieldcal.beside import First
 from fieldcal.breaks import Again
 from fieldcal.calibration import Calibration
@@ -27,6 +27,7 @@ from fieldcal.errors import (
     Skipped,
     Stopped,
 )
+from fieldcal.holding import steady
 from fieldcal.limits import Limits
 from fieldcal.observing import rests
 from fieldcal.plan import Plan, note
@@ -122,13 +123,9 @@ class Running:
 
     def _plan(self) -> Plan[Calibration]:
         task = self._task
-        module = import_module(f"fieldcal.procedures.{task.procedure}")
-        found: Calibration = yield from module.plan(
-            task.about, task.seconds, task.sigma
-        )
+        plan = procedures.procedure(task.procedure).plan
+        found = yield from plan(task.about, task.seconds, task.sigma)
         if task.verification is not None:
-            from fieldcal.procedures.holding import steady
-
             number = len(task.about.positions)
             try:
                 yield from steady(number, task.verification, task.seconds, task.sigma)

@@ -1,1 +1,36 @@
-"""Procedures: generators of steps, one a file."""
+"""Procedures: plans for an operator or a script, one a file, found by their names.
+
+To add one, write procedures/<name>.py with ``POSITIONS``, the positions it takes unless
+the session says others, and ``plan``, a generator of steps (`fieldcal.plan`) that
+returns a `Calibration`. A plan touches no device, no clock and no screen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Protocol, cast
+
+from fieldcal.calibration import Calibration
+from fieldcal.plan import Plan
+from fieldcal.positions import Position
+
+
+class Procedure(Protocol):
+    """What the module of a procedure has."""
+
+    POSITIONS: tuple[Position, ...]
+    plan: Callable[..., Plan[Calibration]]
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """Every procedure there is, in alphabetical order."""
+    return tuple(sorted(module.name for module in iter_modules(__path__)))
+
+
+def procedure(name: str) -> Procedure:
+    """Procedure of that name, which is one of `names`."""
+    return cast(Procedure, import_module(f"{__name__}.{name}"))

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from fieldcal.calibration import Calibration
 from fieldcal.description import Description
+from fieldcal.holding import hold_each, with_left_out
 from fieldcal.observing import angle_setting, observations
 from fieldcal.plan import Plan
 from fieldcal.positions import TWO, Position
-from fieldcal.procedures.holding import hold_each, with_left_out
 from fieldcal.solve import solve
 
 POSITIONS: tuple[Position, ...] = TWO

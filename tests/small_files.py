@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
 
+from fieldcal.importers import open_recording
 from fieldcal.intake import Judge
-from fieldcal.recording import Wanted, open_recording
+from fieldcal.recording import Wanted
 from fieldcal.samples import Block, concat
 from fieldcal.session import Session
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from fieldcal.cli import main
 from fieldcal.errors import FieldcalError, InputError
 from fieldcal.gravity import G0
+from fieldcal.importers import open_recording
 from fieldcal.importers.csv_like import File
 from fieldcal.intake import Judge
 from fieldcal.recording import Wanted as Layout
-from fieldcal.recording import open_recording
 from fieldcal.samples import Block, concat
 from fieldcal.session import Session
 

@@ -69,6 +69,7 @@ every_fitted = pytest.mark.parametrize("effect", FITTED, ids=lambda e: e.id)
 def test_says_what_it_is(effect: Effect) -> None:
     assert effect.kind in ("motion", "sensor", "chain")
     assert effect.covariate and effect.decided_by and effect.source
+    assert effect.cure.endswith(".") or effect.cure.endswith(").")
     assert len(set(effect.names)) == len(effect.names)
     assert all(p.typical > 0 for p in effect.params)
     assert all(effect.unit(name) for name in effect.names)

@@ -17,10 +17,10 @@ from fieldcal.driver import Driver, Health
 from fieldcal.engine import Engine
 from fieldcal.errors import CalibrationFailed, DeviceSilent, Stopped, WrongPosition
 from fieldcal.frames import turn
+from fieldcal.holding import hold_each
 from fieldcal.placing import Placing
 from fieldcal.plan import Hold, Plan, hold
 from fieldcal.positions import FIVE, TWO, Position
-from fieldcal.procedures.holding import hold_each
 from fieldcal.recorder import Recorder
 from fieldcal.samples import Array, Block
 from fieldcal.session import Session

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from fieldcal.errors import InputError
 from fieldcal.gravity import G0
 from fieldcal.headings import Column, read
-from fieldcal.recording import Recording, Wanted, open_recording
+from fieldcal.importers import open_recording
+from fieldcal.recording import Recording, Wanted
 from fieldcal.samples import Block, concat
 
 ROWS = np.column_stack([np.arange(4) * 1e3, np.arange(24).reshape(4, 6)])

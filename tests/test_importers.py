@@ -17,10 +17,11 @@ from fieldcal import recording as recordings
 from fieldcal import sample_files
 from fieldcal.cli import main
 from fieldcal.errors import InputError, SessionError
+from fieldcal.importers import formats, open_recording
 from fieldcal.importing import bring_in
 from fieldcal.intake import Judge
 from fieldcal.integrity import findings
-from fieldcal.recording import Wanted, open_recording
+from fieldcal.recording import Wanted
 from fieldcal.samples import Block, concat
 from fieldcal.session import Session
 
@@ -370,7 +371,7 @@ def test_a_log_whose_format_calls_a_number_a_text_is_refused(tmp_path: Path) -> 
 
 
 def test_every_format_is_tried() -> None:
-    assert set(SMALL) | {"wire"} == set(recordings.formats())
+    assert set(SMALL) | {"wire"} == set(formats())
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from fieldcal import plan_file
+from fieldcal import plan_file, procedures
 from fieldcal.cli import main
 from fieldcal.commands.run import add_arguments
 from fieldcal.commands.run_task import make_task
@@ -49,6 +49,13 @@ def test_a_whole_plan_is_taken() -> None:
     own = {**plan(), "verification": {"alpha_deg": 10.0, "beta_deg": 1.0}}
     named = plan_file.task(own, "p.toml").verification
     assert named is not None and named.degrees == (10.0, 1.0)
+
+
+@pytest.mark.parametrize("name", procedures.names())
+def test_a_procedure_brings_its_positions(name: str) -> None:
+    task = plan_file.task({"run": {"procedure": name}}, "plan.toml")
+    taken = [p.degrees for p in task.about.positions]
+    assert taken == [p.degrees for p in procedures.procedure(name).POSITIONS]
 
 
 @pytest.mark.parametrize(

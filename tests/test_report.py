@@ -19,11 +19,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from fieldcal.cli import main
-from fieldcal.effects import catalogue
 from fieldcal.report import Earlier, Material, gather, packing, render
 from fieldcal.report.agreement import correlations
 from fieldcal.report.blocks import Figure
-from fieldcal.report.cures import CURES
 from fieldcal.report.packing import MISSING, PIECE, Columns, pack, quantised
 from fieldcal.report.residuals import reached, residuals
 from fieldcal.samples import Array
@@ -285,10 +283,6 @@ def test_a_diagnosis_of_any_shape_gives_a_section(
     for block in section.blocks:
         if isinstance(block, Figure):
             json.dumps(block.chart.to_json(), allow_nan=False)
-
-
-def test_every_effect_of_the_catalogue_has_a_cure() -> None:
-    assert set(CURES) == set(catalogue())
 
 
 def _luminance(colour: str) -> float:

@@ -10,7 +10,6 @@ from drawn.positions import drawings
 from drawn.screens import screens
 from fieldcal.effects import Effect, catalogue
 from fieldcal.positions import SETS
-from fieldcal.report.cures import CURES
 
 KINDS = {
     "motion": ("Place, fixture and motion", "They change what the sensors experience."),
@@ -68,7 +67,7 @@ def _section(effect: Effect) -> str:
             *table,
             f"**Seen through** {effect.covariate}. **Told from others by**"
             f" {effect.decided_by}.\n",
-            f"**Cure.** {CURES[effect.id]}\n",
+            f"**Cure.** {effect.cure}\n",
             f"Source: {effect.source}.\n",
         ]
     )

@@ -79,8 +79,8 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal.importers import open_recording
     from fieldcal.joined import Joined
-    from fieldcal.recording import open_recording
 
     if len(args.columns) not in (0, 1, len(args.files)):
         raise InputError("give --columns once, or once for each file")

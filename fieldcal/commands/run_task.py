@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import shlex
 from datetime import datetime
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,15 +30,15 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         Naming what is wrong with the plan.
 
     """
-    from fieldcal import plan_file
+    from fieldcal import plan_file, procedures
 
     if args.resume:
         return _resumed(args)
     if not args.procedure:
         raise InputError(
-            f"name a procedure ({', '.join(plan_file.PROCEDURES)}) or a plan file"
+            f"name a procedure ({', '.join(procedures.names())}) or a plan file"
         )
-    if args.procedure in plan_file.PROCEDURES:
+    if args.procedure in procedures.names():
         name, tables = "the options", _tables_of_options(args)
     else:
         name, tables = args.procedure, _tables_of_file(args)
@@ -66,11 +65,10 @@ def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
 
 
 def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:
-    from fieldcal import description
+    from fieldcal import description, plan_file
 
-    module = import_module(f"fieldcal.procedures.{args.procedure}")
     tables = {"format": description.FORMAT, **site_tables(args, "device")}
-    tables["position"] = [_table(p.name, p.degrees) for p in module.POSITIONS]
+    tables["position"] = plan_file.positions_of(args.procedure)
     tables["run"] = {"procedure": args.procedure, **_given(args)}
     return tables
 
@@ -115,8 +113,3 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
         options = f"{shlex.join(speed)} {args.virtual}".strip()
         given["mover"] = {"kind": "virtual", "options": options}
     return {key: value for key, value in given.items() if value is not None}
-
-
-def _table(name: str, degrees: tuple[float, float] | None) -> dict[str, Any]:
-    alpha, beta = degrees or (0.0, 0.0)
-    return {"name": name, "alpha_deg": round(alpha, 9), "beta_deg": round(beta, 9)}

@@ -172,6 +172,7 @@ class Effect(ABC):
     covariate : what it is seen through
     seen_in : the kind of mismatch that it makes
     decided_by : what the operator can do to tell it from others
+    cure : what to do about it once it is known to be there, in sentences
     source : where the equation and the sizes come from
 
     """
@@ -188,6 +189,7 @@ class Effect(ABC):
     """Whether bias and scale factor do the same, so that it is only ever possible."""
 
     decided_by: ClassVar[str]
+    cure: ClassVar[str]
     source: ClassVar[str]
 
     def applies(self, x: Experience) -> bool:

@@ -23,6 +23,10 @@ class AngleOffset(Motion):
     params = (Param("alpha0_deg", "deg", 1.5), Param("beta0_deg", "deg", 1.5))
     covariate = "one pattern through all positions"
     decided_by = "positions in which both joints are turned, to either side"
+    cure = (
+        "Set the zeros of the joints anew, or let solve estimate them (--tilt "
+        "angle_offset)."
+    )
     source = "Avrutov and Pozniak 2023, (15); 0.1 to 3 deg"
     order = 3
 

@@ -21,6 +21,10 @@ class AngleScale(Motion):
     params = (Param("alpha", "1", 3e-2), Param("beta", "1", 3e-2))
     covariate = "size of the angle"
     decided_by = "larger angles, to either side"
+    cure = (
+        "Check the protractor or the steps of the ladder against a level; use "
+        "smaller angles meanwhile."
+    )
     source = "model of this project; 0.1 to 3 % on protractors and stepped ladders"
     order = 2
 

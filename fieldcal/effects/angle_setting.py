@@ -22,4 +22,8 @@ class AngleSetting(Scatter):
     params = (Param("sigma_deg", "deg", 0.5),)
     covariate = "scatter from position to position along df/dalpha and df/dbeta"
     decided_by = "the same positions taken again: what is random does not come back"
+    cure = (
+        "Use stops or pins instead of the eye, and tell solve how well the "
+        "angles are set (--angles)."
+    )
     source = "model of this project; 0.02 to 0.5 deg by eye and hand"

@@ -27,6 +27,10 @@ class BaseTilt(Motion):
     params = (Param("about_x_deg", "deg", 1.5), Param("about_z_deg", "deg", 1.5))
     covariate = "one pattern through all positions"
     decided_by = "positions in which both joints are turned, to either side"
+    cure = (
+        "Level the base, or take positions with both joints turned and let "
+        "solve estimate it (--tilt base_tilt)."
+    )
     source = "Avrutov and Pozniak 2023, (15), composed as matrices; 0.1 to 3 deg"
     order = 1
 

@@ -27,6 +27,10 @@ class BiasDrift(Sensor):
     covariate = "time"
     seen_in = "time"
     decided_by = "the first position once more at the end"
+    cure = (
+        "Take the first position again at the end, so that the drift can be "
+        "estimated; calibrate shortly before use."
+    )
     source = "IEEE Std 952, rate ramp"
 
     def chance(self, x: Experience) -> float:

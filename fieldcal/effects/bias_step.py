@@ -29,6 +29,10 @@ class BiasStep(Sensor):
     covariate = "time"
     seen_in = "time"
     decided_by = "the position before the jump once more"
+    cure = (
+        "Look for what happened at that instant (supply, range, a knock), and "
+        "take the positions before it again."
+    )
     source = "stress released, a supply switched, a range changed"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -49,6 +49,10 @@ class ClockSkew(Chain):
     params = (Param("ppm", "ppm", 2000.0),)
     covariate = "t against t_host"
     decided_by = "a longer recording, and a host clock kept by a time server"
+    cure = (
+        "Use the host's times over long stretches, or correct the rate by the "
+        "ppm that were found."
+    )
     source = "Paxson 1998; 10 to 2000 ppm"
 
     def find(self, recording: Recording) -> list[Fault]:

@@ -29,6 +29,7 @@ class CrossCoupling(Sensor):
     params = tuple(Param(f"k{i + 1}{j + 1}", "1", 2e-2) for i, j in PAIRS)
     covariate = "force along the other axes"
     decided_by = "positions that load each axis alone, up and down"
+    cure = "Solve with --cross: the coefficients go into the calibration."
     source = "Avrutov and Pozniak 2023, (6); MEMS data sheets state 0.1 to 2 %"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -27,6 +27,7 @@ class Cubic(Sensor):
     params = tuple(Param(i, "1/(m/s^2)^2", 1e-5) for i in "xyz")
     covariate = "f^3"
     decided_by = "positions with the axis at 45° besides 0 and ±1 g"
+    cure = "Use the calibration that diagnose gives with it, or keep to small forces."
     source = "IEEE Std 1293, K3; 1e-6 to 1e-5 on MEMS parts"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -23,6 +23,10 @@ class EarthRate(Motion):
 
     covariate = "gyroscope means turn with the position"
     decided_by = "longer windows with the gyroscopes turned end for end"
+    cure = (
+        'Say grade = "navigation" and the latitude: it becomes the reference of '
+        "the gyroscopes."
+    )
     source = "Avrutov and Pozniak 2023, (39); 15.04 deg/h"
     order = -1
 

@@ -27,6 +27,7 @@ class G2Sensitivity(Sensor):
     params = tuple(Param(i, "(rad/s)/(m/s^2)^2", 5e-7) for i in "xyz")
     covariate = "f^2"
     decided_by = "positions with the axis at 0, 45 and 90°, up and down"
+    cure = "Take the coefficients times the squared force out of the rates."
     source = "IEEE Std 1431; up to 5e-7 on MEMS parts"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

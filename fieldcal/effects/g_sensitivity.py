@@ -30,6 +30,7 @@ class GSensitivity(Sensor):
     )
     covariate = "force"
     decided_by = "positions that load each axis alone, up and down"
+    cure = "Take the coefficients times the measured force out of the rates."
     source = "IEEE Std 1431, g-sensitivity; 5e-7 to 2e-4 on MEMS parts"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -25,6 +25,7 @@ class GravityError(Motion):
     params = (Param("relative", "1", 3e-3),)
     covariate = "scale factors of all three axes together"
     decided_by = "gravity at the site from a survey, or a calibration somewhere else"
+    cure = "Give latitude and height of the site, or its surveyed gravity."
     source = "NIMA TR8350.2; up to 3e-3 for a wrong latitude and height"
     order = 0
     like_calibration = True

@@ -29,6 +29,7 @@ class GyroCrossCoupling(Sensor):
     params = tuple(Param(f"s{i + 1}{j + 1}", "1", 2e-2) for i, j in PAIRS)
     covariate = "rate about the other axes"
     decided_by = "a turn about each axis in turn, by 90° or more"
+    cure = "Let solve use the turns (--turns yes), or a rate table."
     source = "Avrutov et al. 2017, (3.1); MEMS data sheets state 0.1 to 2 %"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

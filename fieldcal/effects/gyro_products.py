@@ -29,6 +29,7 @@ class GyroProducts(Sensor):
     )
     covariate = "products of rate about two axes"
     decided_by = "rates about two axes at once on a rate table"
+    cure = "Turn about one axis at a time, or calibrate on a rate table."
     source = "Avrutov et al. 2017, (4.1) and its example 4"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

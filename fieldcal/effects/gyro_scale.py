@@ -30,6 +30,7 @@ class GyroScale(Sensor):
     carried_by = "gyr_scale"
     covariate = "angle turned"
     decided_by = "a turn about each axis in turn, by 90° or more"
+    cure = "Let solve use the turns between the positions (--turns yes)."
     source = "Avrutov et al. 2017, (3.1); MEMS data sheets state 0.1 to 3 %"
 
     def applies(self, x: Experience) -> bool:

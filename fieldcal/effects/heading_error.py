@@ -26,6 +26,10 @@ class HeadingError(Motion):
     params = (Param("psi_deg", "deg", 15.0),)
     covariate = "horizontal Earth rate"
     decided_by = "positions that turn a gyroscope from east to west"
+    cure = (
+        "Point the fixture north by two bearings instead of a compass, or tell "
+        "solve how well (--heading)."
+    )
     source = "Avrutov and Pozniak 2023, (38); 1 to 30 deg by compass or eye"
     order = 0
 

@@ -27,6 +27,7 @@ class Hum(Line):
     shapes = (Shape("hz", "Hz"),)
     covariate = "spectrum"
     decided_by = "the same window with the suspected source switched off"
+    cure = "Find the source by its frequency, and keep cables and engines away."
     source = "narrow-band interference; any frequency up to half the sampling rate"
     band = (0.05, np.inf)
 

@@ -27,6 +27,7 @@ class LeverArm(Motion):
     params = tuple(Param(i, "m", 0.3) for i in "xyz")
     covariate = "rate squared and angular acceleration in turns"
     decided_by = "faster turns about each axis"
+    cure = "Mount the device nearer to the axes of the turns, or turn slowly."
     source = "rigid body kinematics; 0.01 to 0.3 m on a fixture"
     order = 9
     on_the_way = True

@@ -136,6 +136,7 @@ class Mounting(Chain):
     misread = True
     covariate = "force at rest is not where it should be"
     decided_by = "the drawing on the device, and its data sheet"
+    cure = "Correct [frame] mounting, or the unit, by the drawing on the device."
     source = "model of this project"
 
     def find(self, recording: Recording) -> list[Fault]:

@@ -35,6 +35,10 @@ class NoiseLevel(Chain):
     covariate = "spectrum at high frequency"
     seen_in = "spectrum"
     decided_by = "the axes exchanged: what stays with the axis is the sensor's"
+    cure = (
+        "Compare with the data sheet; a single axis that is noisier points to a "
+        "defect or to vibration along it."
+    )
     source = "model of this project"
 
     def find(self, recording: Recording) -> list[Fault]:

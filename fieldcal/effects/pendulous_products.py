@@ -34,6 +34,10 @@ class PendulousProducts(Sensor):
     )
     covariate = "products of force along two axes"
     decided_by = "positions that load two axes at once, with either sign"
+    cure = (
+        "Use the calibration that diagnose gives with it; positions that load "
+        "two axes at once sharpen it."
+    )
     source = "Avrutov et al. 2017, (2.1); up to 1e-4"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -27,6 +27,10 @@ class Quadratic(Sensor):
     params = tuple(Param(i, "1/(m/s^2)", 5e-4) for i in "xyz")
     covariate = "f^2"
     decided_by = "positions with the axis at 45° besides 0 and ±1 g"
+    cure = (
+        "Use the calibration that diagnose gives with it, and take the "
+        "coefficients out of the forces."
+    )
     source = "IEEE Std 1293, K2; 1e-5 to 5e-4 on MEMS parts"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -34,6 +34,7 @@ class Quantisation(Chain):
     params = (Param("acc", "m/s^2", 1.0), Param("gyr", "rad/s", 0.1))
     covariate = "few distinct values"
     decided_by = "a smaller range, or a finer output format"
+    cure = "Choose a smaller range, or an output with more digits."
     source = "Widrow and Kollar, Quantization Noise"
 
     def find(self, recording: Recording) -> list[Fault]:

@@ -23,4 +23,8 @@ class RandomWalk(Scatter):
     covariate = "scatter between windows beyond white noise"
     seen_in = "time"
     decided_by = "one position held for an hour, and its Allan deviation"
+    cure = (
+        "Nothing takes it out: average no longer than the Allan deviation "
+        "falls, and calibrate shortly before use."
+    )
     source = "IEEE Std 952, rate random walk"

@@ -27,6 +27,10 @@ class ScaleAsymmetry(Sensor):
     params = tuple(Param(i, "1", 5e-3) for i in "xyz")
     covariate = "sign of f"
     decided_by = "positions with the axis at 45° besides 0 and ±1 g"
+    cure = (
+        "Use the calibration that diagnose gives with it, and one scale factor "
+        "for each sign."
+    )
     source = "IEEE Std 1293, scale factor asymmetry; 1e-5 to 5e-3 on MEMS parts"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -29,6 +29,7 @@ class Settling(Sensor):
     covariate = "time since the turn"
     seen_in = "transient"
     decided_by = "a longer wait between the turn and the window"
+    cure = "Wait longer after each turn before the window begins."
     source = "relaxation after a change of load; 1e-4 to 1e-2 m/s^2, 1 to 30 s"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -64,6 +64,7 @@ class Stuck(Chain):
     shapes = (Shape("from_s", "s"), Shape("to_s", "s"))
     covariate = "runs of equal values"
     decided_by = "the stretch recorded again"
+    cure = "Restart the device; if it comes back, the sensor is defective."
     source = "model of this project"
 
     def find(self, recording: Recording) -> list[Fault]:

@@ -30,6 +30,10 @@ class Sway(Line):
     shapes = (Shape("hz", "Hz", 0.1, 2.0),)
     covariate = "line in horizontal force, rate in quadrature"
     decided_by = "the same window on firm ground"
+    cure = (
+        "Put the device on firm ground, wait for the wind to drop, or average "
+        "over whole periods."
+    )
     source = "kinematics of a small rotation; 0.001 to 0.2 deg, 0.1 to 2 Hz"
     band = (0.08, 2.5)
 

@@ -28,6 +28,10 @@ class TemperatureBias(Sensor):
     covariate = "temperature"
     seen_in = "temperature"
     decided_by = "the same position again at another temperature"
+    cure = (
+        "Wait until the temperature stands still, or record while it changes "
+        "and apply the coefficients."
+    )
     source = "IEEE Std 1293, 1431; 1e-4 to 1.5e-2 m/s^2/K, 1e-5 to 5e-4 rad/s/K"
 
     def applies(self, x: Experience) -> bool:

@@ -28,6 +28,7 @@ class TemperatureScale(Sensor):
     covariate = "temperature × force"
     seen_in = "temperature"
     decided_by = "the axis up and down, cold and warm"
+    cure = "Calibrate at the temperature of use, or apply the coefficients."
     source = "IEEE Std 1293; 1e-5 to 3e-4 on MEMS parts"
 
     def applies(self, x: Experience) -> bool:

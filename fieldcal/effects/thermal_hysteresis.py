@@ -28,6 +28,10 @@ class ThermalHysteresis(Sensor):
     covariate = "rate of the temperature"
     seen_in = "temperature"
     decided_by = "the same temperature once heating and once cooling"
+    cure = (
+        "Change the temperature slowly, and calibrate in the direction in which "
+        "the device is used."
+    )
     source = "first-order lag of 10 to 100 s with the temperature_bias sizes"
 
     def applies(self, x: Experience) -> bool:

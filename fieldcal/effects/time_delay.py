@@ -28,6 +28,7 @@ class TimeDelay(Sensor):
     params = (Param("seconds", "s", 0.05),)
     covariate = "angular acceleration in turns"
     decided_by = "faster turns"
+    cure = "Correct the times in the driver by the delay that was found."
     source = "model of this project; 1 to 50 ms from filters and buffers"
 
     def late(self, values: Values) -> float:

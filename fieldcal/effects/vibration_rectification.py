@@ -30,6 +30,7 @@ class VibrationRectification(Sensor):
     params = tuple(Param(i, "1/(m/s^2)", 1e-2) for i in "xyz")
     covariate = "variance of the vibration"
     decided_by = "the same position with the source of vibration off and on"
+    cure = "Switch the source of the vibration off, or put the device on a damper."
     source = "IEEE Std 1293; 1e-4 to 1e-2 on MEMS parts"
 
     def applies(self, x: Experience) -> bool:

@@ -29,6 +29,7 @@ class WarmUp(Sensor):
     covariate = "time since the start"
     seen_in = "time"
     decided_by = "a longer recording, until the change has died out"
+    cure = "Switch the device on earlier: three times tau_s before the first window."
     source = "first-order warm-up of a package, 100 to 2000 s"
 
     def chance(self, x: Experience) -> float:

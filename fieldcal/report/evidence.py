@@ -10,7 +10,6 @@ from fieldcal.calibration.wording import pretty
 from fieldcal.effects import catalogue
 from fieldcal.report.blocks import Block, Cell, Figure, folded, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
-from fieldcal.report.cures import CURES
 from fieldcal.report.loose import Json, list_at, objects_at, real, shown, table_at
 from fieldcal.samples import Array
 
@@ -119,7 +118,8 @@ def next_steps(found: Json) -> list[Block]:
 def _cures(found: Json) -> list[list[str | Cell]]:
     """What helps against each effect that was found, once each."""
     ids = dict.fromkeys(str(e.get("id", "")) for e in objects_at(found, "effects"))
-    return [[i.replace("_", " "), CURES[i]] for i in ids if i in CURES]
+    known = catalogue()
+    return [[i.replace("_", " "), known[i].cure] for i in ids if i in known]
 
 
 def _decisions(found: Json) -> list[str]:

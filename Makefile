@@ -1,17 +1,19 @@
-# `make demo` and `make test` set everything up by themselves, in .venv; a second call does no set-up again.
+# Each command sets up what it needs by itself, in .venv; a second call does no set-up again.
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+DEV := .venv/.dev
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .PHONY: demo test lint bench docs setup clean
 
 demo: $(READY)
 	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
 
-test: $(READY)
+test: $(DEV)
 	$(BIN)/python -m pytest -q
 
-lint: $(READY)
+lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -26,19 +28,25 @@ docs: .venv/.docs
 
 setup: $(READY)
 
+# what calibrates; modules are compiled when they are first imported, which most never are
 $(READY): pyproject.toml constraints.txt Makefile
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "fieldcal needs Python 3.11 or newer; $(PYTHON) is older. Name another: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 2; }
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(PIP) --no-compile -e .
+	@touch $@
+
+# what tests and linters need beside, and every format
+$(DEV): $(READY)
+	$(PIP) -e '.[dev]'
 	@touch $@
 
 # what users would pick instead, to be measured beside
-.venv/.peers: $(READY)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
+.venv/.peers: $(DEV)
+	$(PIP) -e '.[bench]'
 	@touch $@
 
 .venv/.docs: $(READY)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(PIP) -e '.[docs]'
 	@touch $@
 
 clean:

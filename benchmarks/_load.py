@@ -5,7 +5,7 @@ import sys
 from time import perf_counter, process_time, sleep
 from typing import NamedTuple
 
-from fieldcal.driver import open_driver
+from fieldcal.drivers.driver import open_driver
 
 WATCHED = 5.0
 """Time over which the share is taken, s."""

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.recorder import Recorder
-from fieldcal.recording import Wanted
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
+from fieldcal.importing.recording import Wanted
+from fieldcal.session.recorder import Recorder
 
 ROWS = 100_000
 RATE = 1000
@@ -112,7 +112,7 @@ def write_mcap(path: Path, block: Block) -> None:
     """Write raw and calibrated samples as the exporter does."""
     from fieldcal.calibration import Calibration, Nominal
     from fieldcal.exporters import Source, mcap
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
 
     made = path.parent / "recorded"
     with Recorder(made, {"format": 1}) as recorder:

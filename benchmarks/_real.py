@@ -18,15 +18,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fieldcal import description
-from fieldcal.description import Description
-from fieldcal.frames import angles_of
-from fieldcal.gravity import G0
+from fieldcal.core.frames import angles_of
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array, Block
 from fieldcal.importers import open_recording
-from fieldcal.importing import bring_in
-from fieldcal.recording import Wanted
-from fieldcal.samples import Array, Block
-from fieldcal.session import Session
+from fieldcal.importing.ingest import bring_in
+from fieldcal.importing.recording import Wanted
+from fieldcal.session import description
+from fieldcal.session.description import Description
+from fieldcal.session.folder import Session
 
 REAL = Path(__file__).resolve().parents[2] / "shared" / "real"
 

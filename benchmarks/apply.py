@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 
 SAMPLES = 1_000_000
 RUNS = 15

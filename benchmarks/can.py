@@ -11,14 +11,14 @@ import can
 import numpy as np
 
 from benchmarks._load import load_at_1_khz
-from fieldcal.driver import open_driver
+from fieldcal.core.errors import DeviceError
+from fieldcal.core.samples import Block
 from fieldcal.drivers.can_frames import FRAME, Frames, Packed
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import SHIPPED, load, read_map
 from fieldcal.drivers.can_samples import Samples
+from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.options import Options
-from fieldcal.errors import DeviceError
-from fieldcal.samples import Block
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.can_packing import frames
 

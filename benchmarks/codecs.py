@@ -18,10 +18,10 @@ from typing import IO, NamedTuple
 import numpy as np
 
 from benchmarks._load import load_at_1_khz
-from fieldcal.driver import open_driver
+from fieldcal.core.samples import Block
 from fieldcal.drivers.codec import formats
+from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.serial_imu import SerialPort
-from fieldcal.samples import Block
 from fieldcal.sim_device.wire import open_wire
 
 SAMPLES = 500_000

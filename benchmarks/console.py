@@ -15,8 +15,8 @@ from time import monotonic
 import numpy as np
 import pexpect
 
-from fieldcal.movers import VirtualDevice
-from fieldcal.session import Session
+from fieldcal.run.movers import VirtualDevice
+from fieldcal.session.folder import Session
 
 RATE = 1000.0
 """Samples a second."""

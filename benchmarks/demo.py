@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 SEEDS = range(1, 21)
 TILT = {"about_x_deg": 1.0, "about_z_deg": -1.0}

@@ -18,7 +18,7 @@ from time import perf_counter
 
 import numpy as np
 
-from fieldcal.sample_files import to_batch
+from fieldcal.session.sample_files import to_batch
 from fieldcal.sim_device.profile import Profile, Sampling
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import effect
@@ -28,7 +28,7 @@ ANGLES = [(a, b) for b in (0.0, 5.0, -5.0) for a in (0.0, 45.0, -45.0)]
 SESSIONS = {"nine positions, 100 Hz": (100.0, 30.0), "one hour, 1 kHz": (1000.0, 391.0)}
 TWIN = "{folder}/twin.toml"
 COMMANDS = {
-    "read": ["-c", "import sys; from fieldcal.session import Session;"
+    "read": ["-c", "import sys; from fieldcal.session.folder import Session;"
              " Session.open(sys.argv[1]).block"],
     "diagnose": ["-m", "fieldcal", "diagnose"],
     "diagnose --twin": ["-m", "fieldcal", "diagnose", "--twin", TWIN],

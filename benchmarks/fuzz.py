@@ -3,9 +3,9 @@
 import numpy as np
 
 from benchmarks.codecs import TOLD
+from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.codec import formats, open_codec
 from fieldcal.drivers.options import Options
-from fieldcal.samples import Array, Block
 from fieldcal.sim_device.wire import open_wire
 
 FRAMES = 1_000_000

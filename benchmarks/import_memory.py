@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks._logs import RATE, dataflash, samples, ulog
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 
 HOURS = (1, 4)
 PIECE = 300 * RATE

@@ -20,10 +20,10 @@ from tempfile import TemporaryDirectory
 from time import process_time
 
 from benchmarks._logs import COLUMNS, ROWS, Log, samples, write_all, write_tables
+from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
-from fieldcal.importing import bring_in
-from fieldcal.recording import Wanted
-from fieldcal.samples import Block
+from fieldcal.importing.ingest import bring_in
+from fieldcal.importing.recording import Wanted
 
 RUNS = 5
 GOAL = 1.5

@@ -8,10 +8,10 @@ from time import perf_counter
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.core.positions import FIVE, TWO, WIDE, Position
+from fieldcal.core.samples import Array
 from fieldcal.model.planned import parameters, predicted
-from fieldcal.planner import Ladder, best_positions
-from fieldcal.positions import FIVE, TWO, WIDE, Position
-from fieldcal.samples import Array
+from fieldcal.planning.planner import Ladder, best_positions
 from fieldcal.solve import Observations
 from fieldcal.solve import solve as estimate
 from fieldcal.solve.five_position import axis_estimates

@@ -20,9 +20,9 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.commands.table import concealed_values
-from fieldcal.movers import VirtualDevice
-from fieldcal.positions import FIVE
-from fieldcal.session import read_marks
+from fieldcal.core.positions import FIVE
+from fieldcal.run.movers import VirtualDevice
+from fieldcal.session.folder import read_marks
 
 KILLED, PULLED = 200, 100
 SECONDS = 8.0

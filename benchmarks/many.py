@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks import codecs, mavlink
-from fieldcal.driver import Driver, open_driver
-from fieldcal.errors import DeviceError
+from fieldcal.core.errors import DeviceError
+from fieldcal.drivers.driver import Driver, open_driver
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.can_packing import frames
 

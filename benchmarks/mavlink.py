@@ -14,10 +14,10 @@ import numpy as np
 
 from benchmarks._load import load_at_1_khz
 from benchmarks.fuzz import BATCH, FRAMES, spoil
-from fieldcal.driver import open_driver
+from fieldcal.core.samples import Block
+from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.mavlink_samples import KINDS, Decoder
 from fieldcal.drivers.options import Options
-from fieldcal.samples import Block
 from fieldcal.sim_device.mavlink_packing import messages
 
 SAMPLES = 30_000

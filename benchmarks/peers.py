@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.positions import SIX_FACES, Position
-from fieldcal.samples import Array
+from fieldcal.core.positions import SIX_FACES, Position
+from fieldcal.core.samples import Array
 from fieldcal.solve import Observations, solve
 
 SESSION = (

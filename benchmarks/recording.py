@@ -6,8 +6,8 @@ from time import monotonic, process_time, sleep
 
 import numpy as np
 
-from fieldcal.recorder import Recorder
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
+from fieldcal.session.recorder import Recorder
 
 DEVICES, RATE, CHUNK, WATCHED = 10, 1000, 20, 5.0
 """Devices, Hz, samples handed over at once, s."""

@@ -12,13 +12,13 @@ import pyarrow.parquet
 import tomlkit
 
 from fieldcal.cli import main as fieldcal
-from fieldcal.frames import force
-from fieldcal.positions import FIVE, WIDE
+from fieldcal.core.frames import force
+from fieldcal.core.positions import FIVE, WIDE
+from fieldcal.core.samples import Array, Block
 from fieldcal.report import gather, render
 from fieldcal.report.browser import Browser, find
-from fieldcal.sample_files import to_batch
-from fieldcal.samples import Array, Block
-from fieldcal.session import Session
+from fieldcal.session.folder import Session
+from fieldcal.session.sample_files import to_batch
 
 RATE, SECONDS, TURN = 1000, 3600, 4.0
 GRAVITY = 9.81

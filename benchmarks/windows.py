@@ -13,8 +13,8 @@ from time import perf_counter
 import numpy as np
 from scipy.signal import butter, lfilter
 
-from fieldcal.errors import Moved
-from fieldcal.samples import Array, Block
+from fieldcal.core.errors import Moved
+from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Noise, Window, average
 
 SEEDS = 1000

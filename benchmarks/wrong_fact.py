@@ -20,13 +20,13 @@ import numpy as np
 from benchmarks.concealed.sessions import MOUNTINGS, plain
 from benchmarks.concealed.sessions import Session as Played
 from fieldcal.calibration import Calibration
-from fieldcal.description import Description
+from fieldcal.core.errors import FieldcalError
+from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
-from fieldcal.errors import FieldcalError
-from fieldcal.observing import rests
-from fieldcal.samples import Array, Block
-from fieldcal.session import Session
-from fieldcal.solving import solved
+from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.solution import solved
+from fieldcal.session.description import Description
+from fieldcal.session.folder import Session
 
 USUAL, SEED = 120, 71_000_000
 WRONG = 5.0

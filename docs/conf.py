@@ -12,7 +12,7 @@ sys.path.insert(0, str(HERE))
 
 from drawn import mathematics, pages  # noqa: E402
 
-from fieldcal import __version__  # noqa: E402
+from fieldcal.core.version import __version__  # noqa: E402
 
 project = "fieldcal"
 author = "fieldcal"

@@ -23,8 +23,8 @@ from math import exp, sqrt
 
 import numpy as np
 
-from fieldcal.driver import Health
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.drivers.driver import Health
 
 LEARN = 1.0
 """Time that the first regression takes, s."""

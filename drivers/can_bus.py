@@ -16,13 +16,13 @@ from contextlib import suppress
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.can_frames import Packed
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.serial_imu import SerialPort, reason
 from fieldcal.drivers.tcp import POLL
-from fieldcal.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
     from can import BusABC, Message

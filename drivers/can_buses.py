@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.errors import InputError
 from fieldcal.drivers.can_frames import Frames, Packed
-from fieldcal.errors import InputError
 
 MOST = 0xFFFF
 """Buses that are told apart."""

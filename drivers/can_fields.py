@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array
 from fieldcal.drivers.framing import widened
-from fieldcal.samples import Array
 
 if TYPE_CHECKING:
     from cantools.database.can import Signal

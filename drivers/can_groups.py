@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.driver import Health
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.drivers.driver import Health
 
 Index = NDArray[np.int64]
 

@@ -19,17 +19,17 @@ from time import monotonic
 
 import numpy as np
 
-from fieldcal.driver import Driver, Health
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers.can_buses import Buses
 from fieldcal.drivers.can_frames import EXTENDED, FRAME, Frames
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_log import Log, is_log
+from fieldcal.drivers.driver import Driver, Health
 from fieldcal.drivers.options import split
 from fieldcal.drivers.pace import speed
 from fieldcal.drivers.reader import Reader
 from fieldcal.drivers.skew import Skew
-from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Array, Block, Grain, concat
 
 ENOUGH = 10_000
 """Strange frames after which no more identifiers are kept."""

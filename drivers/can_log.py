@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.can_buses import Buses
 from fieldcal.drivers.can_frames import FRAME, Frames, Packed
 from fieldcal.drivers.pace import Pace
-from fieldcal.errors import DeviceError, InputError
 
 READERS = {
     ".log": "CanutilsLogReader",

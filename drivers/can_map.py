@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fieldcal.description import ACC_UNITS, GYR_UNITS
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.drivers.can_fields import Bytes, Field
 from fieldcal.drivers.can_frames import EXTENDED
 from fieldcal.drivers.options import Options
-from fieldcal.errors import InputError
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.session.description import ACC_UNITS, GYR_UNITS
 
 if TYPE_CHECKING:
     from cantools.database.can import Database, Message, Signal

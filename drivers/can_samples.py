@@ -16,6 +16,8 @@ from collections.abc import Sequence as Sequenced
 
 import numpy as np
 
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import CHANNELS, Array, Block, Grain
 from fieldcal.drivers.can_fields import WORD, Bytes
 from fieldcal.drivers.can_frames import ERROR, Frames
 from fieldcal.drivers.can_groups import (
@@ -31,8 +33,6 @@ from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
 from fieldcal.drivers.timebase import Timebase
-from fieldcal.errors import InputError
-from fieldcal.samples import CHANNELS, Array, Block, Grain
 
 DEEP = 8
 """Newer samples that may have begun before one is given up."""

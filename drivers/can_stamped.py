@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import Part
 from fieldcal.drivers.can_samples import STAMP, Samples
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.stamps import Stamps
-from fieldcal.samples import Array, Block
 
 
 class Stamped(Samples):

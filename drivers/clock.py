@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.driver import Health
+from fieldcal.core.samples import Array
 from fieldcal.drivers.arrivals import Arrivals
+from fieldcal.drivers.driver import Health
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.stamps import Stamps
 from fieldcal.drivers.timebase import Rate, Timebase
-from fieldcal.samples import Array
 
 
 class Clock:

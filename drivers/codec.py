@@ -15,15 +15,15 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from fieldcal.driver import Health
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers import protocols
+from fieldcal.drivers.driver import Health
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, resolve
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.drivers.timebase import Timebase
-from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block, Grain, concat
 
 ENOUGH = 3
 """Samples that make a format likely."""

@@ -13,9 +13,9 @@ from urllib.parse import quote
 
 import numpy as np
 
-from fieldcal.description import ACC_UNITS
-from fieldcal.gravity import G0
-from fieldcal.samples import Array
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array
+from fieldcal.session.description import ACC_UNITS
 
 LEAST = 5
 """Lines that make a guess worth while."""

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 Bytes = NDArray[np.uint8]
 Index = NDArray[np.integer[Any]]

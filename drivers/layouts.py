@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.drivers.framing import Bytes, Found, Index, rows, widened
-from fieldcal.samples import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,15 +22,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fieldcal.driver import Driver, Health
+from fieldcal.core.errors import DeviceError, FieldcalError, InputError
+from fieldcal.core.samples import Block, Grain
+from fieldcal.drivers.driver import Driver, Health
 from fieldcal.drivers.mavlink_log import Log, is_log
 from fieldcal.drivers.mavlink_talk import Talk, listed
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.pace import speed
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
-from fieldcal.errors import DeviceError, FieldcalError, InputError
-from fieldcal.samples import Block, Grain
 
 if TYPE_CHECKING:
     from fieldcal.drivers.mavlink_installed import Installed

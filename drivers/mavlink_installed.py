@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Array
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 
 ARDUPILOT, PX4 = 3, 12
 """Numbers of the programs in a heartbeat."""

@@ -14,10 +14,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
+from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.reader import Source
 from fieldcal.drivers.serial_imu import SerialPort
 from fieldcal.drivers.tcp import POLL, Tcp, cannot
-from fieldcal.errors import DeviceError, InputError
 
 WAITING = 1 << 20
 """Bytes that the kernel is asked to keep for us."""

@@ -10,10 +10,10 @@ import gzip
 from bisect import bisect_right
 from pathlib import Path
 
+from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.mavlink_frames import HEADS, SECOND, SIGNATURE
 from fieldcal.drivers.pace import Pace
 from fieldcal.drivers.reader import Chunk
-from fieldcal.errors import DeviceError, InputError
 
 STAMP = 8
 PIECE = 4096

@@ -16,11 +16,11 @@ from typing import Any, Self
 
 import numpy as np
 
+from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.mavlink_installed import PX4
 from fieldcal.drivers.mavlink_link import Line, opener
 from fieldcal.drivers.mavlink_talk import INT32, NO_AUTOPILOT, REAL32, STATION, listed
 from fieldcal.drivers.options import split
-from fieldcal.errors import DeviceError, InputError
 
 BEAT, PATIENCE = 1.0, 0.7
 """Between two heartbeats, and until a question is put again, s."""

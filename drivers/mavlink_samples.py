@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, Found, widened
 from fieldcal.drivers.mavlink_frames import (
@@ -30,7 +31,6 @@ from fieldcal.drivers.mavlink_units import (
 )
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.stamps import Stamps
-from fieldcal.samples import Array, Block, Grain, concat
 
 Fields = NDArray[np.void]
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from math import inf
 from typing import Any
 
+from fieldcal.core.errors import DeviceError
 from fieldcal.drivers.mavlink_installed import (
     PX4,
     Installed,
@@ -21,7 +22,6 @@ from fieldcal.drivers.mavlink_installed import (
     identity,
     names,
 )
-from fieldcal.errors import DeviceError
 
 EVERY = 1.0
 """Between two heartbeats, s."""

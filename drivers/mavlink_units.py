@@ -19,8 +19,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.errors import DeviceError
-from fieldcal.samples import Array
+from fieldcal.core.errors import DeviceError
+from fieldcal.core.samples import Array
 
 G = 9.80665
 """m/s^2; what autopilots call g."""

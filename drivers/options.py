@@ -6,7 +6,7 @@ from collections.abc import Collection
 from math import isfinite
 from urllib.parse import parse_qsl
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 
 class Options:

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from time import monotonic
 from typing import NamedTuple
 
+from fieldcal.core.errors import DeviceError
 from fieldcal.drivers.codec import codec_class, formats, recognise
 from fieldcal.drivers.mavlink_heard import autopilot
 from fieldcal.drivers.serial_imu import open_port
-from fieldcal.errors import DeviceError
 
 SILENT = 2
 """Baud rates at which not a byte came, after which there is no device."""

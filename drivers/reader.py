@@ -15,8 +15,8 @@ from collections.abc import Callable
 from threading import Condition, Thread
 from typing import NamedTuple, Protocol
 
-from fieldcal.driver import host_clock
-from fieldcal.errors import DeviceError
+from fieldcal.core.errors import DeviceError
+from fieldcal.drivers.driver import host_clock
 
 BATCH = 0.02
 """Shortest time between two deliveries, s: a batch costs the same however long."""

@@ -17,16 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.driver import Driver, Health
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.samples import Block, Grain, concat
 from fieldcal.drivers import can_log, mavlink_log
 from fieldcal.drivers.codec import open_codec
+from fieldcal.drivers.driver import Driver, Health
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.pace import Pace, speed
-from fieldcal.errors import DeviceError, InputError
-from fieldcal.observing import grain_of
-from fieldcal.sample_files import ENDINGS, read
-from fieldcal.samples import Block, Grain, concat
-from fieldcal.session import Session
+from fieldcal.evaluation.observations import grain_of
+from fieldcal.session.folder import Session
+from fieldcal.session.sample_files import ENDINGS, read
 
 PIECE = 0.5
 """Longest stretch delivered at once, s of device time."""

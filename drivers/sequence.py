@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 FEW = 1_000_000
 """A counter that leaps by more than this has begun anew."""

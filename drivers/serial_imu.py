@@ -13,15 +13,15 @@ from typing import ClassVar
 
 import serial
 
-from fieldcal.driver import Driver
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.samples import Block, Grain
 from fieldcal.drivers.codec import open_codec, recognise
+from fieldcal.drivers.driver import Driver
 from fieldcal.drivers.mavlink_heard import autopilot
 from fieldcal.drivers.options import split
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
 from fieldcal.drivers.tcp import POLL, Tcp
-from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Block, Grain
 
 SOCKET = "socket://"
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.driver import ClockLine, Health
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.drivers.driver import ClockLine, Health
 
 STRETCH = 1.0
 """First length of a stretch, s of device time."""

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.driver import Health
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.drivers.driver import Health
 
 BACK = 1.0
 """A stamp older by more than this is no late sample but a clock begun anew, s."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import select
 import socket
 
-from fieldcal.errors import DeviceError
+from fieldcal.core.errors import DeviceError
 
 POLL = 0.1
 """Longest wait for a byte before the reader looks whether it should end, s."""

@@ -14,8 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
-from fieldcal.driver import Health
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.drivers.driver import Health
 
 PAUSE = 1.0
 """Arrivals so far apart are no jitter, s."""

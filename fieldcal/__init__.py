@@ -15,25 +15,25 @@ Names are loaded when they are first used, so that importing the package costs n
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.core.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration as Calibration
-    from fieldcal.driver import open_driver as open_driver
-    from fieldcal.observing import observe as observe
-    from fieldcal.positions import Position as Position
-    from fieldcal.samples import Block as Block
-    from fieldcal.session import Session as Session
+    from fieldcal.core.positions import Position as Position
+    from fieldcal.core.samples import Block as Block
+    from fieldcal.drivers.driver import open_driver as open_driver
+    from fieldcal.evaluation.observations import observe as observe
+    from fieldcal.session.folder import Session as Session
     from fieldcal.windows import average as average
 
-__version__ = "0.1.0"
-
 _HOMES = {
-    "Block": "samples",
+    "Block": "core.samples",
     "Calibration": "calibration",
-    "Position": "positions",
-    "Session": "session",
+    "Position": "core.positions",
+    "Session": "session.folder",
     "average": "windows",
-    "observe": "observing",
-    "open_driver": "driver",
+    "observe": "evaluation.observations",
+    "open_driver": "drivers.driver",
 }
 
 

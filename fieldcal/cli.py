@@ -90,7 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] not in COMMANDS:
-        from fieldcal import __version__
+        from fieldcal.core.version import __version__
 
         _top(__version__).parse_args(arguments or ["--help"])
     return _guarded(arguments[0], arguments[1:])
@@ -98,7 +98,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _guarded(name: str, arguments: list[str]) -> int:
     """Turn errors into one sentence and an exit code."""
-    from fieldcal.errors import FieldcalError
+    from fieldcal.core.errors import FieldcalError
 
     command = _load(name)
     try:

@@ -18,8 +18,8 @@ import pytest
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
-    from fieldcal.driver import Driver
-    from fieldcal.movers import VirtualDevice
+    from fieldcal.drivers.driver import Driver
+    from fieldcal.run.movers import VirtualDevice
 
 SIGMAS = 4.5
 """Standard uncertainties within which a value must agree with the truth."""
@@ -70,7 +70,7 @@ class VirtualImu:
 
     def open(self) -> Driver:
         """Open it with the driver of its link."""
-        from fieldcal.driver import open_driver
+        from fieldcal.drivers.driver import open_driver
 
         return open_driver(self.url)
 
@@ -106,7 +106,7 @@ class VirtualImu:
         tables : of session.toml, over what the device itself says
 
         """
-        from fieldcal.pytest_run import recalibrate
+        from fieldcal.run.unattended import recalibrate
 
         self._runs += 1
         folder = self._folder / f"session-{self._runs}"
@@ -188,7 +188,7 @@ def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
         seed: int = 1,
         **options: Any,
     ) -> VirtualImu:
-        from fieldcal.movers import VirtualDevice
+        from fieldcal.run.movers import VirtualDevice
 
         if link not in LINKS:
             raise ValueError(f"link {link!r} is none of {', '.join(LINKS)}")

@@ -1,8 +1,9 @@
 """Procedures: plans for an operator or a script, one a file, found by their names.
 
 To add one, write procedures/<name>.py with ``POSITIONS``, the positions it takes unless
-the session says others, and ``plan``, a generator of steps (`fieldcal.plan`) that
-returns a `Calibration`. A plan touches no device, no clock and no screen.
+the session says others, and ``plan``, a generator of steps
+(`fieldcal.planning.steps`) that returns a `Calibration`. A plan touches no device, no
+clock and no screen.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from pkgutil import iter_modules
 from typing import Protocol, cast
 
 from fieldcal.calibration import Calibration
-from fieldcal.plan import Plan
-from fieldcal.positions import Position
+from fieldcal.core.positions import Position
+from fieldcal.planning.steps import Plan
 
 
 class Procedure(Protocol):

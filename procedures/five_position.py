@@ -6,7 +6,7 @@ than the equations one after the other. Source: Avrutov and Pozniak 2023, (15)-(
 
 from __future__ import annotations
 
-from fieldcal.positions import FIVE, Position
+from fieldcal.core.positions import FIVE, Position
 from fieldcal.procedures.positions import plan
 
 __all__ = ["POSITIONS", "plan"]

@@ -9,11 +9,11 @@ Source: Avrutov and Pozniak 2023, (11)-(14), (36), (45)-(48).
 from __future__ import annotations
 
 from fieldcal.calibration import Calibration
-from fieldcal.description import Description
-from fieldcal.holding import hold_each, with_left_out
-from fieldcal.observing import angle_setting, observations
-from fieldcal.plan import Plan
-from fieldcal.positions import TWO, Position
+from fieldcal.core.positions import TWO, Position
+from fieldcal.evaluation.observations import angle_setting, observations
+from fieldcal.planning.holding import hold_each, with_left_out
+from fieldcal.planning.steps import Plan
+from fieldcal.session.description import Description
 from fieldcal.solve import solve
 
 POSITIONS: tuple[Position, ...] = TWO

@@ -11,7 +11,7 @@ Frames come as ``tiiindd…``: identifier in three hex digits, length, bytes.
 
 from __future__ import annotations
 
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.can_packing import frames
 from fieldcal.sim_device.wire import Wire
 

@@ -19,8 +19,8 @@ from urllib.parse import parse_qsl
 
 import numpy as np
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device.mavlink_packing import (
     ACC_UNITS,
     HIGHRES,

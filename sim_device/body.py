@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Array
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 from fieldcal.sim_device import earth
 from fieldcal.sim_device.influences import Life
 from fieldcal.sim_device.joints import Joints, Swing

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 
 FORCE_LSB = 1e-4
 RATE_LSB = float(np.deg2rad(0.004))

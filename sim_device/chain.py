@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.noise import stream
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import SIX, Effect

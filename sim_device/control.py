@@ -31,7 +31,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 LONGEST = 65536
 """Bytes of a request, or of replies that nobody reads, before a client is dropped."""

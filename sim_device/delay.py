@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Iterator
 from time import monotonic
 
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.noise import stream
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block, concat
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block, concat
 from fieldcal.sim_device.body import Body
 from fieldcal.sim_device.chain import Chain, rows
 from fieldcal.sim_device.influences import outputs

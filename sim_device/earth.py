@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from math import atan, atan2, cos, hypot, radians, sin, sqrt
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 RATE = 7.292115e-5
 """Angular rate of the Earth, rad/s."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from fieldcal.driver import Driver, Health
-from fieldcal.errors import InputError
-from fieldcal.samples import Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
+from fieldcal.drivers.driver import Driver, Health
 from fieldcal.sim_device.device import VirtualDevice
 
 BLOCK_S = 0.1

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.profile import Truth
 from fieldcal.sim_device.vocabulary import AXES, SIX, Effect
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 JOINTS = 3
 ALPHA, BETA, SPIN = range(JOINTS)

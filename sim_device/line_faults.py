@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 from fieldcal.sim_device.can_packing import Frame
 from fieldcal.sim_device.noise import stream
 

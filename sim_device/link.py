@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 
 
 class Link(ABC):

@@ -17,8 +17,8 @@ from pathlib import Path
 from time import sleep
 from typing import TYPE_CHECKING
 
-from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Block
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.adapter import Adapter
 from fieldcal.sim_device.can_packing import Frame, frames
 from fieldcal.sim_device.line_faults import LineFaults

@@ -11,8 +11,8 @@ import math
 from collections import deque
 from time import monotonic, sleep
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.autopilot import Autopilot
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link

@@ -15,8 +15,8 @@ import termios
 from pathlib import Path
 from time import monotonic, sleep
 
-from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Block
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
 from fieldcal.sim_device.pty_port import forget, open_pty

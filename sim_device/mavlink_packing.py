@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device.chain import STANDARD_GRAVITY
 
 HIGHRES, RAW, SCALED = 105, 27, (26, 116, 129)

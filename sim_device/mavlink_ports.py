@@ -9,7 +9,7 @@ from contextlib import suppress
 from time import monotonic
 from typing import Protocol
 
-from fieldcal.errors import DeviceError
+from fieldcal.core.errors import DeviceError
 
 GONE_S = 5.0
 """Silence after which a host on UDP counts as gone, s: five of its heartbeats."""

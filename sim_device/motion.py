@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.joints import ALPHA, BETA, SPIN, Swing
 from fieldcal.sim_device.quaternion import STILL, cross, into, multiply, turn
 

@@ -20,7 +20,7 @@ from zlib import crc32
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.profile import NoiseFigures, Triad
 
 FLICKER_TAU = 4.0 ** np.arange(8)

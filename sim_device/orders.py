@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 from fieldcal.sim_device.line_faults import KINDS, MOST
 from fieldcal.sim_device.vocabulary import AXES
 

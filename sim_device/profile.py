@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 from fieldcal.sim_device import earth
 from fieldcal.sim_device.vocabulary import Effect, check_together
 

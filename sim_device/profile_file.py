@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import CATALOGUE, Effect, effect
 

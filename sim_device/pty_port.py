@@ -10,7 +10,7 @@ import tty
 from collections import deque
 from contextlib import suppress
 
-from fieldcal.errors import DeviceError
+from fieldcal.core.errors import DeviceError
 
 HEARD = 1 << 16
 

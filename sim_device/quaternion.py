@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 STILL: Array = np.array([[1.0], [0.0], [0.0], [0.0]])
 """No turn at all, (4, 1)."""

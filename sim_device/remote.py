@@ -7,7 +7,7 @@ import socket
 from pathlib import Path
 from typing import Any, Self
 
-from fieldcal.errors import DeviceError, InputError
+from fieldcal.core.errors import DeviceError, InputError
 
 PATIENCE_S = 10.0
 

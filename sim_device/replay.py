@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block, concat
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block, concat
 from fieldcal.sim_device.device import PIECE, Sensing
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.temperature import recorded

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.motion import Angle, Rocking
 
 _PEAK = 6**3 / 7**3 / np.sqrt(7)

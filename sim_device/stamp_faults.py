@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 
 PPM = 1e-6
 

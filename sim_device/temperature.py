@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.profile import Climate
 
 SMOOTHED_S = 5.0

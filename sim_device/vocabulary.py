@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 AXES = ("x", "y", "z")
 SIX = ("ax", "ay", "az", "gx", "gy", "gz")

@@ -23,8 +23,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Array
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.quaternion import STILL, multiply, turn
 
 FEWEST = 4

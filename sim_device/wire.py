@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import ClassVar
 from urllib.parse import parse_qsl
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
 
 
 class Wire(ABC):

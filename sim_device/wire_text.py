@@ -15,8 +15,8 @@ from operator import xor
 
 import numpy as np
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device.chain import STANDARD_GRAVITY
 from fieldcal.sim_device.vocabulary import SIX
 from fieldcal.sim_device.wire import Wire

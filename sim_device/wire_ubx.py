@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.wire import Wire
 
 MESSAGE = np.dtype(

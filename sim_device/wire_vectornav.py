@@ -13,7 +13,7 @@ from binascii import crc_hqx
 
 import numpy as np
 
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.wire import Wire
 
 MESSAGE = np.dtype(

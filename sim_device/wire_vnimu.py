@@ -13,7 +13,7 @@ from operator import xor
 
 import numpy as np
 
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.wire import Wire
 
 LINE = "VNIMU,+00.2200,+00.0800,-00.5300" + ",%+07.3f" * 3 + ",%+010.6f" * 3

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device.chain import STANDARD_GRAVITY
 from fieldcal.sim_device.wire import Wire
 

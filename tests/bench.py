@@ -11,8 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet
 import tomlkit
 
-from fieldcal.positions import FIVE
-from fieldcal.sample_files import to_batch
+from fieldcal.core.positions import FIVE
+from fieldcal.session.sample_files import to_batch
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import effect

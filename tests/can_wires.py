@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fieldcal.driver import Driver
+from fieldcal.core.errors import DeviceError
+from fieldcal.core.samples import Array, Block, concat
 from fieldcal.drivers.can_frames import FRAME, Frames, pack
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import Part, read_map
 from fieldcal.drivers.can_samples import Samples
+from fieldcal.drivers.driver import Driver
 from fieldcal.drivers.options import Options
-from fieldcal.errors import DeviceError
-from fieldcal.samples import Array, Block, concat
 
 DBC = """\
 VERSION ""

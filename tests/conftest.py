@@ -24,10 +24,10 @@ settings.load_profile("any machine")
 
 WAITING = frozenset(
     [
-        "test_beside",
+        "test_companions",
         "test_can_imu",
         "test_codecs",
-        "test_console_run",
+        "test_terminal_run",
         "test_crash_safety",
         "test_end_to_end",
         "test_full_disk",
@@ -87,7 +87,7 @@ def recalibrated(tmp_path_factory: pytest.TempPathFactory) -> Recalibrated:
 def soon_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drivers in this process call a device silent after half of the usual time."""
     # not above: numpy reads at its import how many threads it may have
-    from fieldcal.driver import Driver
+    from fieldcal.drivers.driver import Driver
 
     monkeypatch.setattr(Driver.blocks, "__defaults__", (1.5,))
 

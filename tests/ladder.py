@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
 
 Array = NDArray[np.float64]
 LADDER = (

@@ -20,7 +20,7 @@ from session_folders import write_session
 
 from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.result import Diagnosis
-from fieldcal.session import Session
+from fieldcal.session.folder import Session
 
 
 def tables(device: Device) -> dict[str, Any]:

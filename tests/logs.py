@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 
 SYNC = bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12])
 

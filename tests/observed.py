@@ -15,9 +15,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fieldcal.calibration import Nominal
-from fieldcal.gravity import gravity
-from fieldcal.positions import Position
-from fieldcal.samples import Array
+from fieldcal.core.gravity import gravity
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Array
 from fieldcal.solve import Observations
 from fieldcal.windows import Average
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fieldcal.recorder import Recorder
-from fieldcal.samples import Array, Block
-from fieldcal.session import Session
+from fieldcal.core.samples import Array, Block
+from fieldcal.session.folder import Session
+from fieldcal.session.recorder import Recorder
 
 ROWS = 50
 """Samples that are handed over at once."""

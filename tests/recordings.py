@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from observed import SHARED
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 
 REAL = SHARED / "real"
 

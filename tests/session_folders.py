@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow as pa
 import tomlkit
 
-from fieldcal.sample_files import to_batch
-from fieldcal.samples import Block
+from fieldcal.core.samples import Block
+from fieldcal.session.sample_files import to_batch
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import Window, simulate
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
 
+from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.intake import Judge
-from fieldcal.recording import Wanted
-from fieldcal.samples import Block, concat
-from fieldcal.session import Session
+from fieldcal.importing.recording import Wanted
+from fieldcal.importing.validation import Judge
+from fieldcal.session.folder import Session
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 
@@ -20,7 +20,7 @@ COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 def _mcap(path: Path, block: Block) -> None:
     from fieldcal.calibration import Calibration, Nominal
     from fieldcal.exporters import Source, mcap
-    from fieldcal.recorder import Recorder
+    from fieldcal.session.recorder import Recorder
 
     with Recorder(path.parent / "made", {"format": 1}) as recorder:
         recorder.append(block)

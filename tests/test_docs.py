@@ -14,9 +14,9 @@ import pytest
 from bench import five_positions
 
 from fieldcal.cli import COMMANDS
+from fieldcal.core.positions import SETS, Position
 from fieldcal.effects import catalogue
-from fieldcal.positions import SETS, Position
-from fieldcal.session import Session
+from fieldcal.session.folder import Session
 from fieldcal.sim_device.vocabulary import parse
 
 DOCS = Path(__file__).parent.parent / "docs"

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 
 G = 9.80665
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.concealed.sessions import SIX, Session, plain
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import profile as device
 
 Values = dict[str, Any]

@@ -9,7 +9,8 @@ import numpy as np
 
 from benchmarks.concealed.sessions import Session
 from fieldcal.diagnosis import Diagnosis
-from fieldcal.effects import Line, catalogue
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Line
 
 ALWAYS = frozenset({"earth_rate"})
 """True of every session, so never a false alarm."""

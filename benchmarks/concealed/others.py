@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.concealed.draws import EQUATIONS, HOT, drawn, size, sized, suited
 from benchmarks.concealed.sessions import Session, plain
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device.profile import FullScale
 
 CHANCE = ("angle_setting", "random_walk")

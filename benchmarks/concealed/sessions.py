@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal import description
-from fieldcal.description import Description
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
+from fieldcal.session import description
+from fieldcal.session.description import Description
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import Window, simulate

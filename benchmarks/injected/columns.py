@@ -13,11 +13,11 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from benchmarks.injected.parts import Parts
-from fieldcal.description import Description
+from fieldcal.core.frames import force_home, seen_after
+from fieldcal.core.positions import angles, forces
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import Found
-from fieldcal.frames import force_home, seen_after
-from fieldcal.positions import angles, forces
-from fieldcal.samples import Array
+from fieldcal.session.description import Description
 
 STEP = 1e-4
 """Of an angle by which a derivative is taken, rad."""

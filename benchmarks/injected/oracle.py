@@ -26,9 +26,9 @@ from scipy.linalg import cholesky, solve_triangular
 from benchmarks.injected import columns
 from benchmarks.injected.parts import cut
 from benchmarks.injected.scatter import Scatter, scatter, span
-from fieldcal.description import Description
+from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import Diagnosis
-from fieldcal.samples import Array, Block
+from fieldcal.session.description import Description
 
 TIMES = 4
 """How often a calibration is found again from the forces that it gave."""

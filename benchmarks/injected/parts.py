@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.description import Description
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
+from fieldcal.session.description import Description
 
 SHORT_S = 45.0
 EARLY = (0.0, 0.1, 0.25, 0.5, 1.0)

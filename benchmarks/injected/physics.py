@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.injected.readout import put_out
 from benchmarks.injected.scene import Scene
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 
 Rng = np.random.Generator
 

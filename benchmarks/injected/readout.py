@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 FEWEST, MORE = 5, 4.0
 """Samples that make a rail, if they are so many more than at the value next to it."""

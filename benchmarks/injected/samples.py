@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from benchmarks.injected.physics import Added, CannotShow, Rng, direction
 from benchmarks.injected.readout import grid, put_out, rails
 from benchmarks.injected.scene import Scene
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array
 
 STRONG = 15.0
 """Standard deviations from which a fault of the chain is a strong one."""

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from benchmarks.injected.parts import Parts
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 RATIOS = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 """Variances tried, in those of the white noise of a part."""

@@ -12,8 +12,8 @@ from benchmarks._real import Real
 from benchmarks.injected.oracle import Oracle
 from benchmarks.injected.parts import windows_of
 from benchmarks.injected.readout import grid
+from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.diagnosis import Diagnosis
-from fieldcal.samples import CHANNELS, Array, Block
 
 PIECE_S = 0.5
 """Over which the noise of a sample is measured."""

@@ -9,9 +9,9 @@ import io
 from functools import cache
 from typing import Any
 
-from fieldcal.effects import Effect
-from fieldcal.positions import WIDE
-from fieldcal.samples import Array, Block
+from fieldcal.core.positions import WIDE
+from fieldcal.core.samples import Array, Block
+from fieldcal.physics.effect import Effect
 from fieldcal.sim_device.profile import Climate, Profile, Sampling
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import CATALOGUE, parse

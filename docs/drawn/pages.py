@@ -8,8 +8,9 @@ from pathlib import Path
 from drawn.effects import given, picture
 from drawn.positions import drawings
 from drawn.screens import screens
-from fieldcal.effects import Effect, catalogue
-from fieldcal.positions import SETS
+from fieldcal.core.positions import SETS
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Effect
 
 KINDS = {
     "motion": ("Place, fixture and motion", "They change what the sensors experience."),

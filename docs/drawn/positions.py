@@ -12,9 +12,9 @@ from html import escape
 
 import numpy as np
 
-from fieldcal.frames import turn
-from fieldcal.positions import Position
-from fieldcal.samples import Array
+from fieldcal.core.frames import turn
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Array
 
 SIZE = np.array([1.0, 0.45, 0.7])
 """Half lengths of the box along its x, y, z."""

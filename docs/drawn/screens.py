@@ -17,23 +17,23 @@ from tempfile import TemporaryDirectory
 from rich.console import Console, RenderableType
 from rich.text import Text
 
-from fieldcal import description, limits
-from fieldcal.calibration import Calibration
+from fieldcal.calibration import Calibration, limits
 from fieldcal.commands.decision_view import show_decision
 from fieldcal.commands.run_results import first_result
 from fieldcal.commands.table import show
-from fieldcal.console import ConsoleOperator
-from fieldcal.engine import Engine
-from fieldcal.history import History
-from fieldcal.movers import Nobody
-from fieldcal.plan import Hold
-from fieldcal.positions import FIVE
+from fieldcal.core.positions import FIVE
+from fieldcal.history.store import History
+from fieldcal.planning.steps import Hold
 from fieldcal.procedures.five_position import plan
-from fieldcal.recorder import Recorder
+from fieldcal.run.engine import Engine
+from fieldcal.run.movers import Nobody
+from fieldcal.run.operator.protocol import View, Wish
+from fieldcal.run.operator.terminal import ConsoleOperator
+from fieldcal.session import description
+from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.in_process import InProcess
 from fieldcal.sim_device.vocabulary import parse
-from fieldcal.view import View, Wish
 
 WIDTH, HEIGHT = 80, 24
 """Of the terminal, in characters."""

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, headed
 from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
 from fieldcal.drivers.options import Options
-from fieldcal.gravity import G0
-from fieldcal.samples import Array, Block
 
 SYNC = b"\x75\x65"
 HEAD, TAIL, LONGEST = 4, 2, 261

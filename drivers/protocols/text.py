@@ -22,7 +22,8 @@ from string import ascii_letters, hexdigits
 
 import numpy as np
 
-from fieldcal.description import ACC_UNITS, GYR_UNITS
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.codec import Likeness
@@ -31,8 +32,7 @@ from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
-from fieldcal.errors import InputError
-from fieldcal.samples import CHANNELS, Array, Block
+from fieldcal.session.description import ACC_UNITS, GYR_UNITS
 
 LONGEST = 1024
 """Longest line, bytes; what is longer is no line."""

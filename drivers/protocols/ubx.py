@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
@@ -26,7 +27,6 @@ from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, headed, rows
 from fieldcal.drivers.layouts import Raw, in_order
 from fieldcal.drivers.options import Options
-from fieldcal.samples import Array, Block, Grain
 
 Words = NDArray[np.uint32]
 

@@ -19,13 +19,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import crc16
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index
 from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
 from fieldcal.drivers.options import Options
-from fieldcal.samples import Array, Block
 
 SYNC = 0xFA
 LONGEST = 600

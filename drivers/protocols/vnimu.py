@@ -8,10 +8,10 @@ Source: VectorNav UM001, asynchronous output type IMU measurements.
 
 from __future__ import annotations
 
+from fieldcal.core.samples import Grain
 from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.protocols.text import Codec as Lines
-from fieldcal.samples import Grain
 
 
 class Codec(Lines):

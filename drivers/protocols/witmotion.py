@@ -23,13 +23,13 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.description import ACC_UNITS, GYR_UNITS
+from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, rows
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
-from fieldcal.samples import Array, Block, Grain
+from fieldcal.session.description import ACC_UNITS, GYR_UNITS
 
 SIZE = 11
 TIME, ACC, GYR = 0x50, 0x51, 0x52

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import sums
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
@@ -25,7 +26,6 @@ from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, head
 from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
-from fieldcal.samples import Array, Block
 
 SYNC = b"\xfa\xff"
 HEAD, LONGEST = 6, 2055

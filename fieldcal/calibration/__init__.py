@@ -1,4 +1,8 @@
-"""What a calibration is: parameters with their covariance, applied, compared, kept."""
+"""What a calibration is: parameters with their covariance, applied, compared, kept.
+
+The limits that a recalibration must reach are here too (`limits`). Nothing here
+estimates: estimators return a `Calibration`.
+"""
 
 from fieldcal.calibration.comparison import Comparison, compare
 from fieldcal.calibration.gauge import Gauge

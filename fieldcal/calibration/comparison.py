@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Array
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 
 if TYPE_CHECKING:
     from fieldcal.calibration.parameters import Calibration

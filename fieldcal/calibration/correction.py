@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 PIECE = 16384
 """Rows done at once."""

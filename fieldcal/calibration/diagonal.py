@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.calibration.parameters import Calibration, Nominal
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 
 class Diagonal(NamedTuple):

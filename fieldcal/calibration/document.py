@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.calibration.gauge import inward, outward
 from fieldcal.calibration.parameters import COMPONENTS, Calibration, Method
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 FORMAT = 1
 KEYS = ("format", "method", "verdict", "warnings", "parameters", "covariance", "fit")

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration.parameters import Calibration
-from fieldcal.errors import InputError
-from fieldcal.samples import Array
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 
 KEY = "gauge"
 """Of `Calibration.info`, where outputs are volts or counts."""

@@ -15,8 +15,8 @@ from typing import Any, Literal
 import numpy as np
 
 from fieldcal.calibration.correction import corrected, spread
-from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
 
 Method = Literal["two_position", "five_position", "least_squares", "joint", "scalar"]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fieldcal.calibration.parameters import Nominal
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 LEAST, UNSEEN = 0.1, 5.0
 """Share of the nominal scale factor, and standard deviations: less is none."""

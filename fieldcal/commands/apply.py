@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from fieldcal.samples import Block
+    from fieldcal.core.samples import Block
 
 EXAMPLE = """\
   fieldcal apply bench-7/2026-03-01 calibrated.csv
@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.calibration import Nominal
     from fieldcal.commands.compare import read
     from fieldcal.commands.installing import check_same
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
     calibration = read(args.calibration or args.session)
@@ -58,7 +58,7 @@ def _with_units(table: pa.Table) -> pa.Table:
     """Say the unit of each column, so that nobody has to guess it."""
     import pyarrow as pa
 
-    from fieldcal.samples import CHANNELS, UNITS
+    from fieldcal.core.samples import CHANNELS, UNITS
 
     units = {"t": "s", **dict(zip(CHANNELS, UNITS, strict=True)), "temperature": "degC"}
     fields = [
@@ -80,8 +80,8 @@ def _write(path: Path, block: Block) -> None:
     import pyarrow as pa
     from pyarrow import csv, parquet
 
-    from fieldcal.errors import InputError, disk_says
-    from fieldcal.sample_files import to_batch
+    from fieldcal.core.errors import InputError, disk_says
+    from fieldcal.session.sample_files import to_batch
 
     table = pa.Table.from_batches([to_batch(block)])
     part = path.with_name(f".{path.name}.{os.getpid()}")

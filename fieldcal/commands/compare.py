@@ -48,8 +48,8 @@ def read(path: Path) -> Calibration:
 
     """
     from fieldcal.calibration import Calibration
-    from fieldcal.errors import InputError
-    from fieldcal.session import RESULT
+    from fieldcal.core.errors import InputError
+    from fieldcal.session.folder import RESULT
 
     file = path / RESULT if path.is_dir() else path
     try:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fieldcal.diagnosis import Diagnosis
     from fieldcal.diagnosis.explain import Explanation
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
     from fieldcal.twin import Rerun
 
 HELP = "say what physics the simulation leaves out of a recording"
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare
     from fieldcal.diagnosis.verdict import concluded
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
     explanation = explain(prepare(session.block, session.about))
@@ -83,7 +83,7 @@ def _replayed(
 ) -> Rerun:
     """Replay the session on its twin, and write the twin's device file."""
     from fieldcal.diagnosis.quality import raw
-    from fieldcal.session import write_whole
+    from fieldcal.session.folder import write_whole
     from fieldcal.sim_device.profile_file import to_toml
     from fieldcal.twin import rerun
 

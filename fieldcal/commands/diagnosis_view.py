@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import IO, TYPE_CHECKING
 
 from fieldcal.calibration.wording import ranges
+from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.agreement import UNITS
 from fieldcal.diagnosis.result import Found, Mismatch
 from fieldcal.diagnosis.words import said
-from fieldcal.samples import common_unit
 
 if TYPE_CHECKING:
     from fieldcal.twin import Rerun

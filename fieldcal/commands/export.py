@@ -39,10 +39,10 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.calibration import Nominal
     from fieldcal.commands.compare import read
-    from fieldcal.errors import InputError
+    from fieldcal.core.errors import InputError
     from fieldcal.exporters import Source, exporter
-    from fieldcal.session import Session
-    from fieldcal.writeback import installed_in
+    from fieldcal.install.proposal import installed_in
+    from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
     module = exporter(args.format)

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fieldcal.history import History, Run
-    from fieldcal.limits import Limits
-    from fieldcal.trend import Point
+    from fieldcal.calibration.limits import Limits
+    from fieldcal.history.store import History, Run
+    from fieldcal.history.trend import Point
 
 EXAMPLE = """\
   fieldcal history
@@ -61,8 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.errors import InputError
-    from fieldcal.history import History, default_path
+    from fieldcal.core.errors import InputError
+    from fieldcal.history.store import History, default_path
 
     history = History(args.history or default_path())
     if args.serial is None:
@@ -99,7 +99,7 @@ def _devices(args: argparse.Namespace, history: History) -> int:
 def _compare(args: argparse.Namespace, runs: Sequence[Run]) -> int:
     from fieldcal.calibration import compare
     from fieldcal.commands.compare import document, table
-    from fieldcal.errors import InputError
+    from fieldcal.core.errors import InputError
 
     known = {run.number: run for run in runs}
     missing = [n for n in args.compare if n not in known]
@@ -120,8 +120,8 @@ def _compare(args: argparse.Namespace, runs: Sequence[Run]) -> int:
 
 
 def _trends(args: argparse.Namespace, runs: Sequence[Run]) -> int:
-    from fieldcal import limits
-    from fieldcal.trend import names, trend
+    from fieldcal.calibration import limits
+    from fieldcal.history.trend import names, trend
 
     grade = runs[-1].calibration.info.get("conditions", {}).get("grade", "tactical")
     bounds = limits.read(str(grade), args.limits)
@@ -145,7 +145,7 @@ def _trends(args: argparse.Namespace, runs: Sequence[Run]) -> int:
 
 
 def _wanted(asked: Sequence[str] | None, known: Sequence[str]) -> list[str]:
-    from fieldcal.errors import InputError
+    from fieldcal.core.errors import InputError
 
     if not asked:
         biases = [n for n in known if n.startswith(("acc_bias.", "gyr_bias."))]

@@ -7,10 +7,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.trend import Point
+    from fieldcal.history.trend import Point
 
 
 def plot(path: Path, serial: str, trends: Mapping[str, Sequence[Point]]) -> None:

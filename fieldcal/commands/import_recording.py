@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.recording import Recording, Stream, Wanted
+    from fieldcal.importing.recording import Recording, Stream, Wanted
 
 EXAMPLE = """\
   fieldcal import log.csv --columns t,ax,ay,az,gx,gy,gz --acc-unit g --gyr-unit deg/s
@@ -80,7 +80,7 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.importers import open_recording
-    from fieldcal.joined import Joined
+    from fieldcal.importing.merge import Joined
 
     if len(args.columns) not in (0, 1, len(args.files)):
         raise InputError("give --columns once, or once for each file")
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _wanted(args: argparse.Namespace, i: int) -> Wanted:
-    from fieldcal.recording import Wanted
+    from fieldcal.importing.recording import Wanted
 
     given = args.columns[min(i, len(args.columns) - 1)] if args.columns else ""
     columns = tuple(name.strip() for name in given.split(",")) if given else ()
@@ -149,8 +149,8 @@ def _chosen(recording: Recording, wanted: list[str]) -> list[Stream]:
 def _bring(
     args: argparse.Namespace, recording: Recording, stream: Stream, folder: Path
 ) -> None:
-    from fieldcal.description import WORTHLESS
-    from fieldcal.importing import bring_in
+    from fieldcal.importing.ingest import bring_in
+    from fieldcal.session.description import WORTHLESS
 
     name = recording.path.name.split(".")[0]
     about: dict[str, Any] = {"format": 1, **site_tables(args, name)}

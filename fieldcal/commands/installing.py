@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.errors import InputError
-from fieldcal.session import Session
+from fieldcal.core.errors import InputError
+from fieldcal.session.folder import Session
 
 if TYPE_CHECKING:
     from fieldcal.drivers.mavlink_installed import Installed
@@ -23,7 +23,7 @@ GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 
 def with_installed(calibration: Calibration, session: Session) -> Calibration:
     """Add what was installed, and what to install now with its ±, or why not."""
-    from fieldcal.writeback import installed_in
+    from fieldcal.install.proposal import installed_in
 
     there = installed_in(session)
     if there is None:
@@ -61,7 +61,7 @@ def check_same(calibration: Calibration, session: Session) -> None:
 
     """
     from fieldcal.drivers.mavlink_installed import Installed
-    from fieldcal.writeback import installed_in
+    from fieldcal.install.proposal import installed_in
 
     found, there = calibration.info.get("installed"), installed_in(session)
     if not found or not there:
@@ -89,7 +89,7 @@ def _next(
     calibration: Calibration, session: Session, there: Installed
 ) -> dict[str, dict[str, Any]]:
     from fieldcal.calibration import Nominal
-    from fieldcal.writeback import changes
+    from fieldcal.install.proposal import changes
 
     lacking = [group for group in GROUPS if group not in calibration.groups]
     if lacking:

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
-from fieldcal.errors import InputError, PlanError
+from fieldcal.core.errors import InputError, PlanError
 
 if TYPE_CHECKING:
-    from fieldcal.aliasing import Aliases
-    from fieldcal.planner import Grade
-    from fieldcal.positions import Position
+    from fieldcal.core.positions import Position
+    from fieldcal.planning.aliasing import Aliases
+    from fieldcal.planning.planner import Grade
 
 EXAMPLE = """\
   fieldcal plan --noise tactical --positions 5 --minutes 5 -o plan.toml
@@ -54,9 +54,10 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     import numpy as np
 
-    from fieldcal import description, planner
-    from fieldcal.aliasing import aliases
-    from fieldcal.positions import FIVE, SETS
+    from fieldcal.core.positions import FIVE, SETS
+    from fieldcal.planning import planner
+    from fieldcal.planning.aliasing import aliases
+    from fieldcal.session import description
 
     tables = {"format": description.FORMAT, **site_tables(args, "device")}
     gravity = description.parse(tables).gravity
@@ -105,7 +106,7 @@ def _write(
 ) -> None:
     import tomlkit
 
-    from fieldcal.session import write_whole
+    from fieldcal.session.folder import write_whole
 
     if path.exists():
         raise InputError(f"{path}: is there already; name another file")

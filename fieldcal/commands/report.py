@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.write(f"written: {page}\n")
     if args.pdf or args.png:
         from fieldcal.report.browser import Browser
-        from fieldcal.session import write_whole
+        from fieldcal.session.folder import write_whole
 
         with Browser() as browser:
             browser.open(page)
@@ -87,7 +87,7 @@ def write(
     from fieldcal.report import gather, render
     from fieldcal.report.gather import earlier_result
     from fieldcal.report.page import REPORT
-    from fieldcal.session import write_whole
+    from fieldcal.session.folder import write_whole
 
     before = [earlier_result(path) for path in earlier] or _before(session, history)
     return write_whole(output or session / REPORT, render(gather(session, before)))
@@ -95,9 +95,9 @@ def write(
 
 def _before(folder: Path, history: Path | None) -> list[Earlier]:
     """What the history knows of the device, without this session."""
-    from fieldcal.history import History, default_path
+    from fieldcal.history.store import History, default_path
     from fieldcal.report import Earlier
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
 
     path = history or default_path()
     serial = Session.open(folder).about.device.get("serial")

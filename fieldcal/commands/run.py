@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any
 from fieldcal.commands.run_task import make_task
 from fieldcal.commands.several import Several
 from fieldcal.commands.site import add_site
-from fieldcal.errors import FieldcalError
+from fieldcal.core.errors import FieldcalError
 
 if TYPE_CHECKING:
-    from fieldcal.beside import Beside
     from fieldcal.calibration import Calibration
-    from fieldcal.limits import Limits
-    from fieldcal.movers import Mover
-    from fieldcal.plan_file import Task
-    from fieldcal.view import Operator
+    from fieldcal.calibration.limits import Limits
+    from fieldcal.run.companions import Beside
+    from fieldcal.run.movers import Mover
+    from fieldcal.run.operator.protocol import Operator
+    from fieldcal.run.plan_file import Task
 
 EXAMPLE = """\
   fieldcal run five_position --device "serial:/dev/ttyUSB0?format=witmotion"
@@ -111,14 +111,14 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal import limits
+    from fieldcal.calibration import limits
     from fieldcal.commands import run_view
     from fieldcal.commands.run_results import (
         check_heard,
         first_result,
         further_results,
     )
-    from fieldcal.history import History, default_path
+    from fieldcal.history.store import History, default_path
 
     task, folder = make_task(args)
     file = args.limits or task.run.get("limits")
@@ -152,7 +152,7 @@ def _broken_off(
     args: argparse.Namespace, task: Task, folder: Path, error: BaseException
 ) -> None:
     """Say what is kept, if anything was begun."""
-    from fieldcal.session import MARKS
+    from fieldcal.session.folder import MARKS
 
     if not os.path.exists(folder / MARKS):  # False where nobody may look
         return
@@ -167,8 +167,8 @@ def _broken_off(
 def _write_junit(
     path: Path, task: Task, folder: Path, result: Any, said: str = ""
 ) -> None:
-    from fieldcal import junit
-    from fieldcal.session import MARKS, read_marks
+    from fieldcal.run import junit
+    from fieldcal.session.folder import MARKS, read_marks
 
     marks = list(read_marks(folder / MARKS))
     junit.write(path, task.procedure, task.positions, marks, result, said)
@@ -178,12 +178,12 @@ def _record(
     args: argparse.Namespace, task: Task, folder: Path, bounds: Limits
 ) -> tuple[Calibration, dict[str, Any] | None, Sequence[Beside]]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
-    from fieldcal.beside import beside
+    from fieldcal.acceptance.level import level_unknown
     from fieldcal.commands.run_device import device
-    from fieldcal.level import level_unknown
-    from fieldcal.recorder import Recorder
-    from fieldcal.running import Running, taken_before
-    from fieldcal.session import Session
+    from fieldcal.run.companions import beside
+    from fieldcal.run.session_run import Running, taken_before
+    from fieldcal.session.folder import Session
+    from fieldcal.session.recorder import Recorder
 
     with device(task) as (opened, mover), contextlib.ExitStack() as stack:
         driver = opened()
@@ -234,14 +234,14 @@ def _operator(
     args: argparse.Namespace, task: Task, mover: Mover, folder: Path
 ) -> Iterator[Operator]:
     if args.headless:
-        from fieldcal.script import ScriptOperator
+        from fieldcal.run.operator.script import ScriptOperator
 
         yield ScriptOperator(mover)
         return
     from rich.console import Console
 
-    from fieldcal.console import ConsoleOperator
-    from fieldcal.keyboard import Keyboard
+    from fieldcal.run.operator.keyboard import Keyboard
+    from fieldcal.run.operator.terminal import ConsoleOperator
 
     with ConsoleOperator(
         f"fieldcal · {task.procedure} · {folder}",

@@ -7,12 +7,12 @@ import shlex
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.driver import Driver
-    from fieldcal.movers import Mover
-    from fieldcal.plan_file import Task
+    from fieldcal.drivers.driver import Driver
+    from fieldcal.run.movers import Mover
+    from fieldcal.run.plan_file import Task
 
 VIRTUAL_FORMAT = "witmotion"
 
@@ -20,11 +20,11 @@ VIRTUAL_FORMAT = "witmotion"
 @contextlib.contextmanager
 def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
     """Yield what opens the device, and who turns it."""
-    from fieldcal import movers
     from fieldcal.commands.signals import interruptible
     from fieldcal.commands.virtual import address
-    from fieldcal.driver import open_driver
-    from fieldcal.plan_file import TURN
+    from fieldcal.drivers.driver import open_driver
+    from fieldcal.run import movers
+    from fieldcal.run.plan_file import TURN
 
     mover, url = task.mover, str(task.run.get("device", ""))
     with contextlib.ExitStack() as stack:

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldcal.errors import DeviceError, FieldcalError
+from fieldcal.core.errors import DeviceError, FieldcalError
 
 if TYPE_CHECKING:
-    from fieldcal.beside import Beside
     from fieldcal.calibration import Calibration
-    from fieldcal.history import History
-    from fieldcal.limits import Limits
-    from fieldcal.session import Session
+    from fieldcal.calibration.limits import Limits
+    from fieldcal.history.store import History
+    from fieldcal.run.companions import Beside
+    from fieldcal.session.folder import Session
 
 
 def concluded(
@@ -30,11 +30,11 @@ def concluded(
     method : of the procedure
 
     """
-    from fieldcal.assessing import assess, remember
+    from fieldcal.acceptance.assessment import assess, remember
     from fieldcal.commands.installing import with_installed
-    from fieldcal.observing import rests
-    from fieldcal.session import RESULT
-    from fieldcal.solving import solved
+    from fieldcal.evaluation.observations import rests
+    from fieldcal.evaluation.solution import solved
+    from fieldcal.session.folder import RESULT
 
     still = rests(session)
     found = with_installed(solved(session, still, method=method), session)
@@ -49,7 +49,7 @@ def first_result(
     found: Calibration, folder: Path, bounds: Limits, history: History
 ) -> Calibration:
     """Result of the device that was led through the procedure."""
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
 
     return concluded(Session.open(folder), bounds, history, found.method)
 
@@ -58,7 +58,7 @@ def further_results(
     others: Sequence[Beside], bounds: Limits, history: History
 ) -> dict[str, Calibration]:
     """Results of the further devices that were heard to the end, by folder."""
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
 
     found = {}
     for other in others:

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import given_tables, over, site_tables
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.plan_file import Task
+    from fieldcal.run.plan_file import Task
 
 EXACT_DEG = 0.001
 """How well a virtual fixture sets its angles, deg: as it turns them, to rounding."""
@@ -30,7 +30,8 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         Naming what is wrong with the plan.
 
     """
-    from fieldcal import plan_file, procedures
+    from fieldcal import procedures
+    from fieldcal.run import plan_file
 
     if args.resume:
         return _resumed(args)
@@ -48,8 +49,8 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
 
 
 def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
-    from fieldcal import plan_file
-    from fieldcal.running import resumed
+    from fieldcal.run import plan_file
+    from fieldcal.run.session_run import resumed
 
     if args.procedure or args.output:
         raise InputError("--resume goes on with what it finds: give it alone")
@@ -65,7 +66,8 @@ def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
 
 
 def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:
-    from fieldcal import description, plan_file
+    from fieldcal.run import plan_file
+    from fieldcal.session import description
 
     tables = {"format": description.FORMAT, **site_tables(args, "device")}
     tables["position"] = plan_file.positions_of(args.procedure)
@@ -74,7 +76,7 @@ def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _tables_of_file(args: argparse.Namespace) -> dict[str, Any]:
-    from fieldcal import plan_file
+    from fieldcal.run import plan_file
 
     tables = plan_file.read(Path(args.procedure))
     if not isinstance(tables.get("run", {}), dict):

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.errors import FieldcalError
+from fieldcal.core.errors import FieldcalError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -34,7 +34,7 @@ def show_results(
 ) -> None:
     """Print the table of each device, and where the session is."""
     from fieldcal.commands.table import show
-    from fieldcal.session import RESULT
+    from fieldcal.session.folder import RESULT
 
     show(found, truth)
     for name, each in further.items():

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
     from fieldcal.sim_device.line_faults import LineFaults

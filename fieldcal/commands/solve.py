@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
-    from fieldcal.observing import Rests
-    from fieldcal.session import Session
+    from fieldcal.evaluation.observations import Rests
+    from fieldcal.session.folder import Session
 
 EXAMPLE = """\
   fieldcal solve bench-7/2026-03-01
@@ -65,9 +65,9 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
-    from fieldcal.observing import rests
-    from fieldcal.session import RESULT, Session
-    from fieldcal.uncarried import mended
+    from fieldcal.evaluation.not_carried import mended
+    from fieldcal.evaluation.observations import rests
+    from fieldcal.session.folder import RESULT, Session
 
     session = Session.open(args.session)
     if not args.as_printed:
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibration:
     """What windows and turns say, estimated as the options want it."""
-    from fieldcal.solving import solved
+    from fieldcal.evaluation.solution import solved
 
     return solved(
         session,
@@ -113,9 +113,9 @@ def _decided(
     args: argparse.Namespace, found: Calibration, session: Session, still: Rests
 ) -> Calibration:
     """GO or NO-GO, where the session was a recalibration or limits are given."""
-    from fieldcal import limits
-    from fieldcal.assessing import assess, limits_path
-    from fieldcal.history import History, default_path
+    from fieldcal.acceptance.assessment import assess, limits_path
+    from fieldcal.calibration import limits
+    from fieldcal.history.store import History, default_path
 
     if args.limits is None and "run" not in session.about.raw:
         return found

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.write import ask, check_ready, opened
-    from fieldcal.installing import check_unchanged, install, note_done, saved
+    from fieldcal.install.transaction import check_unchanged, install, note_done, saved
 
     path, known = saved(args.session)
     old, new = known["old"], known["new"]

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; 1 if anything is wrong."""
-    from fieldcal.integrity import findings
+    from fieldcal.session.integrity import findings
 
     found = list(findings(args.session))
     if args.json:

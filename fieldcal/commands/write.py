@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.errors import FieldcalError, InputError
+from fieldcal.core.errors import FieldcalError, InputError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.drivers.mavlink_installed import Installed
-    from fieldcal.session import Session
-    from fieldcal.writeback import Change
+    from fieldcal.install.proposal import Change
+    from fieldcal.session.folder import Session
 
 EXAMPLE = """\
   fieldcal write bench-7/2026-03-01 --device mavlink:/dev/ttyACM0
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.compare import read
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
 
     if (args.device is None) == (args.output is None):
         raise InputError("say where to: --device URL, or -o FILE; one of them")
@@ -89,7 +89,7 @@ def prepared(
 
     """
     from fieldcal.calibration import Nominal
-    from fieldcal.writeback import changes, installed_in, left_out
+    from fieldcal.install.proposal import changes, installed_in, left_out
 
     installed = installed_in(session)
     if installed is None:
@@ -107,7 +107,7 @@ def _refuse(
     installed: Installed,
     force: bool,
 ) -> None:
-    from fieldcal.writeback import problems
+    from fieldcal.install.proposal import problems
 
     decision = found.info.get("decision")
     reasons = list(decision["reasons"]) if decision else ["nobody decided about it"]
@@ -159,7 +159,7 @@ def _to_file(path: Path, wanted: Sequence[Change]) -> None:
         If it has another ending.
 
     """
-    from fieldcal.session import write_whole
+    from fieldcal.session.folder import write_whole
 
     if path.suffix in (".param", ".parm"):
         lines = [f"{c.name},{c.new:.9g}" for c in wanted]
@@ -178,7 +178,7 @@ def _to_device(
     wanted: Sequence[Change],
     installed: Installed,
 ) -> None:
-    from fieldcal.installing import (
+    from fieldcal.install.transaction import (
         Undone,
         check_unchanged,
         install,

@@ -10,7 +10,8 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import Found
 from fieldcal.diagnosis.telling import decided_by, telling_position
 from fieldcal.diagnosis.unknown import Unknown, listed
-from fieldcal.effects import Chain, Scatter, catalogue
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Chain, Scatter
 
 LESS_THAN = 3
 """Positions below which none can be held out."""

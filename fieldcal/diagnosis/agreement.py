@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.parts import rms
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.reduce import Rows
-from fieldcal.samples import CHANNELS, Array
 
 UNITS = ("m/s^2", "rad/s")
 

@@ -11,10 +11,11 @@ import numpy as np
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.parts import rms
 from fieldcal.diagnosis.result import Found, number
-from fieldcal.effects import Scatter, catalogue
+from fieldcal.effects import catalogue
 from fieldcal.model.held_out import held_out
 from fieldcal.model.offers import Offer
 from fieldcal.model.sets import Set
+from fieldcal.physics.effect import Scatter
 
 LARGEST = 40.0
 """Odds are not said beyond e to this."""

@@ -12,14 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.description import Description
-from fieldcal.effects import Chain, Experience, Fault, Recording, catalogue
-from fieldcal.effects.recording import lsb_of
-from fieldcal.frames import earth_rate_home, force_home
+from fieldcal.core.frames import earth_rate_home, force_home
+from fieldcal.core.positions import angles
+from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.effects import catalogue
 from fieldcal.model.reduce import masked, rate_of, spans, table_rate
 from fieldcal.model.vibration import usual_noise
-from fieldcal.positions import angles
-from fieldcal.samples import CHANNELS, Array, Block
+from fieldcal.physics.effect import Chain
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.recording import Fault, Recording, lsb_of
+from fieldcal.session.description import Description
 from fieldcal.windows.noise import Noise
 
 MENDING = ("decode_fault", "mounting")

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.agreement import Agreement
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.parts import averages
 from fieldcal.diagnosis.result import Mismatch, number
 from fieldcal.model.reduce import Rows
-from fieldcal.samples import CHANNELS, Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from fieldcal.description import Description
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.prepare import Prepared
-from fieldcal.frames import EARTH_RATE
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.dwell import beginnings
 from fieldcal.model.fitted import Fitted
@@ -26,7 +26,7 @@ from fieldcal.model.system import System
 from fieldcal.model.turn import Turning
 from fieldcal.model.turn_rows import Turns
 from fieldcal.model.wander import Wander
-from fieldcal.samples import Array
+from fieldcal.session.description import Description
 
 ROUGH = 0.7
 """Part of the noise that rounding makes when it is most of it."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.effects import Experience
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.physics.experience import Experience
 
 
 def courses(name: str, x: Experience, channel: int) -> Mapping[str, Array]:

@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.effects import Sensor
 from fieldcal.model.causes import Group
 from fieldcal.model.sizing import Member
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.physics.effect import Sensor
 
 ROWS = 2
 """Rows to either side of the one in which it is sought."""

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.moments import Moments, moments_of
 from fieldcal.diagnosis.periodogram import LONGEST, Complex, Pieces
-from fieldcal.effects import Line
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.physics.effect import Line
 
 FEW, STRETCHES, FOLDS = 3, 5, 12
 """Windows below which stretches of them are left out instead, how many of each, and

@@ -11,15 +11,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.following import courses
 from fieldcal.diagnosis.naming import Removed, in_turns
 from fieldcal.diagnosis.parts import averages
 from fieldcal.diagnosis.result import Kind, Mismatch
-from fieldcal.effects import Fault, catalogue
+from fieldcal.effects import catalogue
 from fieldcal.model.posterior import Standing
 from fieldcal.model.reduce import spans
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.physics.recording import Fault
 
 CLEAR = 25.0
 """Squares that a channel has to lose for the mismatch to be in it."""

@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.periodogram import LONGEST, Complex, Pieces
-from fieldcal.samples import Array
 
 PARTS, LEAST = 15, 4
 """Parts of a window, or of as much of it as a periodogram has, whose sums are kept, so

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.agreement import Agreement
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.instant import instant
 from fieldcal.diagnosis.line import Tone
 from fieldcal.diagnosis.parts import rms
 from fieldcal.diagnosis.result import Found, Quantity
-from fieldcal.effects import Fault, Scatter, catalogue
+from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import Group
 from fieldcal.model.evidence import Index
@@ -23,7 +24,8 @@ from fieldcal.model.posterior import Standing
 from fieldcal.model.sets import Set
 from fieldcal.model.sizing import Member, likeliest
 from fieldcal.model.way import ARRIVAL_S
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.physics.effect import Scatter
+from fieldcal.physics.recording import Fault
 
 DETERMINED = 0.3
 """Part of its variance before the rows that a parameter has left at most to be told."""

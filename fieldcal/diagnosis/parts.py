@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array
 from fieldcal.model.reduce import Rows
-from fieldcal.samples import Array
 
 FEW = 3
 """Windows below which stretches of them are left out instead of windows."""

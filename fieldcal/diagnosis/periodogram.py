@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Experience
-from fieldcal.effects.recording import medians
-from fieldcal.frames import turn
+from fieldcal.core.frames import turn
+from fieldcal.core.samples import Array
 from fieldcal.model.reduce import Rows, Source, rate_of, spans
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.recording import medians
 
 Complex = NDArray[np.complexfloating]
 

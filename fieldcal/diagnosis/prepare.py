@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.description import Description
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import ACC, GYR, Block
 from fieldcal.diagnosis.chain import Checked, check, checked_again
 from fieldcal.diagnosis.line import Remains, Tone
 from fieldcal.diagnosis.spectrum import tones, without
-from fieldcal.effects import Chain, Line, Scatter, catalogue
-from fieldcal.errors import InputError
+from fieldcal.effects import catalogue
 from fieldcal.model.dwell import arrivals
 from fieldcal.model.hand import rows_of
 from fieldcal.model.reduce import Rows, Source, spans
 from fieldcal.model.state import Term
 from fieldcal.model.thermometer import Thermometer
-from fieldcal.samples import ACC, GYR, Block
+from fieldcal.physics.effect import Chain, Line, Scatter
+from fieldcal.session.description import Description
 
 SHORTEST = 20
 """Samples of a window from which it can be used."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.agreement import Agreement
 from fieldcal.diagnosis.explain import Explanation, base_of, inference_of
 from fieldcal.diagnosis.naming import rms_of
@@ -21,7 +22,6 @@ from fieldcal.model.hand import rows_of
 from fieldcal.model.held_out import held_out, turn_residual, turns_foretold
 from fieldcal.model.reduce import reduce
 from fieldcal.model.turn_rows import TurnRows
-from fieldcal.samples import Array, Block
 
 OF_TURNS = "standard deviations, in turns"
 

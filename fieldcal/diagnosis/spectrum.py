@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.core.samples import Block
 from fieldcal.diagnosis.line import Remains, Tone, remains, tuned
 from fieldcal.diagnosis.moments import Moments, moments_of
 from fieldcal.diagnosis.periodogram import (
@@ -25,9 +26,9 @@ from fieldcal.diagnosis.periodogram import (
     stretches,
     take_out,
 )
-from fieldcal.effects import Line, catalogue
+from fieldcal.effects import catalogue
 from fieldcal.model.reduce import Rows, Source
-from fieldcal.samples import Block
+from fieldcal.physics.effect import Line
 
 STEADY = 0.65
 """Part of the energy that one amplitude and phase must take to be a line."""

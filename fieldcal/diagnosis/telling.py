@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.core.frames import turn
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.effects import Experience, catalogue
-from fieldcal.frames import turn
+from fieldcal.effects import catalogue
 from fieldcal.model.sets import Set
 from fieldcal.model.state import State
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 REACH = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
 TELLING = 5.0

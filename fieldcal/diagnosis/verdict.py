@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.calibration.parameters import Nominal
 from fieldcal.calibration.plausible import senseless
-from fieldcal.description import Description
+from fieldcal.core.samples import Block
 from fieldcal.diagnosis import locate, naming
 from fieldcal.diagnosis.advice import advice
 from fieldcal.diagnosis.agreement import UNITS, Agreement
@@ -35,7 +35,7 @@ from fieldcal.model.posterior import Standing
 from fieldcal.model.reduce import spans
 from fieldcal.model.reported import reported
 from fieldcal.model.sets import Set
-from fieldcal.samples import Block
+from fieldcal.session.description import Description
 
 GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}
 

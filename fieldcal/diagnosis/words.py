@@ -12,7 +12,8 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import Found, Mismatch, Quality, Quantity, Verdict
 from fieldcal.diagnosis.telling import decided_by, telling_position
 from fieldcal.diagnosis.unknown import Unknown, listed
-from fieldcal.effects import Scatter, catalogue
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Scatter
 
 SHOWN = 3.0
 """Standard deviations from which a parameter is worth its words."""

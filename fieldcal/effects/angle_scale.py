@@ -12,7 +12,8 @@ array([[-10.,   0.,   0.]])
 
 from __future__ import annotations
 
-from fieldcal.effects import Experience, Motion, Param, Values
+from fieldcal.physics.effect import Motion, Param, Values
+from fieldcal.physics.experience import Experience
 
 
 class AngleScale(Motion):

@@ -12,7 +12,7 @@ this project; 0.02 to 0.5 deg by eye and hand.
 
 from __future__ import annotations
 
-from fieldcal.effects import Param, Scatter
+from fieldcal.physics.effect import Param, Scatter
 
 
 class AngleSetting(Scatter):

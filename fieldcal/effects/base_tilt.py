@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.effects import Experience, Motion, Param, Values
-from fieldcal.frames import turn
+from fieldcal.core.frames import turn
+from fieldcal.physics.effect import Motion, Param, Values
+from fieldcal.physics.experience import Experience
 
 
 class BaseTilt(Motion):

@@ -17,8 +17,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Experience, Sensor, Shape, six
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.physics.effect import NO_SHAPE, Sensor, six
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.shape import Shape
 
 
 class BiasStep(Sensor):

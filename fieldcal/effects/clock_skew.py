@@ -15,8 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.physics.effect import Chain, Param
+from fieldcal.physics.recording import Fault, Recording
 
 STRETCHES = 60
 PPM = 5.0

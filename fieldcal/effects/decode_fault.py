@@ -22,8 +22,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.physics.effect import Chain, Param
+from fieldcal.physics.recording import Fault, Recording
 
 Counts = NDArray[np.int64]
 

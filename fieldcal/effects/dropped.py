@@ -16,8 +16,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.physics.effect import Chain, Param
+from fieldcal.physics.recording import Fault, Recording
 
 PAUSE_S = 5.0
 """A gap outside windows that is longer is a pause of the recording, not a loss."""

@@ -14,8 +14,9 @@ array([[ 0.   , -7.292,  0.   ]])
 
 from __future__ import annotations
 
-from fieldcal.effects import Experience, Motion, Values
-from fieldcal.frames import earth_rate_home
+from fieldcal.core.frames import earth_rate_home
+from fieldcal.physics.effect import Motion, Values
+from fieldcal.physics.experience import Experience
 
 
 class EarthRate(Motion):

@@ -17,8 +17,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Experience, Param, Sensor
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.physics.effect import NO_SHAPE, Param, Sensor
+from fieldcal.physics.experience import Experience
 
 
 class G2Sensitivity(Sensor):

@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.effects import Experience, Motion, Param, Values
+from fieldcal.physics.effect import Motion, Param, Values
+from fieldcal.physics.experience import Experience
 
 
 class HeadingError(Motion):

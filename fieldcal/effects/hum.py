@@ -16,7 +16,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Experience, Line, Shape, six
+from fieldcal.physics.effect import Line, six
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.shape import Shape
 
 
 class Hum(Line):

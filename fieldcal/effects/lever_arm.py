@@ -18,7 +18,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.effects import Experience, Motion, Param, Values
+from fieldcal.physics.effect import Motion, Param, Values
+from fieldcal.physics.experience import Experience
 
 
 class LeverArm(Motion):

@@ -25,9 +25,10 @@ from itertools import pairwise, permutations, product
 
 import numpy as np
 
-from fieldcal.effects import Chain, Fault, Recording
-from fieldcal.gravity import G0
-from fieldcal.samples import Array
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array
+from fieldcal.physics.effect import Chain
+from fieldcal.physics.recording import Fault, Recording
 
 BIAS, SCALE, FLOOR = 1.0, 0.1, 0.1
 """Spread allowed: of bias in m/s^2, of scale, and of what other effects do, m/s^2."""

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.physics.effect import Chain, Param
+from fieldcal.physics.recording import Fault, Recording
 
 RATIO = 1.8
 """Ratio from which an axis counts as noisier: out-of-plane axes reach 1.5."""

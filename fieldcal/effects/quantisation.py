@@ -20,8 +20,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.samples import CHANNELS
+from fieldcal.core.samples import CHANNELS
+from fieldcal.physics.effect import Chain, Param
+from fieldcal.physics.recording import Fault, Recording
 from fieldcal.windows import rounding
 
 MATTERS = 0.5

@@ -12,7 +12,7 @@ widens the intervals. Source: IEEE Std 952, rate random walk, Allan slope +1/2.
 
 from __future__ import annotations
 
-from fieldcal.effects import Scatter, six
+from fieldcal.physics.effect import Scatter, six
 
 
 class RandomWalk(Scatter):

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.effects import Chain, Fault, Param, Recording
-from fieldcal.effects.recording import Rows
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.physics.effect import Chain, Param
+from fieldcal.physics.recording import Fault, Recording, Rows
 
 FEWEST = 5
 """Samples at the rail from which it counts."""

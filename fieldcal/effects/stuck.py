@@ -19,9 +19,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Chain, Fault, Recording, Shape
-from fieldcal.effects.recording import runs
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.physics.effect import Chain
+from fieldcal.physics.recording import Fault, Recording, runs
+from fieldcal.physics.shape import Shape
 
 ODDS = 1e-6
 MANY = 20

@@ -18,8 +18,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Experience, Line, Param, Shape
-from fieldcal.frames import turn
+from fieldcal.core.frames import turn
+from fieldcal.physics.effect import Line, Param
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.shape import Shape
 
 
 class Sway(Line):

@@ -17,8 +17,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldcal.effects import BEYOND, NO_SHAPE, Experience, Sensor, six
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.physics.effect import BEYOND, NO_SHAPE, Sensor, six
+from fieldcal.physics.experience import Experience
 
 
 class ThermalHysteresis(Sensor):

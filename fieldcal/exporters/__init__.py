@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from fieldcal.calibration import COMPONENTS
 from fieldcal.calibration.gauge import SI
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration, Nominal
+    from fieldcal.core.samples import Array
     from fieldcal.drivers.mavlink_installed import Installed
-    from fieldcal.samples import Array
-    from fieldcal.session import Session
+    from fieldcal.session.folder import Session
 
 
 @dataclass(frozen=True, slots=True)

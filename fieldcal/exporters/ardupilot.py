@@ -23,10 +23,10 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import Diagonal, diagonal
+from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, identity, names
-from fieldcal.errors import InputError
 from fieldcal.exporters import Source
-from fieldcal.session import write_whole
+from fieldcal.session.folder import write_whole
 
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
 ENDING = ".param"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fieldcal.calibration.gauge import outward
 from fieldcal.exporters import Source
-from fieldcal.session import write_whole
+from fieldcal.session.folder import write_whole
 
 WHAT = "table of the parameters with their sigma and unit"
 ENDING = "_calibration.csv"

@@ -19,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.exporters import Source
-from fieldcal.samples import Array
-from fieldcal.session import write_whole
+from fieldcal.session.folder import write_whole
 
 WHAT = "matrices of imu_tk (T, K, bias)"
 ENDING = "_acc.calib"

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.exporters import Source
-from fieldcal.session import write_whole
+from fieldcal.session.folder import write_whole
 
 WHAT = "one JSON object, with a JSON Schema"
 ENDING = "_calibration.json"

@@ -23,9 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.exporters import Source
-from fieldcal.samples import Array, Block
-from fieldcal.session import Session, write_whole
+from fieldcal.session.folder import Session, write_whole
 
 WHAT = "Kalibr's imu.yaml (noise, M, C, bias)"
 ENDING = "_imu.yaml"

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.errors import InputError, disk_says
+from fieldcal.core.errors import InputError, disk_says
+from fieldcal.core.samples import Block
 from fieldcal.exporters import Source
-from fieldcal.samples import Block
 
 WHAT = "MCAP, raw and calibrated samples, for Foxglove and PlotJuggler"
 ENDING = ".mcap"

@@ -21,7 +21,7 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.drivers.mavlink_installed import PX4, Installed
 from fieldcal.exporters import Source
 from fieldcal.exporters.ardupilot import Parameters, converted
-from fieldcal.session import write_whole
+from fieldcal.session.folder import write_whole
 
 WHAT = "PX4 parameters (CAL_ACC, CAL_GYRO), for QGroundControl"
 ENDING = ".params"

@@ -13,9 +13,9 @@ from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 
-from fieldcal.errors import InputError
-from fieldcal.packed import head
-from fieldcal.recording import Recording, Wanted
+from fieldcal.core.errors import InputError
+from fieldcal.importing.gzip_stream import head
+from fieldcal.importing.recording import Recording, Wanted
 
 LAST = ("csv_like", "wire")
 """Formats without a mark of their own, tried last, in this order."""

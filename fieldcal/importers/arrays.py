@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fieldcal import columns, headings
-from fieldcal.errors import InputError
-from fieldcal.packed import head, on_disk
-from fieldcal.recording import Recording, Stream
-from fieldcal.samples import Array, Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
+from fieldcal.importing import columns, headings
+from fieldcal.importing.gzip_stream import head, on_disk
+from fieldcal.importing.recording import Recording, Stream
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
 

@@ -14,11 +14,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO, cast
 
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
 from fieldcal.drivers.options import Options
-from fieldcal.errors import InputError
-from fieldcal.packed import head, unpacked
-from fieldcal.recording import Recording, Stream
-from fieldcal.samples import Block
+from fieldcal.importing.gzip_stream import head, unpacked
+from fieldcal.importing.recording import Recording, Stream
 
 if TYPE_CHECKING:
     from fieldcal.drivers.can_buses import Buses

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal import columns, headings
-from fieldcal.arrow_stream import numbers
-from fieldcal.errors import InputError
-from fieldcal.packed import HEAD
-from fieldcal.recording import Recording, Stream
-from fieldcal.samples import Array, Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
+from fieldcal.importing import columns, headings
+from fieldcal.importing.gzip_stream import HEAD
+from fieldcal.importing.recording import Recording, Stream
+from fieldcal.session.arrow_stream import numbers
 
 WHAT = "text with columns"
 

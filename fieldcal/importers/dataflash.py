@@ -15,8 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.batches import Batch, Batches
-from fieldcal.dataflash_messages import (
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
+from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
+from fieldcal.drivers.mavlink_units import unbiased
+from fieldcal.importing.dataflash_messages import (
     AXES,
     BODY,
     FMT,
@@ -25,11 +28,8 @@ from fieldcal.dataflash_messages import (
     MARK,
     Messages,
 )
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
-from fieldcal.drivers.mavlink_units import unbiased
-from fieldcal.errors import InputError
-from fieldcal.recording import Recording, Stream
-from fieldcal.samples import Array, Block
+from fieldcal.importing.fifo_time import Batch, Batches
+from fieldcal.importing.recording import Recording, Stream
 
 WHAT = "ArduPilot dataflash log, .bin"
 

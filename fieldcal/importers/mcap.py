@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.errors import InputError
-from fieldcal.mcap_messages import Decoders, messages
-from fieldcal.packed import head, on_disk
-from fieldcal.recording import Recording, Stream
-from fieldcal.samples import Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
+from fieldcal.importing.gzip_stream import head, on_disk
+from fieldcal.importing.mcap_messages import Decoders, messages
+from fieldcal.importing.recording import Recording, Stream
 
 WHAT = "MCAP with sensor_msgs/Imu"
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fieldcal import columns, headings
-from fieldcal.arrow_stream import numbers
-from fieldcal.errors import InputError
-from fieldcal.packed import on_disk
-from fieldcal.recording import ROWS, Recording, Stream
-from fieldcal.samples import Array, Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
+from fieldcal.importing import columns, headings
+from fieldcal.importing.gzip_stream import on_disk
+from fieldcal.importing.recording import ROWS, Recording, Stream
+from fieldcal.session.arrow_stream import numbers
 
 WHAT = "Parquet and Arrow"
 

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.samples import Block
 from fieldcal.drivers.mavlink_frames import HEADS, SECOND
 from fieldcal.drivers.mavlink_installed import Installed, names
 from fieldcal.drivers.mavlink_log import STAMP, cut, split
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
-from fieldcal.errors import DeviceError, InputError
-from fieldcal.recording import Recording, Stream
-from fieldcal.samples import Block
+from fieldcal.importing.recording import Recording, Stream
 
 if TYPE_CHECKING:
     from fieldcal.drivers.mavlink_samples import Decoder

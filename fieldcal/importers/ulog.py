@@ -22,13 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.batches import Fifo
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block, concat
 from fieldcal.drivers.mavlink_installed import PX4, Installed, names
-from fieldcal.errors import InputError
-from fieldcal.pairing import Pair
-from fieldcal.recording import Recording, Stream
-from fieldcal.samples import Array, Block, concat
-from fieldcal.ulog_messages import Messages, Table
+from fieldcal.importing.alignment import Pair
+from fieldcal.importing.fifo_time import Fifo
+from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.ulog_messages import Messages, Table
 
 WHAT = "PX4 log, .ulg"
 

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from fieldcal.core.errors import FieldcalError, InputError
+from fieldcal.core.samples import Block
 from fieldcal.drivers.codec import Codec, open_codec, recognise
 from fieldcal.drivers.options import Options
-from fieldcal.errors import FieldcalError, InputError
-from fieldcal.recording import Recording, Stream
-from fieldcal.samples import Block
+from fieldcal.importing.recording import Recording, Stream
 
 WHAT = "bytes of a serial port"
 

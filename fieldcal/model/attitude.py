@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Experience
-from fieldcal.frames import turn
+from fieldcal.core.frames import turn
+from fieldcal.core.samples import Array
 from fieldcal.model.rotation import carry, small_turns
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 SMOOTH_S = 0.1
 """Means that the angular acceleration is taken from."""

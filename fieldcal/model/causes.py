@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fieldcal.effects import Effect
+from fieldcal.core.samples import Array
 from fieldcal.model.columns import Course, General
 from fieldcal.model.evidence import Index
-from fieldcal.samples import Array
+from fieldcal.physics.effect import Effect
 
 Basis = Course | General
 Point = tuple[Mapping[str, float], int]

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Effect, Experience, Motion, Sensor
-from fieldcal.frames import EARTH_RATE
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array
 from fieldcal.model.state import State, Term
-from fieldcal.samples import Array
+from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
+from fieldcal.physics.experience import Experience
 
 STEP = 1e-3
 """Of numerical derivatives, in typical sizes."""

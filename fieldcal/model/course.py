@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Experience
+from fieldcal.core.samples import Array
 from fieldcal.model.attitude import between
 from fieldcal.model.reduce import Source, rate_of
 from fieldcal.model.rotation import carry, small_turns
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 FINE_S = 0.02
 """Step of the integration at high sampling rates."""

@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Experience
-from fieldcal.frames import EARTH_RATE
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array
 from fieldcal.model import columns, priors
 from fieldcal.model.causes import CLOSURE, FEW, TRIADS, Cause, Group
 from fieldcal.model.columns import General
@@ -27,7 +27,7 @@ from fieldcal.model.random_causes import flicker, of_chance
 from fieldcal.model.table import Table
 from fieldcal.model.unknown_causes import of_no_effect
 from fieldcal.model.wander import Wander
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 
 class Dictionary(Table):

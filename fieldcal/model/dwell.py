@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.description import Description
+from fieldcal.core.samples import Array, Block
 from fieldcal.model.reduce import Source, rate_of, spans
-from fieldcal.samples import Array, Block
+from fieldcal.session.description import Description
 
 PIECE_S = 0.2
 MOVING = 7.0

@@ -7,12 +7,14 @@ from itertools import combinations
 
 import numpy as np
 
-from fieldcal.effects import Effect, Experience, Motion, Sensor, catalogue
+from fieldcal.core.samples import CHANNELS
+from fieldcal.effects import catalogue
 from fieldcal.model import columns
 from fieldcal.model.causes import TRIADS, Cause, Group, Point
 from fieldcal.model.evidence import Index
 from fieldcal.model.table import Table
-from fieldcal.samples import CHANNELS
+from fieldcal.physics.effect import Effect, Motion, Sensor
+from fieldcal.physics.experience import Experience
 
 
 def of_effects(table: Table) -> Iterator[Cause]:

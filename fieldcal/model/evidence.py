@@ -29,8 +29,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array
 from fieldcal.model.priors import SIZES
-from fieldcal.samples import Array
 
 ROUNDED = 1e-9
 """Part of a column's square that eliminating others leaves of it by rounding."""

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated
 from fieldcal.model.reduce import Rows
 from fieldcal.model.sets import Set
 from fieldcal.model.windows import Linear
-from fieldcal.samples import Array
 
 
 @dataclass(frozen=True, slots=True)

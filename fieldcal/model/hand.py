@@ -14,8 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model.reduce import Rows, Source, averaged, rate_of, reduce, spans
-from fieldcal.samples import Array
 
 WANDERS = 6.0
 """Standard deviations of what the squares across the force have too many."""

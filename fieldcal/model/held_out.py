@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array
 from fieldcal.model.causes import FEW
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.fitted import Fitted, whole
@@ -21,7 +22,6 @@ from fieldcal.model.sets import Set
 from fieldcal.model.system import gram
 from fieldcal.model.turn_rows import TurnRows
 from fieldcal.model.windows import Linear
-from fieldcal.samples import Array
 
 FOLDS = 12
 """Parts left out at most, one position or several far apart in each."""

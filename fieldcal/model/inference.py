@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import FINEST, Motion, Sensor
+from fieldcal.core.samples import Array
 from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram
@@ -25,7 +25,8 @@ from fieldcal.model.state import State, Term
 from fieldcal.model.system import System, gram
 from fieldcal.model.turn_rows import TurnRows, Turns
 from fieldcal.model.windows import Linear
-from fieldcal.samples import Array
+from fieldcal.physics.effect import Motion, Sensor
+from fieldcal.physics.shape import FINEST
 
 PASSES = 8
 """Linearisations at most; a set that comes and goes is settled by weight."""

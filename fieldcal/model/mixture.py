@@ -20,12 +20,12 @@ from itertools import product
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, Index, gains
 from fieldcal.model.sets import Set
 from fieldcal.model.sizing import DENSITY, TRIADS, Sizing, alike
-from fieldcal.samples import Array
 
 KEPT = 4.0
 """Evidence behind the best, ln, from which a hypothesis no longer counts: 50 to 1."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model.reduce import Rows, Source, rate_of
-from fieldcal.samples import Array
 
 MARGIN_S = 0.6
 """Time before and after the motion that is taken along."""

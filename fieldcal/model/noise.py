@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.windows import noise
 from fieldcal.windows.noise import SHOWN, Noise, short_lag, steps_of
 from fieldcal.windows.rounding import least, of_few, of_mean

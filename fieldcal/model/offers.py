@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, gains
 from fieldcal.model.sets import Set, Sets
 from fieldcal.model.sizing import DENSITY, EVEN, Member, Sizes
-from fieldcal.samples import Array
 
 LEVELS = (0, 3, 6, 9, 40)
 """Steps in size by which instability may fall when something is explained."""

@@ -12,11 +12,11 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import Group
 from fieldcal.model.evidence import Eliminated, Index, gains
 from fieldcal.model.sizing import DENSITY, EVEN
-from fieldcal.samples import Array
 
 
 def pairs(

@@ -11,13 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.effects import Experience, Motion, Sensor, catalogue
-from fieldcal.frames import force_home
+from fieldcal.core.frames import force_home
+from fieldcal.core.positions import Position, angles
+from fieldcal.core.samples import Array
+from fieldcal.effects import catalogue
 from fieldcal.model import columns
 from fieldcal.model.columns import View
 from fieldcal.model.state import State, Term
-from fieldcal.positions import Position, angles
-from fieldcal.samples import Array
+from fieldcal.physics.effect import Motion, Sensor
+from fieldcal.physics.experience import Experience
 
 PLAIN = tuple(f"acc_{group}.{axis}" for group in ("bias", "scale") for axis in "xyz")
 """Parameters that every device has."""

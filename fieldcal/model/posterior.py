@@ -14,13 +14,13 @@ from functools import cached_property
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import Group
 from fieldcal.model.offers import Offer
 from fieldcal.model.search import Search
 from fieldcal.model.sets import Set
 from fieldcal.model.sizing import Member
-from fieldcal.samples import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 SIZES: Array = np.geomspace(1e-5, 1e3, 33)
 """Values of v, a factor of 1.78 apart: an evidence changes little between two."""

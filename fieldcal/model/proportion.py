@@ -21,6 +21,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import FEW, TRIADS, Cause, Group
 from fieldcal.model.columns import General, View
@@ -28,7 +29,6 @@ from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated
 from fieldcal.model.sets import Set
 from fieldcal.model.unknown_causes import typical
-from fieldcal.samples import Array
 
 
 def in_proportion(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:

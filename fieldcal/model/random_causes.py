@@ -6,11 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.effects import Scatter, catalogue
+from fieldcal.core.samples import CHANNELS
+from fieldcal.effects import catalogue
 from fieldcal.model import priors, unknown
 from fieldcal.model.causes import TRIADS, Cause, Group
 from fieldcal.model.table import Table
-from fieldcal.samples import CHANNELS
+from fieldcal.physics.effect import Scatter
 
 
 def of_chance(table: Table) -> Iterator[Cause]:

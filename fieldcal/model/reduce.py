@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.description import Description
-from fieldcal.effects import Experience
-from fieldcal.frames import EARTH_RATE, earth_rate_home, force_home
+from fieldcal.core.frames import EARTH_RATE, earth_rate_home, force_home
+from fieldcal.core.positions import angles, rates
+from fieldcal.core.samples import Array, Block
 from fieldcal.model.noise import rounding
 from fieldcal.model.thermometer import Thermometer
 from fieldcal.model.turntable import going_round
 from fieldcal.model.vibration import shaking
-from fieldcal.positions import angles, rates
-from fieldcal.samples import Array, Block
+from fieldcal.physics.experience import Experience
+from fieldcal.session.description import Description
 
 ROWS = 360
 """Rows aimed at, over all windows."""

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 
 def small_turns(t: Array, w: Array, edge: NDArray[np.intp]) -> Array:

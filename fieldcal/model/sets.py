@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, Weighed
 from fieldcal.model.sizing import Member, Sizes, Sizing, alike
-from fieldcal.samples import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

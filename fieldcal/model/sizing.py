@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated, Gram, Index, gained
-from fieldcal.samples import Array
 
 DENSITY = np.log(priors.density())
 UNSTEADY = np.log(priors.density(priors.STEEP))

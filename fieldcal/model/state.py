@@ -13,8 +13,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fieldcal.effects import NO_SHAPE, Effect, Experience, Motion, Sensor
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
+from fieldcal.physics.experience import Experience
 
 
 @dataclass(frozen=True, slots=True)

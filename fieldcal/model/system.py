@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import CLOSURE
 from fieldcal.model.columns import Course, View
@@ -24,7 +25,6 @@ from fieldcal.model.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.turn_rows import TurnRows
 from fieldcal.model.windows import Linear
-from fieldcal.samples import Array
 
 NOTHING, SHOWS = 1e-6, 1.0
 """What a column of typical size makes in windows that show it: more than so many m/s^2

@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Experience
+from fieldcal.core.samples import Array
 from fieldcal.model import columns, unknown
 from fieldcal.model.causes import Basis
 from fieldcal.model.columns import Course, General
 from fieldcal.model.evidence import Index
 from fieldcal.model.wander import Wander
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 
 class Table:

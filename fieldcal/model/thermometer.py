@@ -13,7 +13,7 @@ from math import comb
 
 import numpy as np
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 
 VALUE_S = 12.0
 """Half span of the line for the value."""

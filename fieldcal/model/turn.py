@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.effects import Experience, Motion
+from fieldcal.core.samples import Array
 from fieldcal.model.attitude import (
     accelerations,
     astray,
@@ -33,7 +33,8 @@ from fieldcal.model.evidence import Index
 from fieldcal.model.motion import moving
 from fieldcal.model.reduce import Rows, Source, rate_of, spans
 from fieldcal.model.state import State
-from fieldcal.samples import Array
+from fieldcal.physics.effect import Motion
+from fieldcal.physics.experience import Experience
 
 LEAST = np.deg2rad(1.0)
 """A smaller turn says nothing."""

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.effects import Experience
-from fieldcal.frames import EARTH_RATE
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array
 from fieldcal.model.attitude import between, geometry
 from fieldcal.model.columns import Course, General, View
 from fieldcal.model.dictionary import Dictionary
@@ -26,7 +26,7 @@ from fieldcal.model.state import State, Term
 from fieldcal.model.turn import Turn, Turning, moved, only
 from fieldcal.model.way import BUILT_UP, Way, on_the_way, settling
 from fieldcal.model.windows import Linear
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 STEADY = 3.0
 """Squares a row on the way, with everything fitted that shows there, from which a hand

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.frames import EARTH_RATE
-from fieldcal.samples import Array
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array
 
 TURNS = 1.0
 """Whole turns of a window from which what goes round is told from the mean."""

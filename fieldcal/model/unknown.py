@@ -17,8 +17,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from fieldcal.effects import Experience
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
+from fieldcal.physics.experience import Experience
 
 WAVES = 40
 SPANS = (1.5, 4.0, 9.0, 20.0)

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.model import priors, unknown
 from fieldcal.model.causes import FEW, TRIADS, Cause, Group
 from fieldcal.model.table import Table
-from fieldcal.samples import CHANNELS, Array
 
 
 def of_no_effect(table: Table) -> Iterator[Cause]:

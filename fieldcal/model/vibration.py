@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.model.noise import grain_of, noise_of
-from fieldcal.samples import Array, Block
 from fieldcal.windows.noise import Noise, short_lag
 
 LOUDER = 6.0

@@ -29,11 +29,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.effects import Scatter, catalogue
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.effects import catalogue
 from fieldcal.model import priors, unknown
 from fieldcal.model.evidence import Index
 from fieldcal.model.reduce import Rows
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.physics.effect import Scatter
 
 CHI2_MEDIAN, SCATTERS = 0.4549, 2.3
 """Of chi squared with one degree of freedom: median; scatter of the median's ln."""

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.effects import Experience
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.columns import Course, View
 from fieldcal.model.dictionary import Dictionary
@@ -22,7 +22,7 @@ from fieldcal.model.evidence import Index
 from fieldcal.model.sets import Set
 from fieldcal.model.state import State
 from fieldcal.model.turn import Turn
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 ARRIVAL_S = 0.3
 """Standard uncertainty of the instant at which a turn by hand ends."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fieldcal.core.samples import Array
 from fieldcal.model.evidence import Index
-from fieldcal.samples import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,8 @@
-"""The report: one page that opens offline and shows what a session found."""
+"""The report: one page that opens offline and shows what a session found.
+
+To add a section, write a module with a pure function of `Material` that returns blocks,
+and a line in `page.sections`. Nothing is estimated here.
+"""
 
 from fieldcal.report.gather import Earlier, Material, gather
 from fieldcal.report.page import render

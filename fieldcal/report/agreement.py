@@ -6,11 +6,11 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.wording import title
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.report.blocks import Block, Figure, Matrix, Section, Text
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
 from fieldcal.report.residuals import Residuals, residuals
-from fieldcal.samples import CHANNELS, Array
 
 LEAST_WARMING = 0.05
 """Difference of temperatures below which a chart over it says nothing, K."""

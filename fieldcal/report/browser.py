@@ -20,7 +20,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Self
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 
 NAMES = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),

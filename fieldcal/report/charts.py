@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 DIGITS = 7
 """Significant digits of a number in the page: more than a screen can show."""

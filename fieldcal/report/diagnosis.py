@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration.wording import TITLES, number, pretty, ranges
+from fieldcal.core.samples import CHANNELS, common_unit
 from fieldcal.report import evidence
 from fieldcal.report.blocks import (
     Block,
@@ -42,7 +43,6 @@ from fieldcal.report.loose import (
     shown,
     table_at,
 )
-from fieldcal.samples import CHANNELS, common_unit
 
 MOST = 10
 """Rows of the mismatch that are shown; the rest can be opened."""

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.calibration.wording import pretty
+from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.report.blocks import Block, Cell, Figure, folded, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
 from fieldcal.report.loose import Json, list_at, objects_at, real, shown, table_at
-from fieldcal.samples import Array
 
 MOST_CURVES = 6
 MOST_CANDIDATES = 12

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.errors import FieldcalError, InputError, SessionError
-from fieldcal.observing import Rests, rests
-from fieldcal.samples import Block
-from fieldcal.session import RESULT, Session
+from fieldcal.core.errors import FieldcalError, InputError, SessionError
+from fieldcal.core.samples import Block
+from fieldcal.evaluation.observations import Rests, rests
+from fieldcal.session.folder import RESULT, Session
 
 DIAGNOSIS = "diagnosis.json"
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from fieldcal.calibration import COMPONENTS, Calibration, compare
 from fieldcal.calibration.wording import TITLES, pretty, title
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 from fieldcal.report.blocks import Block, Cell, Figure, Section, table
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Earlier, Material

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.calibration.wording import number
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import CHANNELS
 from fieldcal.report.blocks import Block as Part
 from fieldcal.report.blocks import Figure, Section, Table, Text, table
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
-from fieldcal.samples import CHANNELS
 from fieldcal.windows.allan import SHORTEST, AllanDeviation, allan_deviation
 from fieldcal.windows.stretches import still_stretches
 

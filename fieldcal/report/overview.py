@@ -10,6 +10,7 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import outward
 from fieldcal.calibration.wording import number, pretty, title
+from fieldcal.core.samples import Array
 from fieldcal.report.blocks import (
     Block,
     Cell,
@@ -23,7 +24,6 @@ from fieldcal.report.blocks import (
 )
 from fieldcal.report.gather import Material
 from fieldcal.report.loose import list_at, objects_at, table_at
-from fieldcal.samples import Array
 
 WIDEST = 30.0
 """Change in standard uncertainties that fills its bar."""

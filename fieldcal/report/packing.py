@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 PIECE = 64
 """Values that share an offset and a step."""

@@ -10,10 +10,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from fieldcal import __version__
+from fieldcal.core.version import __version__
 from fieldcal.report.blocks import Block, Code, Facts, Fold, Note, Section, table
 from fieldcal.report.gather import Material
-from fieldcal.session import DESCRIPTION
+from fieldcal.session.folder import DESCRIPTION
 
 OWN = ("report.html", "report.png", "report.pdf")
 """Files that the report itself makes."""

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.calibration.wording import number
-from fieldcal.observing import Rests
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.evaluation.observations import Rests
 from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
 from fieldcal.report.charts import Mark, Record, Span
 from fieldcal.report.gather import Material
 from fieldcal.report.loose import Json, objects_at, real
 from fieldcal.report.packing import Columns, around, pack
-from fieldcal.samples import CHANNELS, Array
 
 CLOSE = 3.0
 """Stretch about each edge of a window that is packed sample by sample, s."""

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.effects import Experience
-from fieldcal.frames import EARTH_RATE, angles_of, earth_rate_home, lasting, turn
+from fieldcal.core.frames import EARTH_RATE, angles_of, earth_rate_home, lasting, turn
+from fieldcal.core.positions import rates
+from fieldcal.core.samples import Array, Block
+from fieldcal.evaluation.observations import observations
 from fieldcal.model.planned import state_of
-from fieldcal.observing import observations
-from fieldcal.positions import rates
+from fieldcal.physics.experience import Experience
 from fieldcal.report.gather import Material
-from fieldcal.samples import Array, Block
 from fieldcal.solve.observations import Observations
 
 

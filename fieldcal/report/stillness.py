@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.averaging import steadied, table_rate
-from fieldcal.observing import Rests
+from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.evaluation.observations import Rests
+from fieldcal.evaluation.window_mean import steadied, table_rate
 from fieldcal.report import blocks
 from fieldcal.report.blocks import Cell, Figure, Section, Tone, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
 from fieldcal.report.gather import Material
 from fieldcal.report.recording import windows
-from fieldcal.samples import CHANNELS, Array, Block
 from fieldcal.windows import Limits
 from fieldcal.windows.cells import CELL, Cells, Table
 from fieldcal.windows.verdict import judge

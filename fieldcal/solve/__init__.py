@@ -1,6 +1,6 @@
 """Estimators: from window averages to parameters with their covariance.
 
->>> from fieldcal.positions import FIVE
+>>> from fieldcal.core.positions import FIVE
 >>> from fieldcal.solve import Observations, solve
 """
 

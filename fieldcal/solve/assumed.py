@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.calibration import Method
-from fieldcal.errors import InputError, NotObservable
+from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.solve.given import Tilt
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.words import join

@@ -73,7 +73,7 @@ def solve(
     NotObservable
         If the positions determine no parameter.
 
-    >>> from fieldcal.positions import TWO
+    >>> from fieldcal.core.positions import TWO
     >>> mean = np.zeros((2, 6))
     >>> mean[:, :3] = [[0.1, -9.81, 0.2], [-6.83672, -6.91037, 0.80457]]
     >>> cov = np.tile(np.diag([1e-6] * 3 + [1e-10] * 3), (2, 1, 1))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.solve.observations import Mask, Observations
 
 

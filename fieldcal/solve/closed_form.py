@@ -20,9 +20,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.errors import NotObservable
+from fieldcal.core.errors import NotObservable
+from fieldcal.core.samples import ACC, Array
 from fieldcal.model.planned import PLAIN
-from fieldcal.samples import ACC, Array
 from fieldcal.solve.closed import Closed
 from fieldcal.solve.observations import Observations
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.model.causes import CLOSURE
 from fieldcal.model.evidence import Gram
 from fieldcal.model.inference import Inference
@@ -20,7 +21,6 @@ from fieldcal.model.state import State
 from fieldcal.model.system import System
 from fieldcal.model.turn import Turning
 from fieldcal.model.turn_rows import TurnRows, Turns
-from fieldcal.samples import Array
 from fieldcal.solve.agreement import Fit, agreement
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask

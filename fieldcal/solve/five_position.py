@@ -34,8 +34,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from fieldcal.errors import InputError, NotObservable
-from fieldcal.samples import ACC, Array
+from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.core.samples import ACC, Array
 from fieldcal.solve.closed import Closed
 from fieldcal.solve.given import Tilt
 from fieldcal.solve.observations import Observations

@@ -16,8 +16,9 @@ from typing import Literal
 
 import numpy as np
 
-from fieldcal.effects import Effect, Experience, Motion, Sensor, catalogue
-from fieldcal.frames import EARTH_RATE, earth_rate_home
+from fieldcal.core.frames import EARTH_RATE, earth_rate_home
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.effects import catalogue
 from fieldcal.model import columns, priors
 from fieldcal.model.causes import TRIADS, Cause, Group
 from fieldcal.model.columns import General
@@ -27,7 +28,8 @@ from fieldcal.model.evidence import Index
 from fieldcal.model.reduce import Rows
 from fieldcal.model.sizing import Member
 from fieldcal.model.wander import Wander
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.physics.effect import Effect, Motion, Sensor
+from fieldcal.physics.experience import Experience
 
 Tilt = Literal["none", "angle_offset", "base_tilt"]
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.samples import ACC, GYR, Array
+from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.solve.closed import Closed
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import determined

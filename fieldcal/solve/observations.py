@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.calibration import Nominal
-from fieldcal.errors import InputError
-from fieldcal.frames import force
-from fieldcal.positions import Position, angles, rates
-from fieldcal.samples import ACC, CHANNELS, GYR, UNITS, Array
+from fieldcal.core.errors import InputError
+from fieldcal.core.frames import force
+from fieldcal.core.positions import Position, angles, rates
+from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array
 from fieldcal.windows import Average
 
 Grade = Literal["tactical", "navigation"]

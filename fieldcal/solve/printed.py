@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.errors import InputError, NotObservable
-from fieldcal.frames import EARTH_RATE
-from fieldcal.samples import GYR, Array
+from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import GYR, Array
 from fieldcal.solve import least_squares
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.closed import Closed

@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Array
 from fieldcal.model.planned import design
-from fieldcal.positions import Position
-from fieldcal.samples import Array
 from fieldcal.solve.observations import Observations
 
 Mask = NDArray[np.bool_]

@@ -10,8 +10,8 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.plausible import senseless
-from fieldcal.errors import NotObservable
-from fieldcal.samples import UNITS as CHANNEL_UNITS
+from fieldcal.core.errors import NotObservable
+from fieldcal.core.samples import UNITS as CHANNEL_UNITS
 from fieldcal.solve import words
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.effects import Experience
-from fieldcal.frames import EARTH_RATE, force_home
+from fieldcal.core.frames import EARTH_RATE, force_home
+from fieldcal.core.positions import rates
+from fieldcal.core.samples import ACC, Array
 from fieldcal.model.reduce import Rows, free_force
-from fieldcal.positions import rates
-from fieldcal.samples import ACC, Array
+from fieldcal.physics.experience import Experience
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.observations import Observations
 

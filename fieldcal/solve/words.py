@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.gravity import G0
-from fieldcal.samples import Array
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array
 from fieldcal.solve.observations import Observations
 
 UNLIKELY = 0.01

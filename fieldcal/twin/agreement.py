@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.agreement import UNITS
 from fieldcal.diagnosis.result import number
-from fieldcal.samples import Array
 from fieldcal.sim_device.profile import Profile
 from fieldcal.twin.ways import Apart
 

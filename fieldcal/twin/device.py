@@ -17,17 +17,18 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.description import Description
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.line import Tone
 from fieldcal.diagnosis.result import Found
-from fieldcal.effects import Chain, Effect, Scatter, catalogue
-from fieldcal.effects.recording import lsb_of
+from fieldcal.effects import catalogue
 from fieldcal.model.reduce import rate_of
 from fieldcal.model.state import State, Term
 from fieldcal.model.thermometer import Thermometer
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.physics.effect import Chain, Effect, Scatter
+from fieldcal.physics.recording import lsb_of
+from fieldcal.session.description import Description
 from fieldcal.sim_device import vocabulary
 from fieldcal.sim_device.profile import (
     Climate,

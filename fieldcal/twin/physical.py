@@ -21,15 +21,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.core.frames import earth_rate_home
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.effects import Experience
-from fieldcal.frames import earth_rate_home
 from fieldcal.model.evidence import Index
 from fieldcal.model.fitted import Fitted
 from fieldcal.model.inference import Inference
 from fieldcal.model.state import State
 from fieldcal.model.system import System
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 STANDS = 3.0
 """Standard deviations from which the fixture does not point north."""

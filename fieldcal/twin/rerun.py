@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.parts import rms
@@ -31,7 +32,6 @@ from fieldcal.model.fitted import Fitted
 from fieldcal.model.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.turn import Turn, Turning
-from fieldcal.samples import Array, Block
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import Window, simulate
 from fieldcal.twin import device as twin

@@ -13,13 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.effects import Experience
 from fieldcal.model.fitted import Fitted
 from fieldcal.model.reduce import spans
 from fieldcal.model.state import State
 from fieldcal.model.turn import Turn, only
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 from fieldcal.sim_device.replay import Window
 from fieldcal.twin.ways import way_of
 

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.model.attitude import vee
 from fieldcal.model.turn import Turn
-from fieldcal.samples import Array, Block
 from fieldcal.sim_device.way import Way
 
 

@@ -1,4 +1,8 @@
-"""The windowed averager: mean, honest standard error, stillness, disturbance."""
+"""From samples to averages: mean, honest standard error, stillness, disturbance.
+
+Here is the one measurement of white noise and rounding that everything uses. Nothing
+here knows positions, parameters or files.
+"""
 
 from fieldcal.windows.limits import Limits
 from fieldcal.windows.mean import Average

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.errors import InputError
-from fieldcal.samples import CHANNELS, Array, Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.windows.cells import resolution
 from fieldcal.windows.noise import SHOWN, short_lag, steps_of
 from fieldcal.windows.rounding import of_mean

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.windows.rounding import shown
 from fieldcal.windows.sums import channels, finest, warmth
 from fieldcal.windows.trend import line

@@ -22,7 +22,7 @@ from typing import Literal
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.windows.quiet import NORMAL, Quiet, running
 
 Kind = Literal["push", "step", "shake"]

@@ -22,7 +22,7 @@ from math import erf
 
 import numpy as np
 
-from fieldcal.samples import Array, Grain
+from fieldcal.core.samples import Array, Grain
 from fieldcal.windows import rounding
 
 AROUND = np.linspace(-1.0, 1.0, 21)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ from itertools import product
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 BAND = 2.5
 """Highest frequency the noise at f = 0 is learnt from, Hz."""

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.windows import rounding
 from fieldcal.windows.sums import finest
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.windows.cells import CELL
 
 LEVELS = 8

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 WAVES = 5
 """Terms of (2); those beyond are taken to fade as the next does."""

@@ -18,7 +18,7 @@ from collections import deque
 
 import numpy as np
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.windows.cells import CELL, Cells, resolution
 from fieldcal.windows.limits import Limits
 from fieldcal.windows.rounding import shown

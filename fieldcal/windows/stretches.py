@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from fieldcal.samples import Array, Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.windows.cells import CELL, Cells, Table, held
 from fieldcal.windows.limits import Limits
 from fieldcal.windows.verdict import judge

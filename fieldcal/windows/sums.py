@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 
 def channels(x: Array, step: Array, first: NDArray[np.int64], whole: bool) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 _PIECES = 12
 """Pieces of a window whose medians the line is laid through."""

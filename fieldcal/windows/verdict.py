@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from fieldcal.errors import Moved
-from fieldcal.samples import CHANNELS, Array
+from fieldcal.core.errors import Moved
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.windows.cells import CELL, Table
 from fieldcal.windows.disturbance import Kind, Statistic, pushes, repeats, shakes, steps
 from fieldcal.windows.limits import Limits

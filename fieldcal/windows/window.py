@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.errors import InputError, Moved
-from fieldcal.samples import Array, Block, Grain
+from fieldcal.core.errors import InputError, Moved
+from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows.cells import CELL, Cells
 from fieldcal.windows.grain import shows, variance
 from fieldcal.windows.limits import Limits

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.driver import open_driver
-from fieldcal.positions import Position
-from fieldcal.samples import concat
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import concat
+from fieldcal.drivers.driver import open_driver
 from fieldcal.solve import Observations, solve
 from fieldcal.windows import Average, average
 

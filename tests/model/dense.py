@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 
 Index = NDArray[np.intp]
 

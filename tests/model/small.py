@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.effects import Experience
+from fieldcal.core.samples import Array
 from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram, Index
@@ -19,7 +19,7 @@ from fieldcal.model.state import State
 from fieldcal.model.system import System, gram
 from fieldcal.model.wander import Wander
 from fieldcal.model.windows import Linear
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 
 LADDER = (
     *((0, 0), (22.5, 0), (45, 0), (45, 5), (22.5, 5), (0, 5)),

@@ -11,6 +11,7 @@ from dense import Dense, shared
 from numpy.typing import NDArray
 
 import fieldcal.diagnosis  # noqa: F401  # model.system cannot be imported before it
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import CLOSURE
 from fieldcal.model.dictionary import Dictionary
@@ -19,7 +20,6 @@ from fieldcal.model.priors import SIZES
 from fieldcal.model.system import gram
 from fieldcal.model.turn_rows import TurnRows
 from fieldcal.model.windows import Linear
-from fieldcal.samples import Array
 
 WINDOWS, ROWS, WIDTH, ASIDE = 4, 3, 9, 9
 """Columns that a set may have; those of the positions' turns come after them."""

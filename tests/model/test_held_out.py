@@ -11,6 +11,7 @@ from dense import Dense, shared
 from numpy.typing import NDArray
 from small import LADDER, dictionary, ladder, nominal, rows_of
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import Cause, Group
 from fieldcal.model.dictionary import Dictionary
@@ -18,7 +19,6 @@ from fieldcal.model.fitted import Fitted, whole
 from fieldcal.model.held_out import folds, held_out
 from fieldcal.model.search import Search
 from fieldcal.model.system import System, gram
-from fieldcal.samples import Array
 
 ROWS = 3 * len(LADDER)
 

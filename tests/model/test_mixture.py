@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from observed import observe, outputs
 
+from fieldcal.core.positions import TWO, Position
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.inference import Inference
 from fieldcal.model.mixture import Mixing, Mixture
 from fieldcal.model.search import Search
 from fieldcal.model.state import State
 from fieldcal.model.system import System
-from fieldcal.positions import TWO, Position
-from fieldcal.samples import Array
 from fieldcal.solve.given import Given, Wanted, seen_by
 from fieldcal.solve.rows import of_means
 

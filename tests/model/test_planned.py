@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from observed import BIAS, COUPLING, SCALE, G, outputs
 
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Array
 from fieldcal.model.planned import PLAIN, design, parameters, predicted
-from fieldcal.positions import Position
-from fieldcal.samples import Array
 
 PLACES = tuple(
     Position.deg(a, b) for a, b in [(-40, -30), (0, 0), (5, 0), (30, -20), (170, 35)]

@@ -14,6 +14,7 @@ import pytest
 from scipy.stats import binomtest, chi2
 from small import Session, ladder
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence import Eliminated
 from fieldcal.model.posterior import Posterior
@@ -21,7 +22,6 @@ from fieldcal.model.priors import SIZES
 from fieldcal.model.reported import reported
 from fieldcal.model.search import Search
 from fieldcal.model.sets import Set
-from fieldcal.samples import Array
 
 ODDS, DRAWS = 0.5, 220
 """Of a cause, for which the chance of one stands where chances are small."""

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from small import LADDER, SD, dictionary, ladder, nominal, rows_of
 
+from fieldcal.core.samples import Array
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.proportion import in_proportion
 from fieldcal.model.search import Search
 from fieldcal.model.system import System, gram
-from fieldcal.samples import Array
 
 X = ladder()
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from small import Session, ladder
 
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import Cause, Group
 from fieldcal.model.evidence import Eliminated
@@ -18,7 +19,6 @@ from fieldcal.model.posterior import Posterior
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search import Search
 from fieldcal.model.sets import Set
-from fieldcal.samples import Array
 
 DENSITY = np.log(priors.density())
 EVEN = int(np.argmin(np.abs(np.log(SIZES))))

@@ -9,14 +9,16 @@ import pytest
 from dense import Dense, shared
 from small import LADDER, dictionary, ladder, rows_of
 
-from fieldcal.effects import Experience, Motion, Sensor, catalogue
-from fieldcal.frames import earth_rate_home
+from fieldcal.core.frames import earth_rate_home
+from fieldcal.core.samples import Array
+from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import Group
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.state import State, Term
 from fieldcal.model.system import System, gram
-from fieldcal.samples import Array
+from fieldcal.physics.effect import Motion, Sensor
+from fieldcal.physics.experience import Experience
 
 EFFECTS = catalogue()
 RNG = np.random.default_rng(7)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fieldcal.core.samples import Array, Block
 from fieldcal.model.thermometer import Thermometer
-from fieldcal.samples import Array, Block
 
 T: Array = np.arange(0.0, 360.0, 0.1)
 

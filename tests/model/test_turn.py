@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fieldcal.description import parse
+from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import inference_of
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.model.causes import Group
@@ -18,7 +18,7 @@ from fieldcal.model.sets import Set
 from fieldcal.model.state import Term
 from fieldcal.model.system import gram
 from fieldcal.model.turn_rows import TurnRows
-from fieldcal.samples import Array, Block
+from fieldcal.session.description import parse
 from fieldcal.sim_device.profile import (
     ONE,
     ZERO,

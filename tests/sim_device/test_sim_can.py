@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.cli import main
+from fieldcal.core.samples import Block
 from fieldcal.drivers.can_map import SHIPPED, load
-from fieldcal.samples import Block
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.adapter import Adapter
 from fieldcal.sim_device.can_packing import frames

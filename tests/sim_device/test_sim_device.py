@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fieldcal.errors import InputError
-from fieldcal.positions import Position
-from fieldcal.samples import Block, concat
+from fieldcal.core.errors import InputError
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Block, concat
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.in_process import InProcess
 from fieldcal.sim_device.profile import NoiseFigures

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldcal import frames
-from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block
+from fieldcal.core import frames
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.chain import Chain
 from fieldcal.sim_device.profile import (

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fieldcal import frames, gravity
-from fieldcal.errors import InputError
-from fieldcal.samples import Array, Block
+from fieldcal.core import frames, gravity
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import Profile, VirtualDevice, earth
 from fieldcal.sim_device.joints import Joints
 from fieldcal.sim_device.motion import Rocking

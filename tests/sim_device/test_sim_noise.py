@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fieldcal.samples import Array
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.noise import GaussMarkov, Noise, Walk
 from fieldcal.sim_device.profile import ONE, ZERO, Climate, NoiseFigures
 from fieldcal.sim_device.temperature import course, recorded

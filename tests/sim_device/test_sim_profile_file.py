@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldcal.errors import InputError
+from fieldcal.core.errors import InputError
 from fieldcal.sim_device import profile_file
 from fieldcal.sim_device.profile import (
     Climate,

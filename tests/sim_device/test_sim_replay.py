@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fieldcal import frames
-from fieldcal.errors import InputError
-from fieldcal.samples import Array
+from fieldcal.core import frames
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.profile import (
     ONE,

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from processes import SIM
 
-from fieldcal.errors import DeviceError, InputError
-from fieldcal.samples import Array, concat
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.samples import Array, concat
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.remote import Remote
 from fieldcal.sim_device.vocabulary import effect

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fieldcal import frames
-from fieldcal.errors import InputError
-from fieldcal.samples import Array
+from fieldcal.core import frames
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 from fieldcal.sim_device.profile import (
     ONE,
     ZERO,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fieldcal.errors import InputError
-from fieldcal.samples import Block
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.wire import formats, open_wire
 

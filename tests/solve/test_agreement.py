@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from observed import BIAS, SCALE, G, observe, outputs
 
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.state import State
-from fieldcal.positions import Position
-from fieldcal.samples import Array
 from fieldcal.solve.estimation import Estimated, estimated
 from fieldcal.solve.given import Wanted, seen_by
 from fieldcal.solve.observations import Index

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from observed import GYR_BIAS, OMEGA, carried, observe, outputs
 
-from fieldcal.effects import Experience
+from fieldcal.core.positions import FIVE, SIX_FACES, Position, angles
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.positions import FIVE, SIX_FACES, Position, angles
-from fieldcal.samples import Array
+from fieldcal.physics.experience import Experience
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.given import (
     NOT_SHOWN,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from observed import BIAS, SCALE, G, observe, outputs
 
+from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.core.samples import Array
 from fieldcal.model.planned import design, parameters
-from fieldcal.positions import FIVE, TWO, Position
-from fieldcal.samples import Array
 from fieldcal.solve import solve
 from fieldcal.solve.rank import LADDER, MOST, determined, ladder_remedy, remedy
 

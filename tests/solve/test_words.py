@@ -7,8 +7,8 @@ from scipy.stats import chi2 as chi_square
 
 from fieldcal.calibration import Nominal
 from fieldcal.calibration.plausible import senseless
-from fieldcal.positions import FIVE, WIDE, Position
-from fieldcal.samples import Array
+from fieldcal.core.positions import FIVE, WIDE, Position
+from fieldcal.core.samples import Array
 from fieldcal.solve import solve, words
 
 NINE = (*WIDE, *FIVE[1:])

@@ -1,0 +1,181 @@
+"""From a recorded session and its calibration to GO or NO-GO, and into the history.
+
+What is not in the calibration is read from the session: temperatures and missing
+samples of the windows, the position that was not fitted, the counts of the link, and
+what the operator insisted on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal.acceptance.decision import Circumstances, decide, with_decision
+from fieldcal.acceptance.verification import Verification, planned, verify
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import Limits
+from fieldcal.core.errors import FieldcalError
+from fieldcal.core.samples import Block
+from fieldcal.evaluation.observations import Rests
+from fieldcal.history.store import History, family
+from fieldcal.session.folder import Session
+from fieldcal.windows import Average, average
+
+
+def assess(
+    found: Calibration,
+    session: Session,
+    still: Rests,
+    limits: Limits,
+    history: History | None,
+) -> Calibration:
+    """The calibration with the decision about it, and where and when it was taken.
+
+    Parameters
+    ----------
+    found : calibration of the session
+    session : the recording
+    still : its windows
+    limits : of the device's grade
+    history : of earlier calibrations, None for none
+
+    """
+    marks = list(session.marks())
+    warnings = list(found.warnings)
+    earlier: Sequence[Calibration] | None = None
+    serial = str(session.about.device.get("serial", ""))
+    if history is not None and serial:
+        try:
+            here = str(session.folder.resolve())
+            runs = [run for run in history.runs(serial) if run.session != here]
+            earlier = [run.calibration for run in family(runs)]
+        except FieldcalError as error:
+            warnings.append(str(error))
+    seen = Circumstances(
+        temperatures=[a.temperature for a in still.averages],
+        link=_link(session.block, still.averages, marks),
+        verification=_verification(found, session, marks, limits),
+        family=earlier,
+        doubts=_doubts(marks),
+    )
+    warnings += [w for w in _restarts(marks) if w not in warnings]
+    made = decide(found, session.about, limits, seen)
+    site = {"latitude_deg": session.about.latitude_deg}
+    site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
+    info = {**found.info, "site": site, "taken_at": taken_at(marks)}
+    return with_decision(replace(found, warnings=tuple(warnings), info=info), made)
+
+
+def remember(history: History, session: Session, found: Calibration) -> str:
+    """Keep a calibration in the history; what to tell the operator, if anything."""
+    if not session.about.device.get("serial"):
+        return ""
+    at = str(found.info.get("taken_at") or taken_at([]))
+    try:
+        history.add(at, session.folder, found)
+    except FieldcalError as error:
+        return f"not kept in the history: {error}"
+    return ""
+
+
+def taken_at(marks: Sequence[Mapping[str, Any]]) -> str:
+    """When the first position was asked for, ISO 8601 in UTC; now without marks."""
+    times = [m["host_s"] for m in marks if isinstance(m.get("host_s"), int | float)]
+    at = datetime.fromtimestamp(times[0], UTC) if times else datetime.now(UTC)
+    return at.isoformat(timespec="seconds")
+
+
+def verification_window(
+    marks: Sequence[Mapping[str, Any]], number: int
+) -> tuple[float, float] | None:
+    """Window of the position numbered behind the fitted ones, s of device time."""
+    windows = [
+        (float(m["start_s"]), float(m["end_s"]))
+        for m in marks
+        if m.get("event") == "window" and m.get("position") == number
+    ]
+    return windows[-1] if windows else None
+
+
+def _verification(
+    found: Calibration,
+    session: Session,
+    marks: Sequence[Mapping[str, Any]],
+    limits: Limits,
+) -> Verification | None:
+    position = planned(session.about)
+    window = verification_window(marks, len(session.positions))
+    if position is None or window is None:
+        return None
+    try:
+        held = average(session.block.between(*window))
+    except FieldcalError:
+        return None
+    angle = float(np.deg2rad(limits.angle_setting_deg))
+    return verify(found, session.about, position, held, angle)
+
+
+def _link(
+    block: Block, windows: Sequence[Average], marks: Sequence[Mapping[str, Any]]
+) -> dict[str, int]:
+    """Samples in the windows, those missing there, and frames refused in all."""
+    samples = missing = 0
+    period = float(np.median(np.diff(block.t))) if len(block) > 1 else np.nan
+    for window in windows:
+        t = block.between(window.start, np.nextafter(window.end, np.inf)).t
+        samples += len(t)
+        if len(t) > 1 and period > 0:
+            missing += int(np.maximum(np.rint(np.diff(t) / period) - 1, 0).sum())
+    bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "link")
+    return {"samples": samples, "missing": missing, "bad": bad}
+
+
+def _doubts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the operator insisted on, where the position was not asked for again."""
+    insisted: dict[int, str] = {}
+    for mark in marks:
+        number = mark.get("position")
+        if not isinstance(number, int):
+            continue
+        if mark.get("event") == "asked":
+            insisted.pop(number, None)
+        elif mark.get("event") == "insisted":
+            insisted[number] = str(mark.get("text", ""))
+    return [
+        f"position {number + 1} was taken on the operator's word, although {text}"
+        for number, text in sorted(insisted.items())
+    ]
+
+
+def _restarts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Say that windows come from before and after a restart of the device."""
+    taken: list[int] = []
+    said = []
+    for mark in marks:
+        if mark.get("event") == "window":
+            taken.append(int(mark["position"]))
+        elif mark.get("event") == "rejoined" and taken:
+            said.append(
+                f"the device's clock began anew behind position {taken[-1] + 1}: if it"
+                " lost power there, its bias at the next start may be another"
+            )
+    counted = sum(int(m.get("restarts", 0)) for m in marks if m.get("event") == "link")
+    if counted:
+        said.append(
+            f"the device started anew {counted} times meanwhile: its bias at the next"
+            " start may be another"
+        )
+    return said
+
+
+def limits_path(session: Session, given: Path | None) -> Path | None:
+    """File of limits: the one given, or the one that the session's plan names."""
+    run = session.about.raw.get("run")
+    if given is None and isinstance(run, Mapping) and "limits" in run:
+        return Path(str(run["limits"]))
+    return given

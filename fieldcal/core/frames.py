@@ -1,0 +1,140 @@
+"""Turns, the mounting of the device, and what its sensors experience at rest.
+
+Procedure axes at home (alpha = beta = 0): x East, y down, z North, right-handed. The
+device is turned by alpha about z, then by beta about the turned x:
+
+    A1 = [[ca, sa, 0], [-sa, ca, 0], [0, 0, 1]]                     (1)
+    A2 = [[1, 0, 0], [0, cb, sb], [0, -sb, cb]]                     (2)
+    A  = A2 A1                                                      (3)
+    f  = A (0, -g, 0)                                               (4)
+    w  = A Omega (0, -sin phi, cos phi)                             (39)
+
+f is specific force, m/s^2; w the Earth's rate, rad/s; phi the latitude. Source: Avrutov
+and Pozniak 2023. The print has +sin phi in (39), which belongs to left-handed axes,
+and -g cos(alpha) sin(beta) in the third line of (5); here the signs follow from
+(1)-(3).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
+
+EARTH_RATE = 7.292115e-5
+"""Angular rate of the Earth, rad/s (WGS84)."""
+
+
+def turn(alpha: ArrayLike, beta: ArrayLike) -> Array:
+    """Direction cosines from base to procedure axes after the turns, (..., 3, 3).
+
+    Parameters
+    ----------
+    alpha, beta : rad, broadcast against each other
+
+    >>> np.round(turn(0.0, np.pi / 2) @ [0, -1, 0], 12) + 0.0
+    array([0., 0., 1.])
+    """
+    alpha, beta = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(beta, float))
+    return np.stack([seen_after(alpha, beta, axis) for axis in np.eye(3)], axis=-1)
+
+
+def seen_after(alpha: Array, beta: Array, vector: Array) -> Array:
+    """A vector (3,) in base axes as procedure axes see it after the turns, (..., 3).
+
+    As `turn` times the vector, where only that is wanted.
+
+    >>> np.round(seen_after(np.zeros(1), np.array([np.pi / 2]), [0, -1, 0]), 12) + 0.0
+    array([[0., 0., 1.]])
+    """
+    x, y, z = vector
+    ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
+    out, on = np.empty((*ca.shape, 3)), y * ca - x * sa
+    out[..., 0] = x * ca + y * sa  # (3)
+    out[..., 1] = on * cb + z * sb
+    out[..., 2] = z * cb - on * sb
+    return out
+
+
+def force_home(gravity: float) -> Array:
+    """Specific force at rest in base axes, (3,) m/s^2: y points down."""
+    return np.array([0.0, -gravity, 0.0])
+
+
+def force(alpha: ArrayLike, beta: ArrayLike, gravity: float) -> Array:
+    """Specific force at rest in procedure axes, (..., 3) m/s^2, (4).
+
+    >>> np.round(force(0.0, 0.0, 9.81), 3) + 0.0
+    array([ 0.  , -9.81,  0.  ])
+    """
+    at_rest: Array = turn(alpha, beta) @ force_home(gravity)  # (4)
+    return at_rest
+
+
+def lasting(rates: Array) -> Array:
+    """What is left of another rate in the mean of whole turns, (n, 3, 3).
+
+    Of a device that turns at `rates` (n, 3), all that lies across goes round in it; one
+    at rest (0) keeps all of it.
+    """
+    speed = np.linalg.norm(rates, axis=1, keepdims=True)
+    axis = np.divide(rates, speed, out=np.zeros_like(rates), where=speed > 0)
+    left: Array = axis[:, :, None] * axis[:, None, :]
+    left[speed[:, 0] == 0] = np.eye(3)
+    return left
+
+
+def earth_rate_home(latitude: float) -> Array:
+    """Earth's rate in base axes, (3,) rad/s; `latitude` in rad, (38)."""
+    return EARTH_RATE * np.array([0.0, -np.sin(latitude), np.cos(latitude)])  # (38)
+
+
+def angles_of(direction: ArrayLike) -> tuple[float, float]:
+    """Turns alpha, beta in rad that bring about a specific force along `direction`.
+
+    `direction` is (3,) in procedure axes, of any length. The inverse of (4), beta in
+    (-pi/2, pi/2]: f = g (-sin a, -cos a cos b, cos a sin b).
+
+    >>> [round(float(np.rad2deg(a)), 6) for a in angles_of(force(0.5, 0.1, 9.81))]
+    [28.64789, 5.729578]
+    """
+    x, y, z = np.asarray(direction, float)
+    beta = np.arctan2(z, -y)
+    if abs(beta) > np.pi / 2:
+        beta -= np.copysign(np.pi, beta)
+    alpha = np.arctan2(-x, z * np.sin(beta) - y * np.cos(beta))
+    return float(alpha), float(beta)
+
+
+def mounting_matrix(axes: Sequence[str]) -> Array:
+    """Signed permutation P, procedure = P @ device, from names such as ``"-z"``.
+
+    Element i names the device axis that lies along procedure axis i. A z-up unit is
+    ``["+x", "-z", "+y"]``.
+
+    Raises
+    ------
+    InputError
+        If the names are not three different signed axes, or make a left-handed frame.
+
+    >>> mounting_matrix(["+x", "-z", "+y"]) @ [0, 0, 9.81]
+    array([ 0.  , -9.81,  0.  ])
+    """
+    matrix = np.zeros((3, 3))
+    if len(axes) != 3 or any(not re.fullmatch(r"[+-]?[xyz]", a) for a in axes):
+        raise InputError(
+            f'mounting {list(axes)} is not three signed axes such as ["+x", "-z", "+y"]'
+        )
+    for row, name in enumerate(axes):
+        matrix[row, "xyz".index(name[-1])] = -1.0 if name[0] == "-" else 1.0
+    if round(float(np.linalg.det(matrix))) != 1:
+        raise InputError(
+            f"mounting {list(axes)} is not a right-handed frame: name each axis once, "
+            "and check the signs against the drawing on the device"
+        )
+    return matrix

@@ -1,0 +1,87 @@
+"""Positions an operator can be asked to hold, and the sets that procedures use."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.frames import force
+from fieldcal.core.samples import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where the device is held; angles in rad, None where they are not known.
+
+    Attributes
+    ----------
+    name : what the operator is told
+    alpha, beta : turns (1), (2) from home, rad
+    rate : constant rate about the procedure axes on a rate table, rad/s
+
+    """
+
+    name: str
+    alpha: float | None = None
+    beta: float | None = None
+    rate: tuple[float, float, float] | None = None
+
+    @classmethod
+    def deg(cls, alpha: float, beta: float, name: str = "") -> Position:
+        """Position from angles in degrees."""
+        return cls(
+            name or f"α = {alpha:g}°, β = {beta:g}°",
+            float(np.deg2rad(alpha)),
+            float(np.deg2rad(beta)),
+        )
+
+    @property
+    def oriented(self) -> bool:
+        """Whether both angles are known."""
+        return self.alpha is not None and self.beta is not None
+
+    @property
+    def degrees(self) -> tuple[float, float] | None:
+        """Both angles in degrees, if known."""
+        if self.alpha is None or self.beta is None:
+            return None
+        alpha, beta = np.rad2deg([self.alpha, self.beta]).round(9).tolist()
+        return alpha, beta
+
+
+def rates(positions: Sequence[Position]) -> Array:
+    """Rates of a rate table, (n, 3) rad/s about the procedure axes; 0 at rest."""
+    return np.array([p.rate or (0.0, 0.0, 0.0) for p in positions]).reshape(-1, 3)
+
+
+def angles(positions: Sequence[Position]) -> tuple[Array, Array]:
+    """Alpha and beta of the positions, (n,) rad each, nan where unknown."""
+    both = [(p.alpha, p.beta) for p in positions]
+    table = np.array(both, dtype=float).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
+
+
+def forces(positions: Sequence[Position], gravity: float) -> Array:
+    """Specific force at rest in procedure axes, (n, 3) m/s^2, nan where unknown."""
+    return force(*angles(positions), gravity)
+
+
+def _set(*pairs: tuple[float, float]) -> tuple[Position, ...]:
+    return tuple(Position.deg(alpha, beta) for alpha, beta in pairs)
+
+
+TWO = _set((0, 0), (45, 5))
+"""The paper's two positions: bias and scale factor on a level base."""
+
+FIVE = _set((0, 0), (22.5, 0), (22.5, 2.5), (45, 2.5), (45, 5))
+"""The paper's five positions: the tilt of the base as well."""
+
+WIDE = _set((-45, -5), (-45, 5), (0, 0), (45, -5), (45, 5))
+"""Five positions that use the whole of a small ladder, to both sides."""
+
+SIX_FACES = _set((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
+"""Each axis up and down; needs more than a ladder."""
+
+SETS = {"two": TWO, "five": FIVE, "wide": WIDE, "six_faces": SIX_FACES}

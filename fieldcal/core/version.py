@@ -1,0 +1,3 @@
+"""The version of fieldcal, as results and reports state it."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,169 @@
+"""What a recording shows and a calibration does not carry.
+
+The estimators of `solve` fit bias, scale factor and what they are told to; a bias that
+drifted, a joint that was read wrongly or a byte that was decoded wrongly is in their
+windows all the same. Here the one model of the diagnosis says what is there, what of it
+the calibration has not in it, and by how much each of its parameters moves with it:
+
+    moved_k = (value with all that is there - value without what is missing) / sigma_k
+
+Both values are the model's own, of the same rows, so that conventions do not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.calibration import Calibration
+from fieldcal.core.samples import CHANNELS
+from fieldcal.diagnosis.chain import check
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.naming import sizes
+from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.diagnosis.verdict import calibrated
+from fieldcal.effects import catalogue
+from fieldcal.model.posterior import Standing
+from fieldcal.model.sets import Set
+from fieldcal.physics.effect import Chain, Scatter
+from fieldcal.session.folder import Session
+
+WRONG = 5.0
+"""Sigmas by which a parameter may move with what is left out before it is no longer to
+be used: no navigator has that in its margin."""
+
+SAID = 1.0
+"""Sigmas from which it is said."""
+
+BYTES = "decode_fault"
+
+
+@dataclass(frozen=True, slots=True)
+class Uncarried:
+    """What a calibration does not carry.
+
+    Attributes
+    ----------
+    causes : probability by id of the effect
+    moved : by how many sigmas each parameter moves with them
+
+    """
+
+    causes: Mapping[str, float]
+    moved: Mapping[str, float]
+
+    @property
+    def most(self) -> tuple[str, float]:
+        """The parameter that moves most, and by how many sigmas."""
+        name = max(self.moved, key=lambda n: abs(self.moved[n]), default="")
+        return name, self.moved.get(name, 0.0)
+
+
+def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
+    """The session with bytes put right that were decoded wrongly, and what was done."""
+    if not session.positions:
+        return session, ()
+    faults = [
+        fault
+        for name, fault in check(session.block, session.about).faults
+        if name == BYTES and fault.mended is not None
+    ]
+    if not faults:
+        return session, ()
+    six, said = session.block.six, []
+    for fault in faults:
+        if fault.mended is None:
+            continue
+        c = CHANNELS.index(fault.channel)
+        six[:, c] = fault.mended[:, c]
+        said.append(
+            f"{fault.channel}: bytes were decoded wrongly"
+            f" ({fault.values.get('kind', 'unknown')}) and are put right here; mend the"
+            " driver that wrote them"
+        )
+    right = replace(session, warnings=())
+    right.__dict__["block"] = replace(session.block, acc=six[:, :3], gyr=six[:, 3:])
+    return right, tuple(said)
+
+
+def angles_set(explanation: Explanation) -> float:
+    """How well a recording shows that angles are set, deg; 0 if it shows nothing."""
+    found = [0.0]
+    for one in explanation.standing:
+        effect = catalogue().get(one.name)
+        if isinstance(effect, Scatter) and {p.unit for p in effect.params} == {"deg"}:
+            told = sizes(explanation, one).values()
+            found += [q.value for q in told if isinstance(q.value, float)]
+    return max(found)
+
+
+def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
+    """What a recording shows that a calibration of it does not carry."""
+    out = [s for s in explanation.standing if not _carries(calibration, s)]
+    if not out:
+        return Uncarried({}, {})
+    return Uncarried({s.name: s.probability for s in out}, _moved(explanation, out))
+
+
+def _carries(calibration: Calibration, standing: Standing) -> bool:
+    """Whether a cause is no effect, is random, or is in the calibration itself."""
+    effect = catalogue().get(standing.name)
+    if effect is None or isinstance(effect, Scatter):
+        return True
+    carrying = {standing.name, *standing.aliases, effect.carried_by}
+    return bool(carrying & set(calibration.groups))
+
+
+def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float]:
+    """By how many sigmas each parameter moves with some causes, by full name."""
+    names = {s.name for s in out}
+    best = explanation.posterior.best
+    kept = tuple(m for m in best.members if m[0].name not in names)
+    search = explanation.posterior.search
+    less: Set = search.evaluated(kept, search.sizes_of(best, kept))
+    now, before = (calibrated(explanation, one) for one in (best, less))
+    return {
+        name: float((now[name][0] - before[name][0]) / before[name][1])
+        for name in now
+        if name in before and before[name][1] > 0 and np.isfinite(now[name][0])
+    }
+
+
+def misread(prepared: Prepared, calibration: Calibration) -> Calibration:
+    """The calibration, not to be used where session.toml is found to be wrong."""
+    said = []
+    for name, fault in prepared.checked.faults:
+        effect = catalogue()[name]
+        if isinstance(effect, Chain) and effect.misread:
+            values = ", ".join(f"{k} = {v}" for k, v in fault.values.items())
+            said.append(
+                f"session.toml is wrong about the {name} ({values}): mend it and solve"
+                " again; the numbers are those of samples that were put right"
+            )
+    if not said:
+        return calibration
+    warnings = (*said, *calibration.warnings)
+    return replace(calibration, warnings=warnings, good=False)
+
+
+def told(calibration: Calibration, missing: Uncarried) -> Calibration:
+    """The calibration with what it does not carry said, and judged."""
+    if not missing.causes:
+        return calibration
+    name, sigmas = missing.most
+    listed = " and ".join(
+        f"{id_} (probability {p:.2f})" for id_, p in missing.causes.items()
+    )
+    info = {"causes": dict(missing.causes), "moved_sigmas": dict(missing.moved)}
+    found = replace(calibration, info={**calibration.info, "not_carried": info})
+    if abs(sigmas) < SAID:
+        return found
+    said = (
+        f"the recording shows {listed}, which this result does not carry: with it"
+        f" {name} moves by {sigmas:+.1f} σ; fieldcal diagnose says what it is and what"
+        " to do"
+    )
+    good = calibration.good and abs(sigmas) < WRONG
+    return replace(found, warnings=(said, *calibration.warnings), good=good)

@@ -1,0 +1,204 @@
+"""From a session's windows to what the estimators are given.
+
+A window with no calm part or no samples is left out, and so is a sensor that says
+nothing in any window; both are said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.calibration import Calibration, Nominal, limits
+from fieldcal.calibration.gauge import SI
+from fieldcal.core.errors import FieldcalError, SessionError
+from fieldcal.core.samples import ACC, CHANNELS, GYR, Grain
+from fieldcal.core.version import __version__
+from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
+from fieldcal.session.description import Description
+from fieldcal.session.folder import Session
+from fieldcal.solve.observations import Observations
+from fieldcal.windows import Average, Noise
+
+
+def observations(
+    about: Description, averages: Sequence[Average], rows: Sequence[int] | None = None
+) -> Observations:
+    """Averages with what is known of the positions they were taken in.
+
+    Parameters
+    ----------
+    about : device, site, frame and positions
+    averages : one for each position, or for those numbered in `rows`
+    rows : numbers of the positions, all by default
+
+    """
+    numbers = range(len(about.positions)) if rows is None else rows
+    return Observations.of(
+        [about.positions[i] for i in numbers],
+        averages,
+        about.gravity,
+        latitude=about.latitude,
+        mounting=about.mounting,
+        grade="navigation" if about.grade == "navigation" else "tactical",
+        nominal=Nominal(**{k: tuple(v.tolist()) for k, v in about.nominal.items()}),
+    )
+
+
+def angle_setting(about: Description) -> float:
+    """How well angles are set, deg; the limit of the grade where nobody said."""
+    if about.angle_setting_deg is not None:
+        return about.angle_setting_deg
+    return limits.read(about.grade).angle_setting_deg
+
+
+def with_provenance(calibration: Calibration, about: Description) -> Calibration:
+    """The calibration with the device it belongs to and the software that made it."""
+    origin = {"device": dict(about.device), "software": f"fieldcal {__version__}"}
+    if not about.gauge.plain:
+        origin["gauge"] = about.gauge.table()
+    return replace(calibration, info={**calibration.info, **origin})
+
+
+def observe(session: Session) -> tuple[Observations, tuple[str, ...]]:
+    """Average the windows of a recorded session; warnings name what was left out.
+
+    Raises
+    ------
+    SessionError
+        If it has no position, or no window of any position can be used.
+
+    """
+    found = rests(session)
+    return observations(session.about, found.averages, found.rows), found.warnings
+
+
+@dataclass(frozen=True, slots=True)
+class Rests:
+    """The windows of a session that can be used.
+
+    Attributes
+    ----------
+    rows : number of each one's position
+    averages : of each
+    warnings : what was left out, and why
+
+    """
+
+    rows: tuple[int, ...]
+    averages: tuple[Average, ...]
+    warnings: tuple[str, ...]
+
+    def at_rest(self, session: Session) -> Rests:
+        """Return those in which no table turned."""
+        held = [
+            i
+            for i, row in enumerate(self.rows)
+            if not table_rate(session.about, row).any()
+        ]
+        return replace(
+            self,
+            rows=tuple(self.rows[i] for i in held),
+            averages=tuple(self.averages[i] for i in held),
+        )
+
+
+def rests(session: Session) -> Rests:
+    """Average the windows of a recorded session.
+
+    Raises
+    ------
+    SessionError
+        If it has no position, or no window of any position can be used.
+
+    """
+    if not session.positions:
+        raise SessionError(
+            f"{session.folder}: session.toml has no [[position]]: write down when each"
+            " position was held, or let fieldcal import find the still stretches"
+        )
+    block = session.block
+    taken: dict[int, Average] = {}
+    warnings = list(session.warnings)
+    noise: Noise | None = None
+    grain = grain_of(session)
+    # each tells the noise for the next
+    held = session.about.in_time()
+    for i, window in zip(held.numbers, held.windows, strict=True):
+        rate = table_rate(session.about, i)
+        try:
+            if rate.any():
+                found, said = take_on_a_table(block, window, rate, grain)
+            else:
+                found, noise, said = take(block, window, noise, grain)
+        except FieldcalError as error:
+            warnings.append(f"{_named(session, i)} is left out: {error}")
+            continue
+        taken[i] = found
+        if said:
+            warnings.append(f"{_named(session, i)}: {said}")
+    if not taken:
+        raise SessionError(
+            f"{session.folder}: no window can be used; {warnings[-1]}"
+            f"{_worth(session.about)}"
+        )
+    rows = sorted(taken)
+    averages, dead = _without_dead([taken[i] for i in rows])
+    return Rests(tuple(rows), tuple(averages), (*warnings, *dead))
+
+
+def _named(session: Session, row: int) -> str:
+    """A position by its number, from 0, and by its name if it has one."""
+    number, name = f"position {row}", session.positions[row].name
+    return number if name == number else f"{number} ({name})"
+
+
+def _without_dead(averages: list[Average]) -> tuple[list[Average], list[str]]:
+    """Averages without a sensor of which an axis says nothing in any window.
+
+    A device without gyroscopes may send zeros in their place.
+    """
+    said = []
+    for sensor, channels in (("accelerometers", ACC), ("gyroscopes", GYR)):
+        sigma = np.array([a.sigma[channels] for a in averages])
+        if not np.isfinite(sigma).any():
+            continue
+        dead = ~(sigma > 0).any(axis=0)
+        if not dead.any():
+            continue
+        names = " ".join(np.array(CHANNELS[channels])[dead])
+        said.append(f"the {sensor} are not used: {names} never changes, or is missing")
+        averages = [_without(a, channels) for a in averages]
+    return averages, said
+
+
+def _without(average: Average, channels: slice) -> Average:
+    mean, covariance = average.mean.copy(), average.covariance.copy()
+    mean[channels] = covariance[channels, :] = covariance[:, channels] = np.nan
+    return replace(average, mean=mean, covariance=covariance)
+
+
+def _worth(about: Description) -> str:
+    """What to do where nobody said what a count is worth."""
+    missing = [
+        f"{group} (how many {unit} in one {si})"
+        for group, unit, si, size in zip(
+            ("acc_scale", "gyr_scale"), about.gauge.units, SI, about.gauge.size,
+            strict=True,
+        )
+        if unit != si and size == 1
+    ]  # fmt: skip
+    if not missing:
+        return ""
+    return f"; session.toml must say in [nominal] {' and '.join(missing)}"
+
+
+def grain_of(session: Session) -> Grain:
+    """What the device said that it rounds to, when it was recorded."""
+    marks = [mark for mark in session.marks() if mark.get("event") == "grain"]
+    if not marks:
+        return Grain()
+    said = marks[-1]
+    return Grain(float(said["acc"]), float(said["gyr"]), bool(said["cut"]))

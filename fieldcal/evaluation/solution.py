@@ -1,0 +1,178 @@
+"""A recorded session, solved: its windows, the turns between them, and what they show.
+
+The rows are those that `diagnose` sees: block means with the noise that is measured in
+the recording, samples put right, lines taken out. Windows that were disturbed count as
+far as they were calm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from fieldcal.calibration import Calibration
+from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.diagnosis.explain import Explanation, explain, origins
+from fieldcal.diagnosis.prepare import Prepared, prepare
+from fieldcal.evaluation.not_carried import angles_set, misread, told, uncarried
+from fieldcal.evaluation.observations import (
+    Rests,
+    angle_setting,
+    observations,
+    with_provenance,
+)
+from fieldcal.session.description import Description
+from fieldcal.session.folder import Session
+from fieldcal.solve import Observations, solve
+from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.rows import variances, widened
+
+Turns = Literal["auto", "yes", "no"]
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A session's windows as the estimators are given them.
+
+    Attributes
+    ----------
+    session : the recording
+    still : windows that can be used
+
+    """
+
+    session: Session
+    still: Rests
+
+    @cached_property
+    def order(self) -> list[int]:
+        """Numbers in `still` in the order in which the windows were held."""
+        averages = self.still.averages
+        return sorted(range(len(averages)), key=lambda i: averages[i].start)
+
+    @cached_property
+    def about(self) -> Description:
+        """What is known of these windows, and where they were calm."""
+        about, still = self.session.about, self.still
+        rows = [still.rows[i] for i in self.order]
+        ends = [(still.averages[i].start, still.averages[i].end) for i in self.order]
+        return replace(
+            about,
+            positions=tuple(about.positions[r] for r in rows),
+            windows=tuple((a, float(np.nextafter(b, np.inf))) for a, b in ends),
+            numbers=tuple(rows),
+        )
+
+    @cached_property
+    def seen(self) -> Observations:
+        """Means of the windows, in the order in which they were held."""
+        averages = [self.still.averages[i] for i in self.order]
+        return observations(self.about, averages, range(len(averages)))
+
+    @cached_property
+    def prepared(self) -> Prepared | None:
+        """The recording, checked and reduced; None where it is too short for that."""
+        try:
+            return prepare(self.session.block, self.about)
+        except InputError:
+            return None
+
+    def recorded(self, turns: bool) -> Recorded | None:
+        """Rows of the windows, and the samples between them if they are to be used."""
+        if self.prepared is None:
+            return None
+        source, rows = self.prepared.source, self.prepared.rows
+        measured = (self.seen.has_acc, self.seen.has_gyr)
+        sd = np.full_like(rows.sd, np.nan)
+        for c in np.flatnonzero(measured):
+            sd[:, 3 * c : 3 * c + 3] = rows.sd[:, 3 * c : 3 * c + 3]
+        rows = replace(rows, sd=sd)
+        rows = widened(rows, variances(self.seen))
+        return Recorded(rows, origins(source, rows), source if turns else None)
+
+
+def solved(
+    session: Session, still: Rests, turns: Turns = "auto", **asked: Any
+) -> Calibration:
+    """Solve a session.
+
+    Parameters
+    ----------
+    session : the recording
+    still : its windows
+    turns : whether what the turns between windows say is used; "yes" insists on it
+    asked : of `fieldcal.solve.solve`; how level the base is and how well angles are set
+        are otherwise what session.toml says, or what the grade asks for
+
+    Raises
+    ------
+    NotObservable
+        If nothing is determined, or turns are insisted on and there are none.
+
+    """
+    laid, about = Laid(session, still), session.about
+    if asked.get("level_sigma_deg") is None:
+        asked["level_sigma_deg"] = about.level_deg
+    if asked.get("angle_sigma_deg") is None:
+        asked["angle_sigma_deg"] = angle_setting(about)
+    printed = bool(asked.get("as_printed"))
+    shown = None if printed or laid.prepared is None else explain(laid.prepared)
+    asked, said = _as_shown(asked, shown)
+    recorded = None if printed else laid.recorded(turns != "no")
+    found = solve(laid.seen, recorded=recorded, **asked)
+    if turns == "yes":
+        _insist(found, session, still)
+    found = replace(found, warnings=(*still.warnings, *said, *found.warnings))
+    found = _listed(with_provenance(found, about), laid.order)
+    if shown is None:
+        return found
+    return misread(shown.prepared, told(found, uncarried(shown, found)))
+
+
+def _as_shown(
+    asked: dict[str, Any], shown: Explanation | None
+) -> tuple[dict[str, Any], list[str]]:
+    """What is asked for, with angles that the recording shows to be set less well."""
+    if shown is None or not (angles := angles_set(shown)) > asked["angle_sigma_deg"]:
+        return asked, []
+    said = (
+        f"the recording shows that angles are set to ± {angles:.2g}° only, not"
+        f" ± {asked['angle_sigma_deg']:.2g}°: the uncertainties are for that; mend the"
+        " fixture, or write down the angles that it really sets"
+    )
+    return asked | {"angle_sigma_deg": angles}, [said]
+
+
+def _insist(found: Calibration, session: Session, still: Rests) -> None:
+    """Refuse a result without what the turns give.
+
+    Raises
+    ------
+    NotObservable
+        If there is no turn.
+
+    """
+    if len(still.at_rest(session).rows) < 1:
+        raise NotObservable(
+            "no position was held at rest, so there is no turn between two; leave"
+            " out --turns"
+        )
+    if "turns" not in found.info:
+        raise NotObservable(
+            "no turn between two positions was recorded whole, so the gyroscopes have "
+            "no scale factor: record on while the device is turned"
+        )
+
+
+def _listed(found: Calibration, order: list[int]) -> Calibration:
+    """With what is said of each position in the order of session.toml."""
+    bad = found.info.get("bad_position")
+    if bad is None:
+        return found
+    listed = [0.0] * len(bad)
+    for i, p in zip(order, bad, strict=True):
+        listed[i] = p
+    return replace(found, info={**found.info, "bad_position": listed})

@@ -1,0 +1,137 @@
+"""Average of one window of a recorded session.
+
+A window that somebody else marked may hold a disturbance: then the longest calm part of
+it is used, and that is said. On a rate table gravity goes round and nothing is asked of
+the accelerometers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.errors import Moved, SessionError
+from fieldcal.core.positions import rates
+from fieldcal.core.samples import Array, Block, Grain
+from fieldcal.model.turntable import going_round
+from fieldcal.session.description import Description
+from fieldcal.windows import Average, Noise, Window, average
+
+SHORTEST = 5.0
+"""Shortest calm part of a disturbed window that is worth using, s."""
+
+
+def take(
+    block: Block,
+    span: tuple[float, float] | None,
+    noise: Noise | None,
+    grain: Grain,
+) -> tuple[Average, Noise | None, str]:
+    """Average of a window, what it taught about the noise, and what must be said.
+
+    Parameters
+    ----------
+    block : the recording
+    span : start and end of the window, s of device time; None where it has none
+    noise : what windows before it taught
+    grain : what the device rounds to
+
+    Raises
+    ------
+    SessionError
+        If there are no samples of it.
+    Moved
+        If no part of it was calm.
+
+    """
+    span = _given(span)
+    part = block.between(*span)
+    if len(part) < 2:
+        raise SessionError(
+            f"no samples lie between {span[0]:g} and {span[1]:g} s; the recording"
+            f" spans {block.t[0]:g} to {block.t[-1]:g} s"
+        )
+    window = Window(noise=noise, grain=grain)
+    window.add(part)
+    try:
+        return window.average(), window.noise and window.noise.spectrum, ""
+    except Moved as moved:
+        calm = _calm(part, moved, noise, grain)
+        if calm is None:
+            raise
+        said = f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
+        return calm, noise, f"{said} is used"
+
+
+def _given(span: tuple[float, float] | None) -> tuple[float, float]:
+    if span is None:
+        raise SessionError("its window was not taken before the recording ended")
+    return span
+
+
+def table_rate(about: Description, row: int) -> Array:
+    """Rate of the table in a position by its number, in device axes, (3,) rad/s."""
+    turned: Array = rates(about.positions[row : row + 1])[0] @ about.mounting
+    return turned
+
+
+def steadied(block: Block, rate: Array) -> tuple[Block, Array]:
+    """A window without what goes round with a rate table, and what that leaves open.
+
+    Gravity goes round, so nothing is asked of the accelerometers; what of the Earth's
+    rate goes round is taken out. The covariance (3, 3) is that of the gyroscopes' mean.
+
+    Parameters
+    ----------
+    block : samples of one window
+    rate : (3,) of the table in device axes, rad/s
+
+    """
+    blind = replace(block, acc=np.full_like(block.acc, np.nan))
+    if len(block) < 2 or not np.isfinite(block.gyr).any(axis=0).all():
+        return blind, np.zeros((3, 3))
+    noise = np.nanstd(np.diff(block.gyr, axis=0), axis=0) / np.sqrt(2)
+    sd = np.broadcast_to(np.where(noise > 0, noise, np.nan), block.gyr.shape)
+    found = going_round(block.t, rate, block.gyr, sd, np.ones(3), 0.0)
+    return replace(blind, gyr=block.gyr - found.values), found.covariance
+
+
+def take_on_a_table(
+    block: Block, span: tuple[float, float] | None, rate: Array, grain: Grain
+) -> tuple[Average, str]:
+    """Average while a table turns at some rate, (3,) rad/s in device axes.
+
+    Otherwise as `take`.
+    """
+    span = _given(span)
+    standing, left = steadied(block.between(*span), rate)
+    one, _, said = take(standing, span, None, grain)
+    covariance = one.covariance.copy()
+    covariance[3:, 3:] += left
+    return replace(one, covariance=covariance), said
+
+
+def _calm(
+    block: Block, moved: Moved, noise: Noise | None, grain: Grain
+) -> Average | None:
+    """Average of the longest calm part, None if there is none worth it."""
+    sides = [
+        block.between(-float("inf"), moved.at),
+        block.between(moved.at, float("inf")),
+    ]
+    best: Average | None = None
+    for side in sorted(sides, key=len, reverse=True):
+        length = float(side.t[-1] - side.t[0]) if len(side) > 1 else 0.0
+        if length < SHORTEST or (best and length <= best.end - best.start):
+            continue
+        try:
+            found: Average | None = average(side, noise=noise, grain=grain)
+        except Moved as again:
+            inside = side.t[0] < again.at < side.t[-1]
+            # a disturbance lasts: what follows its first instant is disturbed as well
+            shifted = again.at if inside else side.t[0] + 1.0
+            found = _calm(side, Moved(str(again), shifted, again.axis), noise, grain)
+        if found and (best is None or found.end - found.start > best.end - best.start):
+            best = found
+    return best

@@ -1,0 +1,80 @@
+"""Whether a value is what earlier calibrations of the device let expect.
+
+A parameter changes from run to run by b_i ~ N(0, tau^2) and is known to sigma_i:
+
+    x_i = mu + b_i + e_i,  e_i ~ N(0, sigma_i^2),  i = 1 ... n
+
+    tau_n^2 = max(0, var x - mean sigma_i^2)                  what n runs tell      (1)
+    tau^2 = (nu_0 r^2 + (n - 1) tau_n^2) / (nu_0 + n - 1)     with what is usual    (2)
+    w_i = 1 / (tau^2 + sigma_i^2),  m = sum w x / sum w       mean                  (3)
+    s^2 = tau^2 + sigma^2 + 1 / sum w                         of a new value        (4)
+    z = (x - m) / s ~ t(nu_0 + n - 1)                                               (5)
+
+r is the spread usual for the grade, worth nu_0 runs, so that one earlier run is enough
+to compare with and many make r forgotten. Units are the parameter's. Source: (1) is the
+moment estimate of a random effect (DerSimonian and Laird 1986, unweighted); (2) the
+mean of a scaled inverse chi-squared prior's posterior.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+
+USUAL = 2.0
+"""nu_0: how many runs the spread that is usual for the grade is worth."""
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What earlier runs let expect of the next one.
+
+    Attributes
+    ----------
+    mean : m
+    spread : tau, from run to run
+    sigma_mean : of m
+    dof : of the t distribution (5)
+    runs : n
+
+    """
+
+    mean: float
+    spread: float
+    sigma_mean: float
+    dof: float
+    runs: int
+
+    def sigma(self, sigma: float) -> float:
+        """Standard deviation of a new value less the mean, (4)."""
+        return float(np.sqrt(self.spread**2 + sigma**2 + self.sigma_mean**2))
+
+    def chance(self, value: float, sigma: float) -> float:
+        """Probability of a value as far off as this, or farther, (5)."""
+        from scipy.special import stdtr
+
+        z = abs(value - self.mean) / self.sigma(sigma)
+        return float(2 * stdtr(self.dof, -z))
+
+
+def expected(values: Array, sigmas: Array, usual: float) -> Expected:
+    """What runs (n,) with their uncertainties (n,) let expect, (1)-(3).
+
+    `usual` is r. There must be one run at least.
+    """
+    n = len(values)
+    told = 0.0
+    if n > 1:
+        told = max(0.0, float(np.var(values, ddof=1) - np.mean(sigmas**2)))  # (1)
+    spread2 = (USUAL * usual**2 + (n - 1) * told) / (USUAL + n - 1)  # (2)
+    w = 1 / (spread2 + sigmas**2)  # (3)
+    return Expected(
+        float(w @ values / w.sum()),
+        float(np.sqrt(spread2)),
+        float(1 / np.sqrt(w.sum())),
+        USUAL + n - 1,
+        n,
+    )

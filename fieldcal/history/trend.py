@@ -1,0 +1,102 @@
+"""One parameter of a device from run to run, and which runs are out of family.
+
+Each run is compared with what the family before it let expect (`family`), as it
+was when it was made; the chance of a false alarm is shared by the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration.limits import Limits
+from fieldcal.history.family import expected
+from fieldcal.history.store import Run, family
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One run's value of a parameter.
+
+    Attributes
+    ----------
+    run : which
+    value, sigma : of the parameter
+    unit : of both
+    chance : probability of such a value by the runs before; nan for the first
+    odd : whether it is out of family
+    spread : from run to run, as known with this run; nan where no grade says
+
+    """
+
+    run: Run
+    value: float
+    sigma: float
+    unit: str
+    chance: float
+    odd: bool
+    spread: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as an object; null where not known."""
+        chance = self.chance if np.isfinite(self.chance) else None
+        return {
+            "number": self.run.number,
+            "value": self.value,
+            "sigma": self.sigma,
+            "unit": self.unit,
+            "chance": chance,
+            "out_of_family": self.odd,
+            "spread": self.spread if np.isfinite(self.spread) else None,
+        }
+
+
+def names(runs: Sequence[Run]) -> tuple[str, ...]:
+    """Parameters that any run has, in order."""
+    return tuple(dict.fromkeys(n for run in runs for n in run.calibration.names))
+
+
+def trend(runs: Sequence[Run], name: str, limits: Limits) -> list[Point]:
+    """Values of one parameter, oldest first.
+
+    Parameters
+    ----------
+    runs : of one device, oldest first
+    name : full name, as in ``acc_bias.x``
+    limits : of its grade
+
+    """
+    usual = limits.repeat(name.partition(".")[0])
+    points = []
+    for i, run in enumerate(runs):
+        found = run.calibration
+        if name not in found.names:
+            continue
+        value, sigma = found.value(name), found.uncertainty(name)
+        unit = found.units[found.names.index(name)]
+        chance, spread = np.nan, np.nan
+        before = _values(family(runs[:i]), name)
+        together = max(1, sum(limits.repeat(n.partition(".")[0]) is not None
+                              for n in found.names))  # fmt: skip
+        if usual is not None:
+            if len(before):
+                usually = expected(before[:, 0], before[:, 1], usual)
+                chance = usually.chance(value, sigma)
+            known = _values(family(runs[: i + 1]), name)
+            told = known if len(known) else np.array([[value, sigma]])
+            spread = expected(told[:, 0], told[:, 1], usual).spread
+        odd = bool(chance < limits.family_chance / together)
+        points.append(Point(run, value, sigma, unit, chance, odd, spread))
+    return points
+
+
+def _values(runs: Sequence[Run], name: str) -> np.ndarray[Any, Any]:
+    rows = [
+        (run.calibration.value(name), run.calibration.uncertainty(name))
+        for run in runs
+        if name in run.calibration.names
+    ]
+    return np.array(rows).reshape(-1, 2)

@@ -1,0 +1,72 @@
+"""Samples of an accelerometer and a gyroscope that have times of their own.
+
+Each sample of the accelerometer goes with the gyroscope's nearest in time, within half
+a period of the accelerometer; where there is none it stays alone. Nothing is
+interpolated. What comes out does not depend on how the samples were cut into blocks.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Block, concat
+
+PATIENCE = 10.0
+"""Longest time that a sample waits for its partner, s: either sensor may end."""
+
+
+class Pair:
+    """Puts each sample of an accelerometer beside the gyroscope's nearest in time.
+
+    Attributes
+    ----------
+    worst : longest time between the two of a pair, s
+
+    """
+
+    def __init__(self) -> None:
+        self._acc: list[Block] = []
+        self._gyr: list[Block] = []
+        self._period = np.nan
+        self.worst = 0.0
+
+    def feed(self, acc: Block | None, gyr: Block | None) -> Block:
+        """Return samples of which both sides are known."""
+        self._acc += [acc] if acc is not None else []
+        self._gyr += [gyr] if gyr is not None else []
+        acc_all, gyr_all = concat(self._acc), concat(self._gyr)
+        until = gyr_all.t[-1] if len(gyr_all) else -np.inf
+        if len(acc_all):
+            until = max(until, acc_all.t[-1] - PATIENCE)
+        ready = int(np.searchsorted(acc_all.t, until))
+        self._acc = [acc_all[ready:]]
+        out = self._paired(acc_all[:ready], gyr_all)
+        if len(out):
+            keep = max(0, int(np.searchsorted(gyr_all.t, out.t[-1])) - 1)
+            self._gyr = [gyr_all[keep:]]
+        elif len(gyr_all):
+            late = int(np.searchsorted(gyr_all.t, gyr_all.t[-1] - PATIENCE))
+            self._gyr = [gyr_all[late:]]
+        return out
+
+    def rest(self) -> Block:
+        """Return the last samples."""
+        return self._paired(concat(self._acc), concat(self._gyr))
+
+    def _paired(self, acc: Block, gyr: Block) -> Block:
+        if not len(acc):
+            return acc
+        if len(acc) > 1:
+            self._period = float(np.median(np.diff(acc.t)))
+        out = np.full((len(acc), 3), np.nan)
+        if len(gyr):
+            right = np.searchsorted(gyr.t, acc.t).clip(0, len(gyr) - 1)
+            left = (right - 1).clip(0)
+            nearer = np.abs(gyr.t[left] - acc.t) <= np.abs(gyr.t[right] - acc.t)
+            nearest = np.where(nearer, left, right)
+            apart = np.abs(gyr.t[nearest] - acc.t)
+            close = ~(apart > self._period / 2)
+            out[close] = gyr.gyr[nearest[close]]
+            if close.any():
+                self.worst = max(self.worst, float(apart[close].max()))
+        return Block.of(acc.t, acc.acc, out, acc.temperature)

@@ -1,0 +1,106 @@
+"""Numbers in columns that the user has named, as samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
+from fieldcal.importing.recording import Wanted
+from fieldcal.session.sample_files import COLUMNS
+
+SKIP = "_"
+"""Stands for a column that is not wanted."""
+
+
+def check(wanted: Wanted) -> None:
+    """Refuse columns that cannot give samples.
+
+    Raises
+    ------
+    InputError
+        Naming the column or unit.
+
+    """
+    known = [c.partition("=")[0] for c in wanted.columns]
+    for name in known:
+        if name not in (*COLUMNS, SKIP):
+            raise InputError(
+                f"column {name!r} is none of: {', '.join(COLUMNS)}, _ to skip one"
+            )
+    named = [c for c in known if c != SKIP]
+    if len(set(named)) < len(named):
+        raise InputError(f"a column is named twice in {','.join(wanted.columns)}")
+    if not {"ax", "gx", "temperature"} & set(named):
+        raise InputError("name the columns: neither ax ay az nor gx gy gz is there")
+    if "t" not in named and not wanted.rate_hz:
+        raise InputError("no column is t, the time: give the rate, e.g. --rate 100")
+    _ = wanted.acc_scale, wanted.gyr_scale, wanted.time_scale
+
+
+class Samples:
+    """Makes samples of columns, piece by piece.
+
+    Parameters
+    ----------
+    wanted : units, and the rate where no column is the time
+
+    """
+
+    def __init__(self, wanted: Wanted) -> None:
+        self._wanted = wanted
+        self._seen = 0
+
+    def block(self, columns: Mapping[str, Array], n: int) -> Block:
+        """Samples of the next n rows; what is not there is unknown."""
+        wanted = self._wanted
+
+        def triad(kind: str, scale: float) -> Array:
+            there = [(i, columns.get(kind + axis)) for i, axis in enumerate("xyz")]
+            whole = all(column is not None for _, column in there)
+            # a channel in one piece: all that follows goes through one channel at once
+            table = np.empty((3, n)) if whole else np.full((3, n), np.nan)
+            for i, column in there:
+                if column is not None:
+                    np.multiply(column, scale, out=table[i])
+            return table.T
+
+        if "t" in columns:
+            t = columns["t"] * wanted.time_scale
+        else:
+            t = (self._seen + np.arange(n)) / (wanted.rate_hz or 1.0)
+        self._seen += n
+        return Block.of(
+            t,
+            triad("a", wanted.acc_scale),
+            triad("g", wanted.gyr_scale),
+            columns.get("temperature"),
+            columns.get("seq"),
+            columns.get("t_host"),
+        )
+
+
+def units(wanted: Wanted) -> str:
+    """Name the units of the columns that are wanted."""
+    known = {c.partition("=")[0] for c in wanted.columns}
+    says = []
+    for channel, unit, lsb in (
+        ("ax", wanted.acc_unit or "m/s^2", wanted.acc_lsb),
+        ("gx", wanted.gyr_unit or "rad/s", wanted.gyr_lsb),
+    ):
+        if channel in known:
+            says.append(f"{lsb:g} counts/({unit})" if lsb != 1 else unit)
+    return ", ".join(says) or "deg C"
+
+
+def notes(wanted: Wanted) -> dict[str, object]:
+    """What a session keeps of the units."""
+    return {
+        "acc_unit": wanted.acc_unit or "m/s^2",
+        "acc_lsb": wanted.acc_lsb,
+        "gyr_unit": wanted.gyr_unit or "rad/s",
+        "gyr_lsb": wanted.gyr_lsb,
+        "time_unit": wanted.time_unit or "s",
+    }

@@ -1,0 +1,227 @@
+"""A session folder made of a stream of a recording, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import time
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.errors import InputError, SessionError, disk_says
+from fieldcal.core.samples import Block
+from fieldcal.importing.merge import Joined
+from fieldcal.importing.recording import Recording
+from fieldcal.importing.spool import Spilled
+from fieldcal.importing.validation import Judge, Written, digest
+from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
+from fieldcal.windows.cells import Cells
+from fieldcal.windows.stretches import still_in, summary
+
+LONG = 5.0
+"""Mean periods without a sample that are a gap."""
+
+
+@dataclass(slots=True)
+class Facts:
+    """What was found in a stream.
+
+    Attributes
+    ----------
+    rows : samples that were taken
+    start_s, end_s : first and last time
+    gaps, longest_gap_s : times that no sample came for `LONG` mean periods
+    coldest, warmest : deg C, None where there is no temperature
+    left_out : rows that were left out, where that was asked for
+
+    """
+
+    rows: int = 0
+    start_s: float = float("nan")
+    end_s: float = float("nan")
+    gaps: int = 0
+    longest_gap_s: float = 0.0
+    coldest: float | None = None
+    warmest: float | None = None
+    left_out: int = 0
+    _period: float = float("nan")
+
+    def add(self, block: Block) -> None:
+        """Take in the block that follows."""
+        if not self.rows:
+            self.start_s = float(block.t[0])
+            if len(block) > 1:
+                self._period = float((block.t[-1] - block.t[0]) / (len(block) - 1))
+        pause = float(block.t[0]) - self.end_s if self.rows else 0.0
+        steps = block.t[1:] - block.t[:-1]
+        for gaps in (np.array([pause]), steps):
+            many = np.count_nonzero(gaps > LONG * self._period)
+            self.gaps += int(many)
+            if many:
+                self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
+        self.rows += len(block)
+        self.end_s = float(block.t[-1])
+        known = block.temperature[np.isfinite(block.temperature)]
+        if len(known):
+            low, high = float(known.min()), float(known.max())
+            self.coldest = low if self.coldest is None else min(low, self.coldest)
+            self.warmest = high if self.warmest is None else max(high, self.warmest)
+
+    @property
+    def rate_hz(self) -> float:
+        """Mean rate, Hz; nan of one sample."""
+        span = self.end_s - self.start_s
+        return (self.rows - 1) / span if span > 0 else float("nan")
+
+    def sentence(self) -> str:
+        """Say it in a line."""
+        says = [f"{self.rows} samples over {self.end_s - self.start_s:.1f} s"]
+        if np.isfinite(self.rate_hz):
+            says.append(f"{self.rate_hz:.4g} Hz")
+        if self.coldest is not None:
+            says.append(f"{self.coldest:.1f} to {self.warmest:.1f} °C")
+        if self.gaps:
+            many = f"{self.gaps} gaps of up to" if self.gaps > 1 else "a gap of"
+            says.append(f"{many} {self.longest_gap_s:.3g} s")
+        return ", ".join(says)
+
+    def table(self) -> dict[str, Any]:
+        """What a mark keeps of it."""
+        kept = {k: v for k, v in asdict(self).items() if not k.startswith("_")}
+        rate = self.rate_hz
+        return kept | {"rate_hz": round(rate, 6) if np.isfinite(rate) else None}
+
+
+@dataclass(frozen=True, slots=True)
+class Brought:
+    """A session that was made.
+
+    Attributes
+    ----------
+    folder : where
+    facts : what was found
+    stretches : where the device was still, s of device time
+    says : what the user must know, repairs first
+
+    """
+
+    folder: Path
+    facts: Facts
+    stretches: list[tuple[float, float]]
+    says: list[str]
+
+
+def bring_in(
+    recording: Recording,
+    stream: str,
+    folder: Path,
+    about: Mapping[str, Any],
+    still: float,
+) -> Brought:
+    """Make a session of one stream.
+
+    Parameters
+    ----------
+    recording, stream : what is brought in
+    folder : made new, or empty
+    about : tables of session.toml but the positions
+    still : shortest still stretch that counts as a position, s
+
+    Raises
+    ------
+    InputError
+        If the recording cannot be used; names file, row and column.
+    SessionError
+        If the folder cannot be written.
+
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise InputError(f"{folder}: is not empty; name another folder with -o")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+        try:
+            brought = _fill(part, recording, stream, about, still)
+            part.chmod(0o755)
+            _settle(*part.iterdir(), part)
+            part.replace(folder)
+            _settle(folder.parent)
+        except BaseException:
+            shutil.rmtree(part, ignore_errors=True)
+            raise
+    except OSError as error:
+        raise SessionError(
+            f"{folder}: cannot be written: {disk_says(error)}"
+        ) from error
+    return Brought(folder, *brought)
+
+
+def _settle(*paths: Path) -> None:
+    """See files and folders onto the disk: a power cut must leave no empty ones."""
+    for path in paths if os.name == "posix" else ():
+        there = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(there)
+        finally:
+            os.close(there)
+
+
+def _fill(
+    part: Path,
+    recording: Recording,
+    stream: str,
+    about: Mapping[str, Any],
+    still: float,
+) -> tuple[Facts, list[tuple[float, float]], list[str]]:
+    import tomlkit
+
+    judge = Judge(str(recording.path), recording.place, recording.repair)
+    facts, cells = Facts(), Cells()
+    with Written(part / "samples.parquet") as written, Spilled(part) as rows:
+        for block in recording.blocks(stream):
+            good = judge.good(block)
+            if len(good):
+                facts.add(good)
+                cells.add(good)
+                rows.add(summary(cells.take_complete()))
+                written.add(good)
+        if not facts.rows:
+            raise InputError(f"{recording.path}: has no row that can be used")
+        facts.left_out = judge.left_out
+        written.close()
+        rest = cells.table
+        rows.add(summary(rest))
+        stretches = still_in(rows, rest.origin, written.between, still)
+    repairs = [*recording.mended, *judge.mended]
+    positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
+    text = tomlkit.dumps({**about, "position": positions})
+    (part / DESCRIPTION).write_text(text, encoding="utf-8")
+    (part / MARKS).write_text(_marks(recording, stream, facts, repairs), "utf-8")
+    return facts, stretches, [*repairs, *recording.says]
+
+
+def _marks(recording: Recording, stream: str, facts: Facts, repairs: list[str]) -> str:
+    """What is kept of where the samples come from."""
+    parts = recording.parts if isinstance(recording, Joined) else [recording]
+    now = round(time(), 3)
+    imported = {
+        "event": "imported",
+        "files": [digest(part.path) for part in parts],
+        "format": type(parts[0]).__module__.rpartition(".")[2],
+        "stream": stream,
+        **facts.table(),
+        "repairs": repairs,
+        "says": recording.says,
+        "host_s": now,
+    }
+    notes = dict(recording.notes(stream))
+    grain = notes.pop("grain", None)
+    marks = [imported, {"event": "device", **notes, "host_s": now}]
+    if grain is not None:
+        marks.append({"event": "grain", **grain, "host_s": now})
+    return "".join(mark_line(mark) for mark in marks)

@@ -1,0 +1,180 @@
+"""What a recording from elsewhere is.
+
+A recording holds the samples of one or several IMUs, each a stream with a name. They
+come piece by piece, so that a log may be as long as it likes.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
+from fieldcal.importing.gzip_stream import PIECE, pieces
+from fieldcal.session.description import ACC_UNITS, GYR_UNITS
+
+ROWS = 1 << 15
+"""Rows that are looked at together."""
+
+MOST = 12
+"""Faults of a file that are listed one by one."""
+
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the user says of a file that does not say it itself.
+
+    Attributes
+    ----------
+    columns : what each column is, or ``t=name`` pairs for columns that have names
+    rate_hz : where there is no time
+    separator, skip : of text files
+    acc_unit, gyr_unit, time_unit : of the file; "" is not said, and SI
+    acc_lsb, gyr_lsb : counts in one unit, for raw counts
+    options : as in a device's address, ``name=value&name=value``
+
+    """
+
+    columns: tuple[str, ...] = ()
+    rate_hz: float | None = None
+    separator: str | None = None
+    skip: int | None = None
+    acc_unit: str = ""
+    gyr_unit: str = ""
+    time_unit: str = ""
+    acc_lsb: float = 1.0
+    gyr_lsb: float = 1.0
+    options: str = ""
+
+    @property
+    def acc_scale(self) -> float:
+        """SI units (or counts, volts) in one of the file's."""
+        return _unit(self.acc_unit or "m/s^2", ACC_UNITS) / self.acc_lsb
+
+    @property
+    def gyr_scale(self) -> float:
+        """SI units (or counts, volts) in one of the file's."""
+        return _unit(self.gyr_unit or "rad/s", GYR_UNITS) / self.gyr_lsb
+
+    @property
+    def time_scale(self) -> float:
+        """Seconds in one of the file's unit of time."""
+        return _unit(self.time_unit or "s", TIME_UNITS)
+
+
+def _unit(unit: str, known: dict[str, float]) -> float:
+    if unit not in known:
+        raise InputError(f"unit {unit!r} is none of: {', '.join(known)}")
+    return known[unit]
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """One IMU of a recording.
+
+    Attributes
+    ----------
+    name : by which it is chosen
+    says : what it is and in which units, a line
+
+    """
+
+    name: str
+    says: str
+
+
+class Recording(ABC):
+    """A file, opened.
+
+    Attributes
+    ----------
+    says : what the user must know, one sentence each; grows while it is read
+    mended : what was left out because it was damaged, grows likewise
+    ends_early : whether it was cut off, as far as it was read
+
+    """
+
+    ends_early = False
+
+    def __init__(self, path: Path, wanted: Wanted, repair: bool = False) -> None:
+        self.path, self.wanted, self.repair = path, wanted, repair
+        modules, extra = self.needs()
+        if missing := [m for m in modules if find_spec(m) is None]:
+            raise InputError(
+                f"{path}: reading it needs {' and '.join(missing)}: "
+                f"pip install 'fieldcal[{extra}]'"
+            )
+        self.says: list[str] = []
+        self.mended: list[str] = []
+        self._more = 0
+
+    def needs(self) -> tuple[tuple[str, ...], str]:
+        """Modules that reading it takes, and the extra of fieldcal that brings them."""
+        return (), ""
+
+    @abstractmethod
+    def streams(self) -> list[Stream]:
+        """The IMUs in it."""
+
+    @abstractmethod
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """Samples of one of them in the order of the file, SI units, device axes."""
+
+    def notes(self, stream: str) -> dict[str, Any]:
+        """What the file says of the device: units, what it has installed."""
+        return {}
+
+    def place(self, row: int) -> str:
+        """Name a sample, counted from 0, as its file does."""
+        return f"row {row + 1}"
+
+    def pieces(self, size: int = PIECE) -> Iterator[bytes]:
+        """Bytes of the file, unpacked, up to where it was cut off."""
+        return pieces(self.path, size, self.cut_off)
+
+    def cut_off(self, where: str, what: str) -> None:
+        """Refuse a file that ends too early, or be content with what comes before.
+
+        Raises
+        ------
+        InputError
+            Where the user did not ask for a repair.
+
+        """
+        self._refuse(where, what, "take what is whole before that")
+        self.ends_early = True
+        sentence = f"{where}: {what}; what was whole before that is taken"
+        if sentence not in self.mended:
+            self.mended.insert(0, sentence)
+
+    def _refuse(self, where: str, what: str, mend: str) -> None:
+        """Raise, unless the user asked for a repair."""
+        if not self.repair:
+            raise InputError(
+                f"{self.path}: {where}: {what}; copy the file again, or {mend} with"
+                " --repair"
+            )
+
+    def damaged(self, where: str, what: str) -> None:
+        """Refuse a damaged place, or take note that it was left out.
+
+        Raises
+        ------
+        InputError
+            Where the user did not ask for a repair.
+
+        """
+        self._refuse(where, what, "leave such places out")
+        if len(self.mended) < MOST:
+            self.mended.append(f"{where}: {what}, left out")
+            self._more = 0
+            return
+        self._more += 1
+        self.mended[MOST:] = [f"{self._more} more damaged places, left out"]

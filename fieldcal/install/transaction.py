@@ -1,0 +1,158 @@
+"""Writing a calibration onto an autopilot so that it can always be taken back.
+
+The old set is saved before the first parameter is touched. After writing everything is
+read back; if anything is not as wanted, the old set is written and read back as well.
+What is saved says what was there, what was written, and whether that succeeded.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.drivers.mavlink_installed import Installed, identity
+from fieldcal.drivers.mavlink_parameters import Parameters, same
+from fieldcal.drivers.mavlink_talk import listed
+from fieldcal.session.folder import DESCRIPTION, Session, write_whole
+
+SAVED = "installed-before-"
+"""What the name of a file with an old set begins with."""
+
+
+class Undone(DeviceError):
+    """Writing failed, and the old set is back."""
+
+
+def check_unchanged(
+    link: Parameters,
+    known: Mapping[str, float],
+    since: str,
+    other: Mapping[str, float] | None = None,
+) -> None:
+    """Refuse if the autopilot does not keep what it is thought to.
+
+    Parameters
+    ----------
+    link : to the autopilot
+    known : what it should keep
+    since : when it kept that, for the error
+    other : what it may keep instead, parameter by parameter
+
+    Raises
+    ------
+    InputError
+        Naming the first parameter that differs.
+
+    """
+    now = link.read(known)
+    for name, value in known.items():
+        also = (other or {}).get(name, value)
+        if not (same(now[name], value) or same(now[name], also)):
+            raise InputError(
+                f"{name} = {now[name]:.9g} on the autopilot, and was {value:.9g}"
+                f" {since}: somebody has changed it since; record again"
+            )
+
+
+def install(
+    link: Parameters, old: Mapping[str, float], new: Mapping[str, float]
+) -> None:
+    """Write, read back, and undo it if anything is not as wanted.
+
+    Raises
+    ------
+    DeviceError
+        If it failed; the text says whether the old set is back.
+
+    """
+    try:
+        link.write(new)
+    except (DeviceError, KeyboardInterrupt) as failed:
+        said = str(failed) or "interrupted"
+        try:
+            link.write(old)
+        except DeviceError as again:
+            raise DeviceError(
+                f"{said}; and it could not be undone ({again}): set by hand"
+                f" {listed(old)}"
+            ) from failed
+        raise Undone(f"{said}; undone, all {len(old)} are as before") from failed
+
+
+def save(
+    folder: Path, device: str, old: Mapping[str, float], new: Mapping[str, float]
+) -> Path:
+    """Save the old set before anything is written; where.
+
+    Raises
+    ------
+    SessionError
+        If it cannot be saved.
+
+    """
+    stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S-%f")
+    path = folder / f"{SAVED}{stamp}.json"
+    document = {"device": device, "old": dict(old), "new": dict(new)}
+    return write_whole(path, json.dumps(document, indent=2) + "\n")
+
+
+def note_done(path: Path, **what: Any) -> None:
+    """Note in a saved set what became of it: ``done``, ``undone``."""
+    document = json.loads(path.read_text("utf-8"))
+    write_whole(path, json.dumps({**document, **what}, indent=2) + "\n")
+
+
+def taken_out(folder: Path) -> list[Path]:
+    """Save the set that a run set to no calibration; no file if it did not.
+
+    A run gives it back when it ends; one that was killed, or lost the link, did not.
+    """
+    session = Session.open(folder)
+    device = session.about.raw.get("run", {}).get("device", "")
+    for mark in reversed(list(session.marks())):
+        told = mark.get("installed") if mark.get("event") == "device" else None
+        if not (told and told.get("taken_out")):
+            continue
+        known = Installed.from_table(told)
+        new = identity(known)
+        old = {name: known.values[name] for name in new}
+        if old != new:  # else a run before it had taken out what there was
+            first = device if isinstance(device, str) else device[0]
+            return [save(folder, first, old, new)]
+    return []
+
+
+def saved(path: Path) -> tuple[Path, dict[str, Any]]:
+    """The last set that was saved in a session and written, or the one of a file.
+
+    Where nothing was written: what a run had taken out and could not give back.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it cannot be read.
+
+    """
+    files = sorted(path.glob(f"{SAVED}*.json")) if path.is_dir() else [path]
+    if not files and (path / DESCRIPTION).is_file():
+        files = taken_out(path)
+    for file in reversed(files):
+        try:
+            document = json.loads(file.read_text("utf-8"))
+            old, new = ({str(k): float(v) for k, v in document[key].items()}
+                        for key in ("old", "new"))  # fmt: skip
+            known = {"device": str(document["device"]), "old": old, "new": new}
+        except (OSError, ValueError, KeyError, AttributeError, TypeError) as error:
+            raise InputError(
+                f"{file}: is no saved set of parameters: {error}"
+            ) from error
+        if not document.get("undone"):
+            return file, known
+    raise InputError(
+        f"{path}: nothing was written from there that could be undone; name the session"
+        " that was written, or its installed-before file"
+    )

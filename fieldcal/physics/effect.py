@@ -1,0 +1,196 @@
+"""What an effect of the catalogue states: equation, parameters, sizes, what to do.
+
+The simulation everyone starts from is bias, scale factor and white noise,
+
+    U = b + diag(k) f + n,    W = d + diag(s) w + n
+
+with the specific force f (m/s^2) and the angular rate w (rad/s) that the known turns,
+local gravity and, for navigation grade, the Earth bring about, in device axes. Effects
+are of three kinds:
+
+- motion: they change what the sensors experience, f and w (`Motion`);
+- sensor: they add to what comes out (`Sensor`), linear in their parameters once the
+  shape parameters (a time constant, an instant) are given;
+- chain: they happen to samples (`Chain`): found on samples, modelled by leaving some
+  out, by shifting or by widening.
+
+Two forms cut across the kinds: a `Scatter` is random, has no equation but a covariance,
+and widens the intervals; a `Line` is an oscillation, found in the spectrum.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.recording import Fault, Recording
+from fieldcal.physics.shape import Shape
+
+Kind = Literal["motion", "sensor", "chain"]
+Seen = Literal[
+    "position", "time", "temperature", "spectrum", "transient", "samples", "turn"
+]
+"""What a mismatch depends on."""
+
+CHANCE = 0.01
+"""That a session has an effect, where its file states no other: one of a hundred."""
+
+BEYOND = 5e-4
+"""The same of what would change by itself beside a temperature that is known to."""
+
+Values = Sequence[float] | Array
+NO_SHAPE: Mapping[str, float] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class Param:
+    """One parameter: its name in the catalogue, its unit, the size it can have.
+
+    `typical` is the upper end of what is seen; it sets what an explanation that needs
+    the parameter costs.
+    """
+
+    name: str
+    unit: str
+    typical: float
+
+
+class Effect(ABC):
+    """One physical effect.
+
+    Attributes
+    ----------
+    kind : motion, sensor or chain
+    params : its parameters, shape parameters not among them
+    shapes : its shape parameters
+    covariate : what it is seen through
+    seen_in : the kind of mismatch that it makes
+    decided_by : what the operator can do to tell it from others
+    cure : what to do about it once it is known to be there, in sentences
+    source : where the equation and the sizes come from
+
+    """
+
+    kind: ClassVar[Kind]
+    params: ClassVar[tuple[Param, ...]] = ()
+    shapes: ClassVar[tuple[Shape, ...]] = ()
+    covariate: ClassVar[str]
+    seen_in: ClassVar[Seen] = "position"
+    carried_by: ClassVar[str] = ""
+    """Group of a calibration that has it in it, beside one of its own name."""
+
+    like_calibration: ClassVar[bool] = False
+    """Whether bias and scale factor do the same, so that it is only ever possible."""
+
+    decided_by: ClassVar[str]
+    cure: ClassVar[str]
+    source: ClassVar[str]
+
+    def applies(self, x: Experience) -> bool:
+        """Whether what it hangs on is known in some rows."""
+        return True
+
+    def chance(self, x: Experience) -> float:
+        """Probability that a session has it, before its rows are seen."""
+        return CHANCE
+
+    def late(self, values: Values) -> float:
+        """Seconds by which it makes the gyroscopes late."""
+        return 0.0
+
+    @property
+    def id(self) -> str:
+        """Name in the catalogue, which is the file's."""
+        return type(self).__module__.rpartition(".")[2]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, shape parameters last."""
+        return tuple(p.name for p in self.params) + tuple(s.name for s in self.shapes)
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter."""
+        units = {p.name: p.unit for p in self.params}
+        return (units | {s.name: s.unit for s in self.shapes})[name]
+
+
+class Motion(Effect):
+    """An effect on what the sensors experience.
+
+    `order` is the place in which several are applied: what changes the vectors in the
+    base first, then the base itself, then the joints.
+    """
+
+    kind = "motion"
+    order: ClassVar[int] = 0
+    on_the_way: ClassVar[bool] = False
+    """Whether it acts while the device is turned, and at rest not at all."""
+
+    @abstractmethod
+    def change(self, x: Experience, values: Values) -> Experience:
+        """Return what is experienced with the effect; `values` in `params` order."""
+
+
+class Sensor(Effect):
+    """An effect on the outputs, linear in its parameters."""
+
+    kind = "sensor"
+
+    @abstractmethod
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """Differentiate the six outputs by the parameters, (n, 6, k).
+
+        Outputs in `samples.CHANNELS` order, m/s^2 and rad/s.
+        """
+
+
+class Scatter(Effect):
+    """A random effect: no equation but a size, which its parameters are.
+
+    Those of every output are walks of the biases; others are of the positions' angles.
+    """
+
+
+class Line(Effect):
+    """An oscillation: a line in the spectrum of the outputs at rest."""
+
+    seen_in = "spectrum"
+
+    band: ClassVar[tuple[float, float]]
+    """Lowest and highest frequency, Hz."""
+
+    @abstractmethod
+    def response(self, x: Experience, hz: float) -> NDArray[np.complexfloating]:
+        """Complex amplitude of the outputs per unit of each complex cause, (n, 6, m).
+
+        An output is Re(response @ cause exp(2 pi i hz t)).
+        """
+
+
+class Chain(Effect):
+    """An effect on samples."""
+
+    kind = "chain"
+    seen_in: ClassVar[Seen] = "samples"
+
+    misread: ClassVar[bool] = False
+    """Whether session.toml is wrong and not the samples: a calibration of samples that
+    are put right is none of those that the device sends."""
+
+    @abstractmethod
+    def find(self, recording: Recording) -> list[Fault]:
+        """Look for it in the samples."""
+
+
+def six(unit_acc: str, acc: float, unit_gyr: str, gyr: float) -> tuple[Param, ...]:
+    """Parameters ax ay az gx gy gz with their units and typical sizes."""
+    return tuple(Param(f"a{i}", unit_acc, acc) for i in "xyz") + tuple(
+        Param(f"g{i}", unit_gyr, gyr) for i in "xyz"
+    )

@@ -1,0 +1,156 @@
+"""What the device goes through, row by row, and how a fixture brings it about.
+
+    f = P^T A(alpha, beta) f_base                        specific force, m/s^2
+    w = P^T (A(alpha, beta) w_base + rate)               angular rate, rad/s
+
+A is the turn (3), P the mounting (procedure = P device), f_base = (0, -g, 0) on a level
+base, w_base the Earth's rate where the gyroscopes see it, `rate` what a rate table
+adds; of the Earth's rate, what lies across that goes round with the table and averages
+out. f and w are in device axes, f_base, w_base and rate in procedure axes. Source:
+Avrutov and Pozniak 2023, (3), (4), (39); signs as in `fieldcal.core.frames`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from fieldcal.core.frames import force_home, lasting, seen_after
+from fieldcal.core.samples import Array
+
+STEADY = 1e-3
+"""Sine of the angle between rate and force up to which a turn leaves the force."""
+
+
+@dataclass(frozen=True, slots=True)
+class Experience:
+    """Rows (windows, block means or samples) and what the device goes through in each.
+
+    Attributes
+    ----------
+    alpha, beta : (n,) rad, the turns; nan where not known
+    f : (n, 3) m/s^2, specific force in device axes
+    w : (n, 3) rad/s, angular rate in device axes
+    w_dot : (n, 3) rad/s^2, angular acceleration in device axes
+    t : (n,) s, device time
+    lasts : (n,) s, what each row is a mean over; 0 for samples
+    since_start : (n,) s since the session's start
+    since_turn : (n,) s since the device was last turned
+    warming : (n,) K, temperature less that at the session's start; nan where unknown
+    heating : (n,) K/s, rate of change of the temperature
+    variance : (n, 3) (m/s^2)^2, of vibration on the accelerometers
+    position : (n,) index of the position, -1 while the device is turned
+    rate : (n, 3) rad/s about the procedure axes, what a rate table adds
+    base_force : (3,) m/s^2, specific force in base axes
+    base_rate : (3,) rad/s, the Earth's rate in base axes; zero where it is left out
+    mounting : (3, 3) P, procedure = P device
+    latitude : rad; nan where unknown
+
+    """
+
+    alpha: Array
+    beta: Array
+    f: Array
+    w: Array
+    w_dot: Array
+    t: Array
+    lasts: Array
+    since_start: Array
+    since_turn: Array
+    warming: Array
+    heating: Array
+    variance: Array
+    position: np.ndarray[Any, np.dtype[np.int_]]
+    rate: Array
+    base_force: Array
+    base_rate: Array
+    mounting: Array
+    latitude: float
+
+    @classmethod
+    def at_rest(cls, alpha: Array, beta: Array, gravity: float, **known: Any) -> Self:
+        """Rows in known positions at rest; whatever else is known by its field's name.
+
+        Parameters
+        ----------
+        alpha, beta : (n,) rad
+        gravity : m/s^2
+
+        >>> x = Experience.at_rest(np.array([0.0]), np.array([0.0]), 9.81)
+        >>> x.f + 0.0
+        array([[ 0.  , -9.81,  0.  ]])
+        """
+        alpha, beta = np.asarray(alpha, float), np.asarray(beta, float)
+        n = len(alpha)
+        unknown = {
+            "f": np.full((n, 3), np.nan),
+            "w": known.get("rate", np.zeros((n, 3))) @ known.get("mounting", np.eye(3)),
+            "w_dot": np.zeros((n, 3)),
+            "t": np.arange(n, dtype=float),
+            "lasts": np.zeros(n),
+            "since_start": np.arange(n, dtype=float),
+            "since_turn": np.full(n, np.inf),
+            "warming": np.zeros(n),
+            "heating": np.zeros(n),
+            "variance": np.zeros((n, 3)),
+            "position": np.arange(n),
+            "rate": np.zeros((n, 3)),
+            "base_force": force_home(gravity),
+            "base_rate": np.zeros(3),
+            "mounting": np.eye(3),
+            "latitude": np.nan,
+        }
+        return cls(alpha, beta, **(unknown | known)).turned()
+
+    def __len__(self) -> int:
+        return len(self.alpha)
+
+    @property
+    def gravity(self) -> float:
+        """Local gravity, m/s^2."""
+        return float(np.linalg.norm(self.base_force))
+
+    @property
+    def warms(self) -> bool:
+        """Whether a thermometer shows that the temperature changes."""
+        return bool(np.isfinite(self.warming).all() and np.ptp(self.warming) > 0)
+
+    @property
+    def oriented(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Rows whose both angles are known, (n,)."""
+        known: np.ndarray[Any, np.dtype[np.bool_]] = np.isfinite(self.alpha + self.beta)
+        return known
+
+    @property
+    def force_known(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Rows in which the turning of a rate table does not turn the force, (n,)."""
+        speed = np.linalg.norm(self.rate, axis=1)
+        across = np.linalg.norm(np.cross(self.rate @ self.mounting, self.f), axis=1)
+        steady = across <= STEADY * speed * self.gravity
+        known: np.ndarray[Any, np.dtype[np.bool_]] = (speed == 0) | (
+            self.oriented & steady
+        )
+        return known
+
+    def turned(self, **changes: Any) -> Self:
+        """Make the changes and bring f and w of the oriented rows up to date.
+
+        `changes` are those of alpha, beta, base_force, base_rate, and of f elsewhere.
+        """
+        alpha, beta, base_force, base_rate = (
+            changes.get(name, getattr(self, name))
+            for name in ("alpha", "beta", "base_force", "base_rate")
+        )
+        force = seen_after(alpha, beta, base_force) @ self.mounting
+        earth = seen_after(alpha, beta, base_rate) @ self.mounting
+        if self.rate.any():
+            table = self.rate @ self.mounting
+            earth = table + (lasting(table) @ earth[:, :, None])[:, :, 0]
+        known = np.isfinite(alpha + beta)[:, None]
+        made = {
+            "f": np.where(known, force, changes.get("f", self.f)),
+            "w": np.where(known, earth, self.w),
+        }
+        return replace(self, **(changes | made))

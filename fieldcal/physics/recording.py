@@ -1,0 +1,156 @@
+"""What the checks of the signal chain look at, and what they report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.physics.experience import Experience
+
+Rows = NDArray[np.intp]
+
+ENOUGH = 20_000
+"""Samples that show the grid that values lie on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Samples, and what was known about them.
+
+    Attributes
+    ----------
+    block : the samples, SI
+    windows : (p, 2) first and one past the last sample of each position's window
+    x : what each position should bring about, p rows
+    scale, bias : (6,) nominal calibration, in `samples.CHANNELS` order
+    noise : (6,) standard deviation of one sample, as means over a second obey it
+    quick : (6,) the same, as one sample differs from the next
+    steps : (6,) step of the grid that values lie on, 0 where they lie on none
+    limits : (2,) full scale of accelerometers and gyroscopes, SI; nan where unknown
+    rate_hz : nominal rate; nan where unknown
+
+    """
+
+    block: Block
+    windows: Rows
+    x: Experience
+    scale: Array
+    bias: Array
+    noise: Array
+    quick: Array
+    steps: Array
+    limits: Array
+    rate_hz: float
+
+    @property
+    def still(self) -> NDArray[np.bool_]:
+        """Samples in one of the windows, (n,)."""
+        inside = np.zeros(len(self.block), dtype=bool)
+        for first, last in self.windows:
+            inside[first:last] = True
+        return inside
+
+    def channel(self, c: int) -> Array:
+        """Samples of one output by its index in `samples.CHANNELS`, (n,)."""
+        triad = self.block.acc if c < 3 else self.block.gyr
+        return np.ascontiguousarray(triad[:, c % 3])
+
+    def six(self, first: int, last: int) -> Array:
+        """All outputs of some samples, (n, 6), each channel in one piece."""
+        out = np.empty((6, last - first))
+        out[:3] = self.block.acc[first:last].T
+        out[3:] = self.block.gyr[first:last].T
+        return out.T
+
+    def position_of(self, row: int) -> int:
+        """Index of the position whose window holds a sample, -1 if none does."""
+        inside = (self.windows[:, 0] <= row) & (row < self.windows[:, 1])
+        return int(np.argmax(inside)) if inside.any() else -1
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Something that happened to samples.
+
+    Attributes
+    ----------
+    channel : name in `samples.CHANNELS`, "t" or "temperature"
+    values : by the effect's parameter name; text where it is no number
+    sigmas : standard uncertainty of the values that are numbers
+    from_s, to_s : stretch of device time concerned
+    rows : (m,) samples of the channel that are not to be used
+    size : departure, in the channel's unit
+    sigma : significance, in standard deviations
+    mended : (n, 6) outputs put right, where they can be
+    channels : every channel concerned, if there are several
+
+    """
+
+    channel: str
+    values: Mapping[str, float | str]
+    sigmas: Mapping[str, float]
+    from_s: float
+    to_s: float
+    rows: Rows = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    size: float = 0.0
+    sigma: float = np.inf
+    mended: Array | None = None
+    channels: tuple[str, ...] = ()
+
+
+def runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """First and one past the last of each run of True, (m, 2).
+
+    >>> runs(np.array([False, True, True, False, True])).tolist()
+    [[1, 3], [4, 5]]
+    """
+    padded = np.concatenate([[False], flags, [False]]).astype(np.int8)
+    steps = np.diff(padded)
+    return np.column_stack([np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)])
+
+
+def medians(values: Array) -> Array:
+    """Median of what is known in each row, (n,); nan where nothing is.
+
+    `numpy.median` looks for nan in each row, which takes four times as long.
+    """
+    if not np.isfinite(values.sum()):
+        some = [row[np.isfinite(row)] for row in values]
+        return np.array([np.median(row) if len(row) else np.nan for row in some])
+    half, odd = divmod(values.shape[1], 2)
+    ordered = np.partition(values, half, axis=1)
+    upper: Array = ordered[:, half]
+    return upper if odd else (ordered[:, :half].max(axis=1) + upper) / 2
+
+
+def lsb_of(values: Array) -> float:
+    """Step of the grid that values lie on, 0 where they lie on none.
+
+    Zero is not looked at: half a step added outward to what was cut off towards zero
+    leaves it where it is.
+
+    >>> round(lsb_of(np.array([0.5, 1.25, -0.25, 1.0])), 12)
+    0.25
+    """
+    some = values[:ENOUGH]
+    some = some[np.isfinite(some)]
+    if len(some) < min(ENOUGH, len(values)):
+        some = values[np.isfinite(values)][:ENOUGH]
+    distinct = np.unique(some[some != 0.0])
+    gaps = np.diff(distinct)
+    gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]
+    if len(gaps) < 2:
+        return 0.0
+    step = float(gaps.min())
+    for _ in range(3):  # the grid's own step is the mean over many, not one difference
+        steps = gaps / step
+        whole = np.round(steps)
+        if np.abs(steps - whole).max() > 0.1 + 0.02 * whole.max() ** 0.5:
+            return 0.0
+        step = float(gaps.sum() / whole.sum())
+    off = np.abs(gaps / step - np.round(gaps / step))
+    return step if off.max() < 0.05 else 0.0

@@ -1,0 +1,96 @@
+"""Parameters that the outputs are not linear in: their ranges, and values to try."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.physics.experience import Experience
+
+POINTS = 16
+"""Values of a time constant to try: an exponential changes little from one to the
+next."""
+
+PIECES = 4
+"""Instants to try within a window; the best is refined by the samples."""
+
+WITHIN = (0.25, 0.08, 0.025, 0.008)
+"""Parts of a row by which an instant is moved in it, closer and closer."""
+
+FINEST = 1.06
+"""Ratio of time constants that are told apart last."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A parameter that the outputs are not linear in, and the range to search.
+
+    `kind` says what it is: a time constant of the "session" or since the "turn", an
+    "instant", or the "frequency" of a line, which is found in the spectrum.
+    """
+
+    name: str
+    unit: str
+    low: float = 0.0
+    high: float = np.inf
+    kind: Literal["session", "turn", "instant", "frequency"] = "frequency"
+
+    def grid(self, x: Experience, since: Array) -> Iterator[tuple[float, int]]:
+        """Values to try in rows, each with the origin that times count from.
+
+        `since` (o, n) is the time since the turn, by origin.
+        """
+        span = float(np.ptp(x.t))
+        if self.kind == "instant":
+            yield from ((float(at), 0) for at in instants(x))
+        elif self.kind == "session":
+            low, high = max(self.low, span / 20), min(self.high, 3 * span)
+            for tau in np.geomspace(low, max(high, 1.01 * low), POINTS):
+                yield float(tau), 0
+        elif self.kind == "turn":
+            for origin, times in enumerate(since):
+                if not np.isfinite(soonest := float(times.min())):
+                    continue  # it was never turned
+                low, high = max(self.low, soonest / 4), min(self.high, span / 3)
+                for tau in np.geomspace(low, max(high, 1.01 * low), POINTS):
+                    yield float(tau), origin
+
+    @property
+    def finer(self) -> tuple[float, ...]:
+        """Steps to the next values to try, closer and closer: ratios, or `WITHIN`."""
+        return (1.0, *WITHIN) if self.kind == "instant" else (1.3, 1.13, FINEST)
+
+    def near(self, x: Experience, here: float, ratio: float) -> Sequence[float]:
+        """Values about one: to either side, or every instant next to it.
+
+        Of instants those between rows first, then parts of a row to either side.
+        """
+        if self.kind != "instant":
+            return here / ratio, here * ratio
+        if ratio < 1:
+            k = int(np.argmin(np.abs(x.t - here)))
+            row = float(x.lasts[k])
+            if row == 0 or abs(float(x.t[k]) - here) > 0.6 * row:
+                return []  # between windows: their rows do not tell
+            return [here + part * ratio * row for part in (-2, -1, 1, 2)]
+        middle = (x.t[1:] + x.t[:-1]) / 2
+        grid = instants(x)
+        low = grid[grid < here].max(initial=-np.inf)
+        high = grid[grid > here].min(initial=np.inf)
+        found: list[float] = middle[(low < middle) & (middle < high)].tolist()
+        return [at for at in found if at != here]
+
+
+def instants(x: Experience) -> Array:
+    """Instants at which something may change: between rows, some for each window, s."""
+    middle = (x.t[1:] + x.t[:-1]) / 2
+    turned = np.diff(x.position) != 0
+    each = np.bincount(np.unique(x.position, return_inverse=True)[1])
+    number = np.concatenate([np.arange(n) for n in each])[1:]
+    step = np.repeat(np.maximum(each // PIECES, 1), each)[1:]
+    kept: Array = middle[turned | (number % step == 0)]
+    return kept

@@ -1,0 +1,121 @@
+"""Which effects a set of positions cannot tell apart, from its own design matrix.
+
+What a calibration takes up itself (bias and scale factor of each sensor) is projected
+out of the columns of every effect. An effect with nothing left is *hidden*: it goes
+into the calibration unseen. Two effects are *aliases* when all that is left of one lies
+in the span of the other: cos of the largest principal angle above `ALIKE`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.positions import Position, angles
+from fieldcal.core.samples import Array
+from fieldcal.effects import catalogue
+from fieldcal.model import columns
+from fieldcal.model.columns import View
+from fieldcal.model.state import State
+from fieldcal.physics.effect import Effect, Motion, Sensor
+from fieldcal.physics.experience import Experience
+
+ALIKE = 0.995
+"""Cosine of an angle at which noise of a few percent hides the difference."""
+
+NOTHING = 1e-6
+"""Part of a column that is left, below which it counts as projected out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Aliases:
+    """What the positions cannot tell.
+
+    Attributes
+    ----------
+    hidden : ids that a calibration takes up unseen
+    pairs : (id, ids it can be mistaken for)
+
+    """
+
+    hidden: tuple[str, ...]
+    pairs: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+def aliases(positions: Sequence[Position], gravity: float) -> Aliases:
+    """Effects at rest that the positions hide or confuse.
+
+    Parameters
+    ----------
+    positions : with known angles
+    gravity : m/s^2
+
+    """
+    x = Experience.at_rest(*angles(positions), gravity)
+    perfect = State(np.zeros(6), np.ones(6), np.zeros((0, 2)), np.zeros(3))
+    view = View.of(x, np.full((1, len(x)), np.inf), perfect)
+    base = _calibration(view)
+    left: dict[str, Array] = {}
+    hidden = []
+    for name, effect in catalogue().items():
+        seen = _columns(effect, view)
+        if seen is None or not np.any(seen):
+            continue
+        basis = _span(_without(seen, base), np.linalg.norm(seen, axis=0).max())
+        if basis.shape[1]:
+            left[name] = basis
+        else:
+            hidden.append(name)
+    return Aliases(tuple(hidden), tuple(_pairs(left)))
+
+
+def _columns(effect: Effect, view: View) -> Array | None:
+    """What an effect does to the six outputs at rest, (6n, k); None if nothing."""
+    if effect.shapes or not isinstance(effect, Motion | Sensor) or not effect.params:
+        return None
+    seen = columns.of_effect(effect, {}, 0).of(view)
+    typical = np.array([p.typical for p in effect.params])
+    flat: Array = (seen * typical).reshape(-1, len(typical))
+    return flat
+
+
+def _calibration(view: View) -> Array:
+    """Columns of bias (both sensors) and scale factor (accelerometers), (6n, 9)."""
+    both = [columns.bias(view), columns.scale(view)[:, :, :3]]
+    out: Array = np.concatenate(both, axis=2).reshape(-1, 9)
+    return out
+
+
+def _without(columns: Array, base: Array) -> Array:
+    q = _span(base, np.linalg.norm(base, axis=0).max())
+    left: Array = columns - q @ (q.T @ columns)
+    return left
+
+
+def _span(columns: Array, size: float) -> Array:
+    """Orthonormal basis of what the columns span, (m, r)."""
+    u, s, _ = np.linalg.svd(columns, full_matrices=False)
+    basis: Array = u[:, s > NOTHING * size]
+    return basis
+
+
+def _pairs(left: dict[str, Array]) -> list[tuple[str, tuple[str, ...]]]:
+    pairs = []
+    for name, basis in left.items():
+        alike = tuple(
+            other
+            for other, span in left.items()
+            if other != name and _contained(basis, span)
+        )
+        if alike:
+            pairs.append((name, alike))
+    return pairs
+
+
+def _contained(a: Array, b: Array) -> bool:
+    """Whether all that a spans lies in the span of b."""
+    if a.shape[1] > b.shape[1]:
+        return False
+    return float(np.linalg.svd(a.T @ b, compute_uv=False)[-1]) > ALIKE

@@ -1,0 +1,55 @@
+"""What procedures share: holding positions one after the other, again if it moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fieldcal.calibration import Calibration
+from fieldcal.core.errors import CalibrationFailed, Moved, Skipped
+from fieldcal.core.positions import Position
+from fieldcal.planning.steps import Plan, hold, note
+from fieldcal.windows import Average
+
+TRIES = 5
+"""Windows begun in a position before the procedure gives up."""
+
+
+def hold_each(
+    positions: Sequence[Position], seconds: float, sigma: float | None = None
+) -> Plan[dict[int, Average]]:
+    """Hold every position; the averages by number, without what was left out."""
+    averages = {}
+    for index, position in enumerate(positions):
+        try:
+            averages[index] = yield from steady(index, position, seconds, sigma)
+        except Skipped as skipped:
+            yield from note(str(skipped))
+    if not averages:
+        raise CalibrationFailed("every position was left out: nothing to calibrate by")
+    return averages
+
+
+def with_left_out(
+    found: Calibration, positions: Sequence[Position], held: dict[int, Average]
+) -> Calibration:
+    """The calibration, saying which positions are not in it."""
+    left = [p.name for i, p in enumerate(positions) if i not in held]
+    said = [f"{name} was left out by the operator" for name in left]
+    return replace(found, warnings=(*found.warnings, *said))
+
+
+def steady(
+    index: int, position: Position, seconds: float, sigma: float | None
+) -> Plan[Average]:
+    """Hold one position until a window was not disturbed."""
+    for _ in range(TRIES):
+        try:
+            return (yield from hold(index, position, seconds, sigma))
+        except Moved as moved:
+            yield from note(f"{moved}; hold still, the window starts again")
+    raise CalibrationFailed(
+        f"{position.name}: no window of {seconds:g} s without a disturbance in {TRIES}"
+        " tries; fix the device better, shelter it from the wind, then go on with"
+        " --resume"
+    )

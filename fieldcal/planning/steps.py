@@ -1,0 +1,61 @@
+"""Procedures as plans: generators that say what should be done, and do nothing.
+
+A plan never touches a device, a clock or a screen. It yields steps; the engine carries
+each one out and sends the result back, or throws the error that a step ended in. So a
+console, a script, a simulator and a test drive the same plan, and a plan can be listed
+without hardware. A plan does not yield while it is being closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from fieldcal.core.positions import Position
+from fieldcal.windows import Average
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Have the device put in a position and average it.
+
+    Attributes
+    ----------
+    index : the number of the position in the session
+    position : where
+    seconds : window length, s of device time
+    sigma : stop earlier once each accelerometer mean is this well known, m/s^2
+
+    """
+
+    index: int
+    position: Position
+    seconds: float
+    sigma: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Tell the operator something."""
+
+    text: str
+
+
+Step = Hold | Note
+Plan = Generator[Step, Any, R]
+
+
+def hold(
+    index: int, position: Position, seconds: float, sigma: float | None = None
+) -> Plan[Average]:
+    """Yield a `Hold`; the reply is its average."""
+    reply: Average = yield Hold(index, position, seconds, sigma)
+    return reply
+
+
+def note(text: str) -> Plan[None]:
+    """Yield a `Note`."""
+    yield Note(text)

@@ -1,0 +1,5 @@
+"""A live run: the engine carries out a plan on a device, whoever turns it.
+
+All waiting for devices and people is done here, on device time. Nothing here
+calculates a calibration. What the operator sees is in ``operator/``.
+"""

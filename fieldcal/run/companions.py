@@ -1,0 +1,205 @@
+"""Further devices on the same table, each recorded as a session of its own.
+
+The first device is led through the procedure; the others are only recorded, each by a
+thread of its own, so none waits for another. A window that the first one had holds for
+all of them: its ends go over the host's clock into each one's own time,
+
+    t_n = f_n^-1(f_1(t_1)),  f_k(t) = host time at which device k's sample t was had
+
+piecewise straight between the batches that came. The first device rests for a while
+before its window begins, and nobody turns it before the window is marked, so the few
+hundredths of a second by which batches are late do not matter.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from threading import Lock, Thread
+from time import monotonic
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.errors import FieldcalError
+from fieldcal.core.samples import Block
+from fieldcal.drivers.driver import Driver, open_driver
+from fieldcal.run.link_marks import LinkMarks
+from fieldcal.session.folder import DESCRIPTION
+from fieldcal.session.recorder import Recorder
+
+BATCHES = 1 << 17
+"""Batches whose times are kept: more than an hour."""
+
+
+class Times:
+    """When the samples of a device were had, s of the host's clock."""
+
+    def __init__(self) -> None:
+        self._pairs: deque[tuple[float, float]] = deque(maxlen=BATCHES)
+
+    def add(self, block: Block) -> None:
+        """Take samples that have come just now."""
+        self._pairs.append((float(block.t[-1]), monotonic()))
+
+    @property
+    def known(self) -> bool:
+        """Whether any samples have come."""
+        return bool(self._pairs)
+
+    def host(self, t: float) -> float:
+        """Host time of a device time."""
+        times, hosts = np.array(self._pairs).T
+        return float(np.interp(t, times, hosts))
+
+    def device(self, host: float) -> float:
+        """Device time of a host time; nan before there are samples."""
+        if not self._pairs:
+            return np.nan
+        times, hosts = np.array(self._pairs).T
+        return float(np.interp(host, hosts, times))
+
+
+class Beside:
+    """A device that is recorded while another one is led through a procedure.
+
+    Attributes
+    ----------
+    folder : its session
+    failed : what ended its recording before its time, None if nothing did
+
+    """
+
+    def __init__(self, driver: Driver, recorder: Recorder) -> None:
+        self.folder = recorder.folder
+        self.failed: FieldcalError | None = None
+        self._driver, self._recorder = driver, recorder
+        self._lock, self._times, self._ends = Lock(), Times(), False
+        if driver.notes:
+            recorder.mark("device", **driver.notes)
+        self._thread = Thread(target=self._run, name=f"record {driver.name}")
+        self._thread.start()
+
+    def mark(self, event: str, **what: Any) -> None:
+        """Append a mark to its session."""
+        with self._lock:
+            self._recorder.mark(event, **what)
+
+    def window(self, position: int, start: float, end: float) -> None:
+        """Mark a window between two host times, s."""
+        with self._lock:
+            first, last = self._times.device(start), self._times.device(end)
+        if last > first:
+            end_s = float(np.nextafter(last, np.inf))
+            self.mark("window", position=position, start_s=first, end_s=end_s)
+
+    def end(self) -> None:
+        """End the recording; safe to call twice."""
+        self._ends = True
+        self._thread.join()
+
+    def _run(self) -> None:
+        marks = LinkMarks(self._driver, self)
+        try:
+            for block in self._driver.blocks():
+                with self._lock:
+                    recorded = self._recorder.append(block)
+                    self._times.add(recorded)
+                marks.take(recorded)
+                if self._ends:
+                    break
+            marks.end()
+        except FieldcalError as fault:
+            # what was only just silent when all was over has been heard enough
+            if not (self._ends and self._times.known):
+                self.failed = fault
+                self.mark("failed", text=str(fault))
+
+
+class First:
+    """The recording of the first device, whose windows hold for the others.
+
+    Parameters
+    ----------
+    recorder : its own
+    others : the further devices
+
+    Attributes
+    ----------
+    tell : told, once, of each further device that fails meanwhile
+
+    """
+
+    def __init__(self, recorder: Recorder, others: Sequence[Beside]) -> None:
+        self._recorder, self.others = recorder, others
+        self._times = Times()
+        self._told: set[Path] = set()
+        self.tell: Callable[[str], None] = lambda text: None
+
+    def append(self, block: Block) -> Block:
+        """Record samples of the first device; returns them as recorded."""
+        recorded = self._recorder.append(block)
+        self._times.add(recorded)
+        for other in self.others:
+            if other.failed is not None and other.folder not in self._told:
+                self._told.add(other.folder)
+                self.tell(f"{other.folder.name}: {other.failed}")
+        return recorded
+
+    def rejoin(self) -> None:
+        """Take note that the link of the first device was opened anew."""
+        self._recorder.rejoin()
+
+    def mark(self, event: str, **what: Any) -> None:
+        """Append a mark, and a window to all sessions.
+
+        The first device's comes last: what it says is taken, the others have as well,
+        whenever the process is killed.
+        """
+        for other in self.others:
+            if event in ("asked", "insisted"):
+                other.mark(event, **what)
+            elif event == "window":
+                span = (self._times.host(what[end]) for end in ("start_s", "end_s"))
+                other.window(what["position"], *span)
+        self._recorder.mark(event, **what)
+
+
+@contextmanager
+def beside(
+    further: Mapping[str, str], recorder: Recorder, about: Mapping[str, Any]
+) -> Iterator[First]:
+    """Record further devices into ``device-2``, ``device-3``, … of a session.
+
+    A session that is there already is gone on with.
+
+    Parameters
+    ----------
+    further : serial numbers of the further devices by their addresses; empty for none
+    recorder : of the first device
+    about : tables of the session, which hold for all but the device's name
+
+    Raises
+    ------
+    DeviceError
+        If one of them cannot be opened.
+
+    """
+    with ExitStack() as stack:
+        others = []
+        for number, (url, serial) in enumerate(further.items(), 2):
+            driver = stack.enter_context(open_driver(url))
+            device = {"name": f"device {number}", "address": url}
+            if serial:
+                device["serial"] = serial
+            if grade := about.get("device", {}).get("grade"):
+                device["grade"] = grade
+            folder = recorder.folder / f"device-{number}"
+            known = (folder / DESCRIPTION).exists()
+            tables = None if known else {**about, "device": device}
+            own = stack.enter_context(Recorder(folder, tables))
+            others.append(Beside(driver, own))
+            stack.callback(others[-1].end)
+        yield First(recorder, others)

@@ -1,0 +1,286 @@
+"""Carries out plans: the one place where a procedure meets a device and a person.
+
+Every sample that comes is recorded, whatever else happens; all waiting is counted in
+device time, so a virtual device may run faster than the wall clock and nothing changes.
+
+A hold goes through three phases. *Turning*: until the device has come to rest where it
+was asked to be; a wrong place is said, and nothing is averaged there. *Averaging*:
+until the window is long enough; a disturbance rejects it. *Taken*: the window is marked
+and its average goes back to the plan. What was taken before, by an engine whose link
+broke or whose process was killed, is handed back at once and not asked for again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeVar
+
+import numpy as np
+
+from fieldcal.core.errors import FieldcalError, Moved, Skipped, Stopped, WrongPosition
+from fieldcal.core.samples import Block, pieces
+from fieldcal.drivers.driver import Driver
+from fieldcal.planning.steps import Hold, Note, Plan, Step
+from fieldcal.run.interruptions import Again, begun_again, gap, restarted
+from fieldcal.run.link_marks import LinkMarks, Recording
+from fieldcal.run.operator.protocol import Display, Operator, Wish
+from fieldcal.run.position_check import Held
+from fieldcal.run.waiting import GAP, SETTLING, Placing, force
+from fieldcal.run.warm_up import Warmth
+from fieldcal.session.description import Description
+from fieldcal.windows import Average, Noise, Window
+
+R = TypeVar("R")
+
+PIECE = 0.1
+"""Longest stretch of samples that is looked at as one, s."""
+
+
+class Engine:
+    """One device, one operator, one session on disk.
+
+    Parameters
+    ----------
+    driver : the device
+    operator : who turns it
+    about : the session's description; site, mounting and nominal calibration serve to
+        judge where the device is
+    recorder : the session folder being written
+    give_up : s of device time away from where it should be after which the hold is
+        given up, if the host's clock has gone on as well; None waits for ever, and
+        begins a window that was disturbed again for ever, as for a person
+    taken : averages of positions taken before, by number; what is taken is added
+    warmth : judges whether the device is still warming up; None does not ask
+
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        operator: Operator,
+        about: Description,
+        recorder: Recording,
+        give_up: float | None = None,
+        taken: dict[int, Average] | None = None,
+        warmth: Warmth | None = None,
+    ) -> None:
+        self._driver = driver
+        self._operator = operator
+        self._about = about
+        self._recorder = recorder
+        self._give_up = give_up
+        self._taken = {} if taken is None else taken
+        self._warmth = warmth
+        self._held: Held | None = None
+        self._hold_now: Hold | None = None
+        self._noise: Noise | None = None
+        self._left: int | None = None
+        self._before: int | None = None
+        self._link = LinkMarks(driver, recorder)
+        self._silence = 0
+        driver.on_silence = self._silent
+        self._stream = self._record(driver)
+        self._display = Display(operator, driver)
+
+    def run(self, plan: Plan[R]) -> R:
+        """Carry out a plan and return its result.
+
+        An error of ours while doing a step is thrown into the plan at that step, which
+        may catch it and go on; anything else ends the run.
+
+        Raises
+        ------
+        Again
+            If the operator wants a position that was taken already once more.
+
+        """
+        reply: object = None
+        error: FieldcalError | None = None
+        try:
+            while True:
+                step = plan.throw(error) if error else plan.send(reply)
+                reply, error = None, None
+                try:
+                    reply = self._do(step)
+                except (Moved, WrongPosition, Skipped) as failed:
+                    error = failed
+        except StopIteration as done:
+            result: R = done.value
+            return result
+        finally:
+            self._link.end()
+
+    def _do(self, step: Step) -> object:
+        match step:
+            case Hold():
+                average = self._taken.get(step.index)
+                if average is None:
+                    average = self._hold(step)
+                    self._taken[step.index] = average
+                else:
+                    self._display.taken_before(step, average)
+                if step.position.oriented:
+                    f = force(average.mean[None, :3], self._about)
+                    self._held = Held(step.position, f)
+                self._before = step.index
+                return average
+            case Note(text):
+                self._tell(text)
+                return None
+
+    def _hold(self, hold: Hold) -> Average:
+        self._hold_now, tries = hold, 0
+        while True:
+            name = hold.position.name
+            self._recorder.mark("asked", position=hold.index, name=name)
+            self._operator.place(hold)
+            self._arrive(hold)
+            try:
+                average = self._average(hold)
+            except Moved as moved:
+                if self._give_up is not None:
+                    raise
+                tries += 1
+                self._tell(begun_again(moved, tries))
+                continue
+            if average is not None:
+                return average
+
+    def _tell(self, text: str) -> None:
+        self._recorder.mark("told", text=text)
+        self._operator.tell(text)
+
+    def _record(self, driver: Driver) -> Iterator[Block]:
+        for raw in driver.blocks():
+            self._silence = 0
+            block = self._recorder.append(raw)
+            self._link.take(block)
+            self._display.heard(block)
+            if self._warmth:
+                self._warmth.add(block)
+            yield from pieces(block, PIECE)
+
+    def _silent(self) -> None:
+        """Say that nothing comes, before anybody thinks that we are stuck."""
+        self._silence += 1
+        said = (
+            f"no samples come from {self._driver.name}: check cable and power; it"
+            " goes on by itself once they do"
+        )
+        if self._silence >= 2 and self._hold_now:
+            self._display.silent(self._hold_now, said)
+        if self._silence == 2:
+            self._tell(said)
+        if self._operator.wish() == "stop":
+            raise Stopped("stopped by the operator")
+
+    def _arrive(self, hold: Hold) -> None:
+        """Wait until the device rests where it should."""
+        placing = Placing(hold, self._about, self._held, self._left == hold.index)
+        asked = self._driver.host_time()
+        insisted = cold = False
+        for block in self._stream:
+            if block.t_host[-1] < asked:
+                continue  # it waited in the link: where the device was before
+            placing.add(block, self._driver.host_time())
+            wish = self._wish(hold, averaging=False)
+            if wish == "confirm" and self._warmth and self._warmth.waits:
+                self._warmth.waived = True
+            elif wish == "confirm" and not placing.arrived:
+                if insisted and placing.usable:
+                    self._insist(hold, placing)
+                    return
+                insisted = self._ask_back(placing)
+            waits = self._warmth is not None and self._warmth.waits
+            reason = placing.reason
+            if placing.arrived and waits and self._warmth:
+                said = self._warmth.says
+                reason = f"{said}; Enter goes on" if said else SETTLING
+            self._display.turning(hold, placing, reason)
+            if reason.endswith("Enter goes on") and not cold:
+                cold = True
+                self._tell(reason)
+            if placing.arrived and not waits and wish != "wait":
+                return
+            self._complain(hold, placing, quiet=wish == "wait")
+        raise AssertionError("blocks() ends in an exception only")
+
+    def _complain(self, hold: Hold, placing: Placing, quiet: bool) -> None:
+        """Say that it rests at a wrong place, and give up in the end."""
+        if not quiet and (said := placing.complaint()):
+            self._recorder.mark("wrong", position=hold.index, text=said)
+            self._operator.tell(said)
+        if placing.arrived or not self._give_up:
+            return
+        if placing.waited_enough(self._give_up):
+            what = (
+                placing.problem or f"it has not come to rest in {placing.waited:.0f} s"
+            )
+            raise WrongPosition(f"{hold.position.name}: {what}")
+
+    def _ask_back(self, placing: Placing) -> bool:
+        """Answer an operator who wants to go on at a wrong place."""
+        if placing.usable and placing.problem:
+            self._tell(
+                f"{placing.problem}; press Enter once more to take it like this, and"
+                " the result is NO-GO"
+            )
+            return True
+        self._tell(f"not yet: {placing.problem or placing.reason}")
+        return False
+
+    def _insist(self, hold: Hold, placing: Placing) -> None:
+        self._recorder.mark("insisted", position=hold.index, text=placing.problem)
+
+    def _wish(self, hold: Hold, averaging: bool) -> Wish | None:
+        """What the operator wants; what ends the step is carried out at once."""
+        wish = self._operator.wish()
+        if wish == "stop":
+            raise Stopped("stopped by the operator")
+        if wish == "skip":
+            self._recorder.mark("skipped", position=hold.index)
+            raise Skipped(f"{hold.position.name} was left out by the operator")
+        if wish == "repeat" and not averaging:
+            if self._before is not None:
+                self._recorder.mark("repeated", position=self._before)
+                raise Again(self._before)
+            self._operator.tell("nothing was taken yet that could be repeated")
+        return wish
+
+    def _average(self, hold: Hold) -> Average | None:
+        """Average a window; None if the operator wants to begin it again."""
+        window, last = Window(noise=self._noise, grain=self._driver.grain), np.nan
+        restarts = self._driver.health.restarts
+        try:
+            for block in self._stream:
+                if block.t[0] - last > GAP:
+                    raise gap(last, float(block.t[0]))
+                if self._driver.health.restarts != restarts:
+                    raise restarted(float(block.t[0]))
+                last = float(block.t[-1])
+                window.add(block)
+                if window.moved:
+                    raise window.moved
+                if self._wish(hold, averaging=True) == "repeat":
+                    self._recorder.mark("repeated", position=hold.index)
+                    return None
+                self._display.averaging(hold, window)
+                if window.elapsed >= hold.seconds or window.done(hold.sigma):
+                    break
+            average = window.average()
+        except Moved as moved:
+            self._left = hold.index
+            what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
+            self._recorder.mark("rejected", position=hold.index, **what)
+            raise
+        end = float(np.nextafter(average.end, np.inf))
+        where = {"start_s": average.start, "end_s": end}
+        self._recorder.mark("window", position=hold.index, **where)
+        self._noise = window.noise and window.noise.spectrum
+        self._display.taken(hold, window)
+        self._say_if_cold()
+        return average
+
+    def _say_if_cold(self) -> None:
+        if self._warmth and (said := self._warmth.says):
+            self._tell(said)

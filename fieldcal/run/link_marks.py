@@ -1,0 +1,118 @@
+"""What the link did meanwhile, as marks beside the samples: gaps, restarts, the clock.
+
+A link in trouble would make a mark for every sample lost, and each is forced to the
+disk. So marks are joined over `EVERY` seconds; what is at least `LONG` is said at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from time import monotonic
+from typing import Any, Protocol
+
+import numpy as np
+
+from fieldcal.core.samples import Block, Grain
+from fieldcal.drivers.driver import Driver
+
+EVERY = 1.0
+"""Shortest time between two marks of the link, s of the host's clock."""
+
+LONG = 0.5
+"""Gap that is marked at once, s of device time."""
+
+CLOCK = 30.0
+"""Time between two marks of the clock, s of the host's clock."""
+
+LIVE = ("rate_hz", "says")
+"""Notes of a driver that go with the samples."""
+
+COUNTS = ("gaps", "missing", "repeated", "restarts", "bad", "skipped")
+
+
+class Marker(Protocol):
+    """Where marks go."""
+
+    def mark(self, event: str, **what: Any) -> None:
+        """Append a mark."""
+
+
+class Recording(Marker, Protocol):
+    """Where an engine puts what happens."""
+
+    def append(self, block: Block) -> Block:
+        """Record samples; returns them as recorded."""
+
+
+class LinkMarks:
+    """Follows the health of a driver and marks what changes.
+
+    Parameters
+    ----------
+    driver : whose link
+    recorder : where the marks go
+
+    """
+
+    def __init__(self, driver: Driver, recorder: Marker) -> None:
+        self._driver, self._recorder = driver, recorder
+        self._before = self._counts()
+        self._last = self._from = self._to = float("nan")
+        self._longest = 0.0
+        self._marked = -EVERY
+        self._clocked = monotonic()
+        self._grain = Grain()
+        self._facts = self._told()
+
+    def take(self, block: Block) -> None:
+        """Note what happened up to these samples."""
+        edges = np.concatenate([[self._last], block.t])
+        steps = np.diff(edges)
+        self._last = float(block.t[-1])
+        if self._grain != self._driver.grain:
+            self._grain = self._driver.grain
+            self._recorder.mark("grain", **asdict(self._grain))
+        if self._told() != self._facts:
+            self._facts = self._told()
+            self._recorder.mark("device", **self._driver.notes)
+        if self._counts() == self._before:
+            self._clock()
+            return
+        if np.isfinite(steps).any():
+            widest = int(np.nanargmax(steps))
+            if steps[widest] > self._longest:
+                self._longest = float(steps[widest])
+                self._from, self._to = edges[widest], edges[widest + 1]
+        if self._longest >= LONG or monotonic() - self._marked >= EVERY:
+            self._mark()
+
+    def end(self) -> None:
+        """Mark what has not been marked."""
+        if self._counts() != self._before:
+            self._mark()
+        self._clock(at_once=True)
+
+    def _told(self) -> dict[str, Any]:
+        """What the driver knows of the device, without what changes all the time."""
+        return {k: v for k, v in self._driver.notes.items() if k not in LIVE}
+
+    def _counts(self) -> dict[str, int]:
+        return {name: getattr(self._driver.health, name) for name in COUNTS}
+
+    def _mark(self) -> None:
+        now = self._counts()
+        more = {k: n - self._before[k] for k, n in now.items() if n != self._before[k]}
+        where = {}
+        if self._longest:
+            where = {"from_s": round(self._from, 6), "to_s": round(self._to, 6)}
+        self._recorder.mark("link", **where, **more)
+        self._before, self._longest, self._marked = now, 0.0, monotonic()
+
+    def _clock(self, at_once: bool = False) -> None:
+        clock = self._driver.health.clock
+        if clock is None or not clock.real_time:
+            return
+        if not (at_once or monotonic() - self._clocked >= CLOCK):
+            return
+        self._clocked = monotonic()
+        self._recorder.mark("clock", **clock._asdict())

@@ -1,0 +1,126 @@
+"""What the engine shows to whoever moves the device, and what it asks of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.drivers.driver import Driver, Health
+from fieldcal.planning.steps import Hold
+from fieldcal.run.position_check import Arrival
+from fieldcal.run.waiting import Placing
+from fieldcal.windows import Average, Window
+
+Phase = Literal["turning", "averaging", "taken", "silent"]
+"""What the engine waits for: to be in place, the window, the next step, samples."""
+
+Wish = Literal["confirm", "repeat", "skip", "stop", "wait"]
+"""What an operator may want: a key, or a mover that is still at work (wait)."""
+
+UNKNOWN = np.full(6, np.nan)
+"""Standard error before there is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What there is to show now.
+
+    Attributes
+    ----------
+    phase : what the engine waits for
+    hold : the step being carried out
+    arrival : where the device is, None while it cannot be told
+    stillness : present motion over the limit for rest; below 1 is still
+    elapsed : s of device time averaged so far
+    sigma : (6,) standard error reached so far, nan before there is one
+    reason : why it waits, empty when it does not
+    rate_hz : samples a second of device time
+    temperature : deg C, nan where unknown
+    health : of the link
+
+    """
+
+    phase: Phase
+    hold: Hold
+    arrival: Arrival | None
+    stillness: float
+    elapsed: float
+    sigma: Array
+    reason: str
+    rate_hz: float
+    temperature: float
+    health: Health
+
+
+class Operator(Protocol):
+    """Whoever moves the device: a person at a console, a script, a virtual device."""
+
+    def place(self, hold: Hold) -> None:
+        """Ask for a position, or begin to turn there; return at once."""
+
+    def tell(self, text: str) -> None:
+        """Show a sentence that must not be missed."""
+
+    def show(self, view: View) -> None:
+        """Show the state; called for every block, must not take long."""
+
+    def wish(self) -> Wish | None:
+        """What was asked for since the last call; called for every block."""
+
+
+class Display:
+    """Shows an operator, block by block, what the engine is at.
+
+    Parameters
+    ----------
+    operator : who is shown it
+    driver : the device, whose health is shown
+
+    """
+
+    def __init__(self, operator: Operator, driver: Driver) -> None:
+        self._operator, self._driver = operator, driver
+        self._rate = self._temperature = np.nan
+
+    def heard(self, block: Block) -> None:
+        """Take note of the rate and temperature of samples that came."""
+        if len(block) > 1:
+            self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
+        self._temperature = float(block.temperature[-1])
+
+    def turning(self, hold: Hold, placing: Placing, reason: str) -> None:
+        """Show where the device is on its way, and what is waited for."""
+        self._show("turning", hold, placing.where, placing.meter, reason=reason)
+
+    def averaging(self, hold: Hold, window: Window) -> None:
+        """Show how far a window is."""
+        self._show("averaging", hold, None, window.meter, window.elapsed, window.sigma)
+
+    def taken(self, hold: Hold, window: Window) -> None:
+        """Show what a window has reached."""
+        self._show("taken", hold, None, window.meter, window.elapsed, window.sigma)
+
+    def taken_before(self, hold: Hold, average: Average) -> None:
+        """Show what was reached when the position was taken before."""
+        self._show("taken", hold, sigma=average.sigma, reason="taken before")
+
+    def silent(self, hold: Hold, said: str) -> None:
+        """Show that nothing comes."""
+        self._show("silent", hold, reason=said)
+
+    def _show(
+        self,
+        phase: Phase,
+        hold: Hold,
+        arrival: Arrival | None = None,
+        stillness: float = np.nan,
+        elapsed: float = 0.0,
+        sigma: Array = UNKNOWN,
+        reason: str = "",
+    ) -> None:
+        link = (self._rate, self._temperature, self._driver.health)
+        view = View(phase, hold, arrival, stillness, elapsed, sigma, reason, *link)
+        self._operator.show(view)

@@ -1,0 +1,69 @@
+"""No operator: progress as JSON lines on standard error, the mover turns the device."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import IO, Any
+
+import numpy as np
+
+from fieldcal.planning.steps import Hold
+from fieldcal.run.movers import Mover
+from fieldcal.run.operator.protocol import View, Wish
+
+EVERY = 5.0
+"""Time between two lines of progress, s of device time."""
+
+
+class ScriptOperator:
+    """Turns the device by `mover` and reports.
+
+    Parameters
+    ----------
+    mover : who turns
+    out : where the lines go; standard error if not given
+
+    """
+
+    def __init__(self, mover: Mover, out: IO[str] | None = None) -> None:
+        self._mover = mover
+        self._out = out or sys.stderr
+        self._shown: tuple[str, int, int, str] = ("", -1, -1, "")
+
+    def place(self, hold: Hold) -> None:
+        """Begin to turn."""
+        self._say("place", position=hold.index, name=hold.position.name)
+        self._mover.turn(hold.position, hold.index)
+
+    def tell(self, text: str) -> None:
+        """Report a sentence."""
+        self._say("tell", text=text)
+
+    def wish(self) -> Wish | None:
+        """Wait for a mover that is still at work."""
+        return "wait" if self._mover.busy() else None
+
+    def show(self, view: View) -> None:
+        """Report progress: each change of phase, and now and then within one."""
+        waits = view.reason.partition(":")[0]
+        now = (view.phase, view.hold.index, int(view.elapsed // EVERY), waits)
+        if now == self._shown:
+            return
+        self._shown = now
+        self._say(
+            view.phase,
+            position=view.hold.index,
+            elapsed_s=round(view.elapsed, 2),
+            of_s=view.hold.seconds,
+            sigma=[_number(s) for s in view.sigma],
+            waiting_for=view.reason or None,
+        )
+
+    def _say(self, event: str, **what: Any) -> None:
+        self._out.write(json.dumps({"event": event, **what}) + "\n")
+        self._out.flush()
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.3g}") if np.isfinite(value) else None

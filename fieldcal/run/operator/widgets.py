@@ -1,0 +1,180 @@
+"""What the operator's screen is made of: inclinometer, meters, list, link.
+
+All of it reads without colour, and fits into 76 columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from fieldcal.core.positions import Position
+from fieldcal.run.operator.protocol import View
+from fieldcal.run.position_check import tenth
+from fieldcal.run.waiting import ORDINARY
+
+METER = 20
+"""Width of the stillness meter, characters."""
+
+BAR = 30
+"""Width of the bar that fills while averaging, characters."""
+
+SCALE = 19
+"""Width of the inclinometer, characters; odd, as the middle is where it should be."""
+
+SPANS = (2.0, 5.0, 10.0, 30.0, 90.0, 180.0)
+"""What half the inclinometer spans, deg: the narrowest that shows where it is."""
+
+NEAR = 1.0
+"""Off by less than this, deg, an angle is not asked to be turned."""
+
+
+def alert(view: View) -> str:
+    """Why it waits, where that wants the operator to do something; else empty."""
+    return "" if view.reason in ORDINARY or view.phase == "taken" else view.reason
+
+
+def angles(view: View) -> list[tuple[str, Text]]:
+    """Name and inclinometer of both joints, where it can be told."""
+    wanted, now = view.hold.position.degrees, view.arrival
+    if now is None or wanted is None:
+        return []
+    seen = (now.alpha_deg, now.beta_deg)
+    return [
+        (name, inclinometer(there, asked, now.limit_deg, now.ok))
+        for name, there, asked in zip("αβ", seen, wanted, strict=True)
+    ]
+
+
+def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
+    """Where it is (o), where it should be (the middle), and which way to turn.
+
+    Parameters
+    ----------
+    seen, wanted : deg
+    limit : how far it may be off, deg; nan where that is not known
+    ok : whether both angles together are close enough
+
+    """
+    off = tenth(wanted - seen)
+    span = next((s for s in SPANS if s >= abs(off)), SPANS[-1])
+    middle = SCALE // 2
+    place = int(np.clip(round(middle - off / span * middle), 0, SCALE - 1))
+    cells = ["·"] * SCALE
+    cells[middle], cells[place] = "|", "o"
+    within = f" ± {limit:.1f}°" if np.isfinite(limit) else ""
+    there = ok or abs(off) < NEAR
+    way = "→" if off > 0 else "←"
+    order = "close enough" if there else f"turn {off:+.1f}° {way}"
+    where = f"[{''.join(cells)}] {tenth(seen):+6.1f}° to {tenth(wanted):+.1f}°{within}"
+    return Text.assemble(where, "  ", (order, "green" if there else "bold yellow"))
+
+
+def stillness(level: float) -> Text:
+    """Motion as part of what is allowed."""
+    if not np.isfinite(level):
+        return Text("listening to the device's noise")
+    filled = int(np.clip(round(level * METER / 2), 0, METER))
+    bar = f"{'#' * filled:·<{METER}}"
+    limit = METER // 2
+    word, style = ("still", "green") if level < 1 else ("MOVING", "bold yellow")
+    return Text.assemble(f"[{bar[:limit]}|{bar[limit:]}] ", (word, style))
+
+
+def sigma(view: View) -> str:
+    """Standard errors reached; of each sensor the worst axis."""
+    acc, gyr = view.sigma[:3], view.sigma[3:]
+    parts = []
+    if np.isfinite(acc).any():
+        parts.append(f"{1e3 * np.nanmax(acc):.2f} mm/s²")
+    if np.isfinite(gyr).any():
+        parts.append(f"{1e3 * np.nanmax(gyr):.3f} mrad/s")
+    return ", ".join(parts) or ""
+
+
+def by_the_end(view: View) -> str:
+    """Standard error to be expected when the window is full, by white noise."""
+    acc = view.sigma[:3][np.isfinite(view.sigma[:3])]
+    if view.hold.sigma:
+        return f", wanted ± {1e3 * view.hold.sigma:.2f} mm/s²"
+    if not len(acc) or view.elapsed >= view.hold.seconds:
+        return ""
+    then = float(acc.max()) * np.sqrt(view.elapsed / view.hold.seconds)
+    return f", by the end about ± {1e3 * then:.2f} mm/s²"
+
+
+def gauges(view: View) -> Table:
+    """Everything that is measured now."""
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(width=9)
+    grid.add_column()
+    if view.phase in ("turning", "silent"):
+        for name, scale in angles(view):
+            grid.add_row(name, scale)
+        grid.add_row("status", "see below" if alert(view) else view.reason)
+    else:
+        seconds = view.hold.seconds
+        share = min(1.0, view.elapsed / seconds)
+        bar = Text(f"[{'#' * round(share * BAR):·<{BAR}}] {share:4.0%}")
+        left = max(0.0, seconds - view.elapsed)
+        grid.add_row("averaging", bar)
+        grid.add_row("time left", f"{left:.0f} s of {seconds:.0f} s")
+        known = sigma(view)
+        reached = f"± {known}{by_the_end(view)}" if known else "not known yet"
+        grid.add_row("reached", reached)
+    if view.phase != "silent":
+        grid.add_row("stillness", stillness(view.stillness))
+    return grid
+
+
+def listing(
+    positions: Sequence[Position],
+    taken: Mapping[int, float],
+    now: int,
+    rows: int,
+    verification: int | None,
+) -> RenderableType:
+    """The positions around the present one, with what was reached in each.
+
+    Parameters
+    ----------
+    positions : all of them
+    taken : standard error of the accelerometers by number, m/s^2
+    now : number of the present one
+    rows : most that there is room for
+    verification : number of the one that is not fitted
+
+    """
+    table = Table.grid(padding=(0, 2))
+    first = int(np.clip(now - rows // 2, 0, max(0, len(positions) - rows)))
+    for i in range(first, min(len(positions), first + rows)):
+        if i in taken:
+            state = f"taken   ± {1e3 * taken[i]:.2f} mm/s²"
+        else:
+            state = "now" if i == now else ""
+        style = "bold" if i == now else ""
+        name = positions[i].name + (" (verification)" if i == verification else "")
+        table.add_row(f"{i + 1}", name, state, style=style)
+    return table
+
+
+def link(view: View) -> Text:
+    """How the link does."""
+    health = view.health
+    rate = f"{view.rate_hz:.0f} Hz" if np.isfinite(view.rate_hz) else "no rate yet"
+    parts = [rate, f"{health.samples} samples"]
+    gaps = "1 gap" if health.gaps == 1 else f"{health.gaps} gaps"
+    parts.append(f"{gaps}, {health.missing} missing, {health.bad} bad frames")
+    if np.isfinite(view.temperature):
+        parts.append(f"{view.temperature:.1f} °C")
+    if health.restarts:
+        parts.append(f"restarts: {health.restarts}")
+    if health.clock and health.clock.real_time:
+        clock = health.clock
+        parts.append(f"clock {clock.fast_ppm:+.0f} ± {clock.sigma_ppm:.1g} ppm")
+    lost = health.missing or health.bad or health.restarts
+    return Text("link: " + " · ".join(parts), style="yellow" if lost else "")

@@ -1,0 +1,256 @@
+"""Plan files: what is to be held, how, and by whom it is turned.
+
+A plan is a session.toml with positions and a table ``[run]``; ``plan.schema.json`` says
+what may stand there, and the description of each key there is the remedy that an error
+names. The session that a run records keeps the table, so that it can be gone on with.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+from fieldcal import procedures
+from fieldcal.acceptance.verification import planned
+from fieldcal.core.errors import InputError, PlanError
+from fieldcal.core.positions import Position, forces
+from fieldcal.session import description
+from fieldcal.session.description import Description
+
+SECONDS, WARM_UP, TURN = 30.0, 300.0, 120.0
+"""Averaging time, longest wait for a device that warms up, longest turn, s."""
+
+APART = math.radians(0.5)
+"""Least angle between the positions of a plan."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What is to be done.
+
+    Attributes
+    ----------
+    tables : of session.toml, with ``[run]``
+    about : the same, parsed
+    run : the table ``[run]``
+    verification : position to hold that is not fitted, if any
+
+    """
+
+    tables: Mapping[str, Any]
+    about: Description
+    run: Mapping[str, Any]
+    verification: Position | None
+
+    @property
+    def procedure(self) -> str:
+        """Name of the procedure."""
+        return str(self.run.get("procedure", "positions"))
+
+    @property
+    def seconds(self) -> float:
+        """Averaging time, s."""
+        return float(self.run.get("seconds", SECONDS))
+
+    @property
+    def sigma(self) -> float | None:
+        """Standard error at which averaging may stop, m/s^2."""
+        return self.run.get("sigma")
+
+    @property
+    def mover(self) -> Mapping[str, Any]:
+        """The table ``[run.mover]``."""
+        mover: Mapping[str, Any] = self.run.get("mover", {"kind": "nothing"})
+        return mover
+
+    @property
+    def further(self) -> Mapping[str, str]:
+        """Serial number of each further device, by its address; empty if not said."""
+        urls, serials = self.run.get("further", ()), self.run.get("further_serial", ())
+        return dict(zip_longest(urls, serials, fillvalue=""))
+
+    @property
+    def positions(self) -> tuple[Position, ...]:
+        """All that is to be held, the verification last."""
+        last = () if self.verification is None else (self.verification,)
+        return (*self.about.positions, *last)
+
+
+@cache
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of a plan, with the procedures that there are."""
+    text = files("fieldcal").joinpath("schemas/plan.schema.json").read_text("utf-8")
+    found: dict[str, Any] = json.loads(text)
+    procedure = found["properties"]["run"]["properties"]["procedure"]
+    procedure["enum"] = list(procedures.names())
+    procedure["description"] = f"write one of {', '.join(procedures.names())}"
+    return found
+
+
+def positions_of(procedure: str) -> list[dict[str, Any]]:
+    """Tables ``[[position]]`` that a procedure takes unless others are said."""
+    taken = procedures.procedure(procedure).POSITIONS
+    return [_table(p.name, p.degrees or (0.0, 0.0)) for p in taken]
+
+
+def _table(name: str, degrees: tuple[float, float]) -> dict[str, Any]:
+    alpha, beta = degrees
+    return {"name": name, "alpha_deg": round(alpha, 9), "beta_deg": round(beta, 9)}
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Tables of a plan file.
+
+    Raises
+    ------
+    InputError
+        If it is no TOML file.
+
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        known = ", ".join(procedures.names())
+        raise InputError(
+            f"{path}: is neither a procedure ({known}) nor a plan file"
+        ) from error
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: is no plan file: {error}") from error
+
+
+def task(tables: Mapping[str, Any], name: str) -> Task:
+    """Check a plan before anything moves.
+
+    Parameters
+    ----------
+    tables : of the plan; a plan without positions takes those of its procedure
+    name : what errors call it: its file
+
+    Raises
+    ------
+    PlanError
+        Naming file, key and remedy.
+
+    """
+    _check_schema(tables, name)
+    run = tables.get("run", {})
+    if "position" not in tables and "procedure" in run:
+        tables = {**tables, "position": positions_of(run["procedure"])}
+    try:
+        about = description.parse(tables)
+    except InputError as error:
+        raise PlanError(f"{name}: {error}") from error
+    _check_positions(about, name)
+    _check_further(about, run, name)
+    made = Task(tables, about, run, planned(about))
+    _check_mover(made, name)
+    return made
+
+
+def _check_schema(tables: Mapping[str, Any], name: str) -> None:
+    from jsonschema import Draft202012Validator
+    from jsonschema.exceptions import best_match
+
+    tables = {"run": {}, **tables}
+    error = best_match(Draft202012Validator(schema()).iter_errors(tables))
+    if error is None:
+        return
+    path = list(error.absolute_path)
+    remedy = str(error.schema.get("description", "mend it"))
+    if error.validator == "required":
+        path.append(next(k for k in error.validator_value if k not in error.instance))
+        what = "is missing"
+    elif error.validator == "additionalProperties":
+        known = error.schema.get("properties", {})
+        path.append(next(k for k in error.instance if k not in known))
+        what, remedy = "is not known", f"there are {', '.join(known)}"
+    elif error.validator == "not":
+        what = "does not belong there"
+    else:
+        what = f"= {json.dumps(error.instance, ensure_ascii=False, default=str)}"
+        what = (what if len(what) < 60 else what[:57] + "…") + " cannot be"
+    raise PlanError(f"{name}: {_key(path)} {what}: {remedy}")
+
+
+def _key(path: list[str | int]) -> str:
+    """A key as one finds it in the file."""
+    if path and path[0] == "position" and len(path) > 1:
+        number = int(path[1]) + 1
+        return " ".join([f"[[position]] number {number}", *map(str, path[2:])])
+    if path and path[0] in ("run", "verification") and len(path) > 1:
+        depth = 2 if path[1] == "mover" and len(path) > 2 else 1
+        table = ".".join(map(str, path[:depth]))
+        return " ".join([f"[{table}]", *map(str, path[depth:])])
+    return ".".join(map(str, path)) or "the file"
+
+
+def _check_positions(about: Description, name: str) -> None:
+    """Refuse positions that cannot end well."""
+    import numpy as np
+
+    positions = about.positions
+    turning = [i for i, p in enumerate(positions, 1) if p.rate and any(p.rate)]
+    if turning:
+        raise PlanError(
+            f"{name}: [[position]] number {turning[0]} has rate_deg_s, and a run holds"
+            " the device at rest: record the rate table by itself, and solve it with"
+            " its windows in session.toml"
+        )
+    if len(positions) < 2 or not all(p.oriented for p in positions):
+        raise PlanError(
+            f"{name}: {len(positions)} positions with known angles are not enough: a"
+            " plan needs two or more, each with alpha_deg and beta_deg"
+        )
+    f = forces(positions, 1.0)
+    if np.linalg.norm(f - f[0], axis=1).max() < APART:
+        raise PlanError(
+            f"{name}: all {len(positions)} positions are the same"
+            f" ({positions[0].name}): no scale factor can be determined; turn the"
+            " device between them"
+        )
+
+
+def _check_further(about: Description, run: Mapping[str, Any], name: str) -> None:
+    """Whether each further device, and each serial number, is one and is named once."""
+    urls, serials = run.get("further", ()), run.get("further_serial", ())
+    if len(serials) > len(urls):
+        raise PlanError(
+            f"{name}: {serials[len(urls)]!r} is the serial number of no device: give"
+            " --serial no more often than --device"
+        )
+    for what, first, more in (
+        ("device", run.get("device"), urls),
+        ("serial number", about.device.get("serial"), serials),
+    ):
+        named = [n for n in (first, *more) if n]
+        if twice := [n for i, n in enumerate(named) if n in named[:i]]:
+            raise PlanError(f"{name}: {what} {twice[0]!r} is named twice: name it once")
+
+
+def _check_mover(made: Task, name: str) -> None:
+    from fieldcal.run.movers import Command
+
+    mover = made.mover
+    try:
+        if mover["kind"] == "command":
+            Command(mover["command"], 1.0).close()
+        elif mover["kind"] == "virtual":
+            shlex.split(mover.get("options", ""))
+    except PlanError as error:
+        raise PlanError(f"{name}: {error}") from error
+    except ValueError as error:
+        raise PlanError(f"{name}: [run.mover] options: {error}; mend it") from error
+    if mover["kind"] == "virtual" and "control" in mover and "device" not in made.run:
+        raise PlanError(
+            f"{name}: [run] device is missing: a virtual device that runs already is"
+            ' read where it said, as in "serial:/dev/pts/3?format=witmotion"'
+        )

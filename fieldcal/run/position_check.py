@@ -1,0 +1,172 @@
+"""Is the device where it was asked to be? Judged from its accelerometers alone.
+
+At rest the specific force shows where the device is, but through a calibration that is
+not known yet and on a base that may be tilted. Both move all positions alike, so once a
+position has been held the *change* since then is judged, and that is known much better:
+a step of 2.5 degrees is told from none.
+
+    |(f - f_held) - (f_wanted - f_held_wanted)| <= g (NEAR + TILT |change wanted| / g)
+
+f is specific force in procedure axes, m/s^2, corrected by the nominal calibration. A
+tilted base changes a turn in proportion to the turn. A place that a common slip
+explains twice as well as the position asked for is taken for the slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.frames import angles_of
+from fieldcal.core.positions import Position, forces
+from fieldcal.core.samples import Array
+
+FIRST = np.deg2rad(8.0)
+"""Tolerance for the first position, rad: base tilt and bias of a raw device."""
+
+NEAR, TILT = np.deg2rad(1.0), np.deg2rad(3.5)
+"""Tolerance for the others, rad: of the joints, and of the base for a unit turn."""
+
+NORM = 0.15
+"""How far the norm may be off g before unit or scale must be wrong, relative."""
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A position that was accepted, and the force measured there."""
+
+    position: Position
+    f: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """Where the device is, and whether that is where it should be.
+
+    Attributes
+    ----------
+    ok : whether averaging may begin
+    alpha_deg, beta_deg : angles the accelerometers show, offset of the base removed
+        where an earlier position tells it
+    problem : one sentence for the operator, empty when ok
+    limit_deg : how far it may be off; nan where only the norm is judged
+
+    """
+
+    ok: bool
+    alpha_deg: float
+    beta_deg: float
+    problem: str = ""
+    limit_deg: float = np.nan
+
+
+def judge(
+    wanted: Position,
+    f: Array,
+    gravity: float,
+    held: Held | None,
+    others: Mapping[str, Position] | None = None,
+) -> Arrival:
+    """Compare measured force with a position asked for.
+
+    Parameters
+    ----------
+    wanted : position asked for; without angles only the norm is judged
+    f : (3,) measured specific force, procedure axes, m/s^2
+    gravity : m/s^2
+    held : an earlier position, or None before the first
+    others : further places it might be in instead, by what is then said of it
+
+    """
+    norm = float(np.linalg.norm(f))
+    alpha, beta = np.rad2deg(angles_of(_without_offset(f, gravity, held)))
+    seen = (float(alpha), float(beta))
+    if abs(norm - gravity) > NORM * gravity:
+        problem = (
+            f"the accelerometers read {norm:.2f} m/s² in all, gravity is"
+            f" {gravity:.2f} m/s²: check unit, range and wire format"
+        )
+        return Arrival(False, *seen, problem)
+    if not wanted.oriented:
+        return Arrival(True, *seen)
+    chord = _chord(wanted, held.position, gravity) if held else 0.0
+    limit = NEAR + TILT * chord if held else FIRST
+    miss = _miss(wanted, f, gravity, held)
+    slip, slip_miss = _nearest_slip(wanted, f, gravity, held, others or {})
+    slipped = slip_miss < min(miss / 2, limit) and miss > NEAR
+    within = float(np.rad2deg(limit))
+    if miss <= limit and not slipped:
+        return Arrival(True, *seen, limit_deg=within)
+    problem = _explain(wanted, seen, slip if slipped else "")
+    return Arrival(False, *seen, problem, within)
+
+
+def tenth(angle: float) -> float:
+    """Round an angle as it is shown, deg; what is rounded to zero has no sign."""
+    return round(float(angle), 1) + 0.0
+
+
+def _force(position: Position, gravity: float) -> Array:
+    f: Array = forces([position], gravity)[0]
+    return f
+
+
+def _chord(a: Position, b: Position, gravity: float) -> float:
+    """Change of the force between two positions over g, 0 to 2."""
+    difference = _force(a, gravity) - _force(b, gravity)
+    return float(np.linalg.norm(difference) / gravity)
+
+
+def _without_offset(f: Array, gravity: float, held: Held | None) -> Array:
+    if held is None:
+        return f
+    clean: Array = f - (held.f - _force(held.position, gravity))
+    return clean
+
+
+def _miss(wanted: Position, f: Array, gravity: float, held: Held | None) -> float:
+    """How far the device is off, rad."""
+    clean = _without_offset(f, gravity, held)
+    return float(np.linalg.norm(clean - _force(wanted, gravity)) / gravity)
+
+
+def _nearest_slip(
+    wanted: Position,
+    f: Array,
+    gravity: float,
+    held: Held | None,
+    others: Mapping[str, Position],
+) -> tuple[str, float]:
+    """The slip that would put the device nearest to where it is, and how near, rad."""
+    a, b = wanted.degrees or (0.0, 0.0)
+    slips = [
+        ((-a, b), "α is turned the wrong way"),
+        ((a, -b), "β is turned the wrong way"),
+        ((-a, -b), "both angles are turned the wrong way"),
+        ((b, a), "α and β are exchanged"),
+        ((a + 180, b), "the device is upside down, or its mounting is not as declared"),
+        ((a, b + 180), "the device is upside down, or its mounting is not as declared"),
+        ((a, 0.0), "β is not turned yet"),
+        ((0.0, b), "α is not turned yet"),
+    ]
+    slips += [(p.degrees, said) for said, p in others.items() if p.degrees]
+    if held and held.position.degrees:
+        slips.insert(0, (held.position.degrees, "it has not been turned yet"))
+    there = forces([Position.deg(*angles) for angles, _ in slips], gravity)
+    away = _without_offset(f, gravity, held) - there
+    misses = np.linalg.norm(away, axis=1) / gravity
+    best = int(np.argmin(misses))
+    return slips[best][1], float(misses[best])
+
+
+def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:
+    a, b = wanted.degrees or (0.0, 0.0)
+    where = f"the device is at α = {tenth(seen[0]):.1f}°, β = {tenth(seen[1]):.1f}°"
+    asked = f"asked for is α = {a:g}°, β = {b:g}°"
+    if slip:
+        return f"{slip}: {where}, {asked}"
+    off = {"α": tenth(a - seen[0]), "β": tenth(b - seen[1])}
+    turns = [f"{by:+.1f}° in {name}" for name, by in off.items() if by]
+    return f"{where}, {asked}: turn it by {', '.join(turns) or 'a little'}"

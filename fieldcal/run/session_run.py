@@ -1,0 +1,207 @@
+"""A run from its first position to its last, across whatever breaks in between.
+
+The link may break, the process may be killed, the operator may want a position once
+more: each time the plan starts again from its beginning, and what was taken is handed
+to it at once. So there is one way to go on, whether after a second or after a reboot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+from fieldcal import procedures
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import Limits
+from fieldcal.core.errors import (
+    DeviceError,
+    FieldcalError,
+    MoverFailed,
+    SessionError,
+    Skipped,
+    Stopped,
+)
+from fieldcal.drivers.driver import Driver
+from fieldcal.evaluation.observations import rests
+from fieldcal.planning.holding import steady
+from fieldcal.planning.steps import Plan, note
+from fieldcal.run.companions import First
+from fieldcal.run.engine import Engine
+from fieldcal.run.interruptions import Again
+from fieldcal.run.operator.protocol import Operator
+from fieldcal.run.plan_file import WARM_UP, Task
+from fieldcal.run.warm_up import Warmth
+from fieldcal.session.folder import RESULT, Session
+from fieldcal.session.recorder import Recorder
+from fieldcal.windows import Average, average
+
+RETRY = 0.5
+"""Time between two attempts to open the device again, s."""
+
+
+class Running:
+    """One task on one device.
+
+    Parameters
+    ----------
+    task : what is to be done
+    operator : who turns the device
+    recorder : the session folder
+    opened : opens the device
+    limits : of its grade
+    patience : how long to try to open a device that is gone, s
+    give_up : as of `Engine`
+    taken : averages of positions taken before, by number
+
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        operator: Operator,
+        recorder: Recorder | First,
+        opened: Callable[[], Driver],
+        limits: Limits,
+        patience: float,
+        give_up: float | None,
+        taken: dict[int, Average] | None = None,
+    ) -> None:
+        self._task, self._operator, self._recorder = task, operator, recorder
+        self._opened, self._patience, self._give_up = opened, patience, give_up
+        self._taken = {} if taken is None else taken
+        self._lost: tuple[float, DeviceError] | None = None
+        wait = float(task.run.get("warm_up_s", WARM_UP))
+        self._warmth = Warmth(limits.temperature_rate_k_min, wait)
+
+    def run(self, driver: Driver) -> Calibration:
+        """Carry the task out, beginning with a device that is open; it is closed.
+
+        Raises
+        ------
+        FieldcalError
+            If it cannot be done; what was recorded is kept.
+
+        """
+        while True:
+            try:
+                with driver:
+                    return self._with(driver)
+            except MoverFailed:
+                raise
+            except DeviceError as error:
+                if driver.health.samples:
+                    self._lost = (monotonic(), error)
+                if self._lost is None:
+                    raise  # it never said anything: nothing to wait for
+                # what befalls a device that has not come back since is no news
+                since, first = self._lost
+                driver = self._wait_for_device(first, since + self._patience)
+
+    def _with(self, driver: Driver) -> Calibration:
+        recorder, task = self._recorder, self._task
+        if driver.notes:
+            recorder.mark("device", **driver.notes)
+            for text in driver.notes.get("says", ()):
+                self._operator.tell(text)
+        engine = Engine(
+            driver,
+            self._operator,
+            task.about,
+            recorder,
+            self._give_up,
+            self._taken,
+            self._warmth,
+        )
+        while True:
+            try:
+                return engine.run(self._plan())
+            except Again as again:
+                self._taken.pop(again.index, None)
+
+    def _plan(self) -> Plan[Calibration]:
+        task = self._task
+        plan = procedures.procedure(task.procedure).plan
+        found = yield from plan(task.about, task.seconds, task.sigma)
+        if task.verification is not None:
+            number = len(task.about.positions)
+            try:
+                yield from steady(number, task.verification, task.seconds, task.sigma)
+            except Skipped as skipped:
+                yield from note(str(skipped))
+        return found
+
+    def _wait_for_device(self, lost: DeviceError, deadline: float) -> Driver:
+        """Open the device again, or give up with the error that it was lost by."""
+        self._recorder.mark("lost", text=str(lost))
+        left = deadline - monotonic()
+        if left > 0:
+            said = str(lost).removesuffix(", then start again")
+            self._operator.tell(
+                f"{said}; goes on by itself once it is back, within {left:.0f} s"
+            )
+        while monotonic() < deadline:
+            with suppress(DeviceError):
+                driver = self._opened()
+                self._recorder.rejoin()
+                return driver
+            if self._operator.wish() == "stop":
+                raise Stopped("stopped by the operator")
+            sleep(RETRY)
+        raise lost
+
+
+def taken_before(session: Session, task: Task) -> dict[int, Average]:
+    """Averages of the positions that a session has whole, by number."""
+    from fieldcal.acceptance.assessment import verification_window
+
+    marks = list(session.marks())
+    taken: dict[int, Average] = {}
+    with suppress(SessionError):
+        still = rests(session)
+        taken = dict(zip(still.rows, still.averages, strict=True))
+    last = len(task.about.positions)
+    window = verification_window(marks, last)
+    if window is not None and task.verification is not None:
+        with suppress(FieldcalError):
+            taken[last] = average(session.block.between(*window))
+    for number in list(taken):
+        if not _stands(marks, number):
+            del taken[number]
+    return taken
+
+
+def _stands(marks: list[dict[str, Any]], number: int) -> bool:
+    """Whether the last that was said of a position is that its window was taken."""
+    said = [
+        m["event"]
+        for m in marks
+        if m.get("position") == number and m.get("event") in ("window", "repeated")
+    ]
+    return bool(said) and said[-1] == "window"
+
+
+def resumed(folder: Path) -> tuple[Session, dict[str, Any]]:
+    """A session to go on with, and its tables.
+
+    Raises
+    ------
+    SessionError
+        If it is none, is finished already, or was not recorded by a run.
+
+    """
+    session = Session.open(folder)
+    tables = dict(session.about.raw)
+    if "run" not in tables:
+        raise SessionError(
+            f"{folder}: was not recorded by fieldcal run: begin a new one, or solve it"
+            " as it stands by fieldcal solve"
+        )
+    finished = any(mark.get("event") == "finished" for mark in session.marks())
+    if finished and (folder / RESULT).exists():
+        raise SessionError(
+            f"{folder}: is finished, nothing is left to take: see fieldcal solve"
+        )
+    return session, tables

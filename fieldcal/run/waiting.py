@@ -1,0 +1,211 @@
+"""Waiting for the device to rest where it was asked to be, block by block.
+
+Nothing here reads a device or talks to anybody: the engine feeds it and passes on what
+it says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Array, Block, concat
+from fieldcal.planning.steps import Hold
+from fieldcal.run.position_check import NORM, Arrival, Held, judge
+from fieldcal.session.description import Description
+from fieldcal.windows import Stillness
+
+SETTLE = 1.5
+"""Rest before a window begins, s: a joint that was just let go of still creeps."""
+
+PATIENCE = 3.0
+"""Rest at a wrong place before that is said, s: a person stops in between."""
+
+REMIND = 60.0
+"""Time at the same wrong place after which it is said again, s."""
+
+LISTENING, MOVING = "listening to the noise", "moving: waiting for it to rest"
+SETTLING, TURNING = "settling", "waiting for the turn"
+ORDINARY = (LISTENING, MOVING, SETTLING, TURNING)
+"""What every turn waits for; any other reason wants the operator to do something."""
+
+GAP = 0.5
+"""Longest time without samples that a rest may have, s."""
+
+LEAST = 10.0
+"""Wait by the host's clock before a position is given up, s.
+
+A virtual device at 80 times the clock has waited for 90 s when the mover, and whoever
+reads it, have had 1.1 s.
+"""
+
+
+class Placing:
+    """The way of the device to one position.
+
+    Parameters
+    ----------
+    hold : what was asked for
+    about : site, mounting and nominal calibration
+    held : a position that was accepted before, if any
+    left : whether a window here was broken off by a movement just before
+
+    Attributes
+    ----------
+    meter : present motion as part of what is allowed; below 1 is rest
+    arrival : where the device rests, None while it moves
+    where : where it is, as far as that can be told while it moves
+    f : (3,) specific force there, procedure axes, m/s^2; None likewise
+    waited : s of samples since it was asked for, by the device's clock
+    waited_host : the same by the host's, which may have gone on less
+
+    """
+
+    def __init__(
+        self, hold: Hold, about: Description, held: Held | None, left: bool = False
+    ) -> None:
+        self._hold, self._about, self._held, self._left = hold, about, held, left
+        self._others = _others(hold, about)
+        self._began: float | None = None
+        self._start()
+        self._last = self._last_host = np.nan
+        self.waited = self.waited_host = 0.0
+
+    def _start(self) -> None:
+        self._stillness = Stillness()
+        self._resting = _Resting()
+        self._told = -np.inf
+        self.arrival: Arrival | None = None
+        self.where: Arrival | None = None
+        self.f: Array | None = None
+
+    @property
+    def meter(self) -> float:
+        """Present motion as part of what is allowed."""
+        return self._stillness.meter
+
+    @property
+    def seconds(self) -> float:
+        """Rest so far, s."""
+        return self._resting.seconds
+
+    def add(self, block: Block, host: float) -> None:
+        """Take in the block that follows; a time without any is no waiting.
+
+        `host` is the time by the host's clock, s.
+        """
+        if self._last_host < host:
+            self.waited_host += min(GAP, host - self._last_host)
+        self._last_host = host
+        away = float(block.t[0]) - self._last
+        if away > GAP:
+            self._start()
+            self._began = None if self._began is None else self._began + away
+        self._last = float(block.t[-1])
+        self._began = float(block.t[0]) if self._began is None else self._began
+        self.waited = self._last - self._began
+        self._stillness.add(block)
+        self._resting.add(block, self._stillness.since)
+        if self._resting.seconds > 0:
+            self.f = force(self._resting.block.acc, self._about)
+            self.where = self.arrival = self._judged(self.f)
+        else:
+            self.arrival, self.f, self._told = None, None, -np.inf
+            now = self._judged(force(block.acc, self._about))
+            self.where = replace(now, ok=False)
+
+    def _judged(self, f: Array) -> Arrival:
+        wanted, g = self._hold.position, self._about.gravity
+        return judge(wanted, f, g, self._held, self._others)
+
+    @property
+    def arrived(self) -> bool:
+        """Whether it rests where it should."""
+        there = self.arrival is not None and self.arrival.ok
+        return there and self.seconds >= SETTLE
+
+    @property
+    def usable(self) -> bool:
+        """Whether it rests, and reads about gravity: a place one may insist on."""
+        if self.f is None or self.seconds < SETTLE:
+            return False
+        off = abs(float(np.linalg.norm(self.f)) - self._about.gravity)
+        return off <= NORM * self._about.gravity
+
+    @property
+    def reason(self) -> str:
+        """What it waits for, for the operator."""
+        if self._stillness.since is None:
+            return MOVING if np.isfinite(self.meter) else LISTENING
+        if self.arrival is not None and not self.arrival.ok:
+            return self.problem if self.seconds >= PATIENCE else TURNING
+        return SETTLING
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with the place, in one sentence; empty if nothing is."""
+        if self.arrival is None or self.arrival.ok or self.f is None:
+            return ""
+        problem = self.arrival.problem
+        number = self._hold.index + 1
+        if self._left:
+            problem = f"turned too early, position {number} is not done: {problem}"
+        return problem
+
+    def waited_enough(self, give_up: float) -> bool:
+        """Whether it was waited for so many s, and whoever turns it had the time to."""
+        return self.waited > give_up and self.waited_host > min(give_up, LEAST)
+
+    def complaint(self) -> str:
+        """What is to be said aloud now: once for a rest, and again every minute."""
+        since = self._last - self._told
+        if self.seconds < PATIENCE or since < REMIND or not (said := self.problem):
+            return ""
+        again = np.isfinite(self._told)
+        self._told = self._last
+        return f"still waiting, {self.waited:.0f} s: {said}" if again else said
+
+
+def _others(hold: Hold, about: Description) -> dict[str, Position]:
+    """The plan's other positions, by what is said if the device is in one of them."""
+    others = {}
+    for i, position in enumerate(about.positions):
+        if position.degrees == hold.position.degrees:
+            continue
+        comes = f", position {hold.index + 1} comes first" if i > hold.index else ""
+        others[f"this is position {i + 1}{comes}"] = position
+    return others
+
+
+def force(acc: Array, about: Description) -> Array:
+    """Mean specific force in procedure axes by the nominal calibration, (3,).
+
+    `acc` is (n, 3) m/s^2, device axes.
+    """
+    nominal = about.nominal
+    f = (np.nanmean(acc, axis=0) - nominal["acc_bias"]) / nominal["acc_scale"]
+    turned: Array = about.mounting @ f
+    return turned
+
+
+class _Resting:
+    """The last second of samples since the device came to rest."""
+
+    def __init__(self) -> None:
+        self._blocks: list[Block] = []
+        self.seconds = 0.0
+
+    def add(self, block: Block, still_since: float | None) -> None:
+        if still_since is None:
+            self._blocks, self.seconds = [], 0.0
+            return
+        self.seconds = float(block.t[-1] - still_since)
+        self._blocks.append(block)
+        while len(self._blocks) > 1 and block.t[-1] - self._blocks[1].t[0] > 1.0:
+            self._blocks.pop(0)
+
+    @property
+    def block(self) -> Block:
+        return concat(self._blocks)

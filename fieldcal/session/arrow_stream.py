@@ -1,0 +1,312 @@
+"""Samples as an Arrow IPC stream in which every batch carries its own checksum.
+
+Any Arrow reader opens the file; the checksum stands in the batch's own metadata:
+``crc32`` of its columns, one after the other, and its ``number`` and first ``row``.
+Reading takes what is whole and says what is not: a batch that was cut off, changed,
+lost or doubled. Behind a damaged place it goes on at the next batch that is whole.
+"""
+
+from __future__ import annotations
+
+import io
+import zlib
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MARKER = b"\xff\xff\xff\xff"
+"""What every message of a stream begins with; messages begin at multiples of 8."""
+
+OURS = {"crc32", "number", "row"}
+"""What a batch says of itself; a stream of another program says none of it."""
+
+END = MARKER + b"\0\0\0\0"
+"""What a stream that was closed in order ends with."""
+
+
+class Encoder:
+    """Makes the bytes of a stream, a batch at a time.
+
+    Parameters
+    ----------
+    schema : columns of every batch
+    number, row : batches and rows that are there already, in a stream that goes on
+
+    """
+
+    def __init__(self, schema: pa.Schema, number: int = 0, row: int = 0) -> None:
+        import pyarrow as pa
+
+        self._sink = io.BytesIO()
+        self._stream = pa.ipc.new_stream(self._sink, schema)
+        self._number, self._row = number, row
+        self._there = schema.serialize().to_pybytes() if number else b""
+
+    def batch(self, batch: pa.RecordBatch) -> bytes:
+        """Bytes of the next batch, with those of the stream's head before the first."""
+        said = {
+            "crc32": f"{checksum(batch, self._number, self._row):08x}",
+            "number": str(self._number),
+            "row": str(self._row),
+        }
+        self._stream.write_batch(batch, custom_metadata=said)
+        self._number += 1
+        self._row += batch.num_rows
+        return self._taken()
+
+    def end(self) -> bytes:
+        """Bytes that end the stream."""
+        self._stream.close()
+        return self._taken()
+
+    def _taken(self) -> bytes:
+        data = self._sink.getvalue().removeprefix(self._there)
+        self._there = b""
+        self._sink.seek(0)
+        self._sink.truncate()
+        return data
+
+
+def checksum(batch: pa.RecordBatch, number: int, row: int) -> int:
+    """Checksum of a batch's numbers and of its place."""
+    crc = zlib.crc32(b"%d %d" % (number, row))
+    for name, column in zip(batch.schema.names, batch.columns, strict=True):
+        known = column.type == "double"
+        values = numbers(column) if known else column.to_numpy(zero_copy_only=False)
+        values = np.ascontiguousarray(values)
+        crc = zlib.crc32(values.data, zlib.crc32(name.encode(), crc))
+    return crc
+
+
+def numbers(column: pa.Array | pa.ChunkedArray) -> Array:
+    """Values of a column of float64; nan where there is none.
+
+    Arrow's own way would load all of pandas, where it is installed, to see whether what
+    it is asked for is one of pandas' kinds.
+    """
+    chunks = getattr(column, "chunks", [column])
+    parts = [_numbers(chunk) for chunk in chunks if len(chunk)]
+    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0), *parts])
+
+
+def _numbers(chunk: pa.Array) -> Array:
+    whole = chunk.fill_null(np.nan) if chunk.null_count else chunk
+    first, last = whole.offset, whole.offset + len(whole)
+    return np.frombuffer(whole.buffers()[1], dtype=float)[first:last]
+
+
+class Found(NamedTuple):
+    """What a stream holds.
+
+    Attributes
+    ----------
+    schema : its columns; None if not even these are there
+    batches : those that are whole, in order
+    says : what is not whole, one sentence without the file's name each
+    checked : whether every batch had a checksum
+    number, row : of the batch that would follow
+
+    """
+
+    schema: pa.Schema | None
+    batches: list[pa.RecordBatch]
+    says: list[str]
+    checked: bool
+    number: int
+    row: int
+
+
+def whole(data: bytes) -> int:
+    """Bytes up to the end of the last whole batch; 0 where there is none.
+
+    A stream that was closed in order ends behind that, with a marker.
+    """
+    import pyarrow as pa
+
+    source, end, batches = pa.BufferReader(data), 0, 0
+    try:
+        while True:
+            batches += pa.ipc.read_message(source).type == "record batch"
+            end = int(source.tell())
+    except (pa.ArrowException, EOFError, OSError):
+        return end if batches else 0
+
+
+def decode(data: bytes, usual: pa.Schema | None = None) -> Found:
+    """Read what is whole of a stream.
+
+    Parameters
+    ----------
+    data : the file
+    usual : columns to go by where the head of the stream is damaged
+
+    """
+    return _Decoder(data, usual).run()
+
+
+class _Decoder:
+    """Reads a stream message by message."""
+
+    def __init__(self, data: bytes, usual: pa.Schema | None) -> None:
+        import pyarrow as pa
+
+        self._data = pa.py_buffer(data)
+        self._raw = data
+        self._faults = (pa.ArrowException, OSError, EOFError, ValueError, KeyError,
+                        StopIteration)  # fmt: skip
+        self._usual = usual
+        self._head = b""
+        self._schema: pa.Schema | None = None
+        self._source = pa.BufferReader(self._data)
+        self._stream: Any = None
+        self._next = -1
+        self._batches: list[Any] = []
+        self._says: list[str] = []
+        self._expected, self._row, self._checked = 0, 0, True
+
+    def run(self) -> Found:
+        at = self._read_head()
+        if self._schema is not None:
+            self._read_all(at)
+        if not self._checked:
+            self._expected = len(self._batches)
+            self._row = sum(batch.num_rows for batch in self._batches)
+        return Found(
+            self._schema,
+            self._batches,
+            self._says,
+            self._checked,
+            self._expected,
+            self._row,
+        )
+
+    def _read_head(self) -> int:
+        """Where the first batch begins."""
+        import pyarrow as pa
+
+        try:
+            self._stream = pa.ipc.open_stream(self._source)
+            self._schema = self._stream.schema
+            self._next = end = int(self._source.tell())
+            self._head = self._raw[:end]
+            return end
+        except self._faults:
+            if self._usual is None or not self._raw:
+                return 0
+        with pa.BufferOutputStream() as sink, pa.ipc.new_stream(sink, self._usual):
+            pass
+        head = sink.getvalue().to_pybytes()[: -len(END)]
+        first = next(self._candidates(8), None)
+        if first is None:
+            return 0
+        self._says.append("its head is damaged; the usual columns are taken")
+        self._schema, self._head = self._usual, head
+        return first
+
+    def _read_all(self, at: int) -> None:
+        size = len(self._raw)
+        while at < size:
+            if self._raw[at : at + len(END)] == END:
+                at += len(END)
+                if at < size:
+                    self._says.append(f"{size - at} bytes behind its end are left out")
+                return
+            end = self._message(at)
+            if end is None:
+                behind = next(
+                    (c for c in self._candidates(at + 8) if self._whole(c)), None
+                )
+                if behind is None:
+                    break
+                self._says.append(f"bytes {at} to {behind} are damaged and left out")
+                end = behind
+            at = end
+        rows = sum(batch.num_rows for batch in self._batches)
+        self._says.append(f"was cut off; its {rows} whole rows are used")
+
+    def _whole(self, at: int) -> bool:
+        """Whether a message begins here that can be read."""
+        return self._read(at) is not None
+
+    def _candidates(self, at: int) -> Iterator[int]:
+        at = self._raw.find(MARKER, at)
+        while at >= 0:
+            if at % 8 == 0:
+                yield at
+            at = self._raw.find(MARKER, at + 1)
+
+    def _read(self, at: int) -> tuple[int, Any, dict[str, str]] | None:
+        """End of a message, its batch and what it says of itself; None if not whole."""
+        import pyarrow as pa
+
+        try:
+            if at == self._next:  # behind the last: no copy of its bytes is needed
+                found = _batch(self._stream)
+                self._next = int(self._source.tell())
+                return self._next, *found
+        except self._faults:
+            self._next = -1
+        source = pa.BufferReader(self._data.slice(at))
+        try:
+            message = pa.ipc.read_message(source)
+            end = at + int(source.tell())
+            if message.type != "record batch":
+                return end, None, {}
+            return end, *_batch(pa.ipc.open_stream(self._head + self._raw[at:end]))
+        except self._faults:
+            return None
+
+    def _message(self, at: int) -> int | None:
+        """Take the message that begins here; where it ends, None if it is not whole."""
+        found = self._read(at)
+        if found is None:
+            return None
+        end, batch, said = found
+        if batch is not None:
+            self._take(batch, said)
+        return end
+
+    def _take(self, batch: Any, said: dict[str, str]) -> None:
+        if not OURS & said.keys() and not self._expected:
+            self._checked = False
+            self._batches.append(batch)
+            return
+        try:
+            number, row = int(said["number"]), int(said["row"])
+            good = int(said["crc32"], 16) == checksum(batch, number, row)
+        except (KeyError, ValueError):
+            good, number, row = False, self._expected, self._row
+        if not good:
+            self._says.append(
+                f"batch {self._expected + 1}, {batch.num_rows} rows from row "
+                f"{self._row + 1} on, is damaged and left out"
+            )
+            self._expected, self._row = self._expected + 1, self._row + batch.num_rows
+            return
+        if number and number < self._expected:
+            self._says.append(f"batch {number + 1} is there twice; once is used")
+            return
+        if number > self._expected:
+            self._says.append(
+                f"batches {self._expected + 1} to {number} are missing, rows "
+                f"{self._row + 1} to {row}"
+            )
+        self._expected, self._row = number + 1, row + batch.num_rows
+        self._batches.append(batch)
+
+
+def _batch(stream: Any) -> tuple[Any, dict[str, str]]:
+    """Next batch of a stream, and what it says of itself."""
+    batch, said = stream.read_next_batch_with_custom_metadata()
+    batch.validate(full=True)
+    # Arrow takes metadata that are no text
+    pairs = (said or {}).items()
+    return batch, {
+        k.decode(errors="replace"): v.decode(errors="replace") for k, v in pairs
+    }

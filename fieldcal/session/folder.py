@@ -1,0 +1,231 @@
+"""The session folder: one format for live sessions, imports and offline work.
+
+    session.toml    what was known and planned          (`description`)
+    samples.<ext>   the raw samples                     (`sample_files`, `recorder`)
+    marks.jsonl     what happened, as it happened
+    result.json     calibration, by solve
+
+session.toml is never rewritten: windows of a live session stand in marks.jsonl, and
+whatever is derived goes into its own file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.errors import SessionError, disk_says
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Array, Block
+from fieldcal.session import description, sample_files
+from fieldcal.session.description import ACC_UNITS, GYR_UNITS, Description
+
+DESCRIPTION = "session.toml"
+MARKS = "marks.jsonl"
+RESULT = "result.json"
+
+
+@dataclass
+class Session:
+    """A session folder, opened for reading.
+
+    Attributes
+    ----------
+    folder : where
+    about : what session.toml says, with the windows that marks.jsonl adds
+    warnings : what was cut off or passed over while reading
+
+    """
+
+    folder: Path
+    about: Description
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def open(cls, folder: Path | str) -> Session:
+        """Open a session folder.
+
+        Raises
+        ------
+        SessionError
+            If it is none, or its session.toml or marks.jsonl cannot be used.
+
+        """
+        folder = Path(folder)
+        about = description.read(folder / DESCRIPTION)
+        says: list[str] = []
+        marks = list(read_marks(folder / MARKS, says))
+        return cls(folder, _with_windows(about, marks), tuple(says))
+
+    @property
+    def positions(self) -> tuple[Position, ...]:
+        """Positions in the order of session.toml."""
+        return self.about.positions
+
+    @property
+    def windows(self) -> tuple[tuple[float, float] | None, ...]:
+        """Window of each position, (start, end) in s of device time."""
+        return self.about.windows
+
+    @property
+    def gravity(self) -> float:
+        """Local gravity, m/s^2."""
+        return self.about.gravity
+
+    @property
+    def latitude(self) -> float:
+        """Latitude, rad."""
+        return self.about.latitude
+
+    @property
+    def mounting(self) -> Array:
+        """P of procedure = P @ device, (3, 3)."""
+        return self.about.mounting
+
+    @property
+    def grade(self) -> str:
+        """Grade: tactical, or navigation when the gyroscopes see the Earth rate."""
+        return self.about.grade
+
+    @property
+    def nominal(self) -> Mapping[str, Array]:
+        """The calibration a simulation starts from: (3,) by group."""
+        return self.about.nominal
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal rate, or what the times say where none is given."""
+        t = self.block.t
+        if self.about.rate_hz is not None or len(t) < 2:
+            return self.about.rate_hz or np.nan
+        return float(1 / np.median(np.diff(t)))
+
+    @cached_property
+    def block(self) -> Block:
+        """All samples, in SI units; volts and counts by the nominal scale factors."""
+        raw, cut = sample_files.read(sample_files.find(self.folder))
+        self.warnings += cut
+        units, gauge = self.about.units, self.about.gauge.size
+        for triad, unit in (
+            (raw.acc, ACC_UNITS[units["acceleration"]] / gauge[0]),
+            (raw.gyr, GYR_UNITS[units["angular_rate"]] / gauge[1]),
+        ):
+            if unit != 1.0:
+                np.multiply(triad, unit, out=triad)
+        return raw
+
+    def marks(self) -> Iterator[dict[str, Any]]:
+        """What happened, in order."""
+        return read_marks(self.folder / MARKS)
+
+    def write_json(self, name: str, content: Mapping[str, Any]) -> Path:
+        """Write a derived file whole, or not at all."""
+        return write_whole(
+            self.folder / name, json.dumps(content, indent=2, allow_nan=False) + "\n"
+        )
+
+
+def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:
+    windows = list(about.windows)
+    for mark in marks:
+        i = mark.get("position")
+        if mark.get("event") == "window" and isinstance(i, int) and i < len(windows):
+            windows[i] = (float(mark["start_s"]), float(mark["end_s"]))
+        elif mark.get("event") == "repeated" and isinstance(i, int):
+            windows[i : i + 1] = [None]
+    return replace(about, windows=tuple(windows))
+
+
+def mark_line(mark: Mapping[str, Any]) -> str:
+    r"""Return a mark as a line of marks.jsonl, with its checksum.
+
+    >>> mark_line({"event": "told"})
+    '{"event": "told", "crc32": "1a049d94"}\\n'
+    """
+    text = json.dumps(mark)
+    return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'
+
+
+def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:
+    """Marks of a file that are whole; no file gives none.
+
+    A line that was changed is left out, and so is a last one that was cut off.
+
+    Parameters
+    ----------
+    path : marks.jsonl
+    says : where what was left out is said, one sentence each
+
+    Raises
+    ------
+    SessionError
+        If the file cannot be read.
+
+    """
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be read: {error}") from error
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        mark = _mark(line)
+        if mark is not None:
+            yield mark
+        elif says is not None:
+            what = "was cut off" if number == len(lines) else "is damaged"
+            says.append(f"{path.name}: line {number} {what} and left out")
+
+
+def _mark(line: str) -> dict[str, Any] | None:
+    """Return a mark of a line; None if it is none, or not as it was written."""
+    try:
+        mark = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(mark, dict):
+        return None
+    told = mark.pop("crc32", None)
+    text = line.rpartition(', "crc32": ')[0] + "}"
+    if told is not None and told != f"{zlib.crc32(text.encode()):08x}":
+        return None
+    return mark
+
+
+def write_whole(path: Path, content: str | bytes) -> Path:
+    """Write a file so that a reader finds the old one or the new one, never half.
+
+    Raises
+    ------
+    SessionError
+        If it cannot be written.
+
+    """
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content.encode() if isinstance(content, str) else content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(name)
+            raise
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be written: {disk_says(error)}") from error
+    return path

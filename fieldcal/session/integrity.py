@@ -1,0 +1,144 @@
+"""Whether a session folder is whole: each file against its checksums and its schema.
+
+The JSON Schemas are in ``schemas/``, one for each kind of file, for other programs too;
+session.toml is judged as TOML reads it, marks.jsonl line by line.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fieldcal.calibration import Calibration
+from fieldcal.core.errors import InputError, SessionError
+from fieldcal.session import description, sample_files
+from fieldcal.session.folder import DESCRIPTION, MARKS, RESULT, read_marks
+
+DIAGNOSIS = "diagnosis.json"
+
+SCHEMAS = {
+    DESCRIPTION: "session", MARKS: "mark", RESULT: "result", DIAGNOSIS: "diagnosis"
+}  # fmt: skip
+"""Which schema a file is held to."""
+
+
+class Finding(NamedTuple):
+    """What is wrong with a file.
+
+    Attributes
+    ----------
+    file : its name in the folder
+    text : what, where, and what is done about it
+
+    """
+
+    file: str
+    text: str
+
+
+def schema(kind: str) -> dict[str, Any]:
+    """Return one of the schemas: session, mark, result or diagnosis."""
+    path = files("fieldcal").joinpath(f"schemas/{kind}.schema.json")
+    found: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    return found
+
+
+def findings(folder: Path) -> Iterator[Finding]:
+    """What is wrong with a session, file by file; nothing if all of it is whole.
+
+    Raises
+    ------
+    SessionError
+        If there is no session.toml: it is no session.
+
+    """
+    yield from _description(folder)
+    yield from _samples(folder)
+    yield from _marks(folder / MARKS)
+    for name in (RESULT, DIAGNOSIS):
+        if (folder / name).exists():
+            yield from _derived(folder / name)
+    for path in sorted(folder.glob(".*.*")):
+        if path.is_file():
+            text = "was left by a program that was killed while it wrote; delete it"
+            yield Finding(path.name, text)
+
+
+def _description(folder: Path) -> Iterator[Finding]:
+    path = folder / DESCRIPTION
+    try:
+        description.read(path)
+    except SessionError as error:
+        if not path.exists():
+            raise
+        yield Finding(DESCRIPTION, _without(path, str(error)))
+        return
+    yield from _against(DESCRIPTION, tomllib.loads(path.read_text("utf-8")), "")
+
+
+def _samples(folder: Path) -> Iterator[Finding]:
+    try:
+        path = sample_files.find(folder)
+    except SessionError as error:
+        yield Finding("samples", _without(folder, str(error)))
+        return
+    try:
+        _, says = sample_files.read(path)
+    except SessionError as error:
+        yield Finding(path.name, _without(path, str(error)))
+        return
+    yield from (Finding(path.name, _without(Path(path.name), text)) for text in says)
+
+
+def _marks(path: Path) -> Iterator[Finding]:
+    says: list[str] = []
+    marks = list(read_marks(path, says))
+    yield from (Finding(MARKS, _without(Path(MARKS), text)) for text in says)
+    for number, mark in enumerate(marks, start=1):
+        yield from _against(MARKS, mark, f"mark {number}, ")
+
+
+def _derived(path: Path) -> Iterator[Finding]:
+    try:
+        document = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        yield Finding(path.name, f"is not JSON: {error}; make it again")
+        return
+    wrong = list(_against(path.name, document, ""))
+    yield from wrong
+    if path.name == RESULT and not wrong:
+        try:
+            Calibration.from_json(document)
+        except InputError as error:
+            yield Finding(path.name, f"{error}; make it again")
+
+
+def _against(name: str, document: Any, place: str) -> Iterator[Finding]:
+    for error in _validator(SCHEMAS[name]).iter_errors(document):
+        text = f"{place}{_path(error.absolute_path)}: {_short(error.message)}"
+        yield Finding(name, text)
+
+
+@cache
+def _validator(kind: str) -> Any:
+    import jsonschema
+
+    return jsonschema.Draft202012Validator(schema(kind))
+
+
+def _path(parts: Any) -> str:
+    return ".".join(str(part) for part in parts) or "the whole"
+
+
+def _short(text: str) -> str:
+    return text if len(text) < 120 else f"{text[:60]} … {text[-50:]}"
+
+
+def _without(path: Path, text: str) -> str:
+    """Leave out the name of the file where a sentence begins with it."""
+    return text.removeprefix(f"{path}: ").removeprefix(f"{path} ")

@@ -1,0 +1,271 @@
+"""Writing a session while it happens, so that a killed process loses next to nothing.
+
+Samples go into an Arrow IPC stream, each batch complete in itself, with its checksum,
+and handed to the operating system at least every `FLUSH` seconds, also while the device
+is silent; every `SYNC` seconds they are on the disk. Marks are appended a line at a
+time, each with its checksum. Both files only ever grow by whole pieces: a piece that
+the disk takes half is taken back. So after a kill everything up to the last fifth of a
+second is there and can be read, and a recording that broke off can be gone on with:
+what stands after its last whole batch is cut off, and the next batch follows.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from threading import Event, Lock, Thread
+from time import monotonic, time
+from typing import Any, Self
+
+import numpy as np
+
+from fieldcal.core.errors import SessionError, disk_says
+from fieldcal.core.samples import Block, concat
+from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line, write_whole
+from fieldcal.session.sample_files import read, schema, to_batch
+
+FLUSH = 0.2
+"""Longest time that samples wait in memory, s of the host's clock."""
+
+SYNC = 1.0
+"""Time after which samples are on the disk, s: what a power cut may cost."""
+
+SAMPLES = "samples.arrows"
+
+
+BREAK = 1.0
+"""Least time that a break of the recording takes, s of device time."""
+
+
+class _Growing:
+    """A file that grows by whole pieces.
+
+    Parameters
+    ----------
+    path : where
+    size : bytes of it that are kept; None makes it new, or raises FileExistsError
+
+    """
+
+    def __init__(self, path: Path, size: int | None = None) -> None:
+        how = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0)
+        self.fd = os.open(path, how | (os.O_EXCL if size is None else 0), 0o644)
+        self._size = size or 0
+        os.ftruncate(self.fd, self._size)
+
+    def append(self, data: bytes) -> None:
+        """Write all of it, or nothing and raise OSError."""
+        left = memoryview(data)
+        try:
+            while left:
+                left = left[os.write(self.fd, left) :]
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self.fd, self._size)
+            raise
+        self._size += len(data)
+
+    def sync(self) -> None:
+        os.fsync(self.fd)
+
+    def close(self) -> None:
+        os.close(self.fd)
+
+
+class Recorder:
+    """The session folder of a run in progress; a context manager.
+
+    Parameters
+    ----------
+    folder : where
+    about : tables of session.toml; None goes on with a session that broke off
+
+    Raises
+    ------
+    SessionError
+        If the folder holds a session already: nothing is ever overwritten. Or, from any
+        method, if the disk refuses.
+
+    """
+
+    def __init__(self, folder: Path, about: Mapping[str, Any] | None) -> None:
+        self.folder = folder
+        self._last: tuple[float, float] | None = None
+        self._shift, self._broken = 0.0, False
+        self._unwritten = b""
+        self._waiting: list[Block] = []
+        self._lock = Lock()
+        self._fault: OSError | None = None
+        self._written = monotonic()
+        self._stop, self._closed = Event(), False
+        try:
+            if about is None:
+                self._resume()
+            else:
+                self._begin(about)
+        except FileExistsError as error:
+            raise SessionError(
+                f"{folder}: holds a session already; name another folder, or go on"
+                " with it by --resume"
+            ) from error
+        except OSError as error:
+            raise SessionError(
+                f"{folder}: cannot be written: {disk_says(error)}"
+            ) from error
+        self._watch = Thread(target=self._keep_up, daemon=True, name="recorder")
+        self._watch.start()
+
+    def _begin(self, about: Mapping[str, Any]) -> None:
+        import tomlkit
+
+        from fieldcal.session.arrow_stream import Encoder
+
+        names = (DESCRIPTION, SAMPLES, MARKS)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if any((self.folder / name).exists() for name in names):
+            raise FileExistsError
+        # of two that begin at once, one gets the file
+        self._samples = _Growing(self.folder / SAMPLES)
+        try:
+            write_whole(self.folder / DESCRIPTION, tomlkit.dumps(about))
+            self._marks = _Growing(self.folder / MARKS)
+        except BaseException:
+            # what holds nothing must not be in the way of the next attempt
+            self._samples.close()
+            for name in names:
+                (self.folder / name).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                self.folder.rmdir()
+            raise
+        self._encoder = Encoder(schema())
+
+    def _resume(self) -> None:
+        """Cut off what is not whole, and go on behind it."""
+        from fieldcal.session.arrow_stream import Encoder, decode, whole
+
+        path = self.folder / SAMPLES
+        data = path.read_bytes() if path.exists() else b""
+        end = whole(data)
+        if end:
+            found = decode(data[:end], schema())
+            self._encoder = Encoder(schema(), found.number, found.row)
+            block = read(path)[0]
+            self._last = (float(block.t[-1]), float(block.t_host[-1]))
+            self.rejoin()
+        else:
+            self._encoder = Encoder(schema())
+        self._samples = _Growing(path, end)
+        marks = self.folder / MARKS
+        lines = marks.read_bytes() if marks.exists() else b""
+        self._marks = _Growing(marks, lines.rfind(b"\n") + 1)
+
+    def rejoin(self) -> None:
+        """Take note that the link was opened anew: its clock may have begun anew."""
+        self._shift, self._broken = 0.0, True
+
+    def append(self, block: Block) -> Block:
+        """Record samples, in SI units and device axes; returns them as recorded.
+
+        The times of a device whose clock began anew go on from the last sample by what
+        the host saw go by, so that they never run backwards.
+        """
+        if self._broken and self._last is not None:
+            self._broken = False
+            last, last_host = self._last
+            away = float(block.t_host[0]) - last_host
+            if block.t[0] < last + BREAK:
+                away = away if np.isfinite(away) else BREAK
+                self._shift = last + max(BREAK, away) - float(block.t[0])
+                self.mark("rejoined", shift_s=self._shift)
+        if self._shift:
+            block = replace(block, t=block.t + self._shift)
+        self._last = (float(block.t[-1]), float(block.t_host[-1]))
+        with self._lock:
+            self._waiting.append(block)
+        if self._fault:
+            raise self._refused(self._fault) from self._fault
+        if monotonic() - self._written >= FLUSH:
+            self.flush()
+        return block
+
+    def flush(self) -> None:
+        """Hand what waits to the operating system."""
+        with self._lock:
+            self._written = monotonic()
+            if not self._waiting and not self._unwritten:
+                return
+            waiting = concat(self._waiting)
+            if len(waiting):
+                # kept until it is written, so that nothing is lost if it is not
+                self._unwritten += self._encoder.batch(to_batch(waiting))
+            self._waiting = []
+            try:
+                self._samples.append(self._unwritten)
+                self._unwritten = b""
+            except OSError as error:
+                self._fault = error
+                raise self._refused(error) from error
+            self._fault = None
+
+    def mark(self, event: str, **what: Any) -> None:
+        """Append a mark: what happened, with the host's time."""
+        line = mark_line({"event": event, **what, "host_s": round(time(), 3)})
+        self.flush()
+        try:
+            # the samples first: a mark must never speak of what is not there
+            self._samples.sync()
+            self._marks.append(line.encode())
+            self._marks.sync()
+        except OSError as error:
+            raise self._refused(error) from error
+
+    def close(self) -> None:
+        """Write what waits and end the stream; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._stop.set()
+        self._watch.join()
+        told = self._fault is not None
+        try:
+            self.flush()
+            self._samples.append(self._encoder.end())
+            self._samples.sync()
+        except OSError as error:
+            raise self._refused(error) from error
+        except SessionError:
+            if not told:
+                raise
+        finally:
+            self._samples.close()
+            self._marks.close()
+
+    def _keep_up(self) -> None:
+        """Flush and sync in the background; a fault is told at the next call."""
+        synced = monotonic()
+        while not self._stop.wait(FLUSH / 2):
+            try:
+                if monotonic() - self._written >= FLUSH:
+                    self.flush()
+                if monotonic() - synced >= SYNC:
+                    self._samples.sync()
+                    synced = monotonic()
+            except SessionError:
+                pass
+            except OSError as error:
+                self._fault = error
+
+    def _refused(self, error: OSError) -> SessionError:
+        return SessionError(
+            f"{self.folder}: cannot be written: {disk_says(error)}; what was recorded"
+            " is kept"
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()

@@ -1,0 +1,301 @@
+"""GO or NO-GO: each reason by itself, and the statistics behind them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+from scipy.spatial.transform import Rotation
+
+from fieldcal.acceptance.decision import Circumstances, Decision, decide, with_decision
+from fieldcal.acceptance.growth import growth
+from fieldcal.acceptance.verification import proposed, verify
+from fieldcal.calibration import Calibration, limits
+from fieldcal.calibration.document import schema
+from fieldcal.core.errors import InputError
+from fieldcal.core.frames import mounting_matrix
+from fieldcal.core.positions import FIVE, TWO, WIDE, Position
+from fieldcal.history.family import expected
+from fieldcal.session import description
+from fieldcal.solve import Observations, solve
+from fieldcal.windows import Average
+
+G = 9.81
+ABOUT = description.parse({"site": {"gravity": G}})
+BOUNDS = limits.read("tactical")
+GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
+LINK = {"samples": 10000, "missing": 0, "bad": 0}
+
+
+def calibration(
+    sigma: tuple[float, float, float] = (1e-3, 1e-4, 1e-5), good: bool = True
+) -> Calibration:
+    units = ("m/s^2", "1", "rad/s")
+    return Calibration(
+        "joint",
+        tuple(f"{g}.{a}" for g in GROUPS for a in "xyz"),
+        np.repeat([0.1, 1.0, 0.01], 3),
+        np.diag(np.repeat(np.square(sigma), 3)),
+        tuple(np.repeat(units, 3).tolist()),
+        7.0,
+        7,
+        1e-3,
+        good=good,
+        info={"level_sigma_deg": 0.02},
+    )
+
+
+def decided(found: Calibration, **seen: object) -> Decision:
+    known: dict[str, object] = {"temperatures": [21.0, 21.5], "link": LINK}
+    return decide(found, ABOUT, BOUNDS, Circumstances(**(known | seen)))  # type: ignore[arg-type]
+
+
+def test_a_sound_calibration_is_go_and_says_what_it_could_not_check() -> None:
+    made = decided(calibration())
+    assert made.go and not made.reasons
+    unknown = [c.name for c in made.checks if c.ok is None]
+    assert unknown == ["change", "verification"]
+    document = with_decision(calibration(), made).to_json()
+    assert document["verdict"] == "good" and document["decision"]["go"]
+    Draft202012Validator(schema()).validate(document)
+    again = Calibration.from_json(document)
+    assert again.info["expectation"][1]["seconds"] == 600.0
+
+
+@pytest.mark.parametrize(
+    ("found", "seen", "says"),
+    [
+        (calibration(good=False), {}, "the estimate itself is bad"),
+        (calibration((0.03, 1e-4, 1e-5)), {}, "acc_bias x is known to ± 0.03 m/s²"),
+        (calibration((1e-3, 1e-2, 1e-5)), {}, "acc_scale x is known to ± 0.01"),
+        (calibration((1e-3, 1e-4, 1e-3)), {}, "gyr_bias x is known to ± 0.001 rad/s"),
+        (calibration(), {"temperatures": [70.0]}, "70.0 to 70.0 °C"),
+        (calibration(), {"temperatures": [20, 26.5]}, "let it warm up"),
+        (calibration(), {"link": {**LINK, "missing": 50}}, "50 of 10050 samples"),
+        (calibration(), {"link": {**LINK, "bad": 50}}, "50 of 10050 frames refused"),
+        (calibration(), {"doubts": ["position 3 was insisted on"]}, "insisted on"),
+    ],
+)
+def test_every_reason_by_itself_makes_it_no_go(
+    found: Calibration, seen: dict[str, object], says: str
+) -> None:
+    made = decided(found, **seen)
+    assert not made.go and len(made.reasons) == 1 and says in made.reasons[0]
+
+
+def test_a_fit_that_disagrees_with_itself_is_no_go() -> None:
+    found = calibration()
+    odd = Calibration.from_json({**found.to_json(), "fit": {"chi2": 60.0, "dof": 7,
+                                 "rms": 1e-3, "unit": "m/s^2"}})  # fmt: skip
+    assert "do not agree" in decided(odd).reasons[0]
+
+
+def test_a_required_group_that_is_missing_is_no_go_unless_its_sensor_is_not_read() -> (
+    None
+):
+    whole = calibration()
+    without_scale = _only(whole, ("acc_bias", "gyr_bias"))
+    assert "acc_scale x y z was not determined" in decided(without_scale).reasons[0]
+    assert decided(_only(whole, ("acc_bias", "acc_scale"))).go
+
+
+def test_a_tilt_that_nobody_saw_and_nobody_excluded_is_no_go() -> None:
+    whole = calibration()
+    unsaid = decided(replace(whole, info={}))
+    assert not unsaid.go and len(unsaid.reasons) == 1
+    assert "how level the base is" in unsaid.reasons[0]
+    assert "--level" in unsaid.reasons[0] and "0.17 m/s²" in unsaid.reasons[0]
+    said = [check for check in decided(whole).checks if check.name == "level"]
+    assert [check.ok for check in said] == [True] and "± 0.02°" in said[0].says
+    seen = replace(whole, info={}, method="scalar")
+    assert decided(seen).go, "the norm of the force knows of no tilt"
+    rng = np.random.default_rng(1)
+    windows = [_held(p, rng) for p in FIVE]
+    found = solve(Observations.of(FIVE, windows, G))
+    assert {"base_tilt", "angle_offset"} & set(found.groups)
+    assert "level" not in [check.name for check in decided(found).checks]
+
+
+def test_a_position_that_does_not_fit_is_told_beside_the_decision() -> None:
+    rng = np.random.default_rng(2)
+    windows = [_held(p, rng) for p in FIVE]
+    windows[1] = _held(Position.deg(22.0, 0.4), rng)
+    made = decided(solve(Observations.of(FIVE, windows, G)))
+    told = [check for check in made.checks if check.name == "positions"]
+    assert [check.ok for check in told] == [None]
+    assert told[0].says.startswith("the position α = 22.5°, β = 0°")
+
+
+def _only(found: Calibration, groups: tuple[str, ...]) -> Calibration:
+    rows = [i for i, n in enumerate(found.names) if n.startswith(groups)]
+    return Calibration(
+        "joint",
+        tuple(found.names[i] for i in rows),
+        found.values[rows],
+        found.covariance[np.ix_(rows, rows)],
+        tuple(found.units[i] for i in rows),
+        7.0,
+        7,
+        1e-3,
+        info=found.info,
+    )
+
+
+def _shifted(found: Calibration, by: float) -> Calibration:
+    values = found.values.copy()
+    values[0] += by
+    return replace(found, values=values)
+
+
+def test_a_change_is_judged_by_the_history_of_the_device() -> None:
+    found, rng = calibration(), np.random.default_rng(1)
+    quiet = [_shifted(found, 1e-3 * rng.standard_normal()) for _ in range(30)]
+    wild = [_shifted(found, 0.3 * rng.standard_normal()) for _ in range(30)]
+    moved = _shifted(found, 0.2)
+    assert decided(moved, family=[]).go
+    assert decided(found, family=quiet).go
+    assert "acc_bias x differs from 30" in decided(moved, family=quiet).reasons[0]
+    assert decided(moved, family=wild).go, "this device has always done that"
+
+
+@pytest.mark.parametrize("runs", [1, 2, 5, 20])
+def test_false_alarms_are_as_rare_as_said(runs: int) -> None:
+    rng, usual, sigma = np.random.default_rng(runs), 0.05, 0.02
+    tries = 3000
+    spread = rng.normal(0.0, usual, (tries, runs + 1))
+    seen = spread + rng.normal(0.0, sigma, spread.shape)
+    sigmas = np.full(runs, sigma)
+    chances = [expected(x[:-1], sigmas, usual).chance(x[-1], sigma) for x in seen]
+    assert np.mean(np.array(chances) < 0.01) < 0.016
+    assert np.mean(np.array(chances) < 0.5) > 0.3, "nor is everything expected"
+
+
+def test_many_runs_make_the_usual_spread_forgotten() -> None:
+    rng = np.random.default_rng(3)
+    values = rng.normal(1.0, 0.5, 200)
+    found = expected(values, np.full(200, 0.01), 0.001)
+    assert found.spread == pytest.approx(0.5, rel=0.15)
+    assert found.mean == pytest.approx(values.mean(), abs=1e-3)
+
+
+@pytest.mark.parametrize("axes", [("+x", "+y", "+z"), ("+x", "-z", "+y")])
+def test_the_growth_of_errors_is_that_of_a_navigator(axes: tuple[str, ...]) -> None:
+    """A strapdown navigator run many times with errors drawn from the covariance."""
+    rng, n, t, steps = np.random.default_rng(5), 1500, 60.0, 120
+    sigma = np.array([2e-3, 5e-3, 9e-3, 1e-3, 5e-4, 2e-3, 3e-5, 6e-5, 1e-5])
+    found = calibration()
+    mixing = np.eye(9)
+    mixing[4, 1], mixing[5, 2] = 0.5, -0.3  # bias and scale go together
+    root = np.diag(sigma) @ mixing
+    found = Calibration(
+        "joint", found.names, found.values, root @ root.T, found.units, 1.0, 1, 0.0
+    )
+    p = mounting_matrix(axes)
+    drawn = (root @ rng.standard_normal((9, n))).T
+    bias, scale, rate = drawn[:, :3], drawn[:, 3:6], drawn[:, 6:]
+    up = np.array([0.0, -G, 0.0])
+    f = (bias + scale * (up @ p)) @ p.T + up
+    levelled = (root @ rng.standard_normal((9, n))).T[:, :3] @ p.T
+    tilt0 = np.column_stack([-levelled[:, 2], 0 * levelled[:, 1], levelled[:, 0]]) / G
+    w = rate @ p.T
+    velocity = np.zeros((n, 3))
+    for k in range(steps):
+        now = (k + 0.5) * t / steps
+        attitude = Rotation.from_rotvec(tilt0) * Rotation.from_rotvec(w * now)
+        velocity += (attitude.apply(f) - up) * t / steps
+    end = (Rotation.from_rotvec(tilt0) * Rotation.from_rotvec(w * t)).as_rotvec()
+    told = growth(found, G, p, t)
+    assert told.level == pytest.approx(velocity[:, [0, 2]].std(axis=0).max(), rel=0.07)
+    assert told.vertical == pytest.approx(velocity[:, 1].std(), rel=0.07)
+    assert told.tilt == pytest.approx(end[:, [0, 2]].std(axis=0).max(), rel=0.07)
+    assert told.heading == pytest.approx(end[:, 1].std(), rel=0.07)
+
+
+def test_growth_is_not_told_of_what_was_not_determined() -> None:
+    told = growth(_only(calibration(), ("acc_bias",)), G, np.eye(3), 60.0).to_json()
+    assert told["heading_sigma_deg"] is None and told["tilt_sigma_deg"] is None
+    assert told["vertical_velocity_sigma_m_s"] is not None
+
+
+def _held(position: Position, rng: np.random.Generator, cross: float = 0.0) -> Average:
+    """A window of a device on a tilted base, worked out by other means than ours."""
+    alpha, beta = np.deg2rad(position.degrees or (0.0, 0.0))
+    base = Rotation.from_euler("x", np.deg2rad(-1)) * Rotation.from_euler(
+        "z", np.deg2rad(0.7)
+    )
+    body = Rotation.from_euler("x", -beta) * Rotation.from_euler("z", -alpha) * base
+    f = body.apply([0.0, -G, 0.0])
+    f = np.array([0.2, -0.3, 0.1]) + np.array([1.004, 0.996, 1.007]) * f
+    f[0] += cross * G
+    covariance = np.diag([4e-7] * 3 + [1e-9] * 3)
+    mean = np.concatenate([f, [0.01, -0.02, 0.006]])
+    mean += rng.multivariate_normal(np.zeros(6), covariance)
+    return Average(mean, covariance, 21.0, 3000, 0.0, 30.0)
+
+
+def test_a_position_not_fitted_is_predicted_within_its_uncertainty() -> None:
+    rng, position, chances = np.random.default_rng(8), proposed(FIVE), []
+    for _ in range(150):
+        windows = [_held(p, rng) for p in FIVE]
+        found = solve(Observations.of(FIVE, windows, G))
+        chances.append(verify(found, ABOUT, position, _held(position, rng)).chance)
+    assert 0.01 < np.mean(np.array(chances) < 0.05) < 0.12
+    assert np.mean(chances) == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_position_that_is_off_is_no_go() -> None:
+    rng, position = np.random.default_rng(9), proposed(FIVE)
+    found = solve(Observations.of(FIVE, [_held(p, rng) for p in FIVE], G))
+    seen = verify(found, ABOUT, position, _held(position, rng, cross=0.02))
+    assert seen.largest == pytest.approx(0.2, abs=0.05)
+    made = decide(found, ABOUT, BOUNDS, Circumstances([21.0], LINK, seen))
+    reason = next(r for r in made.reasons if "not fitted" in r)
+    assert position.name in reason and "does not explain" in reason
+
+
+@pytest.mark.parametrize("positions", [TWO, FIVE, WIDE])
+def test_the_verification_position_is_within_the_ladder_and_new(
+    positions: tuple[Position, ...],
+) -> None:
+    found = proposed(positions).degrees
+    assert found is not None and found not in [p.degrees for p in positions]
+    known = np.array([p.degrees for p in positions])
+    assert (known.min(axis=0) <= found).all() and (found <= known.max(axis=0)).all()
+
+
+def test_limits_of_a_file_go_over_the_defaults(tmp_path: Path) -> None:
+    path = tmp_path / "limits.toml"
+    path.write_text("[tactical]\nacc_bias_sigma = 0.5\n")
+    mine = limits.read("tactical", path)
+    assert mine.acc_bias_sigma == 0.5
+    assert mine.gyr_bias_sigma == BOUNDS.gyr_bias_sigma
+    assert limits.read("navigation", path).acc_bias_sigma < 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            "[tactical]\nacc_bias = 1\n",
+            "acc_bias is no limit; there are acc_bias_sigma",
+        ),
+        ("[tactical]\nacc_bias_sigma = -1\n", "must be a number above 0"),
+        ("[tactical]\nacc_bias_sigma = 'x'\n", "must be a number above 0"),
+        ("[tactical]\nacc_bias_sigma = true\n", "must be a number above 0"),
+        ("[tactical]\ntemperature_min_c = 90.0\n", "must be below temperature_max_c"),
+        ("[lunar]\n", "[lunar] is no grade"),
+        ("tactical = 3\n", "write [tactical]"),
+        ("x = [", "is no file of limits"),
+    ],
+)
+def test_a_wrong_file_of_limits_names_file_key_and_remedy(
+    tmp_path: Path, text: str, says: str
+) -> None:
+    path = tmp_path / "limits.toml"
+    path.write_text(text)
+    with pytest.raises(InputError) as error:
+        limits.read("tactical", path)
+    assert says in str(error.value) and "limits.toml" in str(error.value)

@@ -1,0 +1,182 @@
+"""Samples in volts or counts: the same calibration, in their unit."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+from session_folders import places, recorded, write_session
+
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.document import schema
+from fieldcal.calibration.gauge import Gauge, inward, outward
+from fieldcal.cli import main
+from fieldcal.core.errors import InputError
+from fieldcal.sim_device.profile import Profile
+from fieldcal.sim_device.vocabulary import parse
+
+ACC, GYR = 2**15 / (8 * 9.80665), 2**15 / np.deg2rad(1000)
+"""Counts of a device of 8 g and 1000 deg/s."""
+
+COUPLED = "cross_coupling:k12=0.003,k31=0.002"
+
+SEEN = {"gyr_bias": (0.011, -0.02, 0.006)}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """One session in SI, and the same in counts and in volts."""
+    device = Profile(effects=(parse("earth_rate:"), parse(COUPLED)))
+    positions, out = places(seconds=15.0), {}
+    block = recorded(device, positions)
+    for unit, acc, gyr in (("SI", 1.0, 1.0), ("count", ACC, GYR), ("V", 0.2, 3.0)):
+        folder = tmp_path_factory.mktemp(unit)
+        units = {"acceleration": unit, "angular_rate": unit} if unit != "SI" else {}
+        nominal = {
+            "acc_scale": [acc] * 3,
+            "gyr_scale": [gyr] * 3,
+            "gyr_bias": [gyr * b for b in SEEN["gyr_bias"]],
+        }
+        scaled = replace(block, acc=block.acc * acc, gyr=block.gyr * gyr)
+        limits = {"acceleration": 78.0 * acc, "angular_rate": 17.0 * gyr}
+        write_session(
+            folder, scaled, positions, units=units, nominal=nominal, range=limits
+        )
+        out[unit] = folder
+    return out
+
+
+@pytest.mark.parametrize(("unit", "acc", "gyr"), [("count", ACC, GYR), ("V", 0.2, 3.0)])
+def test_what_is_solved_is_the_same_in_another_unit(
+    folders: dict[str, Path], unit: str, acc: float, gyr: float
+) -> None:
+    documents = []
+    for name in ("SI", unit):
+        assert main(["solve", str(folders[name]), "--cross"]) == 0
+        documents.append(json.loads((folders[name] / "result.json").read_text()))
+        Draft202012Validator(schema()).validate(documents[-1])
+    plain, scaled = (d["parameters"] for d in documents)
+    assert plain.keys() == scaled.keys()
+    for group, entry in plain.items():
+        kind = {"acc": acc, "cro": acc, "gyr": gyr}
+        c = kind.get(group[:3], 1.0)
+        for key in ("value", "sigma"):
+            mine, other = (np.array(e[key], float) for e in (entry, scaled[group]))
+            np.testing.assert_allclose(other, c * mine, rtol=1e-5, atol=1e-6 * c)
+    assert scaled["acc_bias"]["unit"] == unit
+    assert scaled["acc_scale"]["unit"] == f"{unit}/(m/s^2)"
+    assert scaled["gyr_bias"]["unit"] == unit
+
+
+def test_effects_are_relative_and_the_calibration_is_in_counts(
+    folders: dict[str, Path],
+) -> None:
+    said = []
+    for name in ("SI", "count"):
+        assert main(["diagnose", str(folders[name])]) == 1
+        said.append(json.loads((folders[name] / "diagnosis.json").read_text()))
+    (plain,), (counted,) = (d["effects"] for d in said)
+    assert plain["id"] == counted["id"] == "cross_coupling"
+    k12 = [e["parameters"]["k12"]["value"] for e in (plain, counted)]
+    assert k12[0] == pytest.approx(k12[1], rel=1e-4)
+    bias = [d["calibration"]["acc_bias"] for d in said]
+    assert bias[1]["unit"] == "count"
+    mine = [ACC * v for v in bias[0]["value"]]
+    assert bias[1]["value"] == pytest.approx(mine, rel=1e-4)
+
+
+def test_it_is_applied_exported_and_shown(
+    folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = {}
+    for name in ("SI", "count"):
+        folder = str(folders[name])
+        assert main(["solve", folder, "--cross"]) == 0
+        assert main(["apply", folder, str(tmp_path / f"{name}.csv")]) == 0
+        out[name] = np.genfromtxt(tmp_path / f"{name}.csv", delimiter=",", names=True)
+        assert main(["report", folder, "-o", str(tmp_path / f"{name}.html")]) == 0
+    for channel in ("ax", "gz"):
+        np.testing.assert_allclose(out["SI"][channel], out["count"][channel], atol=1e-6)
+    page = (tmp_path / "count.html").read_text()
+    assert "count/(m/s²)" in page
+    capsys.readouterr()
+    table = tmp_path / "c.csv"
+    command = ["export", str(folders["count"]), "--format"]
+    assert main([*command, "csv", "-o", str(table)]) == 0
+    assert "acc_scale.x" in table.read_text() and "count/(m/s^2)" in table.read_text()
+    assert main([*command, "imu_tk", "-o", str(tmp_path / "t")]) == 0
+    assert f"the samples' count divided by {ACC:g}" in capsys.readouterr().err
+
+
+def test_counts_that_nobody_said_the_worth_of(
+    folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (folders["count"] / "session.toml").read_text()
+    positions = text[text.index("[[position]]") :]
+    (tmp_path / "session.toml").write_text(
+        'format = 1\n[units]\nacceleration = "count"\nangular_rate = "count"\n'
+        + positions
+    )
+    samples = folders["count"] / "samples.arrows"
+    (tmp_path / "samples.arrows").write_bytes(samples.read_bytes())
+    assert main(["solve", str(tmp_path)]) == 2
+    assert (
+        "[nominal] acc_scale (how many count in one m/s^2)" in capsys.readouterr().err
+    )
+
+
+@given(
+    acc=st.floats(1e-6, 1e6),
+    gyr=st.floats(1e-6, 1e6),
+    units=st.sampled_from([("count", "count"), ("V", "rad/s"), ("m/s^2", "V")]),
+)
+def test_out_and_in_again(acc: float, gyr: float, units: tuple[str, str]) -> None:
+    names = ("acc_bias.x", "gyr_scale.z", "base_tilt.about_x_deg", "cross_coupling.k12")
+    made = Calibration(
+        "joint",
+        names,
+        np.array([0.1, 1.02, -0.3, 0.004]),
+        np.diag([1e-4, 1e-6, 1e-2, 1e-8]),
+        ("m/s^2", "1", "deg", "1"),
+        1.0,
+        1,
+        0.1,
+        info={"gauge": Gauge((acc, gyr), units).table()},
+    )
+    again = inward(outward(made))
+    np.testing.assert_allclose(again.values, made.values, rtol=1e-12)
+    np.testing.assert_allclose(again.covariance, made.covariance, rtol=1e-12)
+    assert again.units == made.units
+    assert outward(made).value("base_tilt.about_x_deg") == -0.3
+
+
+@pytest.mark.parametrize(
+    "table",
+    [{}, {"size": [1.0], "units": ["V", "V"]}, {"size": [0, 1], "units": "VV"}, 3],
+)
+def test_a_gauge_that_is_none_is_refused(table: object) -> None:
+    with pytest.raises(InputError, match="gauge is not two sizes"):
+        Gauge.read(table)
+
+
+def test_an_import_of_counts_asks_what_they_are_worth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    block = recorded(Profile(), places([(0.0, 0.0)], 20.0))
+    rows = np.column_stack([block.t, np.round(block.six * np.repeat([ACC, GYR], 3))])
+    log = tmp_path / "log.csv"
+    np.savetxt(log, rows, delimiter=",")
+    command = ["import", str(log), "--columns", "t,ax,ay,az,gx,gy,gz"]
+    bare = ["--acc-unit", "count", "--gyr-unit", "count", "-o", str(tmp_path / "a")]
+    assert main([*command, *bare]) == 0
+    assert "nothing says what a count is worth" in capsys.readouterr().err
+    worth = ["--acc-unit", "m/s^2", "--acc-lsb", str(ACC), "--gyr-unit", "rad/s"]
+    worth += ["--gyr-lsb", str(GYR), "-o", str(tmp_path / "b")]
+    assert main([*command, *worth]) == 0
+    assert "1 still stretch" in capsys.readouterr().err

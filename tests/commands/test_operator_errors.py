@@ -1,0 +1,123 @@
+"""What a person may get wrong about a port: one sentence, exit code 3, nothing lost."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Timer
+from time import sleep
+from typing import Any
+
+import numpy as np
+import pytest
+from wires import STREAMS
+
+pytest.importorskip("sqlite3")
+
+from fieldcal.cli import main
+from fieldcal.drivers.driver import open_driver
+from fieldcal.run.movers import VirtualDevice
+from fieldcal.session.folder import Session
+
+
+def failed(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """The sentence that a run ends with."""
+    run = ["run", "two_position", "--headless", "--device", url, "-o", str(folder)]
+    assert main([*run, "--patience", "0"]) == 3
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    said = last.removeprefix("fieldcal run: ")
+    assert said != last and not re.search(r"\.\s|[\[{<]|Error", said)
+    return said
+
+
+@pytest.mark.usefixtures("soon_silent")
+def test_the_wrong_baud_rate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with VirtualDevice(["--serial", "mip", "--baud", "921600"]) as device:
+        url = f"serial:{device.port}?format=mip&baud=115200"
+        said = failed(url, tmp_path / "s", capsys)
+    assert "no format that is known; check the baud rate" in said
+    sends = ["--serial", "mip", "--baud", "921600"]
+    with VirtualDevice(sends, once=False) as device:  # a probe comes and goes
+        assert main(["ports", "--probe", "--seconds", "2", device.port]) == 0
+    assert "?format=mip&baud=921600" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("soon_silent")
+def test_the_wrong_format(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with VirtualDevice(["--serial", "xsens"]) as device:
+        said = failed(f"serial:{device.port}?format=mip", tmp_path / "s", capsys)
+    assert said.endswith("these are no mip bytes; try format=xsens")
+
+
+@contextmanager
+def somebody_else() -> Iterator[None]:
+    """Have no rights for a while: those of root are laid down."""
+    if os.geteuid():
+        yield
+        return
+    os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+def test_a_port_of_somebody_else(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    opened = os.open
+
+    def without_rights(path: Any, *how: Any, **more: Any) -> int:
+        # to the port only: the checkout may be in a folder that nobody else may read
+        with somebody_else() if str(path) == str(port) else nullcontext():
+            return opened(path, *how, **more)
+
+    with TemporaryDirectory() as folder:
+        port = Path(folder, "ttyUSB0")
+        port.touch(mode=0o000)
+        os.chmod(folder, 0o755)
+        monkeypatch.setattr(os, "open", without_rights)
+        said = failed(f"serial:{port}", tmp_path / "s", capsys)
+    assert "no permission; add yourself to the group that owns it (dialout)" in said
+
+
+def test_a_port_that_another_program_has(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with VirtualDevice(["--serial", "xsens"]) as device:
+        with open_driver(f"serial:{device.port}?format=xsens"):
+            said = failed(f"serial:{device.port}?format=xsens", tmp_path / "s", capsys)
+    assert said.endswith("another program has it open; close that first")
+
+
+def test_half_a_frame_at_the_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stream = STREAMS["mip"](60, np.random.default_rng(0))
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+
+    def dies() -> None:
+        os.write(ours, b"".join(stream.pieces)[:-7])
+        sleep(0.2)  # the kernel drops what lies in a pty that is closed
+        os.close(ours)
+
+    away = Timer(0.3, dies)
+    away.start()
+    url = f"serial:{os.ttyname(theirs)}?format=mip&reconnect=0"
+    said = failed(url, tmp_path / "s", capsys)
+    away.join()
+    os.close(theirs)
+    assert said.endswith("hung up: check cable and power, then start again")
+    block = Session.open(tmp_path / "s").block
+    np.testing.assert_allclose(block.six, stream.samples.six[:-1], rtol=1e-6)

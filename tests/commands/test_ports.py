@@ -1,0 +1,138 @@
+"""`fieldcal ports`: what answers on a pty, at which rate and in which format."""
+
+import json
+
+import numpy as np
+import pytest
+from talking import Say, talking
+from wires import STREAMS, nmea
+
+from fieldcal.cli import main
+from fieldcal.core.errors import DeviceSilent
+from fieldcal.drivers.columns import guess
+from fieldcal.drivers.driver import open_driver
+from fieldcal.drivers.probe import bauds, probe
+
+
+def sample(name: str) -> Say:
+    pieces = STREAMS[name](2000, np.random.default_rng(1)).pieces
+    return lambda i: pieces[i % 2000]
+
+
+@pytest.mark.parametrize("name", sorted(set(STREAMS) - {"text"}))
+def test_a_format_is_told_by_its_frames(name: str) -> None:
+    with talking(sample(name)) as port:
+        found = probe(port, 0.5)
+        assert found.format == name
+        assert 30 < found.rate_hz < 300  # a busy machine says less than 200
+        with open_driver(found.url) as imu:
+            assert len(next(imu.blocks(3.0)))
+
+
+def packets(*names: str) -> Say:
+    """An autopilot's heartbeats, every tenth of what it says, and these messages."""
+    dialect = pytest.importorskip("pymavlink.dialects.v20.all")
+    pytest.importorskip("fastcrc")
+    vehicle = dialect.MAVLink(None, 1, 1)
+    beat = dialect.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3)
+    numbers = [0, 0, -1000, 0, 0, 0, 0, 0, 0]
+
+    def say(i: int) -> bytes:
+        parts = [] if i % 10 else [beat]
+        if "RAW_IMU" in names:
+            parts.append(dialect.MAVLink_raw_imu_message(5000 * i, *numbers))
+        if "SCALED_IMU2" in names:
+            parts.append(dialect.MAVLink_scaled_imu2_message(5 * i, *numbers))
+        return b"".join(part.pack(vehicle) for part in parts)
+
+    return say
+
+
+@pytest.mark.parametrize(
+    ("sends", "query", "says"),
+    [
+        (("SCALED_IMU2", "RAW_IMU"), "&message=RAW_IMU", "RAW_IMU about 1"),
+        ((), "", "no message of an IMU until it is asked"),
+    ],
+)
+def test_an_autopilot_is_told_by_its_packets(
+    sends: tuple[str, ...], query: str, says: str
+) -> None:
+    with talking(packets(*sends)) as port:
+        found = probe(port, 0.5)
+        assert found.format == "mavlink" and says in found.says
+        assert found.url == f"mavlink:{port}?baud={found.baud}{query}"
+        with open_driver(f"serial:{port}?format=xsens") as imu:
+            with pytest.raises(
+                DeviceSilent, match=f"an autopilot's; try mavlink:{port}"
+            ):
+                next(imu.blocks(0.3))
+
+
+def test_lines_of_numbers_are_told_with_their_columns(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def line(i: int) -> bytes:
+        return nmea(f"IMU,{5 * i},{i},0.1,-0.2,99.5,0.0001,0.6,-0.8,{24 + i % 2}.5")
+
+    with talking(line) as port:
+        assert main(["ports", "--probe", "--seconds", "0.5", "--json", port]) == 0
+        shown = json.loads(capsys.readouterr().out)
+        (entry,) = shown["ports"]
+        answer = entry["answer"]
+        assert answer["format"] == "text"
+        assert answer["baud"] == bauds()[0]
+        assert answer["url"].endswith(
+            "&columns=t,seq,gx,gy,gz,ax,ay,az,temperature&t_unit=ms&acc_unit=g"
+            "&prefix=IMU&checksum=xor"
+        )
+        with open_driver(answer["url"]) as imu:
+            block = next(imu.blocks(3.0))
+            assert np.linalg.norm(block.acc[0]) == pytest.approx(9.80665, abs=1e-3)
+
+
+def test_the_table_says_how_to_use_it(capsys: pytest.CaptureFixture[str]) -> None:
+    with talking(sample("witmotion")) as port:
+        assert main(["ports", "--probe", "--seconds", "0.5", port]) == 0
+        shown = capsys.readouterr()
+        assert f"to use it: serial:{port}?format=witmotion&baud=" in shown.out
+        assert "listening" in shown.err
+
+
+def test_silence_and_noise_and_no_port(capsys: pytest.CaptureFixture[str]) -> None:
+    rng = np.random.default_rng(2)
+    with talking(lambda i: b"") as port:
+        assert "nothing comes" in probe(port, 0.1).says
+    with talking(lambda i: rng.bytes(30)) as port:
+        assert "no format that is known" in probe(port, 0.1).says
+    assert "no such port" in probe("/dev/nowhere", 0.1).says
+    assert main(["ports", "--probe", "/dev/nowhere", "--json"]) == 3
+    assert json.loads(capsys.readouterr().out)["ports"][0]["answer"]["url"] == ""
+
+
+def test_without_a_probe_it_lists(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ports", "--json"]) == 0
+    assert isinstance(json.loads(capsys.readouterr().out)["ports"], list)
+    assert main(["ports"]) == 0
+
+
+def test_the_wrong_format_is_told_by_the_driver() -> None:
+    with talking(sample("witmotion")) as port:
+        with open_driver(f"serial:{port}?format=text") as imu:
+            with pytest.raises(DeviceSilent, match="no text bytes; try format=witm"):
+                next(imu.blocks(0.3))
+
+
+@pytest.mark.parametrize("separator", ["comma", "semicolon", "tab", "space"])
+def test_separators_are_found(separator: str) -> None:
+    mark = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}[separator]
+    rows = [[0.01 * i, 0, 9.8, 0.1, 0, 0, 0] for i in range(20)]
+    text = "".join(mark.join(map(str, row)) + "\r\n" for row in rows)
+    found = guess(text.encode(), 0.2)
+    assert found is not None
+    assert found.startswith("columns=t,ax,ay,az,gx,gy,gz")
+
+
+def test_words_are_no_numbers() -> None:
+    assert guess(b"login: \nPassword: \n" * 20, 1.0) is None
+    assert guess(b"", 1.0) is None

@@ -1,0 +1,167 @@
+"""Recordings of others, taken through the command line as a user would."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from fieldcal.cli import main
+from fieldcal.session.folder import Session
+
+UNITS = range(5)
+
+NORM_RESIDUAL = [0.0017, 0.0022, 0.0022, 0.0015, 0.0032]
+"""Norm residual once non-orthogonality is modelled, m/s^2: the README of the data."""
+
+IMPORT = ["--columns", "ax,ay,az,gx,gy,gz", "--rate", "100", "--gravity", "9.81"]
+"""9.81 m/s^2 is the gravity that the peer's own cost function takes."""
+
+
+HAND = ["--still", "2"]
+"""Held by hand: shorter stops are shaky."""
+
+
+def solve(folder: Path, *options: str) -> dict[str, Any]:
+    assert main(["solve", str(folder), "--json", *options]) in (0, 1)
+    result: dict[str, Any] = json.loads((folder / "result.json").read_text())
+    return result
+
+
+def both(result: dict[str, Any], group: str) -> tuple[np.ndarray, np.ndarray]:
+    found = result["parameters"][group]
+    return np.array(found["value"], float), np.array(found["sigma"], float)
+
+
+@pytest.fixture(scope="module")
+def folders(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    made = []
+    for i in UNITS:
+        folder = tmp_path_factory.mktemp("mikoff") / "session"
+        log = shared / "real" / "mikoff_mpu9150_x5" / f"imu{i}.log.gz"
+        assert main(["import", str(log), *IMPORT, *HAND, "-o", str(folder)]) == 0
+        made.append(folder)
+    return made
+
+
+@pytest.fixture(scope="module")
+def solved(folders: list[Path]) -> list[dict[str, Any]]:
+    return [solve(folder, "--cross") for folder in folders]
+
+
+@pytest.mark.parametrize("i", UNITS)
+def test_five_mpu9150_leave_no_more_than_the_peer_s_model(
+    solved: list[dict[str, Any]], i: int
+) -> None:
+    assert solved[i]["method"] == "scalar"
+    assert solved[i]["verdict"] == "good"
+    half_a_digit = 0.00005
+    # theirs is the least there is; ours weighs the stops, and fits the turns as well
+    assert solved[i]["fit"]["rms"] <= 1.05 * NORM_RESIDUAL[i] + half_a_digit
+
+
+def stops_without_weights(folder: Path) -> np.ndarray:
+    """Mean specific force of each stop, (n, 3), as anybody would take it."""
+    session = Session.open(folder)
+    spans = [w for w in session.windows if w]
+    return np.array([session.block.between(*w).acc.mean(axis=0) for w in spans])
+
+
+def norms_of_the_peer_s_model(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    matrix = np.array([[x[3], x[6], x[7]], [0, x[4], x[8]], [0, 0, x[5]]])
+    f = np.linalg.solve(matrix, (y - x[:3]).T)
+    return np.asarray(np.linalg.norm(f, axis=0) - 9.81)
+
+
+@pytest.mark.parametrize("i", UNITS)
+def test_five_mpu9150_predict_a_stop_left_out_as_well_as_plain_least_squares(
+    solved: list[dict[str, Any]], folders: list[Path], i: int
+) -> None:
+    """The peer's model and method, on the same stops: nine numbers, equal weights."""
+    y = stops_without_weights(folders[i])
+    assert len(y) == solved[i]["conditions"]["positions"]
+    ideal = np.array([0, 0, 0, 1, 1, 1, 0, 0, 0], float)
+    missed = []
+    for k in range(len(y)):
+        others = np.delete(y, k, axis=0)
+        fit = least_squares(
+            norms_of_the_peer_s_model, ideal, args=(others,), xtol=1e-14
+        )
+        missed.append(norms_of_the_peer_s_model(fit.x, y[k : k + 1])[0])
+    assert solved[i]["left_out_rms"] <= 1.01 * np.sqrt(np.mean(np.square(missed)))
+
+
+@pytest.mark.parametrize("i", UNITS)
+def test_five_mpu9150_agree_with_the_peer_s_published_table(
+    solved: list[dict[str, Any]], shared: Path, i: int
+) -> None:
+    """The peer gives no uncertainty; half a unit of its last digit is added to ours."""
+    path = shared / "real" / "mikoff_mpu9150_x5" / "peer_results.toml"
+    peer = tomllib.loads(path.read_text())["accelerometer"]
+    theirs = {
+        "acc_bias": [peer[f"bias_{a}"][i] for a in "xyz"],
+        "acc_scale": [1 + peer[f"scale_percent_{a}"][i] / 100 for a in "xyz"],
+        "cross_coupling": np.deg2rad(
+            [peer[f"m_{p}_deg"][i] for p in ("xy", "xz", "yz")]
+        ),
+    }
+    rounding = {"acc_bias": 5e-4, "acc_scale": 5e-6, "cross_coupling": 9e-6}
+    for group, published in theirs.items():
+        value, sigma = both(solved[i], group)
+        off = value - published
+        allowed = 3 * np.hypot(sigma, rounding[group])
+        assert (np.abs(off) <= allowed).all(), (
+            f"unit {i}, {group}: ours - peer = {off}, 3 sigma = {allowed}"
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "offset"),
+    [
+        ("p10", "two_position", None),
+        ("p09", "joint", "angle_offset"),
+        ("p01", "joint", None),
+        ("p03", "joint", "angle_offset"),
+        ("p04", "joint", "base_tilt"),
+    ],
+)
+def test_practice_sessions_are_solved_within_the_stated_uncertainty(
+    shared: Path, tmp_path: Path, name: str, method: str, offset: str | None
+) -> None:
+    folder = tmp_path / name
+    shutil.copytree(shared / "practice" / name, folder)
+    folder.chmod(0o755)
+    answers = json.loads((shared / "practice" / "answers.json").read_text())[name]
+    result = solve(folder)
+    assert result["method"] == method and result["verdict"] == "good"
+    pulls = []
+    for group in ("acc_bias", "acc_scale", "gyr_bias"):
+        value, sigma = both(result, group)
+        pulls.append((value - answers["truth"][group]) / sigma)
+    if offset:
+        value, sigma = both(result, offset)
+        pulls.append((value - list(answers["concealed"][offset].values())) / sigma)
+    assert np.abs(np.concatenate(pulls)).max() < 3.5
+    assert np.sqrt(np.mean(np.concatenate(pulls) ** 2)) < 1.8
+
+
+def test_ten_short_intervals_have_next_to_no_freedom_and_that_is_said(
+    shared: Path, tmp_path: Path
+) -> None:
+    log = shared / "real" / "tomisuarez_mpu6050" / "example_data_calibration.csv.gz"
+    call = ["import", str(log), *IMPORT, "-o", str(tmp_path / "s"), "--still", "0.3"]
+    call += ["--acc-unit", "g", "--acc-lsb", "16384"]
+    call += ["--gyr-unit", "deg/s", "--gyr-lsb", "131"]
+    assert main(call) == 0
+    session = tomllib.loads((tmp_path / "s" / "session.toml").read_text())
+    assert session["position"]
+    code = main(["solve", str(tmp_path / "s"), "--json", "--cross"])
+    if code != 2:
+        result = json.loads((tmp_path / "s" / "result.json").read_text())
+        assert "degree" in " ".join(result["warnings"])

@@ -1,0 +1,78 @@
+"""Values off by whole bytes, put right count by count."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from ladder import TACTICAL, record, ride
+from ladder_sessions import tables
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import CHANNELS, Block
+from fieldcal.diagnosis.chain import check
+from fieldcal.effects.decode_fault import undone
+from fieldcal.session import description
+
+LSB = np.repeat([16 * 9.80665 / 2**15, np.deg2rad(1000) / 2**15], 3)
+"""Steps of a device of 16 g and 1000 deg/s."""
+
+Counts = NDArray[np.int64]
+
+
+def slip(kind: str, counts: Counts) -> Counts:
+    """What a driver makes of 16-bit counts, byte by byte."""
+    out = []
+    for count in counts.tolist():
+        high, low = count.to_bytes(2, "big", signed=True)
+        if kind == "bytes_swapped":
+            out.append(int.from_bytes(bytes([low, high]), "big", signed=True))
+        else:
+            signed = int.from_bytes(bytes([high]), "big", signed=True)
+            out.append(256 * signed + (low - 256 if low > 127 else low))
+    return np.array(out)
+
+
+def with_six(block: Block, six: NDArray[np.float64]) -> Block:
+    return replace(block, acc=six[:, :3], gyr=six[:, 3:])
+
+
+@pytest.mark.parametrize("kind", ["bytes_swapped", "low_byte_signed"])
+@pytest.mark.parametrize("bias", [0.02, 0.12, 0.57, -0.3])
+def test_each_count_is_what_it_was(kind: str, bias: float) -> None:
+    device = replace(TACTICAL, acc_noise=0.01, acc_bias=(bias, -0.1, bias))
+    about = description.parse(tables(device))
+    block = record(device, ride(device, seed=3))
+    counts = np.round(block.six / LSB).astype(np.int64)
+    whole, tried = counts * LSB, 0
+    for c, name in enumerate(CHANNELS):
+        broken = slip(kind, counts[:, c])
+        if np.array_equal(broken, counts[:, c]):
+            continue
+        six = whole.copy()
+        six[:, c] = broken * LSB[c]
+        told = check(with_six(block, six), about)
+        found = [f.values for i, f in told.faults if i == "decode_fault"]
+        assert found == [{"channel": name, "kind": kind}]
+        np.testing.assert_allclose(told.block.six, whole, rtol=1e-6, atol=1e-9)
+        tried += 1
+    assert tried >= 3
+
+
+@pytest.mark.parametrize("steps", [0.05, 0.3, 1.2])
+def test_steps_however_coarse_are_no_slip(steps: float) -> None:
+    device = replace(TACTICAL, acc_noise=0.1, gyr_noise=2e-3, gyr_bias=(0.3, 0.05, 0.0))
+    block = record(device, ride(device, seed=3))
+    size = np.repeat([steps, steps / 100], 3)
+    six = np.round(block.six / size) * size
+    told = check(with_six(block, six), description.parse(tables(TACTICAL)))
+    assert "decode_fault" not in told.ids
+
+
+@given(st.lists(st.integers(-32768, 32767), min_size=2, max_size=60))
+def test_nothing_is_made_of_nothing(counts: list[int]) -> None:
+    some = np.array(counts)
+    kind, mended = undone(some)
+    assert len(mended) == len(some)
+    assert bool(kind) or np.array_equal(mended, some)

@@ -1,0 +1,326 @@
+"""Exported numbers, used as each program uses them, against fieldcal's own `apply`."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+
+from fieldcal.calibration import Calibration, Nominal
+from fieldcal.cli import main
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
+from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
+from fieldcal.exporters import Source, ardupilot, exporter, formats, px4
+from fieldcal.session.folder import Session
+from fieldcal.session.integrity import schema
+from fieldcal.session.recorder import Recorder
+
+PAIRS = [f"{i}{j}" for i in "123" for j in "123" if i != j]
+
+
+def calibration(
+    rng: np.random.Generator, cross: float, gyr_scale: float = 0.0
+) -> Calibration:
+    values = {
+        "acc_bias": rng.normal(0, 0.3, 3),
+        "acc_scale": 1 + rng.normal(0, 0.02, 3),
+        "gyr_bias": rng.normal(0, 0.02, 3),
+    }
+    if gyr_scale:
+        values["gyr_scale"] = 1 + rng.normal(0, gyr_scale, 3)
+    flat = {
+        f"{g}.{a}": v
+        for g, three in values.items()
+        for a, v in zip("xyz", three, strict=True)
+    }
+    if cross:
+        flat |= {f"cross_coupling.k{p}": rng.normal(0, cross) for p in PAIRS}
+        if gyr_scale:
+            flat |= {f"gyro_cross_coupling.e{p}": rng.normal(0, cross) for p in PAIRS}
+    k = len(flat)
+    return Calibration(
+        "joint", tuple(flat), np.array(list(flat.values())), 1e-8 * np.eye(k),
+        ("1",) * k, 1.0, 1, 1e-3,
+    )  # fmt: skip
+
+
+def samples(rng: np.random.Generator, n: int = 200) -> Block:
+    return Block.of(
+        np.arange(n) / 100, rng.normal(0, 9, (n, 3)), rng.normal(0, 1, (n, 3))
+    )
+
+
+def corrected(
+    values: dict[str, float], autopilot: int, instance: int, raw: Block
+) -> tuple[Array, Array]:
+    """(raw - offset) * scale, as both autopilots do it."""
+    known = names(autopilot, instance)
+    offset, scale, gyro = (
+        np.array([values[n] for n in known[what]])
+        for what in ("acc_offset", "acc_scale", "gyr_offset")
+    )
+    return (raw.acc - offset) * scale, raw.gyr - gyro
+
+
+@pytest.mark.parametrize(("module", "number"), [(ardupilot, ARDUPILOT), (px4, PX4)])
+@pytest.mark.parametrize("instance", [0, 2])
+def test_an_autopilot_corrects_raw_samples_as_apply_does(
+    module: ModuleType, number: int, instance: int
+) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        cal, raw = calibration(rng, 0.0), samples(rng)
+        found = module.parameters(cal, instance=instance)
+        acc, gyr = corrected(dict(found.values), number, instance, raw)
+        np.testing.assert_allclose(acc, cal.apply(raw).acc, atol=1e-12)
+        np.testing.assert_allclose(gyr, cal.apply(raw).gyr, atol=1e-12)
+        assert not found.says
+
+
+@pytest.mark.parametrize(("module", "number"), [(ardupilot, ARDUPILOT), (px4, PX4)])
+@pytest.mark.parametrize("taken_out", [False, True])
+def test_what_was_installed_is_put_together_with_what_was_found(
+    module: ModuleType, number: int, taken_out: bool
+) -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        known = names(number, 1)
+        device = Installed(number, 1, dict.fromkeys(known["rotation"], 0.0), taken_out)
+        for what, centre, width in (
+            ("acc_offset", 0, 0.4),
+            ("acc_scale", 1, 0.03),
+            ("gyr_offset", 0, 0.02),
+        ):
+            device.values |= {n: float(rng.normal(centre, width)) for n in known[what]}
+        raw, cal = samples(rng), calibration(rng, 0.0)
+        acc, gyr = corrected(device.values, number, 1, raw)
+        sent = raw if taken_out else Block.of(raw.t, acc, gyr)
+        new = module.parameters(
+            cal, installed=Installed.from_table(device.as_table())
+        ).values
+        acc, gyr = corrected(dict(new), number, 1, raw)
+        np.testing.assert_allclose(acc, cal.apply(sent).acc, atol=1e-12)
+        np.testing.assert_allclose(gyr, cal.apply(sent).gyr, atol=1e-12)
+
+
+def test_what_an_autopilot_has_no_place_for_is_said_with_its_size() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        cal = calibration(rng, 0.003, 0.01)
+        raw = samples(rng)
+        found = ardupilot.parameters(cal)
+        acc, _ = corrected(dict(found.values), ARDUPILOT, 0, raw)
+        true = cal.apply(raw).acc
+        error = np.abs(acc - true).max(axis=1) / np.linalg.norm(true, axis=1)
+        (said,) = [s for s in found.says if s.startswith("cross_coupling")]
+        bound = float(said.split(" m/s^2")[0].rpartition(" ")[2]) / 9.80665
+        assert error.max() <= bound * 1.01
+        assert error.max() > 0.3 * bound
+        assert any(s.startswith("gyr_scale") for s in found.says)
+
+
+def test_parameters_of_another_program_or_a_turned_board_are_refused() -> None:
+    rng = np.random.default_rng(4)
+    cal = calibration(rng, 0.0)
+    with pytest.raises(InputError, match="another autopilot"):
+        ardupilot.parameters(cal, installed=Installed(PX4, 0))
+    turned = Installed(
+        PX4, 0, {n: 1.0 for some in names(PX4, 0).values() for n in some}
+    )
+    with pytest.raises(InputError, match="SENS_BOARD_ROT"):
+        px4.parameters(cal, installed=turned)
+    with pytest.raises(InputError, match="in full"):
+        Installed.from_table({"parameters": 3})
+
+
+def source(folder: Path, cal: Calibration, raw: Block) -> Source:
+    about = {"format": 1, "device": {"name": "bench", "serial": "A1"}}
+    end = float(raw.t[-1])
+    about["position"] = [{"start_s": 0.0, "end_s": end}]
+    with Recorder(folder, about) as recorder:
+        recorder.append(raw)
+    (folder / "result.json").write_text(json.dumps(cal.to_json()))
+    return Source(cal, Nominal(), Session.open(folder))
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> tuple[Source, Block, Block]:
+    """A full calibration, raw samples, and what `apply` makes of them."""
+    rng = np.random.default_rng(5)
+    cal, raw = calibration(rng, 0.004, 0.01), samples(rng, 2000)
+    raw = replace(raw, temperature=np.linspace(20, 21, len(raw)))
+    return source(tmp_path / "s", cal, raw), raw, cal.apply(raw)
+
+
+def written(made: Source, name: str, folder: Path) -> Path:
+    module = exporter(name)
+    path = folder / f"out{module.ENDING}"
+    module.write(made, path)
+    return path
+
+
+def test_an_ardupilot_file_is_read_by_pymavlink(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    from pymavlink.mavparm import MAVParmDict
+
+    path = written(made[0], "ardupilot", tmp_path)
+    table = MAVParmDict()
+    assert table.load(str(path))
+    expected = ardupilot.parameters(made[0].calibration).values
+    assert {k: table[k] for k in expected} == pytest.approx(expected, rel=1e-7)
+    assert set(table.keys()) == set(expected)
+
+
+def test_a_px4_file_has_a_parameter_a_line(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    lines = written(made[0], "px4", tmp_path).read_text().splitlines()
+    rows = [line.split("\t") for line in lines if not line.startswith("#")]
+    expected = px4.parameters(made[0].calibration).values
+    assert {r[2]: float(r[3]) for r in rows} == pytest.approx(expected, rel=1e-7)
+    assert {(r[0], r[1], r[4]) for r in rows} == {("1", "1", "9")}
+
+
+def test_imu_tk_corrects_by_t_k_u_minus_b(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    path = written(made[0], "imu_tk", tmp_path)
+    gyro = path.with_name(path.name.replace("_acc", "_gyro"))
+    _, raw, true = made
+    for file, u, f in ((path, raw.acc, true.acc), (gyro, raw.gyr, true.gyr)):
+        numbers = np.array(file.read_text().split(), dtype=float)
+        t, k, b = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3), numbers[18:]
+        np.testing.assert_allclose((u - b) @ (t @ k).T, f, atol=1e-9)
+        np.testing.assert_array_equal(np.diag(t).round(12), 1)
+        np.testing.assert_array_equal(k, np.diag(np.diag(k)))
+        # the paper's sign: a = T K (a_S + b)
+        np.testing.assert_allclose((u + -b) @ (t @ k).T, f, atol=1e-9)
+
+
+def test_kalibr_predicts_what_was_recorded(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    told = yaml.safe_load(written(made[0], "kalibr", tmp_path).read_text())
+    _, raw, true = made
+    acc, gyr = told["accelerometers"], told["gyroscopes"]
+    m_acc, m_gyr, turn = (np.array(x) for x in (acc["M"], gyr["M"], gyr["C_gyro_i"]))
+    np.testing.assert_allclose(true.acc @ m_acc.T + acc["bias"], raw.acc, atol=1e-9)
+    predicted = true.gyr @ (m_gyr @ turn).T + gyr["bias"]
+    np.testing.assert_allclose(predicted, raw.gyr, atol=1e-9)
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-11)
+    assert np.linalg.det(turn) > 0 and np.all(m_gyr == np.tril(m_gyr).round(15))
+    # white noise of sd 9 m/s^2 and 1 rad/s at 100 Hz; the largest of three axes
+    assert told["accelerometer_noise_density"] == pytest.approx(0.9, rel=0.5)
+    assert told["gyroscope_noise_density"] == pytest.approx(0.1, rel=0.5)
+    assert "accelerometer_random_walk" not in told
+
+
+def test_imu_calib_corrects_by_sm_u_minus_bias(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    told = yaml.safe_load(written(made[0], "ros", tmp_path).read_text())
+    _, raw, true = made
+    for prefix, u, f in (("", raw.acc, true.acc), ("gyro_", raw.gyr, true.gyr)):
+        sm = np.array(told[f"{prefix}SM"]).reshape(3, 3)
+        np.testing.assert_allclose(u @ sm.T - told[f"{prefix}bias"], f, atol=1e-9)
+
+
+def test_json_follows_its_schema_and_corrects(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    told = json.loads(written(made[0], "json", tmp_path).read_text())
+    jsonschema.validate(told, schema("export"))
+    _, raw, true = made
+    for name, u, f in (
+        ("accelerometer", raw.acc, true.acc),
+        ("gyroscope", raw.gyr, true.gyr),
+    ):
+        found = (u - told[name]["bias"]) @ np.array(told[name]["matrix"]).T
+        np.testing.assert_allclose(found, f, atol=1e-9)
+    assert told["nominal"] == []
+
+
+def test_the_table_has_every_parameter(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    cal = made[0].calibration
+    with written(made[0], "csv", tmp_path).open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["name"] for row in rows] == list(cal.names)
+    np.testing.assert_allclose([float(r["value"]) for r in rows], cal.values)
+    np.testing.assert_allclose([float(r["sigma"]) for r in rows], cal.sigma)
+
+
+def test_mcap_is_read_by_ros_and_by_ourselves(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    path = written(made[0], "mcap", tmp_path)
+    _, raw, true = made
+    for topic, expected in (("/imu/raw", raw), ("/imu/calibrated", true)):
+        folder = tmp_path / topic.replace("/", "_")
+        assert main(["import", str(path), "--instance", topic, "-o", str(folder)]) == 0
+        back = Session.open(folder).block
+        np.testing.assert_array_equal(back.acc, expected.acc)
+        np.testing.assert_array_equal(back.gyr, expected.gyr)
+        np.testing.assert_allclose(back.t, expected.t, atol=1e-9)
+        np.testing.assert_array_equal(back.temperature, raw.temperature)
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        found = [
+            m for *_, m in reader.iter_decoded_messages(topics=["/imu/calibrated"])
+        ]
+    f: Any = found[7].linear_acceleration
+    np.testing.assert_array_equal([f.x, f.y, f.z], true.acc[7])
+    assert found[7].orientation_covariance[0] == -1
+
+
+def test_what_was_not_determined_is_said_not_filled_in_silence(
+    made: tuple[Source, Block, Block], tmp_path: Path
+) -> None:
+    whole = made[0].calibration
+    keep = [i for i, n in enumerate(whole.names) if n.startswith("acc_bias")]
+    few = replace(
+        whole,
+        names=tuple(whole.names[i] for i in keep),
+        values=whole.values[keep],
+        covariance=whole.covariance[np.ix_(keep, keep)],
+        units=tuple(whole.units[i] for i in keep),
+    )
+    some = replace(made[0], calibration=few)
+    for name in ("imu_tk", "kalibr", "ros", "json"):
+        says = exporter(name).write(some, tmp_path / name)
+        assert any("gyr_scale.y" in sentence for sentence in says)
+    says = exporter("ardupilot").write(some, tmp_path / "a.param")
+    assert "gyr_bias was not determined: not written" in says
+    assert "GYR" not in (tmp_path / "a.param").read_text().partition("INS_")[2]
+
+
+@pytest.mark.parametrize("name", formats())
+def test_the_command_writes_every_format_and_overwrites_none(
+    name: str,
+    made: tuple[Source, Block, Block],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    module = exporter(name)
+    assert "raw" in (module.__doc__ or "") and module.WHAT
+    call = ["export", str(tmp_path / "s"), "--format", name, "-o", str(tmp_path / "o")]
+    assert main(call) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'o'}\n"
+    before = (tmp_path / "o").read_bytes()
+    assert main(call) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert (tmp_path / "o").read_bytes() == before

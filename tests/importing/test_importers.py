@@ -1,0 +1,409 @@
+"""Importers against logs with known samples, and against mutated ones."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
+from small_files import SMALL, Small, whole
+
+from fieldcal.cli import main
+from fieldcal.core.errors import InputError, SessionError
+from fieldcal.core.samples import Block, concat
+from fieldcal.importers import formats, open_recording
+from fieldcal.importing import recording as recordings
+from fieldcal.importing.ingest import bring_in
+from fieldcal.importing.recording import Wanted
+from fieldcal.importing.validation import Judge
+from fieldcal.session import sample_files
+from fieldcal.session.folder import Session
+from fieldcal.session.integrity import findings
+
+INSTALLED = {
+    "INS_ACCOFFS_X": 0.1, "INS_ACCOFFS_Y": 0.2, "INS_ACCOFFS_Z": 0.3,
+    "INS_ACCSCAL_X": 1.01, "INS_ACCSCAL_Y": 1.02, "INS_ACCSCAL_Z": 1.03,
+    "INS_GYROFFS_X": 0.01, "INS_GYROFFS_Y": 0.02, "INS_GYROFFS_Z": 0.03,
+    "AHRS_ORIENTATION": 0.0,
+}  # fmt: skip
+SLOT = {
+    "CAL_ACC_PRIME": 101.0, "CAL_ACC0_ID": 100.0, "CAL_ACC1_ID": 101.0,
+    "CAL_ACC1_XOFF": 0.5, "CAL_ACC1_YOFF": 0.25, "CAL_ACC1_ZOFF": 0.125,
+    "CAL_ACC1_XSCALE": 1.5, "CAL_ACC1_YSCALE": 1.25, "CAL_ACC1_ZSCALE": 0.75,
+    "CAL_GYRO1_XOFF": 0.5, "CAL_GYRO1_YOFF": 0.25, "CAL_GYRO1_ZOFF": 0.125,
+    "SENS_BOARD_ROT": 0.0,
+}  # fmt: skip
+COLUMNS = "t,ax,ay,az,gx,gy,gz"
+WANTED = Wanted(tuple(COLUMNS.split(",")))
+
+
+def session(folder: Path, *call: str) -> Session:
+    assert main(["import", *call, "-o", str(folder)]) == 0
+    return Session.open(folder)
+
+
+def mark(folder: Path, event: str) -> dict[str, Any]:
+    return next(m for m in Session.open(folder).marks() if m["event"] == event)
+
+
+def same(found: Block, expected: Block, atol: float = 0.0) -> None:
+    np.testing.assert_allclose(
+        found.t - found.t[0], expected.t - expected.t[0], atol=1e-6
+    )
+    np.testing.assert_allclose(found.acc, expected.acc, rtol=0, atol=atol)
+    np.testing.assert_allclose(found.gyr, expected.gyr, rtol=0, atol=atol)
+
+
+def test_px4_sensors_are_kept_apart_with_their_own_calibration(tmp_path: Path) -> None:
+    units = {0: imu(1), 1: imu(2, 300)}
+    path = tmp_path / "log.anything"
+    path.write_bytes(ulog(units, SLOT, combined=imu(3), late=0.002))
+    out = tmp_path / "out"
+    assert main(["import", str(path), "-o", str(out)]) == 0
+    for n, block in units.items():
+        folder = out / f"sensor_accel.{n}"
+        same(Session.open(folder).block, block)
+        np.testing.assert_array_equal(
+            Session.open(folder).block.temperature, block.temperature
+        )
+        assert not list(findings(folder))
+        assert any("2 ms apart" in s for s in mark(folder, "imported")["says"])
+    device = mark(out / "sensor_accel.1", "device")
+    assert device["device_id"] == 101 and device["installed"]["taken_out"]
+    assert device["installed"]["instance"] == 1 and not device["installed"]["missing"]
+    assert device["installed"]["parameters"]["CAL_ACC1_XOFF"] == 0.5
+    combined = Session.open(out / "sensor_combined.0").block
+    stale = np.arange(len(combined)) % 50 == 7
+    assert np.isnan(combined.acc[stale]).all()
+    np.testing.assert_array_equal(combined.gyr, imu(3).gyr)
+    told = mark(out / "sensor_combined.0", "device")["installed"]
+    assert told["instance"] == 1 and not told["taken_out"]
+
+
+def test_a_px4_log_in_small_pieces_is_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulog({0: imu(1)}, SLOT, late=0.004))
+    whole = concat(open_recording(path, WANTED).blocks("sensor_accel.0"))
+    monkeypatch.setattr(recordings.Recording.pieces, "__defaults__", (997,))
+    parts = list(open_recording(path, WANTED).blocks("sensor_accel.0"))
+    assert len(parts) > 3
+    same(concat(parts), whole)
+    same(whole, imu(1))
+
+
+def test_ardupilot_sensors_and_what_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pymavlink.DFReader import DFReader_binary
+
+    units = {0: imu(1), 1: imu(2)}
+    path = tmp_path / "00000001.bin"
+    path.write_bytes(dataflash(units, INSTALLED))
+    monkeypatch.setattr(recordings.Recording.pieces, "__defaults__", (1009,))
+    out = tmp_path / "out"
+    assert main(["import", str(path), "-o", str(out)]) == 0
+    reader = DFReader_binary(str(path))
+    theirs = []
+    while (said := reader.recv_match(type=["IMU"])) is not None:
+        if said.I == 1:
+            theirs.append([said.AccX, said.AccY, said.AccZ])
+    reader.close()
+    for n, block in units.items():
+        found = Session.open(out / f"IMU.{n}").block
+        same(found, block)
+        np.testing.assert_array_equal(found.temperature, block.temperature)
+    np.testing.assert_array_equal(Session.open(out / "IMU.1").block.acc, theirs)
+    told = mark(out / "IMU.0", "device")["installed"]
+    assert told["parameters"] == pytest.approx(INSTALLED)
+    assert not told["missing"] and not told["taken_out"]
+    assert mark(out / "IMU.1", "device")["installed"]["missing"]
+
+
+def test_a_telemetry_log_of_two_sensors(tmp_path: Path) -> None:
+    units = {0: imu(1), 1: imu(2)}
+    path = tmp_path / "flight.log"
+    path.write_bytes(tlog(units, INSTALLED))
+    out = tmp_path / "out"
+    assert main(["import", str(path), "-o", str(out)]) == 0
+    for n, block in units.items():
+        same(Session.open(out / f"HIGHRES_IMU.{n}").block, block)
+    device = mark(out / "HIGHRES_IMU.0", "device")
+    assert device["acc_unit"] == "m/s^2"
+    assert device["installed"]["parameters"] == pytest.approx(INSTALLED)
+
+
+@pytest.mark.parametrize("ending", [".log", ".asc", ".blf"])
+def test_can_logs(tmp_path: Path, ending: str) -> None:
+    (tmp_path / "imu.dbc").write_text(dbc())
+    can_log(tmp_path / f"drive{ending}", imu(1))
+    (tmp_path / f"drive{ending}").rename(tmp_path / "drive.dat")
+    options = f"dbc={tmp_path / 'imu.dbc'}&map={CAN_MAP}"
+    found = session(tmp_path / "s", str(tmp_path / "drive.dat"), "--options", options)
+    same(found.block, imu(1), atol=6e-4)
+
+
+def test_can_logs_of_several_buses_are_never_mixed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "imu.dbc").write_text(dbc())
+    lines: list[str] = []
+    for bus in (0, 1):
+        can_log(tmp_path / f"{bus}.log", imu(bus))
+        text = (tmp_path / f"{bus}.log").read_text()
+        lines += text.replace("can0", f"can{bus}").splitlines()
+    path = tmp_path / "both.log"
+    path.write_text("\n".join(sorted(lines)))
+    options = f"dbc={tmp_path / 'imu.dbc'}&map={CAN_MAP}"
+    assert main(["import", str(path), "--options", options]) == 2
+    assert "come from the buses can0, can1: choose one" in capsys.readouterr().err
+    for bus in (0, 1):
+        chosen = f"{options}&channel=can{bus}"
+        found = session(tmp_path / f"s{bus}", str(path), "--options", chosen)
+        same(found.block, imu(bus), atol=6e-4)
+    none = f"{options}&channel=can7"
+    assert main(["import", str(path), "--options", none]) == 2
+    assert "comes from can7, but from can0, can1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("time", ["", "(1718000000.000000)", "(2024-06-10 12:00:00.0)"])
+def test_what_candump_prints_is_named(tmp_path: Path, time: str) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text(f" {time}  can0  123   [6]  00 00 00 00 52 26\n" * 50)
+    with pytest.raises(InputError, match="record with candump -l"):
+        open_recording(path, Wanted()).streams()
+
+
+@pytest.mark.parametrize("ending", [".npz", ".npy", ".mat", ".h5"])
+def test_arrays_of_any_kind(tmp_path: Path, ending: str) -> None:
+    arrays(tmp_path / f"log{ending}", imu(1))
+    path = tmp_path / "log.data"
+    path.write_bytes(gzip.compress((tmp_path / f"log{ending}").read_bytes()))
+    same(session(tmp_path / "s", str(path), "--columns", COLUMNS).block, imu(1))
+    name = {".npy": "array", ".h5": "group/imu"}.get(ending, "imu")
+    named = [f"{c}={name}.{i}" for i, c in enumerate(COLUMNS.split(","))]
+    again = session(tmp_path / "n", str(path), "--columns", ",".join(named))
+    same(again.block, imu(1))
+
+
+@pytest.mark.parametrize("kind", ["parquet", "stream", "feather"])
+def test_tables_with_named_columns(tmp_path: Path, kind: str) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    names = ["time", "acc_x", "acc_y", "acc_z", "gx", "gy", "gz"]
+    made = pa.table(dict(zip(names, table(imu(1)).T, strict=True)))
+    path = tmp_path / "table"
+    if kind == "parquet":
+        pyarrow.parquet.write_table(made, path)
+    else:
+        new = pa.ipc.new_file if kind == "feather" else pa.ipc.new_stream
+        with new(path, made.schema) as writer:
+            writer.write_table(made)
+    columns = "t=time,ax=acc_x,ay=acc_y,az=acc_z,gx,gy,gz"
+    same(session(tmp_path / "s", str(path), "--columns", columns).block, imu(1))
+
+
+def test_files_of_one_imu_are_joined_where_their_times_agree(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    block = imu(1)
+    np.savez(tmp_path / "a.npz", a=np.column_stack([block.t, block.acc]))
+    np.savetxt(tmp_path / "g.csv", np.column_stack([block.t - block.t[0], block.gyr]))
+    np.savez(tmp_path / "w.npz", w=np.column_stack([block.t, block.temperature]))
+    call = [str(tmp_path / n) for n in ("a.npz", "w.npz")]
+    call += ["--join", "--columns", "t,ax,ay,az", "--columns", "t,temperature"]
+    found = session(tmp_path / "s", *call).block
+    np.testing.assert_array_equal(found.temperature, block.temperature)
+    assert len(mark(tmp_path / "s", "imported")["files"]) == 2
+    call = [str(tmp_path / n) for n in ("a.npz", "g.csv")]
+    call += ["--join", "--columns", "t,ax,ay,az", "--columns", "t,gx,gy,gz"]
+    assert main(["import", *call, "-o", str(tmp_path / "x")]) == 2
+    assert "g.csv: line 1, column t: 0 s, but a.npz has 5 s" in capsys.readouterr().err
+
+
+BAD = np.array([[0.0, 1], [0.01, 2], [9.0, 3], [0.02, 4], [0.02, 5], [0.01, 6],
+                [0.03, np.inf], [0.0, 0], [0.04, 7]])  # fmt: skip
+
+
+def test_bad_rows_are_refused_or_left_out_and_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = np.column_stack([BAD, BAD[:, 1], BAD[:, 1]])
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",")
+    call = ["import", str(tmp_path / "log.csv"), "--columns", "t,ax,ay,az"]
+    call += ["-o", str(tmp_path / "s")]
+    assert main(call) == 2
+    said = capsys.readouterr().err
+    assert "log.csv: line 8, column t ax ay az: hold only zeros" in said
+    assert not (tmp_path / "s").exists() and len(list(tmp_path.iterdir())) == 1
+    assert main([*call, "--repair"]) == 0
+    repairs = mark(tmp_path / "s", "imported")["repairs"]
+    said = capsys.readouterr().err
+    assert all(sentence in said for sentence in repairs)
+    assert sorted(s.split(":")[0] for s in repairs) == [
+        "line 3, column t",
+        "line 5 to line 6, column t",
+        "line 7, column ax",
+        "line 8, column t ax ay az",
+    ]
+    np.testing.assert_array_equal(
+        Session.open(tmp_path / "s").block.acc[:, 0], [1, 2, 4, 7]
+    )
+    assert mark(tmp_path / "s", "imported")["left_out"] == 5
+
+
+@given(
+    st.lists(
+        st.sampled_from([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, np.nan, np.inf]), max_size=12
+    ),
+    st.integers(1, 5),
+)
+def test_rows_that_are_let_through_always_go_forward(
+    times: list[float], cut: int
+) -> None:
+    t = np.array(times)
+    block = Block.of(t, np.ones((len(t), 3)), np.ones((len(t), 3)))
+    judge = Judge("x", lambda row: f"row {row}", repair=True)
+    parts = [judge.good(block[i : i + cut]) for i in range(0, len(t), cut)]
+    kept = concat(parts).t
+    assert (np.diff(kept) > 0).all() and np.isfinite(kept).all()
+    assert len(kept) + judge.left_out == len(t)
+    assert bool(judge.mended) == (judge.left_out > 0)
+
+
+def test_what_is_in_a_file_is_listed_and_chosen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(dataflash({0: imu(1), 2: imu(2)}, {}))
+    assert main(["import", str(path), "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("\t")[1] for line in lines] == ["IMU.0", "IMU.2"]
+    assert all("m/s^2" in line for line in lines)
+    same(session(tmp_path / "s", str(path), "--instance", "IMU.2").block, imu(2))
+    call = ["import", str(path), "--instance", "IMU.1", "-o", str(tmp_path / "x")]
+    assert main(call) == 2
+    assert "has no IMU.1; there are IMU.0, IMU.2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"", "is empty"),
+        (b"SQLite format 3\0" + bytes(100), "ros2 bag convert"),
+        (bytes(range(256)) * 9, "--format"),
+        (b"1,2,3\n", "say what its columns are"),
+        (b"\x1f\x8b\x08\x00garbage", "behind byte 0, unpacked"),
+    ],
+)
+def test_what_cannot_be_told_is_refused_with_the_remedy(
+    tmp_path: Path, content: bytes, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_bytes(content)
+    assert main(["import", str(tmp_path / "file"), "-o", str(tmp_path / "s")]) == 2
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "s").exists()
+
+
+def test_a_library_that_is_missing_is_named_with_its_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recordings, "find_spec", lambda name: None)
+    for content, extra in (
+        (ulog({0: imu(1, 5)}, {}), "ulog"),
+        (dataflash({0: imu(1, 5)}, {}), "mavlink"),
+        (b"\x89MCAP0\r\n", "mcap"),
+        (b"\x89HDF\r\n\x1a\n", "hdf5"),
+        (b"(1.0) can0 001#00\n", "can"),
+    ):
+        (tmp_path / "file").write_bytes(content)
+        with pytest.raises(InputError, match=rf"pip install 'fieldcal\[{extra}\]'"):
+            open_recording(tmp_path / "file", WANTED)
+
+
+@pytest.fixture(scope="module", params=sorted(SMALL))
+def small(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Small:
+    return Small(request.param, tmp_path_factory.mktemp(request.param) / "file")
+
+
+@settings(
+    max_examples=60, deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)  # fmt: skip
+@given(data=st.data())
+def test_mutated_files_are_read_or_refused_in_words(
+    small: Small, data: st.DataObject
+) -> None:
+    mutated = bytearray(small.content)
+    changes = data.draw(st.integers(0, 3))
+    for _ in range(changes):
+        at = data.draw(st.integers(0, len(mutated) - 1))
+        mutated[at] = data.draw(st.integers(0, 255))
+    n = len(mutated)
+    small.path.write_bytes(mutated[: data.draw(st.sampled_from([n, n - 1, n // 2]))])
+    repair = data.draw(st.booleans())
+    try:
+        found = whole(small.path, small.wanted, small.name, repair)
+    except InputError as error:
+        assert small.path.name in str(error) or "imu.dbc" in str(error)
+        return
+    assert len(found) <= len(small.expected)
+    # a changed byte may change a number in a format that has no checksum
+    assert changes or small.knows(found)
+
+
+def test_a_log_whose_format_calls_a_number_a_text_is_refused(tmp_path: Path) -> None:
+    small = Small("dataflash", tmp_path / "file")
+    content = bytearray(small.content)
+    content[189] = ord("n")
+    small.path.write_bytes(content)
+    with pytest.raises(InputError, match="fit"):
+        whole(small.path, small.wanted, small.name, repair=False)
+
+
+def test_every_format_is_tried() -> None:
+    assert set(SMALL) | {"wire"} == set(formats())
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, bytes]:
+    """Samples of a session that was imported, and its file."""
+    folder = tmp_path_factory.mktemp("kept")
+    n = 5000
+    six = np.random.default_rng(3).normal(0, 0.02, (n, 6)) + [0, 0, 9.8, 0, 0, 0]
+    block = Block.of(np.arange(n) / 100, six[:, :3], six[:, 3:])
+    SMALL["parquet"](folder / "x.parquet", block)
+    recording = open_recording(folder / "x.parquet", Wanted(tuple(COLUMNS.split(","))))
+    bring_in(recording, "0", folder / "s", {"format": 1}, 2.0)
+    return block, (folder / "s" / "samples.parquet").read_bytes()
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_changed_bytes_of_an_imported_session_invent_no_sample(
+    data: st.DataObject,
+    kept: tuple[Block, bytes],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    block, whole = kept[0], bytearray(kept[1])
+    near_end = data.draw(st.booleans())
+    at = data.draw(st.integers(len(whole) - 4000 if near_end else 0, len(whole) - 1))
+    whole[at] ^= data.draw(st.integers(1, 255))
+    path = tmp_path_factory.mktemp("changed") / "samples.parquet"
+    path.write_bytes(whole)
+    try:
+        found, _ = sample_files.read(path)
+    except SessionError as error:
+        assert str(error).startswith(f"{path}: ")
+        return
+    for name in ("t", "six"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(block, name))

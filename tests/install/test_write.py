@@ -1,0 +1,248 @@
+"""Writing parameters to a virtual autopilot: right, wrong, and taken back."""
+
+from __future__ import annotations
+
+import json
+import pty
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytest.importorskip("fastcrc")
+pytest.importorskip("pymavlink")
+
+from processes import FIELDCAL, simulated
+
+from fieldcal.calibration import Calibration, Nominal
+from fieldcal.cli import main
+from fieldcal.commands.write import prepared
+from fieldcal.core.errors import InputError
+from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
+from fieldcal.drivers.mavlink_parameters import Parameters
+from fieldcal.install.proposal import changes, problems
+from fieldcal.session.folder import Session
+from fieldcal.session.recorder import Recorder
+
+BIAS, SCALE = (0.2, -0.3, 0.1), (1.006, 0.992, 1.008)
+GYR = (0.011, -0.02, 0.006)
+
+
+@contextmanager
+def autopilot(query: str = "") -> Iterator[str]:
+    """A virtual autopilot that is asked for parameters only; its address."""
+    with simulated("--mavlink", f"tcpin:127.0.0.1:0?{query}") as (place, _):
+        yield f"mavlink:{place}?system=1&component=1"
+
+
+def installed(autopilot: int = ARDUPILOT, taken_out: bool = False) -> Installed:
+    known = names(autopilot, 0)
+    values = dict.fromkeys((*known["acc_offset"], *known["gyr_offset"]), 0.05)
+    values |= dict.fromkeys(known["acc_scale"], 1.02)
+    values |= dict.fromkeys(known["rotation"], 0.0)
+    return Installed(autopilot, 0, values, taken_out)
+
+
+def calibration(go: bool = True) -> Calibration:
+    groups = {"acc_bias": BIAS, "acc_scale": SCALE, "gyr_bias": GYR}
+    units = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s"}
+    return Calibration(
+        "joint",
+        tuple(f"{g}.{a}" for g in groups for a in "xyz"),
+        np.concatenate([np.array(v) for v in groups.values()]),
+        np.diag(np.repeat([1e-6, 1e-8, 1e-10], 3)),
+        tuple(units[g] for g in groups for _ in "xyz"),
+        5.0,
+        7,
+        1e-3,
+        info={"decision": {"go": go, "reasons": [] if go else ["too warm"]}},
+    )
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    """A solved session that was recorded from an autopilot."""
+    return make(tmp_path / "s", calibration(), installed())
+
+
+def make(folder: Path, found: Calibration, there: Installed) -> Path:
+    folder.mkdir()
+    (folder / "session.toml").write_text("format = 1\n")
+    mark = {"event": "device", "installed": there.as_table()}
+    (folder / "marks.jsonl").write_text(json.dumps(mark) + "\n")
+    (folder / "result.json").write_text(json.dumps(found.to_json()))
+    return folder
+
+
+def old_query(there: Installed) -> str:
+    return "&".join(f"{k}={v}" for k, v in there.values.items())
+
+
+@given(
+    st.sampled_from([ARDUPILOT, PX4]),
+    st.booleans(),
+    st.lists(st.floats(-2, 2), min_size=6, max_size=6),
+    st.lists(st.floats(0.9, 1.1), min_size=6, max_size=6),
+)
+def test_what_is_installed_takes_all_of_it_out(
+    program: int, taken_out: bool, offsets: list[float], scales: list[float]
+) -> None:
+    """The sensor's own output, through the new parameters, is the true force."""
+    o, k = np.array(offsets[:3]), np.array(scales[:3])
+    true, raw_bias, raw_scale = np.array([1.0, -9.8, 0.3]), offsets[3:], scales[3:]
+    raw = raw_bias + np.array(raw_scale) * true
+    there = installed(program, taken_out)
+    known = names(program, 0)
+    there.values |= dict(zip(known["acc_offset"], o.tolist(), strict=True))
+    there.values |= dict(zip(known["acc_scale"], k.tolist(), strict=True))
+    # what was sent is (r - o) k, unless it was taken out for the recording
+    gain, zero = (np.ones(3), np.zeros(3)) if taken_out else (k, o)
+    bias, scale = (np.array(raw_bias) - zero) * gain, np.array(raw_scale) * gain
+    found = calibration()
+    values = np.concatenate([bias, scale, np.array(GYR)])
+    found = Calibration(
+        "joint", found.names, values, found.covariance, found.units, 0.0, 0, 0.0
+    )
+    new = {c.name: c.new for c in changes(found, Nominal(), there)}
+    offset, factor = (
+        np.array([new[n] for n in known[w]]) for w in ("acc_offset", "acc_scale")
+    )
+    np.testing.assert_allclose((raw - offset) * factor, true, atol=1e-9)
+
+
+def test_the_uncertainty_of_a_parameter_is_that_of_many_calibrations() -> None:
+    rng, found = np.random.default_rng(1), calibration()
+    drawn = rng.multivariate_normal(found.values, found.covariance, 4000)
+    there = installed()
+    new = np.array(
+        [
+            [c.new for c in changes(_with(found, values), Nominal(), there)]
+            for values in drawn
+        ]
+    )
+    sigma = [c.sigma for c in changes(found, Nominal(), there)]
+    np.testing.assert_allclose(new.std(axis=0), sigma, rtol=0.06)
+
+
+def _with(found: Calibration, values: np.ndarray) -> Calibration:
+    return Calibration(
+        "joint", found.names, values, found.covariance, found.units, 0.0, 0, 0.0
+    )
+
+
+@pytest.mark.parametrize(("kind", "program"), [("ardupilot", ARDUPILOT), ("px4", PX4)])
+def test_written_read_back_and_undone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, program: int
+) -> None:
+    there = installed(program)
+    folder = make(tmp_path / "s", calibration(), there)
+    wanted = {c.name: c.new for c in changes(calibration(), Nominal(), there)}
+    with autopilot(f"autopilot={kind}&{old_query(there)}") as url:
+        assert main(["write", str(folder), "--device", url, "--yes", "--json"]) == 0
+        said = json.loads(capsys.readouterr().out)
+        assert {p["name"]: p["new"] for p in said["parameters"]} == wanted
+        with Parameters(url.removeprefix("mavlink:")) as link:
+            kept = link.read(wanted)
+        np.testing.assert_allclose(
+            list(kept.values()), list(wanted.values()), rtol=1e-6
+        )
+        assert main(["undo", str(folder), "--yes"]) == 0
+        with Parameters(url.removeprefix("mavlink:")) as link:
+            kept = link.read(wanted)
+        old = [there.values[n] for n in wanted]
+        np.testing.assert_allclose(list(kept.values()), old, rtol=1e-6)
+        assert main(["undo", str(folder), "--yes"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ("drop=INS_ACCOFFS_Y", "INS_ACCOFFS_Y = 0.05"),
+        ("glitch=INS_GYROFFS_X", "INS_GYROFFS_X"),
+        ("glitch=INS_ACCSCAL_X,INS_ACCOFFS_Z", "INS_ACCSCAL_X"),
+    ],
+)
+def test_a_parameter_dropped_or_altered_is_noticed_and_all_is_undone(
+    session: Path, capsys: pytest.CaptureFixture[str], fault: str, says: str
+) -> None:
+    there = installed()
+    with autopilot(f"{fault}&{old_query(there)}") as url:
+        assert main(["write", str(session), "--device", url, "--yes"]) == 3
+        said = capsys.readouterr().err
+        assert says in said and "undone, all 9 are as before" in said
+        with Parameters(url.removeprefix("mavlink:")) as link:
+            kept = link.read(there.values)
+    for name, value in there.values.items():
+        assert kept[name] == pytest.approx(value, rel=1e-6), name
+
+
+def test_what_cannot_be_undone_is_said_with_the_values(
+    session: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    there = installed()
+    with autopilot(f"alter=INS_ACCSCAL_Y&{old_query(there)}") as url:
+        assert main(["write", str(session), "--device", url, "--yes"]) == 3
+    said = capsys.readouterr().err
+    assert "could not be undone" in said and "INS_ACCSCAL_Y = 1.02" in said
+
+
+def test_no_go_is_not_written_unless_forced(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = make(tmp_path / "s", calibration(go=False), installed())
+    out = tmp_path / "new.param"
+    assert main(["write", str(folder), "-o", str(out)]) == 1
+    assert "NO-GO" in (said := capsys.readouterr().err) and "too warm" in said
+    assert not out.exists()
+    assert main(["write", str(folder), "-o", str(out), "--force"]) == 0
+    assert "INS_ACCOFFS_X," in out.read_text()
+
+
+def test_parameters_changed_since_the_recording_are_not_written_over(
+    session: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with autopilot() as url:
+        assert main(["write", str(session), "--device", url, "--yes"]) == 2
+    assert "somebody has changed it" in capsys.readouterr().err
+
+
+def test_nobody_there_to_be_asked(
+    session: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ours, theirs = pty.openpty()
+    with autopilot(old_query(installed())) as url:
+        call = [*FIELDCAL, "write", str(session)]
+        done = subprocess.run(
+            [*call, "--device", url], stdin=subprocess.DEVNULL, capture_output=True
+        )
+        assert done.returncode == 2 and b"give --yes" in done.stderr
+        with subprocess.Popen(
+            [*call, "--device", url], stdin=theirs, stderr=subprocess.PIPE
+        ) as asked:
+            with open(ours, "w", closefd=False) as terminal:
+                terminal.write("n\n")
+            _, said = asked.communicate()
+        assert asked.returncode == 1 and b"as you wished" in said
+        assert not list(session.glob("installed-before*"))
+
+
+def test_values_that_no_sensor_has_are_named() -> None:
+    found = calibration()
+    wild = np.array([9.0, 0, 0, 2.0, 1, 1, 0, 0, 0])
+    there = installed(taken_out=True)
+    said = problems(changes(_with(found, wild), Nominal(), there), there)
+    assert len(said) == 2 and "INS_ACCOFFS_X = 9" in said[0]
+    assert "INS_ACCSCAL_X = 0.5" in said[1]
+
+
+def test_a_session_of_no_autopilot_is_refused(tmp_path: Path) -> None:
+    about = {"format": 1, "device": {"name": "bench"}, "sampling": {"rate_hz": 100.0}}
+    with Recorder(tmp_path / "s", about) as recorder:
+        recorder.mark("device", serial="7")
+    with pytest.raises(InputError, match="not recorded from an autopilot"):
+        prepared(Session.open(tmp_path / "s"), calibration())

@@ -1,0 +1,154 @@
+"""Several devices at once on one table: a session and a result for each."""
+
+import json
+import subprocess
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from processes import RUN
+
+from fieldcal.commands.virtual import address
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Block
+from fieldcal.history.store import History
+from fieldcal.run.companions import Times
+from fieldcal.run.movers import VirtualDevice
+from fieldcal.session.folder import Session, read_marks
+
+LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
+BIASES = ["0.2,-0.3,0.1", "-0.1,0.4,0.2", "0.3,0.1,-0.2"]
+
+
+def led(
+    devices: Sequence[VirtualDevice],
+    urls: Sequence[str],
+    *options: str,
+    killed_at: int | None = None,
+) -> tuple[int, Any, str]:
+    """A run of two positions in which somebody turns all devices when told to."""
+    run = [*RUN, "--headless", "--json", *options]
+    if "--resume" not in options:
+        run += ["two_position", "--level=0.001", "--angles=0.001"]
+        run += ["--seconds=10", "--latitude=50.45"]
+    for url in urls:
+        run += ["--device", url]
+    said = []
+    with subprocess.Popen(
+        run, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr and process.stdout
+        for line in process.stderr:
+            said.append(line.strip())
+            told = json.loads(line) if line.startswith("{") else {}
+            if told.get("event") == "place" and told["position"] == killed_at:
+                process.kill()
+                break
+            if told.get("event") == "place":
+                angles = [(0.0, 0.0), (45.0, 5.0)][told["position"]]
+                for device in devices:
+                    device.turn(Position.deg(*angles))
+        out = process.stdout.read()
+    return process.returncode, json.loads(out or "null"), said[-1]
+
+
+def started(
+    stack: ExitStack, speed: str, *last: str, once: bool = True
+) -> tuple[list[VirtualDevice], list[str]]:
+    devices, urls = [], []
+    for link, bias in zip(LINKS, BIASES, strict=True):
+        options = [*link.split(), "--speed", speed, f"--acc-bias={bias}"]
+        options += ["--latitude=50.45", "--height=0"]
+        options += last if link == LINKS[-1] else ()
+        devices.append(stack.enter_context(VirtualDevice(options, once)))
+        urls.append(address(options, devices[-1].port))
+    return devices, urls
+
+
+def test_three_devices_on_three_links_have_a_session_and_a_result_each(
+    tmp_path: Path,
+) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20")
+        serials = ["--serial", "A1", "--serial", "B1", "--history", str(tmp_path / "h")]
+        code, result, said = led(devices, urls, *serials, "-o", str(tmp_path / "s"))
+        truths = [device.truth for device in devices]
+    assert code == 0, said
+    check(tmp_path / "s", truths, urls, result)
+    assert [row[:2] for row in History(tmp_path / "h").serials()] == [
+        ("A1", 1),
+        ("B1", 1),
+    ]
+    (kept,) = History(tmp_path / "h").runs("B1")
+    assert kept.session == str(tmp_path / "s" / "device-2")
+    assert kept.calibration.to_json() == result["further"]["device-2"]
+
+
+def test_all_devices_are_gone_on_with_after_a_kill(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20", once=False)
+        session = tmp_path / "s"
+        led(devices, urls, "-o", str(session), killed_at=1)
+        folder = session / "device-2"
+        before = list(read_marks(folder / "marks.jsonl"))
+        code, result, said = led(devices, [], "--resume", str(session))
+        truths = [device.truth for device in devices]
+    assert code == 0, said
+    check(session, truths, urls, result)
+    taken = [m for m in before if m["event"] == "window"]
+    after = [m for m in read_marks(folder / "marks.jsonl") if m["event"] == "window"]
+    assert len(taken) == 1 and after[0] == taken[0] and len(after) == 2
+
+
+def check(root: Path, truths: Sequence[Any], urls: Sequence[str], result: Any) -> None:
+    """Whether every device has its session, and a result that is right."""
+    sessions = [root, *sorted(root.glob("device-*"))]
+    assert [path.name for path in sessions] == ["s", "device-2", "device-3"]
+    for folder, truth, url in zip(sessions, truths, urls, strict=True):
+        written = json.loads((folder / "result.json").read_text())
+        for group in ("acc_bias", "acc_scale", "gyr_bias"):
+            found = written["parameters"][group]
+            off = np.subtract(found["value"], truth[group])
+            assert np.abs(off / np.array(found["sigma"])).max() < 4.5, (folder, group)
+        assert written["decision"]["go"]
+        session = Session.open(folder)
+        assert not session.warnings and (np.diff(session.block.t) > 0).all()
+        if folder != sessions[0]:
+            assert session.about.device["address"] == url
+            key = result["further"][folder.name]["parameters"]
+            assert key == written["parameters"]
+
+
+def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20")
+        urls[1] += "&reconnect=0"
+        devices[1].ask(fault={"silence_s": 1e6})
+        code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
+    assert code == 3
+    assert said.startswith("fieldcal run: device-2: ")
+    assert said.endswith("; the other devices have their results")
+    assert result["verdict"] == "good" and set(result["further"]) == {"device-3"}
+    marks = list(Session.open(tmp_path / "s" / "device-2").marks())
+    assert marks[-1]["event"] == "failed"
+
+
+def test_a_further_device_is_decided_about_by_itself(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        devices, urls = started(stack, "20", "--gyr-noise=0.02,0.02,0.02")
+        code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
+    assert code == 1, said
+    assert result["decision"]["go"]
+    further = {name: each["decision"] for name, each in result["further"].items()}
+    assert further["device-2"]["go"] and not further["device-3"]["go"]
+    assert "gyr_bias" in further["device-3"]["reasons"][0]
+
+
+def test_times_go_over_the_hosts_clock() -> None:
+    times = Times()
+    assert np.isnan(times.device(0.0))
+    for t in (10.0, 10.5, 11.0):
+        times.add(Block.of(np.array([t]), np.zeros((1, 3))))
+    assert abs(times.device(times.host(10.7)) - 10.7) < 1e-6

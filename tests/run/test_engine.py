@@ -1,0 +1,398 @@
+"""The engine on the virtual device: right when all goes well, and when it does not."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fieldcal.core.errors import CalibrationFailed, DeviceSilent, Stopped, WrongPosition
+from fieldcal.core.frames import turn
+from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.core.samples import Array, Block
+from fieldcal.drivers.driver import Driver, Health
+from fieldcal.planning.holding import hold_each
+from fieldcal.planning.steps import Hold, Plan, hold
+from fieldcal.run.engine import Engine
+from fieldcal.run.interruptions import Again
+from fieldcal.run.operator.protocol import View, Wish
+from fieldcal.run.position_check import Held
+from fieldcal.run.waiting import Placing
+from fieldcal.run.warm_up import Warmth
+from fieldcal.session import description
+from fieldcal.session.folder import Session
+from fieldcal.session.recorder import Recorder
+from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device.in_process import InProcess
+from fieldcal.sim_device.profile import Climate, Profile
+from fieldcal.windows import Average
+
+ABOUT = description.parse({"site": {"latitude_deg": 50.45, "height_m": 170.0}})
+
+
+@dataclass
+class Turner:
+    """Turns the virtual device, and slips on the way as it is told to."""
+
+    driver: InProcess
+    slips: list[tuple[float, float]] = field(default_factory=list)
+    bump_at: list[float] = field(default_factory=list)
+    told: list[str] = field(default_factory=list)
+    views: list[View] = field(default_factory=list)
+    late: Position | None = None
+    corrects: bool = True
+    bumped: list[float] = field(default_factory=list)
+    wishes: list[Wish | None] = field(default_factory=list)
+
+    def place(self, hold: Hold) -> None:
+        alpha, beta = hold.position.degrees or (0.0, 0.0)
+        if self.slips:
+            alpha, beta = self.slips.pop(0)
+            self.late = hold.position
+        self.driver.place(Position.deg(alpha, beta))
+
+    def tell(self, text: str) -> None:
+        self.told.append(text)
+        if self.late and self.corrects:
+            self.driver.place(self.late)
+            self.late = None
+
+    def wish(self) -> Wish | None:
+        return self.wishes.pop(0) if self.wishes else None
+
+    def show(self, view: View) -> None:
+        self.views.append(view)
+        if self.bump_at and view.elapsed > self.bump_at[0]:
+            self.bump_at.pop(0)
+            self.bumped.append(self.driver.device.time)
+            self.driver.device.bump()
+
+
+@dataclass
+class Bench:
+    """An engine with everything around it."""
+
+    folder: Path
+    turner: Turner
+    engine: Engine
+    recorder: Recorder
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        yield make(recorder, InProcess(VirtualDevice(seed=3)))
+
+
+def hold_all(
+    positions: Sequence[Position], seconds: float
+) -> Plan[tuple[Average, ...]]:
+    """Hold every position; the averages in order."""
+    held = yield from hold_each(positions, seconds)
+    return tuple(held.values())
+
+
+def make(recorder: Recorder, driver: InProcess) -> Bench:
+    turner = Turner(driver)
+    engine = Engine(driver, turner, ABOUT, recorder, give_up=60.0)
+    return Bench(recorder.folder, turner, engine, recorder)
+
+
+def events(bench: Bench) -> list[str]:
+    bench.recorder.close()
+    return [m["event"] for m in Session.open(bench.folder).marks()]
+
+
+def test_windows_are_taken_after_the_turn_and_every_sample_is_recorded(
+    bench: Bench,
+) -> None:
+    first, second = bench.engine.run(hold_all(TWO, 12.0))
+    assert 12.0 <= first.end - first.start < 12.3
+    assert events(bench) == ["asked", "window", "asked", "window"]
+    block = Session.open(bench.folder).block
+    assert len(block) == bench.turner.driver.health.samples
+    inside = block.between(second.start, np.nextafter(second.end, np.inf))
+    np.testing.assert_allclose(inside.six.mean(axis=0), second.mean, atol=1e-9)
+    quiet = block.between(second.start - 1.0, second.start).gyr.std(axis=0).max()
+    assert quiet < 2 * inside.gyr.std(axis=0).max()
+
+
+def test_a_wrong_turn_is_said_before_anything_is_averaged(bench: Bench) -> None:
+    bench.turner.slips = [(0, 0), (-45, 5)]
+    averages = bench.engine.run(hold_all(TWO, 10.0))
+    wrong = [t for t in bench.turner.told if "wrong way" in t]
+    assert len(wrong) == 1 and "α is turned the wrong way" in wrong[0]
+    assert averages[1].mean[0] < 0, "the window must be from +45 degrees"
+    assert events(bench).count("window") == 2
+
+
+def test_a_position_never_reached_is_given_up(bench: Bench) -> None:
+    bench.turner.slips = [(0, 0), (30, 5)]
+    bench.turner.corrects = False
+    with pytest.raises(WrongPosition, match="turn it by"):
+        bench.engine.run(hold_all(TWO, 10.0))
+    assert events(bench) == ["asked", "window", "asked", "wrong"]
+
+
+class Fast(InProcess):
+    """A device that runs at ten times the host's clock."""
+
+    def host_time(self) -> float:
+        return self.device.time / 10
+
+
+def test_a_fast_device_gives_whoever_turns_it_some_time_by_the_clock(
+    tmp_path: Path,
+) -> None:
+    driver = Fast(VirtualDevice(seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        bench = make(recorder, driver)
+        bench.turner.slips, bench.turner.corrects = [(30, 5)], False
+        with pytest.raises(WrongPosition, match="turn it by"):
+            bench.engine.run(hold_all(TWO, 10.0))
+    assert 10.0 < driver.host_time() < 10.5
+
+
+def test_a_bump_rejects_the_window_and_it_is_taken_again(bench: Bench) -> None:
+    bench.turner.bump_at = [8.0]
+    average = bench.engine.run(hold_all(TWO[:1], 20.0))[0]
+    assert events(bench) == ["asked", "rejected", "told", "asked", "window"]
+    mark = [m for m in Session.open(bench.folder).marks() if m["event"] == "rejected"]
+    assert mark[0]["at_s"] == pytest.approx(bench.turner.bumped[0], abs=0.5)
+    assert average.start > mark[0]["at_s"]
+
+
+def test_who_never_holds_still_is_told_so_in_the_end(bench: Bench) -> None:
+    bench.turner.bump_at = [10.0] * 9
+    with pytest.raises(CalibrationFailed, match="without a disturbance in 5 tries"):
+        bench.engine.run(hold_all(TWO[:1], 30.0))
+
+
+def test_a_person_in_the_wind_is_told_what_to_do_and_may_go_on(bench: Bench) -> None:
+    bench.turner.bump_at = [10.0] * 7
+    driver, turner = bench.turner.driver, bench.turner
+    Engine(driver, turner, ABOUT, bench.recorder).run(hold_all(TWO[:1], 15.0))
+    assert len(turner.told) == 7 and events(bench).count("window") == 1
+    assert "times now" not in turner.told[1]
+    assert "disturbed 7 times now: fix the device better" in turner.told[6]
+
+
+def test_a_hold_ends_early_once_the_sigma_asked_for_is_reached(bench: Bench) -> None:
+    average: Average = bench.engine.run(hold(0, TWO[0], 120.0, sigma=5e-3))
+    assert average.end - average.start < 60.0
+    assert average.sigma[:3].max() <= 5e-3
+
+
+class Hiccup(InProcess):
+    """A link that loses two seconds of samples, once."""
+
+    lost = False
+
+    def receive(self, timeout: float) -> Block | None:
+        if not self.lost and self.device.time > 14.0:
+            self.lost = True
+            self.device.take(200)
+        return super().receive(timeout)
+
+
+def test_samples_missing_inside_a_window_reject_it(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        bench = make(recorder, Hiccup(VirtualDevice(seed=1)))
+        bench.engine.run(hold_all(TWO[:1], 20.0))
+    assert "no samples came between" in bench.turner.told[0]
+    assert events(bench).count("window") == 1
+
+
+class Dead(Driver):
+    """A device that says nothing."""
+
+    def __init__(self, address: str = "") -> None:
+        self.name, self.health = "dead device", Health()
+
+    def receive(self, timeout: float) -> Block | None:
+        return None
+
+    def close(self) -> None: ...
+
+    def blocks(self, timeout: float = 0.1):  # type: ignore[no-untyped-def]
+        return super().blocks(0.05)
+
+
+def test_a_silent_device_is_said_to_be_silent(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner = Turner(InProcess(VirtualDevice()))
+        engine = Engine(Dead(), turner, ABOUT, recorder)
+        with pytest.raises(DeviceSilent, match="dead device has sent no sample"):
+            engine.run(hold_all(TWO, 5.0))
+
+
+def test_the_operator_sees_where_the_device_is_and_how_far_the_average_is(
+    bench: Bench,
+) -> None:
+    bench.engine.run(hold_all(TWO, 10.0))
+    seen = [v for v in bench.turner.views if v.phase == "turning" and v.arrival]
+    last = seen[-1].arrival
+    assert last is not None and last.alpha_deg == pytest.approx(45, abs=2)
+    averaging = [v for v in bench.turner.views if v.phase == "averaging"]
+    assert averaging[-1].elapsed > averaging[0].elapsed
+    taken = [v for v in bench.turner.views if v.phase == "taken"]
+    assert len(taken) == 2 and np.isfinite(taken[0].sigma).all()
+    assert taken[0].rate_hz == pytest.approx(100, rel=0.01)
+
+
+def test_what_was_taken_before_is_not_asked_for_again(bench: Bench) -> None:
+    first, second = bench.engine.run(hold_all(TWO, 10.0))
+    again = Engine(
+        bench.turner.driver, bench.turner, ABOUT, bench.recorder, 60.0, {0: first}
+    )
+    averages = again.run(hold_all(TWO, 10.0))
+    assert averages[0] is first and averages[1].start > second.end
+    assert events(bench).count("asked") == 3
+
+
+def test_a_position_left_out_is_told_to_the_procedure(bench: Bench) -> None:
+    bench.turner.wishes = [*[None] * 30, "skip"]
+    held = bench.engine.run(hold_each(FIVE[:2], 10.0))
+    assert list(held) == [1]
+    assert "was left out by the operator" in bench.turner.told[0]
+
+
+def test_a_taken_position_is_wanted_again(bench: Bench) -> None:
+    taken: dict[int, Average] = {}
+    turner = bench.turner
+    engine = Engine(turner.driver, turner, ABOUT, bench.recorder, 60.0, taken)
+    with pytest.raises(Again) as again:
+        engine.run(_then_repeat(turner))
+    assert again.value.index == 0 and list(taken) == [0]
+
+
+def _then_repeat(turner: Turner) -> Plan[None]:
+    yield from hold_all(TWO[:1], 5.0)
+    turner.wishes = ["repeat"]
+    yield from hold(1, TWO[1], 5.0)
+
+
+def test_an_operator_may_stop(bench: Bench) -> None:
+    bench.turner.wishes = ["stop"]
+    with pytest.raises(Stopped):
+        bench.engine.run(hold_all(TWO, 10.0))
+
+
+def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
+    """Every pair of the five, on bases tilted by up to a degree and a half."""
+    rng = np.random.default_rng(6)
+    for _ in range(5):
+        tilt = turn(*np.deg2rad(rng.uniform(-1.5, 1.5, 2)))
+        f = {i: _force(p, tilt) for i, p in enumerate(FIVE)}
+        for wanted, there in itertools.permutations(range(5), 2):
+            known = Held(FIVE[wanted - 1], f[wanted - 1]) if wanted else None
+            placing = Placing(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
+            placing.add(_resting(f[there]), 4.0)
+            assert not placing.arrived, (wanted, there)
+            placing = Placing(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
+            placing.add(_resting(f[wanted]), 4.0)
+            assert placing.arrived, (wanted, placing.problem)
+
+
+FIVE_ABOUT = description.parse(
+    {
+        "site": {"gravity": 9.81},
+        "position": [
+            dict(zip(("alpha_deg", "beta_deg"), p.degrees or (), strict=False))
+            for p in FIVE
+        ],
+    }
+)
+
+
+def _force(position: Position, tilt: Array) -> Array:
+    f: Array = turn(position.alpha or 0.0, position.beta or 0.0) @ tilt @ [0, -9.81, 0]
+    return f
+
+
+def _resting(f: Array) -> Block:
+    t = np.arange(400) / 100
+    noise = np.random.default_rng(1).standard_normal((400, 6))
+    return Block.of(t, f + 0.005 * noise[:, :3], 0.001 * noise[:, 3:])
+
+
+def test_nothing_is_known_of_a_time_without_samples() -> None:
+    placing = Placing(Hold(0, FIVE[0], 10.0), FIVE_ABOUT, None)
+    block = _resting(np.array([0.0, -9.81, 0.0]))
+    placing.add(block[:150], 1.5)
+    assert placing.seconds > 1.0
+    placing.add(block[300:], 3.0)
+    assert placing.seconds < 1.5 and not placing.arrived
+
+
+def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
+    warming = replace(Climate(), self_heating_k=20.0, warm_up_s=60.0)
+    driver = InProcess(VirtualDevice(replace(Profile(), temperature=warming), seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner = Turner(driver)
+        warmth = Warmth(0.5, 40.0)
+        engine = Engine(driver, turner, ABOUT, recorder, warmth=warmth)
+        engine.run(hold_all(TWO[:1], 10.0))
+    assert "still warming up" in turner.told[0] and "Enter goes on" in turner.told[0]
+    waits = [v.reason for v in turner.views if "Enter goes" in v.reason]
+    assert waits and "K/min" in waits[0]
+    window = [m for m in Session.open(tmp_path / "s").marks() if m["event"] == "window"]
+    assert 39.0 < window[0]["start_s"] < 43.0, "but not for ever"
+    assert "still warming up" in turner.told[-1]
+
+
+@pytest.mark.parametrize(("step", "rate"), [(0.0, 0.0), (1.0, 0.0), (0.01, 0.3)])
+def test_a_steady_temperature_is_no_warming_up(step: float, rate: float) -> None:
+    for seed in range(20):
+        warmth = Warmth(0.5, 600.0)
+        for block in _temperatures(seed, step, rate):
+            warmth.add(block)
+            assert not warmth.says
+
+
+@pytest.mark.parametrize(("step", "within"), [(0.0, 15.0), (1.0, 70.0)])
+def test_warming_up_is_noticed_also_in_whole_degrees(
+    step: float, within: float
+) -> None:
+    warmth, said = Warmth(0.5, 600.0), np.inf
+    for block in _temperatures(1, step, 4.0):
+        warmth.add(block)
+        if warmth.says:
+            said = min(said, float(block.t[-1]))
+    assert said < within
+    rate, sigma = warmth.rate
+    assert abs(rate - 4.0) < 4 * sigma + 0.05
+
+
+def _temperatures(seed: int, step: float, rate: float) -> Iterator[Block]:
+    """Two minutes of a device whose temperature changes by `rate` K/min."""
+    rng = np.random.default_rng(seed)
+    for start in np.arange(0.0, 120.0, 0.5):
+        t = start + np.arange(50) / 100
+        temperature = 20.0 + rate * t / 60
+        temperature = temperature + 0.05 * rng.standard_normal(50)
+        if step:
+            temperature = step * np.round(temperature / step)
+        yield Block.of(t, np.zeros((50, 3)), temperature=temperature)
+
+
+def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
+    """A slow lean of a tenth of a degree, for longer than the window is."""
+    device, turner = bench.turner.driver.device, bench.turner
+
+    class Leaning(Turner):
+        leant = False
+
+        def show(self, view: View) -> None:
+            super().show(view)
+            if view.elapsed > 8.0 and not self.leant:
+                self.leant = True
+                device.bump(push=0.0, tilt=np.deg2rad(0.1), seconds=20.0)
+
+    leaning = Leaning(turner.driver)
+    Engine(turner.driver, leaning, ABOUT, bench.recorder).run(hold_all(TWO[:1], 20.0))
+    assert "hold still, the window starts again" in leaning.told[0]

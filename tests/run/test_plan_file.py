@@ -1,0 +1,298 @@
+"""Plans: refused before anything moves, and turned by what they name."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import stat
+import sys
+import tomllib
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+from xml.etree.ElementTree import parse
+
+import pytest
+import tomlkit
+from hypothesis import given
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+
+from fieldcal import procedures
+from fieldcal.cli import main
+from fieldcal.commands.run import add_arguments
+from fieldcal.commands.run_task import make_task
+from fieldcal.core.errors import InputError, MoverFailed, PlanError
+from fieldcal.core.positions import FIVE, Position
+from fieldcal.run import plan_file
+from fieldcal.run.movers import Command, VirtualDevice
+
+POSITIONS = [{"alpha_deg": 0.0, "beta_deg": 0.0}, {"alpha_deg": 45.0, "beta_deg": 5.0}]
+TABLE = {"alpha_deg": 0.0, "beta_deg": 0.0, "rate_deg_s": [20.0, 0.0, 0.0]}
+
+
+def plan(**run: Any) -> dict[str, Any]:
+    return {"position": POSITIONS, "run": run}
+
+
+def test_the_schema_is_one() -> None:
+    Draft202012Validator.check_schema(plan_file.schema())
+
+
+def test_a_whole_plan_is_taken() -> None:
+    mover = {"kind": "command", "command": ["tt", "{alpha}", "{beta}"], "timeout_s": 9}
+    task = plan_file.task(
+        plan(seconds=20, verify=True, mover=mover, device="serial:/dev/x"), "p.toml"
+    )
+    assert task.seconds == 20.0 and task.procedure == "positions"
+    assert len(task.positions) == 3 and task.verification is not None
+    own = {**plan(), "verification": {"alpha_deg": 10.0, "beta_deg": 1.0}}
+    named = plan_file.task(own, "p.toml").verification
+    assert named is not None and named.degrees == (10.0, 1.0)
+
+
+@pytest.mark.parametrize("name", procedures.names())
+def test_a_procedure_brings_its_positions(name: str) -> None:
+    task = plan_file.task({"run": {"procedure": name}}, "plan.toml")
+    taken = [p.degrees for p in task.about.positions]
+    assert taken == [p.degrees for p in procedures.procedure(name).POSITIONS]
+
+
+@pytest.mark.parametrize(
+    ("tables", "says"),
+    [
+        (plan(seconds=-1), "[run] seconds = -1 cannot be: give the averaging time"),
+        (plan(seconds="30"), '[run] seconds = "30" cannot be'),
+        (plan(second=30), "[run] second is not known: there are procedure, seconds"),
+        (plan(device="ttyUSB0"), "[run] device = "),
+        (
+            plan(further=["can:can0"], further_serial=["B1", "C1"]),
+            "'C1' is the serial number of no device: give --serial no more often",
+        ),
+        (
+            plan(device="can:can0", further=["can:can0"]),
+            "device 'can:can0' is named tw",
+        ),
+        (
+            plan(further=["can:0", "can:1"], further_serial=["B1", "B1"]),
+            "serial number 'B1' is named twice: name it once",
+        ),
+        (plan(mover={}), "[run.mover] kind is missing: write a table [run.mover]"),
+        (plan(mover={"kind": "crane"}), "write nothing, command or virtual"),
+        (plan(mover={"kind": "command"}), "command is missing"),
+        (
+            plan(mover={"kind": "nothing", "command": ["x"]}),
+            "[run.mover] command does not belong there: leave it out, or write",
+        ),
+        (
+            plan(mover={"kind": "command", "command": ["x", "{gamma}"]}),
+            "{gamma} is none of alpha, beta, position, name",
+        ),
+        (
+            plan(mover={"kind": "command", "command": ["x", "{"]}),
+            "is none of alpha, beta",
+        ),
+        (plan(mover={"kind": "virtual", "options": "'"}), "[run.mover] options"),
+        (plan(mover={"kind": "virtual", "control": "/x"}), "[run] device is missing"),
+        (
+            {"run": {}, "position": [POSITIONS[0], {"alpha_deg": 900, "beta_deg": 0}]},
+            "[[position]] number 2 alpha_deg = 900 cannot be: give an angle in degrees",
+        ),
+        (
+            {"run": {}, "position": [{"alpha_deg": 1}]},
+            "[[position]] number 1 beta_deg is missing: give alpha_deg and beta_deg",
+        ),
+        ({"run": {}, "position": POSITIONS[:1] * 3}, "are the same"),
+        ({"run": {}}, "are not enough"),
+        (
+            {"run": {}, "position": [*POSITIONS, TABLE]},
+            "number 3 has rate_deg_s, and a run holds",
+        ),
+        (
+            {**plan(), "verification": {"alpha_deg": 1}},
+            "[verification] beta_deg is miss",
+        ),
+        ({**plan(), "site": {"gravity": 0.0}}, "gravity = 0"),
+    ],
+)
+def test_a_wrong_plan_is_refused_with_file_key_and_remedy(
+    tables: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(PlanError) as error:
+        plan_file.task(tables, "p.toml")
+    assert str(error.value).startswith("p.toml: ") and says in str(error.value)
+
+
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.text(max_size=9), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+KEYS = st.sampled_from(
+    ["run", "position", "site", "frame", "device", "nominal", "verification", "format"]
+    + ["seconds", "mover", "kind", "alpha_deg", "beta_deg", "procedure", "sigma"]
+)
+
+
+@given(st.dictionaries(KEYS, ANYTHING | st.dictionaries(KEYS, ANYTHING), max_size=5))
+def test_whatever_a_plan_says_it_is_taken_or_refused(tables: dict[str, Any]) -> None:
+    for whole in (tables, {**plan(), **tables}):
+        try:
+            task = plan_file.task(whole, "p.toml")
+        except PlanError as error:
+            assert str(error).startswith("p.toml: ")
+        else:
+            assert len(task.about.positions) >= 2
+
+
+def script(folder: Path, body: str) -> list[str]:
+    """A command that is a small program of ours."""
+    path = folder / "turntable.py"
+    path.write_text(body)
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return [sys.executable, str(path), "{position}", "{alpha}", "{beta}", "{name}"]
+
+
+def wait(mover: Command) -> None:
+    deadline = monotonic() + 20.0
+    while mover.busy():
+        assert monotonic() < deadline
+        sleep(0.01)
+
+
+def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
+    out = tmp_path / "said"
+    call = script(tmp_path, f"import sys; open({str(out)!r}, 'w').write(str(sys.argv))")
+    with Command(call, 20.0) as mover:
+        assert not mover.busy()
+        mover.turn(FIVE[3], 3)
+        wait(mover)
+    assert "'4', '45', '2.5', 'α = 45°, β = 2.5°'" in out.read_text()
+
+
+@pytest.mark.parametrize(
+    ("body", "timeout", "says"),
+    [
+        ("import sys; sys.exit('axis 2 is stuck')", 20.0, "exit code 1: axis 2 is stu"),
+        ("import time; time.sleep(60)", 0.3, "was not done after 0.3 s"),
+    ],
+)
+def test_a_command_that_fails_is_said(
+    tmp_path: Path, body: str, timeout: float, says: str
+) -> None:
+    with Command(script(tmp_path, body), timeout) as mover:
+        mover.turn(Position.deg(1.0, 0.0), 0)
+        with pytest.raises(MoverFailed, match=says):
+            wait(mover)
+
+
+def test_a_command_that_is_not_there_is_said() -> None:
+    with (
+        Command(["/no/such/turntable"], 1.0) as mover,
+        pytest.raises(MoverFailed, match="cannot be called"),
+    ):
+        mover.turn(FIVE[0], 0)
+
+
+CALLER = """\
+import sys
+from fieldcal.sim_device.remote import Remote
+with Remote({control!r}) as device:
+    device.turn(float(sys.argv[2]), float(sys.argv[3]))
+if sys.argv[1] == {fails!r}:
+    sys.exit("the table is jammed")
+"""
+
+
+def run(folder: Path, device: VirtualDevice, fails: str, junit: Path) -> int:
+    call = script(folder, CALLER.format(control=device.control, fails=fails))
+    mover = {"kind": "command", "command": call, "timeout_s": 30.0}
+    tables = {
+        "site": {
+            "latitude_deg": 50.45,
+            "height_m": 170.0,
+            "level_deg": 0.001,
+            "angle_setting_deg": 0.001,
+        },
+        **plan(
+            seconds=8.0,
+            device=f"serial:{device.port}?format=witmotion",
+            mover=mover,
+            procedure="two_position",
+        ),
+    }
+    path = folder / "plan.toml"
+    path.write_text(tomlkit.dumps(tables))
+    session = folder / "s"
+    return main(
+        ["run", str(path), "--headless", "--json", "-o", str(session)]
+        + ["--junit", str(junit)]
+    )
+
+
+def test_a_night_without_an_operator(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A plan, a turntable's command, a result and what CI reads of it."""
+    junit = tmp_path / "run.xml"
+    with VirtualDevice(["--serial", "witmotion", "--speed", "20"], False) as device:
+        assert run(tmp_path, device, "", junit) == 0
+        said = capsys.readouterr()
+        truth = device.truth
+    result = json.loads(said.out)
+    off = result["parameters"]["acc_bias"]["value"][0] - truth["acc_bias"][0]
+    assert abs(off) < 4.5 * result["parameters"]["acc_bias"]["sigma"][0]
+    events = [json.loads(line)["event"] for line in said.err.splitlines()]
+    assert events.count("place") == 2 and events.count("taken") == 2
+    suite = parse(junit).getroot()
+    assert suite.get("failures") == suite.get("errors") == "0"
+    names = [case.get("name", "") for case in suite.iter("testcase")]
+    assert names[0] == "1: α = 0°, β = 0°" and "gyr_bias uncertainty" in names
+
+
+def test_a_turntable_that_jams_ends_the_run_with_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    junit = tmp_path / "run.xml"
+    with VirtualDevice(["--serial", "witmotion", "--speed", "20"], False) as device:
+        assert run(tmp_path, device, "2", junit) == 3
+    said = capsys.readouterr().err
+    assert "the table is jammed" in said and "--resume" in said
+    suite = parse(junit).getroot()
+    assert suite.get("failures") == suite.get("errors") == "1"
+    (error,) = suite.iter("error")
+    assert "jammed" in error.get("message", "")
+
+
+def parsed(*arguments: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    return parser.parse_args(arguments)
+
+
+def test_what_options_say_goes_over_the_plan(tmp_path: Path) -> None:
+    path = tmp_path / "plan.toml"
+    path.write_text(tomlkit.dumps({"site": {"latitude_deg": 50.0}, **plan()}))
+    said = ["--latitude", "60", "--serial", "A1", "--level", "0.1"]
+    about = make_task(parsed(str(path), *said))[0].about
+    assert about.latitude_deg == 60.0 and about.device["serial"] == "A1"
+    assert about.level_deg == 0.1
+    said = ["--device", "can:0", "--device", "can:1", "--device", "can:2"]
+    task, _ = make_task(parsed(str(path), *said, "--serial", "A1", "--serial", "B1"))
+    assert task.run["device"] == "can:0" and task.about.device["serial"] == "A1"
+    assert task.further == {"can:1": "B1", "can:2": ""}
+    about = make_task(parsed(str(path)))[0].about
+    assert about.latitude_deg == 50.0 and about.level_deg is None
+    with pytest.raises(InputError, match="leave those options out"):
+        make_task(parsed("--resume", str(tmp_path), "--latitude", "60"))
+
+
+def test_the_plan_of_the_readme_is_one() -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
+    blocks = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+    assert len(blocks) == 1
+    assert len(plan_file.task(tomllib.loads(blocks[0]), "README.md").positions) == 5

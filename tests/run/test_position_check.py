@@ -1,0 +1,83 @@
+"""A device that is not where it should be is noticed, and the slip is named."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldcal.core.frames import force, turn
+from fieldcal.core.positions import FIVE, SETS, TWO, Position
+from fieldcal.core.samples import Array
+from fieldcal.run.position_check import Held, judge
+
+G = 9.81
+BIAS = np.array([0.25, -0.15, 0.2])
+SCALE = np.array([1.008, 0.992, 1.004])
+
+
+def measured(alpha: float, beta: float, tilt: float = 0.0) -> Array:
+    """What a raw device with bias and scale shows on a tilted base; degrees."""
+    base = turn(np.deg2rad(tilt), np.deg2rad(-tilt)) @ [0, -G, 0]
+    f: Array = turn(np.deg2rad(alpha), np.deg2rad(beta)) @ base
+    return BIAS + SCALE * f
+
+
+@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("tilt", [-2.0, 0.0, 2.0])
+def test_the_right_positions_are_accepted_from_a_raw_device_on_a_tilted_base(
+    name: str, tilt: float
+) -> None:
+    held: Held | None = None
+    for position in SETS[name]:
+        alpha, beta = position.degrees or (0, 0)
+        f = measured(alpha, beta, tilt)
+        arrival = judge(position, f, G, held)
+        assert arrival.ok, (position.name, arrival.problem)
+        held = held or Held(position, f)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "beta", "says"),
+    [
+        (-45, 5, "α is turned the wrong way"),
+        (45, -5, "β is turned the wrong way"),
+        (-45, -5, "both angles are turned the wrong way"),
+        (5, 45, "α and β are exchanged"),
+        (0, 0, "it has not been turned yet"),
+        (225, 5, "upside down"),
+        (38, 5, "turn it by +"),
+        (45, 0, "β is not turned yet"),
+    ],
+)
+def test_a_slip_is_named(alpha: float, beta: float, says: str) -> None:
+    held = Held(TWO[0], measured(0, 0))
+    arrival = judge(TWO[1], measured(alpha, beta), G, held)
+    assert not arrival.ok and says in arrival.problem
+
+
+def test_a_step_of_two_and_a_half_degrees_is_told_from_none() -> None:
+    held = Held(FIVE[1], measured(22.5, 0))
+    assert not judge(FIVE[2], measured(22.5, 0), G, held).ok
+    assert judge(FIVE[2], measured(22.5, 2.5), G, held).ok
+    assert not judge(FIVE[2], measured(22.5, -2.5), G, held).ok
+
+
+def test_the_first_position_upside_down_or_in_a_wrong_unit() -> None:
+    over = judge(TWO[0], measured(180, 0), G, None)
+    assert not over.ok and "upside down" in over.problem
+    in_g = judge(TWO[0], measured(0, 0) / G, G, None)
+    assert not in_g.ok and "unit" in in_g.problem
+
+
+def test_without_angles_only_the_norm_is_judged() -> None:
+    anywhere = Position("as you like")
+    assert judge(anywhere, measured(77, 33), G, None).ok
+    assert not judge(anywhere, 2 * measured(77, 33), G, None).ok
+
+
+@given(st.floats(-180, 180), st.floats(-90, 90))
+def test_angles_shown_are_the_angles_held(alpha: float, beta: float) -> None:
+    f = force(np.deg2rad(alpha), np.deg2rad(beta), G)
+    seen = judge(Position("x"), f, G, None)
+    again = force(np.deg2rad(seen.alpha_deg), np.deg2rad(seen.beta_deg), G)
+    np.testing.assert_allclose(again, f, atol=1e-6)

@@ -1,0 +1,188 @@
+"""Going on after a break: nothing finished is lost, and no number is wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from time import sleep
+from typing import Any
+
+import numpy as np
+import pytest
+from processes import wait_for_samples
+
+from benchmarks.kills import Bench, windows
+from fieldcal.core.errors import SessionError
+from fieldcal.core.samples import Block
+from fieldcal.run import plan_file
+from fieldcal.run.session_run import resumed, taken_before
+from fieldcal.session import description
+from fieldcal.session.folder import MARKS, Session
+from fieldcal.session.recorder import SAMPLES, Recorder
+
+ROOT = Path(__file__).parents[2]
+TABLES = {
+    "format": 1,
+    "position": [
+        {"alpha_deg": 0.0, "beta_deg": 0.0},
+        {"alpha_deg": 45.0, "beta_deg": 5.0},
+    ],
+    "run": {"procedure": "two_position"},
+}
+
+
+def still(start: float, seconds: float, host: float, seed: int = 1) -> Block:
+    """Samples of a device at home."""
+    n = round(100 * seconds)
+    rng, t = np.random.default_rng(seed), start + np.arange(n) / 100
+    acc = [0.0, -9.81, 0.0] + 0.02 * rng.standard_normal((n, 3))
+    gyr = 0.002 * rng.standard_normal((n, 3))
+    return Block.of(t, acc, gyr, t_host=host + t - start)
+
+
+def recorded(folder: Path) -> None:
+    """A session of which the first position is taken, and the second begun."""
+    with Recorder(folder, TABLES) as recorder:
+        for k in range(15):
+            recorder.append(still(float(k), 1.0, 1000.0 + k, k))
+            recorder.flush()
+            if k == 11:
+                where = {"start_s": 1.0, "end_s": 11.0}
+                recorder.mark("window", position=0, **where)
+
+
+def test_whatever_was_cut_off_what_is_whole_is_gone_on_with(tmp_path: Path) -> None:
+    recorded(tmp_path / "whole")
+    data = (tmp_path / "whole" / SAMPLES).read_bytes()
+    marks = (tmp_path / "whole" / MARKS).read_bytes()
+    rng = np.random.default_rng(4)
+    for i, end in enumerate(rng.integers(0, len(data), 40).tolist()):
+        folder = tmp_path / str(i)
+        folder.mkdir()
+        (folder / "session.toml").write_text("format = 1\n")
+        (folder / SAMPLES).write_bytes(data[:end])
+        (folder / MARKS).write_bytes(marks[: rng.integers(0, len(marks))])
+        with Recorder(folder, None) as recorder:
+            recorder.append(still(0.0, 1.0, 2000.0))
+            recorder.mark("told", text="on")
+        session = Session.open(folder)
+        block = session.block
+        assert not session.warnings
+        assert (np.diff(block.t) > 0).all() and len(block) % 100 == 0
+        assert [m["event"] for m in session.marks()][-1] == "told"
+
+
+@pytest.mark.parametrize(
+    ("clock", "away", "begins"),
+    [(20.0, 5.0, 20.0), (0.0, 60.0, 75.0), (3.0, 0.2, 15.99), (14.99, 0.0, 15.99)],
+)
+def test_time_goes_on_though_the_device_began_anew(
+    tmp_path: Path, clock: float, away: float, begins: float
+) -> None:
+    recorded(tmp_path / "s")
+    with Recorder(tmp_path / "s", None) as recorder:
+        as_recorded = recorder.append(still(clock, 1.0, 1014.99 + away))
+    assert as_recorded.t[0] == pytest.approx(begins, abs=0.02)
+    assert (np.diff(Session.open(tmp_path / "s").block.t) > 0).all()
+
+
+def test_what_was_taken_is_known_and_what_was_wanted_again_is_not(
+    tmp_path: Path,
+) -> None:
+    recorded(tmp_path / "s")
+    session, tables = resumed(tmp_path / "s")
+    taken = taken_before(session, plan_file.task(tables, "s"))
+    assert list(taken) == [0] and taken[0].n == 1000
+    with Recorder(tmp_path / "s", None) as recorder:
+        recorder.mark("repeated", position=0)
+    session, tables = resumed(tmp_path / "s")
+    assert taken_before(session, plan_file.task(tables, "s")) == {}
+    assert session.windows == (None, None)
+
+
+def test_what_cannot_be_gone_on_with_is_said(tmp_path: Path) -> None:
+    with pytest.raises(SessionError, match="is no session"):
+        resumed(tmp_path)
+    (tmp_path / "session.toml").write_text("format = 1\n")
+    with pytest.raises(SessionError, match="was not recorded by fieldcal run"):
+        resumed(tmp_path)
+    recorded(tmp_path / "s")
+    with Recorder(tmp_path / "s", None) as recorder:
+        recorder.mark("finished")
+    resumed(tmp_path / "s")  # killed before the result was written
+    (tmp_path / "s" / "result.json").write_text("{}")
+    with pytest.raises(SessionError, match="is finished"):
+        resumed(tmp_path / "s")
+
+
+def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
+    recorded(tmp_path / "s")
+    with pytest.raises(SessionError, match="--resume"):
+        Recorder(tmp_path / "s", TABLES)
+    assert description.read(tmp_path / "s" / "session.toml").positions
+
+
+RUNS = 3
+
+
+@pytest.fixture(scope="module")
+def series() -> Iterator[dict[str, subprocess.Popen[str]]]:
+    """Runs that are broken in both ways, side by side: mostly they wait."""
+    code = (
+        "import json, sys; from benchmarks.kills import series\n"
+        f"found = series(sys.argv[1], {RUNS}, seed=11, most=1)\n"
+        "print(json.dumps([[o.broken, o.lost, o.pulls, o.says] for o in found]))"
+    )
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    begun = {
+        kind: subprocess.Popen(
+            [sys.executable, "-c", code, kind], cwd=ROOT, env=env, text=True, **pipes
+        )
+        for kind in ("killed", "pulled")
+    }
+    yield begun
+    for process in begun.values():
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("kind", ["killed", "pulled"])
+def test_runs_that_are_broken_end_with_right_numbers(
+    series: dict[str, subprocess.Popen[str]], kind: str
+) -> None:
+    """A few of what benchmarks/kills.py does by the hundred."""
+    said, wrong = series[kind].communicate(timeout=120)
+    assert series[kind].returncode == 0, wrong
+    outcomes = json.loads(said)
+    assert sum(broken for broken, *_ in outcomes) >= RUNS / 2
+    for _, lost, pulls, says in outcomes:
+        assert lost == 0 and says == ""
+        assert len(pulls) >= 11 and np.abs(pulls).max() < 4.5
+
+
+def test_a_laptop_that_fell_asleep_goes_on_with_right_numbers(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, 3, speed="20")
+    try:
+        run = bench.start(tmp_path / "s")
+        wait_for_samples(tmp_path / "s", run, 40_000)
+        run.send_signal(signal.SIGSTOP)
+        sleep(1.5)  # half a minute of the device's time
+        run.send_signal(signal.SIGCONT)
+        _, said = run.communicate(timeout=60)
+        assert run.returncode in (0, 1), said
+        pulls = bench.pulls(tmp_path / "s")
+        taken = windows(tmp_path / "s")
+    finally:
+        bench.device.close()
+    assert sorted(taken) == [0, 1, 2, 3, 4]
+    block = Session.open(tmp_path / "s").block
+    for start, end in taken.values():
+        inside = block.between(start, end)
+        assert np.diff(inside.t).max() < 0.5
+    assert len(pulls) >= 11 and np.abs(pulls).max() < 4.5

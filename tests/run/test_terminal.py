@@ -1,0 +1,172 @@
+"""What the operator reads, rendered as on a terminal of 80 by 24 and on a plain one."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from fieldcal.core.positions import FIVE
+from fieldcal.drivers.driver import Health
+from fieldcal.planning.steps import Hold
+from fieldcal.run.movers import Nobody
+from fieldcal.run.operator.banner import drawable, large
+from fieldcal.run.operator.protocol import Phase, View
+from fieldcal.run.operator.terminal import ConsoleOperator
+from fieldcal.run.position_check import Arrival
+
+HOLD = Hold(1, FIVE[1], 30.0)
+
+
+def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> View:
+    known: dict[str, object] = {
+        "phase": phase,
+        "hold": HOLD,
+        "arrival": Arrival(False, 3.0, 0.2, "the device is at α = 3.0°"),
+        "stillness": 0.4,
+        "elapsed": elapsed,
+        "sigma": np.array([1e-3, 2e-3, 3e-3, 1e-5, 1e-5, 2e-5]),
+        "reason": "the device is at α = 3.0°",
+        "rate_hz": 100.0,
+        "temperature": 24.5,
+        "health": Health(samples=1234),
+    }
+    return View(**(known | changes))  # type: ignore[arg-type]
+
+
+def screen(operator: ConsoleOperator, width: int = 80) -> str:
+    out = io.StringIO()
+    Console(file=out, width=width, height=24, color_system=None).print(
+        operator.screen()
+    )
+    return out.getvalue()
+
+
+@pytest.fixture
+def operator() -> ConsoleOperator:
+    console = Console(file=io.StringIO(), width=80, height=24, force_terminal=True)
+    made = ConsoleOperator("fieldcal · five_position", FIVE, Nobody(), console)
+    made.place(HOLD)
+    return made
+
+
+def test_turning_says_where_to_where_it_is_and_what_it_waits_for(
+    operator: ConsoleOperator,
+) -> None:
+    operator.show(view("turning"))
+    said = screen(operator)
+    assert "T U R N   T O   α = 22.5°, β = 0°" in said
+    assert "+3.0°" in said and "turn +19.5°" in said
+    assert "100 Hz" in said and "24.5 °C" in said
+
+
+def test_averaging_says_hold_still_time_left_and_what_is_reached(
+    operator: ConsoleOperator,
+) -> None:
+    operator.show(view("averaging", 12.0))
+    said = screen(operator)
+    assert "H O L D   S T I L L" in said and "18 s" in said and "3.00 mm/s²" in said
+
+
+def test_a_position_taken_is_ticked_off_with_its_sigma(
+    operator: ConsoleOperator,
+) -> None:
+    operator.show(view("taken", 30.0))
+    assert "taken   ± 3.00 mm/s²" in screen(operator)
+
+
+def test_what_went_wrong_stays_until_the_position_is_taken(
+    operator: ConsoleOperator,
+) -> None:
+    operator.tell("disturbed at 12.3 s on ay")
+    operator.place(HOLD)
+    operator.show(view("averaging", 1.0))
+    assert "! disturbed at 12.3 s on ay" in screen(operator)
+    operator.show(view("taken", 30.0))
+    assert "disturbed" not in screen(operator)
+
+
+def test_what_was_wrong_with_the_turn_is_gone_once_it_is_done(
+    operator: ConsoleOperator,
+) -> None:
+    operator.show(view("turning"))
+    operator.tell("still waiting, 60 s: the device is at α = 3.0°")
+    assert screen(operator).count("the device is at α = 3.0°") == 1
+    assert "still waiting, 60 s: the device is at" in screen(operator)
+    operator.tell("not yet: it moves")
+    assert "! not yet" in screen(operator)
+    operator.show(view("averaging", 1.0, reason=""))
+    assert "!" not in screen(operator)
+
+
+def test_a_link_that_is_silent_is_said_large_and_for_as_long_as_it_is(
+    operator: ConsoleOperator,
+) -> None:
+    operator.show(view("silent", reason="no samples come from ttyUSB0: check cable"))
+    said = screen(operator)
+    assert "N O   S A M P L E S" in said and "! no samples come from ttyUSB0" in said
+    operator.show(view("turning"))
+    assert "S A M P L E S" not in screen(operator)
+
+
+def test_hands_off_does_not_ask_to_be_turned_on(operator: ConsoleOperator) -> None:
+    there = Arrival(True, 21.0, 1.2, limit_deg=2.4)
+    operator.show(view("turning", arrival=there, reason="settling"))
+    said = screen(operator)
+    assert "H A N D S   O F F" in said and said.count("close enough") == 2
+    assert "+21.0° to +22.5° ± 2.4°" in said
+    warms = "the device is still warming up: +4.0 ± 0.2 K/min; Enter goes on"
+    operator.show(view("turning", arrival=there, reason=warms))
+    assert "W A I T" in screen(operator) and warms in screen(operator)
+
+
+@pytest.mark.parametrize("phase", ["turning", "averaging", "taken"])
+def test_everything_fits_80_by_24(operator: ConsoleOperator, phase: Phase) -> None:
+    operator.tell("a sentence of the usual length about what happened, and what to do")
+    operator.tell("α is turned the wrong way: it is at α = -22.3°, β = 0.1° instead")
+    operator.show(view(phase, 10.0))
+    operator.tell("α is turned the wrong way: it is at α = -22.3°, β = 0.1° instead")
+    lines = screen(operator).splitlines()
+    assert len(lines) <= 24 and max(map(len, lines)) <= 80
+
+
+def test_on_a_tall_screen_the_instruction_is_read_from_afar() -> None:
+    out = io.StringIO()
+    console = Console(file=out, width=100, height=40, force_terminal=True)
+    made = ConsoleOperator("t", FIVE, Nobody(), console)
+    made.place(HOLD)
+    made.show(view("turning"))
+    console.print(made.screen())
+    lines = out.getvalue()
+    for line in [*large("TURN TO"), *large("α 22.5°  β 0°")]:
+        assert line in lines
+    assert len(lines.splitlines()) <= 40
+    assert not drawable("WAIT FOR ME?") and drawable("HOLD STILL")
+
+
+def test_many_positions_leave_room_for_what_is_said() -> None:
+    console = Console(file=io.StringIO(), width=80, height=24, force_terminal=True)
+    with ConsoleOperator("t", FIVE * 6, Nobody(), console) as made:
+        made.place(Hold(14, FIVE[4], 30.0))
+        made.tell("a sentence of the usual length about what happened, and what to do")
+        made.show(view("turning", hold=Hold(14, FIVE[4], 30.0)))
+        said = screen(made)
+    assert len(said.splitlines()) <= 24 and "15  α = 45°, β = 5°" in said
+    assert "link: 100 Hz" in said and "! a sentence of the usual" in said
+
+
+def test_plain_lines_for_a_log() -> None:
+    out = io.StringIO()
+    console = Console(file=out, width=200)
+    with ConsoleOperator("t", FIVE, Nobody(), console, plain=True) as operator:
+        operator.place(HOLD)
+        operator.tell("bumped")
+        for elapsed in np.arange(0, 30, 0.1):
+            operator.show(view("averaging", float(elapsed)))
+        operator.show(view("taken", 30.0))
+    lines = out.getvalue().splitlines()
+    assert lines[0].startswith("position 2: turn to α = 22.5°")
+    assert lines[1] == "! bumped" and lines[-1].startswith("position 2: taken, ± 3.00")
+    assert len(lines) == 6

@@ -1,0 +1,237 @@
+"""The session folder: what is read, what is refused and with which words."""
+
+import gzip
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldcal.core.errors import InputError, SessionError
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Block
+from fieldcal.session import description, sample_files
+from fieldcal.session.folder import Session
+from fieldcal.session.recorder import Recorder
+
+HEAD = "t,ax,ay,az,gx,gy,gz"
+ROWS = "0.00,0,-9.81,0,0,0,0\n0.01,0,-9.80,0,0,0,0\n"
+
+
+def folder(at: Path, toml: str = "", csv: str | None = f"{HEAD}\n{ROWS}") -> Path:
+    at.mkdir(exist_ok=True)
+    (at / "session.toml").write_text("format = 1\n" + toml)
+    if csv is not None:
+        (at / "samples.csv").write_text(csv)
+    return at
+
+
+def block(n: int = 50, start: float = 0.0) -> Block:
+    rng = np.random.default_rng(1)
+    t = start + np.arange(n) / 100
+    return Block.of(t, rng.normal(size=(n, 3)), rng.normal(size=(n, 3)))
+
+
+def test_units_become_si_and_missing_values_stay_missing(tmp_path: Path) -> None:
+    toml = '[units]\nacceleration = "mg"\nangular_rate = "deg/s"\n'
+    csv = f"{HEAD},temperature\n0,0,-1000,0,180,0,0,25\n1,,nan,0,0,0,0,\n"
+    got = Session.open(folder(tmp_path, toml, csv)).block
+    np.testing.assert_allclose(got.acc[0], [0, -G0, 0])
+    np.testing.assert_allclose(got.gyr[0], [np.pi, 0, 0])
+    assert np.isnan(got.acc[1, :2]).all() and np.isnan(got.temperature[1])
+    assert np.isnan(got.seq).all()
+
+
+def test_every_file_kind_gives_the_same_samples(tmp_path: Path) -> None:
+    wanted = block()
+    table = pa.Table.from_batches([sample_files.to_batch(wanted)])
+    csv = tmp_path / "a.csv"
+    pa.csv.write_csv(table, csv)
+    (tmp_path / "b.csv.gz").write_bytes(gzip.compress(csv.read_bytes()))
+    pyarrow.parquet.write_table(table, tmp_path / "c.parquet")
+    with Recorder(tmp_path / "d", {"format": 1}) as recorder:
+        recorder.append(wanted)
+    for name in ("a.csv", "b.csv.gz", "c.parquet", "d/samples.arrows"):
+        got, warnings = sample_files.read(tmp_path / name)
+        assert not warnings, name
+        np.testing.assert_array_equal(got.six, wanted.six)
+        np.testing.assert_array_equal(got.t, wanted.t)
+
+
+@pytest.mark.parametrize(
+    ("csv", "says"),
+    [
+        ("", "is empty"),
+        (HEAD + "\n", "no rows"),
+        (f"{HEAD}\n0,0,0,0,0,0,0\n1,0,x,0,0,0,0\n", "row 2, column ay: 'x'"),
+        (f"{HEAD}\n0,0,0,0,0,0,0\n0,0,0,0,0,0,0\n", "row 2, column t: 0 s is the same"),
+        (f"{HEAD}\n1,0,0,0,0,0,0\n0,0,0,0,0,0,0\n", "row 2, column t: 0 s is before"),
+        (f"{HEAD}\n1,0,0,0,0,0\n2,0,0,0,0,0,0\n", "row 1 has 6 columns, not 7"),
+        (f"{HEAD}\nnan,0,0,0,0,0,0\n", "row 1, column t"),
+        (f"{HEAD}\n0,inf,0,0,0,0,0\n", "row 1, column ax: inf"),
+        ("t,ax,ay\n0,0,0\n", "no column az"),
+        ("t,p\n0,0\n", "neither accelerometers"),
+        ("ax,ay,az\n0,0,0\n", "no column t"),
+        ("1,2,3\n4,5,6\n", "first row must name the columns"),
+    ],
+)
+def test_a_samples_file_that_makes_no_sense_is_refused_with_the_place(
+    tmp_path: Path, csv: str, says: str
+) -> None:
+    session = Session.open(folder(tmp_path, csv=csv))
+    with pytest.raises(SessionError, match="samples.csv") as error:
+        _ = session.block
+    assert says in str(error.value)
+
+
+def test_no_samples_file_or_two_of_them(tmp_path: Path) -> None:
+    with pytest.raises(SessionError, match="no samples file"):
+        _ = Session.open(folder(tmp_path, csv=None)).block
+    folder(tmp_path)
+    (tmp_path / "samples.parquet").write_bytes(b"")
+    with pytest.raises(SessionError, match="keep one"):
+        _ = Session.open(tmp_path).block
+
+
+def test_a_csv_cut_off_anywhere_keeps_its_whole_rows(tmp_path: Path) -> None:
+    text = f"{HEAD}\n{ROWS}0.02,0,-9.82,0,0,0,0\n"
+    first_row = text.index("\n", text.index("\n") + 1)
+    for end in range(first_row, len(text)):
+        (tmp_path / "samples.csv").write_text(text[:end])
+        got, _ = sample_files.read(tmp_path / "samples.csv")
+        whole = text[:end].count("\n") - 1
+        assert whole <= len(got) <= whole + 1
+
+
+def test_a_gz_cut_off_is_read_as_far_as_it_goes_and_says_so(tmp_path: Path) -> None:
+    rows = "".join(f"{i / 100},{i % 7},-9.8,{i % 3},0,0,0\n" for i in range(5000))
+    packed = gzip.compress(f"{HEAD}\n{rows}".encode())
+    path = tmp_path / "samples.csv.gz"
+    path.write_bytes(packed[: len(packed) // 2])
+    got, warnings = sample_files.read(path)
+    assert 100 < len(got) < 5000 and "cut off" in warnings[0]
+    path.write_bytes(b"no gzip at all")
+    with pytest.raises(SessionError, match="not a gzip file"):
+        sample_files.read(path)
+
+
+def test_a_stream_cut_at_any_byte_keeps_every_whole_batch(tmp_path: Path) -> None:
+    sizes = []
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        path = tmp_path / "s" / "samples.arrows"
+        for i in range(2):
+            recorder.append(block(2, start=i))
+            recorder.flush()
+            sizes.append(path.stat().st_size)
+    data = path.read_bytes()
+    cut = tmp_path / "cut.arrows"
+    for end in range(len(data)):
+        cut.write_bytes(data[:end])
+        whole = sum(end >= size for size in sizes)
+        try:
+            got, warnings = sample_files.read(cut)
+        except SessionError as error:
+            assert whole == 0 and str(cut) in str(error)
+            continue
+        assert len(got) == 2 * whole and warnings
+        np.testing.assert_array_equal(got.acc[:2], block(2).acc)
+
+
+def test_a_session_is_never_overwritten(tmp_path: Path) -> None:
+    Recorder(tmp_path, {"format": 1}).close()
+    with pytest.raises(SessionError, match="holds a session already"):
+        Recorder(tmp_path, {"format": 1})
+
+
+def test_windows_of_a_live_session_stand_in_its_marks(tmp_path: Path) -> None:
+    about = {"format": 1, "position": [{"alpha_deg": 0.0, "beta_deg": 0.0}] * 2}
+    with Recorder(tmp_path, about) as recorder:
+        recorder.append(block())
+        recorder.mark("window", position=1, start_s=0.1, end_s=0.4)
+    with (tmp_path / "marks.jsonl").open("a") as marks:
+        marks.write('{"event": "window", "posi')
+    session = Session.open(tmp_path)
+    assert session.windows == (None, (0.1, 0.4))
+    assert [m["event"] for m in session.marks()] == ["window"]
+    assert len(session.block) == 50
+    (tmp_path / "marks.jsonl").write_text("{nonsense\n{}\n")
+    session = Session.open(tmp_path)
+    assert list(session.marks()) == [{}]
+    assert session.warnings == ("marks.jsonl: line 1 is damaged and left out",)
+
+
+@pytest.mark.parametrize(
+    ("toml", "says"),
+    [
+        ("format = 2", "format = 2"),
+        ("[site]\ngravity = 0", "[site] gravity = 0 must be above 0"),
+        ("[site]\nlevel_deg = -0.1", "[site] level_deg = -0.1 must be above 0"),
+        ("[site]\nlevel_deg = 20", "level_deg = 20 is no level base"),
+        ("[site]\nlatitude_deg = 'x'", "latitude_deg = 'x' is not a number"),
+        ("[site]\nlatitude_deg = 100.0", "latitude 100"),
+        ("[units]\nacceleration = 'furlong'", "'furlong' is none of: m/s^2"),
+        ("[frame]\nmounting = ['+x', '+x', '+z']", "right-handed"),
+        ("[nominal]\nacc_bias = [1, 2]", "must be three numbers"),
+        ("[device]\ngrade = 'toy'", "none of: tactical, navigation"),
+        ("[model]\neffects = 'base_tilt'", "list of ids"),
+        ("[[position]]\nalpha_deg = 1", "position 0 has alpha_deg alone"),
+        ("[[position]]\nstart_s = 5\nend_s = 5", "must come before"),
+        ("[[position]]\nrate_deg_s = [1]", "three numbers"),
+        ("[sampling]\nrate_hz = -1", "rate_hz = -1 must be above 0"),
+        ("x = [", "is not TOML"),
+    ],
+)
+def test_a_session_toml_that_makes_no_sense_is_refused_with_the_place(
+    tmp_path: Path, toml: str, says: str
+) -> None:
+    (tmp_path / "session.toml").write_text(toml)
+    with pytest.raises(SessionError, match="session.toml") as error:
+        Session.open(tmp_path)
+    assert says in str(error.value)
+
+
+def test_a_folder_without_session_toml_is_said_to_be_none(tmp_path: Path) -> None:
+    with pytest.raises(SessionError, match="fieldcal import"):
+        Session.open(tmp_path / "nowhere")
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4),
+    max_leaves=6,
+)
+tables = st.dictionaries(
+    st.sampled_from(["alpha_deg", "mounting", "acc_bias", "gravity", "effects", "x"]),
+    json_values,
+    max_size=4,
+)
+names = st.sampled_from(["site", "frame", "nominal", "model", "position", "units"])
+
+
+@given(st.dictionaries(names, json_values | tables | st.lists(tables, max_size=3)))
+def test_any_table_is_read_or_refused_in_words(raw: dict[str, Any]) -> None:
+    try:
+        about = description.parse(raw)
+    except InputError as error:
+        assert str(error)
+    else:
+        assert about.gravity > 0
+
+
+def test_a_derived_file_is_whole_and_strict_json(tmp_path: Path) -> None:
+    session = Session.open(folder(tmp_path))
+    path = session.write_json("result.json", {"a": 1})
+    assert json.loads(path.read_text()) == {"a": 1}
+    with pytest.raises(ValueError, match="JSON"):
+        session.write_json("result.json", {"a": float("nan")})
+    assert json.loads(path.read_text()) == {"a": 1}
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "result.json",
+        "samples.csv",
+        "session.toml",
+    ]

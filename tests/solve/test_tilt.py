@@ -1,0 +1,95 @@
+"""The tilt that the accelerometers find, in the gyroscopes' reference as well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from observed import GYR_BIAS, OMEGA, carried, observe, outputs
+
+from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.samples import Array
+from fieldcal.solve import Observations, solve
+
+LATITUDE = np.deg2rad(50)
+EARTH = [0.0, -OMEGA * np.sin(LATITUDE), OMEGA * np.cos(LATITUDE)]
+NINE = (
+    *FIVE,
+    *(Position.deg(a, b) for a, b in [(-45, 5), (-22, -5), (0, 5), (30, -4)]),
+)
+TILTS = {"angle_offset": [0.8, -0.6], "base_tilt": [0.7, -0.9]}
+
+
+def rates(places: Sequence[Position], tilt: str, degrees: Sequence[float]) -> Array:
+    """The Earth's rate that the device feels, (n, 3) rad/s."""
+    first, second = np.deg2rad(degrees)
+    out = []
+    for p in places:
+        a, b = p.alpha or 0.0, p.beta or 0.0
+        if tilt == "base_tilt":
+            out.append(carried(a, b, carried(second, first, EARTH).tolist()))
+        else:
+            out.append(carried(a + first, b + second, EARTH))
+    return np.array(out)
+
+
+def navigation(
+    rng: np.random.Generator,
+    places: Sequence[Position],
+    tilt: str,
+) -> Observations:
+    degrees = TILTS[tilt]
+    if tilt == "base_tilt":
+        acc = outputs(places, base_deg=degrees)
+    else:
+        acc = outputs(places, offset_deg=degrees)
+    gyr = GYR_BIAS + rates(places, tilt, degrees)
+    return observe(
+        places,
+        acc + 1e-4 * rng.standard_normal(acc.shape),
+        gyr=gyr + 5e-8 * rng.standard_normal(gyr.shape),
+        sigma=1e-4,
+        sigma_gyr=5e-8,
+        latitude=LATITUDE,
+        grade="navigation",
+    )
+
+
+@pytest.mark.parametrize("tilt", TILTS)
+@pytest.mark.parametrize("places", [FIVE, NINE], ids=["five", "nine"])
+def test_navigation_gyroscopes_on_a_tilted_base(
+    places: Sequence[Position], tilt: str
+) -> None:
+    rng = np.random.default_rng(3)
+    pulls, chi2 = [], []
+    for _ in range(25 if len(places) > 5 else 40):
+        found = solve(navigation(rng, places, tilt), tilt=tilt)  # type: ignore[arg-type]
+        bias, bias_sigma = found.vector("gyr_bias")
+        scale, scale_sigma = found.vector("gyr_scale")
+        pulls += [(bias - GYR_BIAS) / bias_sigma, (scale - 1) / scale_sigma]
+        gyroscopes = found.info["gyroscopes"]
+        chi2.append(gyroscopes["chi2"] / gyroscopes["dof"])
+    flat = np.concatenate(pulls)
+    # of instability it is only known that it is no larger than the noise
+    assert 0.75 < np.std(flat) < 1.1
+    assert abs(np.mean(flat)) < 0.25
+    assert np.mean(chi2) == pytest.approx(1, abs=0.1)
+
+
+def test_a_base_known_to_be_nearly_level_is_in_the_gyroscopes_uncertainty() -> None:
+    rng = np.random.default_rng(7)
+    two = (Position.deg(0, 0), Position.deg(45, 5))
+    pulls = []
+    for _ in range(60):
+        x, z = 0.2 * rng.standard_normal(2)
+        gyr = GYR_BIAS + rates(two, "base_tilt", [x, z])
+        gyr = gyr + 1e-8 * rng.standard_normal((2, 3))
+        seen = observe(
+            two, outputs(two, base_deg=(x, z)), gyr=gyr, sigma_gyr=1e-8,
+            latitude=LATITUDE, grade="navigation",
+        )  # fmt: skip
+        found = solve(seen, level_sigma_deg=0.2)
+        bias, sigma = found.vector("gyr_bias")
+        pulls.append((bias - GYR_BIAS)[[0, 2]] / sigma[[0, 2]])
+    assert np.std(pulls) == pytest.approx(1, abs=0.2)

@@ -1,0 +1,350 @@
+"""The windowed averager on noise of known error and disturbances of known place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import butter, lfilter
+
+from fieldcal.core.errors import InputError, Moved
+from fieldcal.core.samples import CHANNELS, Array, Block, concat
+from fieldcal.windows import Average, Limits, Window, average
+from fieldcal.windows.longrun import error_of_mean
+
+UNIT = np.repeat([0.05, 0.002], 3)
+HOME = np.array([0.1, -9.81, 0.2, 0.01, -0.02, 0.005])
+
+
+def white(rng: np.random.Generator, n: int, c: int = 6) -> Array:
+    return rng.standard_normal((n, c))
+
+
+def low_passed(hz: float, rate: float = 100.0) -> Callable[..., Array]:
+    def source(rng: np.random.Generator, n: int, c: int = 6) -> Array:
+        b, a = butter(2, 2 * hz / rate)
+        x: Array = lfilter(b, a, white(rng, n + 200, c), axis=0)[200:]
+        scaled: Array = x / x.std()
+        return scaled
+
+    return source
+
+
+def markov(phi: float) -> Callable[..., Array]:
+    def source(rng: np.random.Generator, n: int, c: int = 6) -> Array:
+        e = np.sqrt(1 - phi**2) * white(rng, n + 300, c)
+        x: Array = lfilter([1], [1, -phi], e, axis=0)[300:]
+        return x
+
+    return source
+
+
+def flicker(knee: float, rate: float = 100.0) -> Callable[..., Array]:
+    def source(rng: np.random.Generator, n: int, c: int = 6) -> Array:
+        f = np.fft.rfftfreq(2 * n, 1 / rate)[1:, None]
+        spectrum = white(rng, n, c) + 1j * white(rng, n, c)
+        spectrum = np.vstack([np.zeros((1, c)), spectrum * np.sqrt((1 + knee / f) * n)])
+        return np.fft.irfft(spectrum, 2 * n, axis=0)[:n]
+
+    return source
+
+
+def block_of(noise: Array, rate: float = 100.0, start: float = 0.0) -> Block:
+    six = HOME + noise * UNIT
+    t = start + np.arange(len(six)) / rate
+    return Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), 25.0))
+
+
+def rejection(block: Block) -> Moved | None:
+    try:
+        average(block)
+    except Moved as moved:
+        return moved
+    return None
+
+
+def pulls(source: Callable[..., Array], channels: int = 900) -> Array:
+    """Difference of neighbouring 30 s means over its stated error."""
+    cells = []
+    for seed in range(channels // 300):
+        x = source(np.random.default_rng(seed), 6000, 300)
+        cells.append(x.reshape(600, 10, 300).mean(axis=1))
+    y = np.hstack(cells)
+    a, b = (error_of_mean(part, 0.1).covariance for part in (y[:300], y[300:]))
+    return np.asarray(
+        (y[:300].mean(axis=0) - y[300:].mean(axis=0)) / np.sqrt(np.diag(a) + np.diag(b))
+    )
+
+
+@pytest.mark.parametrize(
+    ("source", "least", "most"),
+    [
+        (white, 0.90, 1.04),
+        (low_passed(20), 0.90, 1.04),
+        (low_passed(5), 0.90, 1.04),
+        (markov(0.5), 0.90, 1.04),
+        (markov(0.95), 0.70, 1.0),
+        (flicker(1.0), 0.80, 1.1),
+    ],
+)
+def test_the_error_stated_is_the_error_made(
+    source: Callable[..., Array], least: float, most: float
+) -> None:
+    found = pulls(source)
+    assert least < found.std() < most
+    assert np.mean(np.abs(found) > 1.96) < 0.075
+
+
+def test_white_noise_averages_with_the_root_of_the_number() -> None:
+    sigmas = [average(block_of(white(np.random.default_rng(s), 6000))).sigma
+              for s in range(20)]  # fmt: skip
+    ratio = np.median(sigmas / (UNIT / np.sqrt(6000)))
+    assert 0.97 < ratio < 1.06
+
+
+def test_a_line_does_not_pass_for_noise() -> None:
+    rng = np.random.default_rng(0)
+    t = np.arange(6000)[:, None] / 100
+    x = white(rng, 6000)
+    swaying = x + np.sin(2 * np.pi * 1.9 * t + rng.uniform(0, 6, 6))
+    alone, along = average(block_of(x)), average(block_of(swaying))
+    assert (along.sigma < 2 * alone.sigma).all()
+
+
+def test_channels_that_wander_together_say_so() -> None:
+    rng = np.random.default_rng(1)
+    mixing = np.eye(6)
+    mixing[1, 0] = mixing[4, 0] = 2.0
+    found = np.zeros((6, 6))
+    for _ in range(10):
+        cov = average(block_of(white(rng, 3000) @ mixing.T)).covariance
+        sigma = np.sqrt(np.diag(cov))
+        found += cov / np.outer(sigma, sigma) / 10
+        assert np.linalg.eigvalsh(cov / np.outer(sigma, sigma)).min() > 0
+    truth = mixing @ mixing.T
+    size = np.sqrt(np.diag(truth))
+    np.testing.assert_allclose(found, truth / np.outer(size, size), atol=0.1)
+
+
+def test_noise_alone_is_not_rejected() -> None:
+    rejected = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        for source in (white, low_passed(20), markov(0.5), flicker(0.03)):
+            rejected += rejection(block_of(source(rng, 3000))) is not None
+    assert rejected <= 2, "of 240 windows"
+
+
+@pytest.mark.parametrize(("rate", "seconds"), [(50.0, 30.0), (100.0, 60.0)])
+def test_five_sigma_for_half_a_second_are_caught(rate: float, seconds: float) -> None:
+    n, long = int(rate * seconds), int(rate / 2)
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        x = white(rng, n)
+        first = (0, n - long, int(rng.integers(n - long)))[seed % 3]
+        channel = int(rng.integers(6))
+        x[first : first + long, channel] += rng.choice([-5.0, 5.0])
+        moved = rejection(block_of(x, rate, start=100.0))
+        assert moved is not None and moved.axis == CHANNELS[channel]
+        assert abs(moved.at - 100.0 - first / rate) < 0.5
+        told = re.search(r"([\d.]+) s into the window on (\w+)", str(moved))
+        assert told and abs(float(told[1]) - first / rate) < 0.55
+
+
+def test_a_lean_is_rejected_and_a_warm_up_is_not() -> None:
+    rng = np.random.default_rng(2)
+    t = np.arange(6000)[:, None] / 100
+    mean_error = 1 / np.sqrt(6000)
+    for at in (10.0, 20.0, 40.0, 55.0):
+        lean = 60 * mean_error * np.clip((t - at) / 2.0, 0, 1) * np.eye(6)[1]
+        moved = rejection(block_of(white(rng, 6000) + lean))
+        assert moved and moved.axis == "ay" and abs(moved.at - at) < 5.0
+    for size in (5.0, 15.0, 30.0):
+        warm = size * mean_error * (1 - np.exp(-t / 100)) / (1 - np.exp(-0.6))
+        assert rejection(block_of(white(rng, 6000) + warm)) is None
+
+
+def test_a_drift_that_no_warm_up_makes_is_rejected() -> None:
+    block = block_of(white(np.random.default_rng(3), 6000))
+    block.acc[:, 2] += np.linspace(0, 0.3, 6000)
+    moved = rejection(block)
+    assert moved and moved.axis == "az" and "creeping on az" in str(moved)
+
+
+def test_what_shakes_to_and_fro_is_rejected() -> None:
+    x = white(np.random.default_rng(4), 3000)
+    x[1500:1540, 2] += 8 * (-1.0) ** np.arange(40)
+    moved = rejection(block_of(x))
+    assert moved and moved.axis == "az" and "shaken" in str(moved)
+    assert abs(moved.at - 15.0) < 0.3
+
+
+def test_a_stuck_channel_is_named() -> None:
+    block = block_of(white(np.random.default_rng(5), 3000))
+    block.acc[1800:2600, 0] = block.acc[1800, 0]
+    moved = rejection(block)
+    assert moved and moved.axis == "ax" and abs(moved.at - 18.0) < 0.3
+    assert "repeats one value for 7.9 s" in str(moved)
+
+
+def test_a_device_in_motion_throughout_is_no_device_at_rest() -> None:
+    t = np.arange(3000) / 100
+    block = block_of(white(np.random.default_rng(6), 3000))
+    block.acc[:, 0] += 3 * np.sin(2 * np.pi * 0.7 * t)
+    moved = rejection(block)
+    assert moved and "no device at rest" in str(moved)
+    assert average(block, Limits(acc=10.0)).n == 3000
+
+
+def same(a: Average, b: Average) -> bool:
+    pairs = [(a.mean, b.mean), (a.covariance, b.covariance)]
+    return all(np.allclose(x, y, rtol=1e-7, atol=1e-14) for x, y in pairs) and (
+        (a.n, a.start, a.end) == (b.n, b.start, b.end)
+    )
+
+
+@settings(max_examples=25)
+@given(
+    cuts=st.lists(st.integers(0, 1500), max_size=12),
+    rate=st.sampled_from([37.0, 100.0, 204.8]),
+    lost=st.integers(0, 40),
+    seed=st.integers(0, 99),
+)
+def test_how_samples_are_cut_into_blocks_does_not_matter(
+    cuts: list[int], rate: float, lost: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    block = block_of(white(rng, 1500), rate, start=1e5)
+    block.acc[rng.integers(0, 1500, lost), 1] = np.nan
+    edges = [0, *sorted(cuts), 1500]
+    window = Window()
+    for first, last in zip(edges, edges[1:], strict=False):
+        window.add(block[first:last])
+    whole = Window()
+    whole.add(block)
+    np.testing.assert_allclose(window.sigma, whole.sigma, rtol=1e-7)
+    assert window.motion == pytest.approx(whole.motion, rel=1e-6)
+    assert window.meter == pytest.approx(whole.meter, rel=1e-6)
+    if window.moved is None:
+        assert same(window.average(), average(block))
+
+
+def test_a_nan_is_a_missing_value() -> None:
+    rng = np.random.default_rng(7)
+    block = block_of(white(rng, 3000))
+    block.acc[rng.random(3000) < 0.2, 0] = np.nan
+    block.gyr[:] = np.nan
+    block.temperature[::2] = np.nan
+    found = average(block)
+    assert found.mean[0] == pytest.approx(np.nanmean(block.acc[:, 0]), rel=1e-12)
+    assert np.isnan(found.mean[3:]).all() and np.isnan(found.sigma[3:]).all()
+    assert np.isnan(found.covariance[0, 3]) and found.temperature == 25.0
+    assert found.sigma[0] == pytest.approx(0.05 / np.sqrt(2400), rel=0.35)
+
+
+def test_lost_samples_are_no_disturbance() -> None:
+    rejected = 0
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        block = block_of(white(rng, 3000))
+        kept = np.sort(rng.choice(3000, 2200, replace=False))
+        kept = kept[(kept < 700) | (kept > 800)]
+        rows = [block[int(k) : int(k) + 1] for k in kept]
+        rejected += rejection(concat(rows)) is not None
+    assert rejected == 0
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.3, 0.5, 1.0])
+def test_rounding_that_the_noise_does_not_hide_is_in_the_error(noise: float) -> None:
+    errors, sigmas = [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        truth = rng.uniform(0, 1, 6)
+        values = np.round(truth + noise * rng.standard_normal((3000, 6)))
+        found = average(Block.of(np.arange(3000) / 100, values[:, :3], values[:, 3:]),
+                        Limits(10, 10, 10, 10))  # fmt: skip
+        errors.append(found.mean - truth)
+        sigmas.append(found.sigma)
+    rms = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(sigmas)))
+    assert 0.35 < rms < 1.15
+
+
+def test_the_noise_of_one_window_sharpens_the_next() -> None:
+    rng = np.random.default_rng(8)
+    first = Window()
+    first.add(block_of(white(rng, 3000)))
+    x = white(rng, 400)
+    x[300:350, 1] += 4.0
+    alone, after = Window(), Window(noise=first.noise)
+    for window in (alone, after):
+        window.add(block_of(x))
+    assert alone.moved is None
+    assert after.moved and after.moved.axis == "ay"
+
+
+def test_averaging_stops_when_it_is_good_enough_or_useless() -> None:
+    rng = np.random.default_rng(9)
+    window = Window()
+    window.add(block_of(white(rng, 3000)))
+    assert window.done() is None and window.done(5e-4) is None
+    assert "0.002 m/s² was wanted" in (window.done(2e-3) or "")
+    wandering = Window()
+    wandering.add(block_of(flicker(5.0)(rng, 6000)))
+    assert "the bias wanders" in (wandering.done(1e-9) or "")
+    stopped = 0
+    for seed in range(40):
+        long = Window()
+        long.add(block_of(white(np.random.default_rng(seed), 3000)))
+        stopped += long.done(1e-9) is not None
+    assert stopped <= 1
+
+
+def test_a_window_shows_how_it_goes() -> None:
+    block = block_of(white(np.random.default_rng(10), 3000), start=50.0)
+    block.acc[2900:2930, 0] += 0.5
+    window = Window()
+    assert (window.n, window.elapsed, window.motion) == (0, 0.0, 0.0)
+    assert np.isnan(window.mean).all() and window.done(1.0) is None
+    window.add(block[:20])
+    assert np.isnan(window.sigma).all()
+    window.add(block[20:2850])
+    assert window.moved is None and window.meter < 1 and window.motion < 1
+    assert window.elapsed == pytest.approx(28.49)
+    np.testing.assert_allclose(window.mean, block.six[:2850].mean(axis=0), rtol=1e-12)
+    window.add(block[2850:2940])
+    assert window.meter > 1 and window.motion > 1 and window.moved
+    with pytest.raises(Moved, match="on ax"):
+        window.average()
+
+
+def test_a_window_too_short_has_no_error() -> None:
+    with pytest.raises(InputError, match=r"50 samples over 0.49 s .* take 1 s"):
+        average(block_of(white(np.random.default_rng(0), 50)))
+    with pytest.raises(InputError, match="0 samples"):
+        average(block_of(white(np.random.default_rng(0), 0)))
+
+
+def test_a_device_that_turns_a_little_in_the_hand_is_known_along_gravity() -> None:
+    """Across gravity its specific force wanders, along it only its noise is left."""
+    pulls, across = [], []
+    n = np.array([0.48, -0.8, 0.36])
+    aside = np.linalg.svd(n[None, :])[2][1:]
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        lean = np.cumsum(rng.standard_normal((500, 2)), axis=0) * 2e-4
+        f = 9.81 * (n + lean @ aside)
+        f *= 9.81 / np.linalg.norm(f, axis=1)[:, None]
+        six = np.hstack([f, np.zeros((500, 3))]) + 0.03 * white(rng, 500)
+        window = Window()
+        window.add(Block.of(np.arange(500) / 100, six[:, :3], six[:, 3:]))
+        mean, covariance = window.mean[:3], window.covariance[:3, :3]
+        along = mean / np.linalg.norm(mean)
+        pulls.append(np.linalg.norm(mean) - 9.81)
+        pulls[-1] /= np.sqrt(along @ covariance @ along)
+        across.append(aside[0] @ covariance @ aside[0] / (along @ covariance @ along))
+    assert 0.8 < np.std(pulls) < 1.15
+    assert np.median(across) > 4

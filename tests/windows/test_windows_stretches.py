@@ -1,0 +1,147 @@
+"""Still stretches of recordings: made ones, practice sessions and those of others."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Block
+from fieldcal.session.folder import Session
+from fieldcal.windows import average, still_stretches
+
+
+def recording(
+    seed: int, tremor: float = 0.0
+) -> tuple[Block, list[tuple[float, float]]]:
+    """Begins in a turn; five rests of 6 s with turns of 2 s between them."""
+    rng = np.random.default_rng(seed)
+    rate, angle, speed, rests = 100.0, [0.0], [0.0], []
+    for k in range(5):
+        u = np.arange(200) / 200
+        turn = np.deg2rad(35.0 + 10 * k)
+        angle += list(angle[-1] + turn * u**2 * (3 - 2 * u))
+        speed += list(turn * 6 * u * (1 - u) / 2)
+        rests.append((len(angle) / rate, len(angle) / rate + 6))
+        angle += [angle[-1]] * 600
+        speed += [0.0] * 600
+    n, a = len(angle), np.array(angle)
+    sway = tremor * np.sin(2 * np.pi * 1.7 * np.arange(n) / rate)
+    acc = 9.81 * np.column_stack([np.sin(a + sway), np.zeros(n), np.cos(a + sway)])
+    acc += 0.03 * rng.standard_normal((n, 3))
+    gyr = 0.002 * rng.standard_normal((n, 3)) + 0.02
+    gyr[:, 1] -= np.array(speed) + np.gradient(sway, 1 / rate)
+    return Block.of(np.arange(n) / rate, acc, gyr), rests
+
+
+@pytest.mark.parametrize("tremor", [0.0, 0.001])
+def test_rests_are_found_between_the_turns(tremor: float) -> None:
+    for seed in range(5):
+        block, rests = recording(seed, tremor)
+        found = still_stretches(block, 3.0)
+        assert len(found) == len(rests)
+        for (start, end), (began, ended) in zip(found, rests, strict=True):
+            assert began - 0.15 <= start <= began + 1.0
+            assert ended - 1.0 <= end <= ended + 0.15
+            assert average(block.between(start, end)).n > 300
+
+
+def test_a_recording_without_a_turn_is_one_stretch() -> None:
+    rng = np.random.default_rng(0)
+    block = Block.of(
+        np.arange(6000) / 100, [0, 0, 9.81] + rng.normal(0, 0.03, (6000, 3))
+    )
+    ((start, end),) = still_stretches(block)
+    assert start < 1.0 and end > 59.0
+
+
+def test_nothing_still_is_nothing_found() -> None:
+    t = np.arange(3000)[:, None] / 100
+    rng = np.random.default_rng(0)
+    acc = 3 * np.sin(2 * np.pi * np.array([0.4, 0.7, 0.9]) * t)
+    block = Block.of(t[:, 0], acc + rng.normal(0, 0.03, acc.shape), acc / 2)
+    assert still_stretches(block) == []
+    assert still_stretches(block[:5]) == []
+
+
+@pytest.mark.parametrize("name", ["p01", "p02", "p04", "p07", "p09", "p10"])
+def test_practice_positions_are_found(shared: Path, name: str) -> None:
+    session = Session.open(shared / "practice" / name)
+    held = [window for window in session.windows if window]
+    found = still_stretches(session.block, 5.0)
+    for start, end in held:
+        near = [(a, b) for a, b in found if a < end and b > start]
+        covered = sum(min(b, end) - max(a, start) for a, b in near)
+        assert covered > 0.9 * (end - start), f"{start} to {end} s of {name}"
+    for start, end in found:
+        inside = session.block.between(start, end)
+        seconds = [inside.between(t, t + 1).six for t in np.arange(start, end - 1)]
+        level = np.array([part.mean(axis=0) for part in seconds])
+        assert np.ptp(level[:, :3], axis=0).max() < 0.06, "a turn got in"
+
+
+@pytest.mark.parametrize("unit", range(5))
+def test_five_hand_turned_units_rest_as_often_as_their_makers_say(
+    shared: Path, unit: int
+) -> None:
+    path = shared / "real" / "mikoff_mpu9150_x5" / f"imu{unit}.log.gz"
+    with gzip.open(path, "rt") as log:
+        six = np.loadtxt(log)
+    block = Block.of(np.arange(len(six)) / 100, six[:, :3], six[:, 3:])
+    found = still_stretches(block, 2.0)
+    assert 18 <= len(found) <= 20
+    for start, end in found:
+        part = block.between(start, end)
+        assert np.linalg.norm(average(part).mean[:3]) == pytest.approx(9.81, abs=0.5)
+        rates = part.gyr - part.gyr.mean(axis=0)
+        assert np.abs(rates).max() < 0.25, "a turn got in"
+
+
+def test_the_faces_of_a_ferraris_session_are_found_and_its_rotations_not(
+    shared: Path,
+) -> None:
+    folder = shared / "real" / "imucal_ferraris"
+    rows = json.loads((folder / "example_ferraris_session_list.json").read_text())
+    with gzip.open(folder / "example_ferraris_session.csv.gz", "rt") as file:
+        table = np.genfromtxt(file, delimiter=",", names=True)
+    acc = np.column_stack([table[f"acc_{a}"] for a in "xyz"])
+    gyr = np.deg2rad(np.column_stack([table[f"gyr_{a}"] for a in "xyz"]))
+    block = Block.of(np.arange(len(acc)) / 204.8, acc, gyr)
+    found = still_stretches(block, 1.5)
+    for name, part in rows.items():
+        start, end = part["start"] / 204.8, part["end"] / 204.8
+        within = sum(max(0.0, min(b, end) - max(a, start)) for a, b in found)
+        share = within / (end - start)
+        assert share < 0.1 if name.endswith("rot") else share > 0.6, name
+
+
+def test_the_long_rests_of_a_hand_held_recording_are_found(shared: Path) -> None:
+    folder = shared / "real" / "tomisuarez_mpu6050"
+    with gzip.open(folder / "example_data_calibration.csv.gz", "rt") as file:
+        counts = np.loadtxt(file, delimiter=",", skiprows=5)
+    scale = np.repeat([9.81 / 16384, np.deg2rad(1 / 131)], 3)
+    six = counts * scale
+    block = Block.of(np.arange(len(six)) / 100, six[:, :3], six[:, 3:])
+    found = still_stretches(block, 1.0)
+    starts, ends = np.loadtxt(folder / "peer_static_intervals.csv", delimiter=",") / 100
+    for start, end in zip(starts, ends, strict=True):
+        if end - start > 1.5:
+            assert any(a < end and b > start for a, b in found), f"{start} to {end} s"
+
+
+def test_a_real_device_at_rest_is_never_rejected_and_its_means_repeat(
+    shared: Path,
+) -> None:
+    folder = shared / "real" / "tomisuarez_mpu6050"
+    with gzip.open(folder / "example_data_tinit_calc.csv.gz", "rt") as file:
+        counts = np.loadtxt(file, delimiter=",", skiprows=5)
+    six = counts * np.repeat([9.81 / 16384, np.deg2rad(1 / 131)], 3)
+    block = Block.of(np.arange(len(six)) / 100, six[:, :3], six[:, 3:])
+    windows = [average(block.between(at, at + 30)) for at in range(0, 420, 30)]
+    change = np.diff([window.mean for window in windows], axis=0)
+    variance = np.array([window.sigma**2 for window in windows])
+    pulls = change / np.sqrt(variance[1:] + variance[:-1])
+    assert 0.8 < pulls.std() < 1.3

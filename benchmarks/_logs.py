@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import Block
-from fieldcal.importing.recording import Wanted
+from fieldcal.importing.recording import ReadOptions
 from fieldcal.session.recorder import Recorder
 
 ROWS = 100_000
@@ -111,7 +111,7 @@ BO_ 16 A: 8 X
 def write_mcap(path: Path, block: Block) -> None:
     """Write raw and calibrated samples as the exporter does."""
     from fieldcal.calibration import Calibration, Nominal
-    from fieldcal.exporters import Source, mcap
+    from fieldcal.exporters import ExportSource, mcap
     from fieldcal.session.folder import Session
 
     made = path.parent / "recorded"
@@ -119,7 +119,7 @@ def write_mcap(path: Path, block: Block) -> None:
         recorder.append(block)
     none = np.empty(0)
     unit = Calibration("joint", (), none, np.empty((0, 0)), (), 0.0, 0, 0.0)
-    mcap.write(Source(unit, Nominal(), Session.open(made)), path)
+    mcap.write(ExportSource(unit, Nominal(), Session.open(made)), path)
 
 
 def read_ulog(path: Path) -> None:
@@ -202,7 +202,7 @@ def read_parquet(path: Path) -> None:
     pyarrow.parquet.read_table(path)
 
 
-Log = tuple[Path, Callable[[Path], None], Wanted]
+Log = tuple[Path, Callable[[Path], None], ReadOptions]
 """A file, what merely reads it, and what the user says of it."""
 
 
@@ -225,7 +225,7 @@ def write_tables(folder: Path, rows: int) -> dict[str, Log]:
     savemat(folder / "packed.mat", {"imu": table}, do_compression=True)
     columns = dict(zip(COLUMNS, table.T, strict=True))
     pyarrow.parquet.write_table(pa.table(columns), folder / "x.parquet")
-    named = Wanted(COLUMNS)
+    named = ReadOptions(COLUMNS)
     return {
         "csv, numpy": (folder / "x.csv", read_text, named),
         "matlab, scipy": (folder / "x.mat", read_matlab, named),
@@ -248,8 +248,8 @@ def write_all(folder: Path, rows: int) -> dict[str, Log]:
     write_can(folder / "x.asc", block)
     write_can(folder / "x.blf", block)
     write_mcap(folder / "x.mcap", block)
-    bus = Wanted(options=f"dbc={folder / 'imu.dbc'}&map=ax=ax,ay=ay,az=az")
-    none = Wanted()
+    bus = ReadOptions(options=f"dbc={folder / 'imu.dbc'}&map=ax=ax,ay=ay,az=az")
+    none = ReadOptions()
     return {
         "ulog, pyulog": (folder / "x.ulg", read_ulog, none),
         "dataflash, pymavlink": (folder / "x.bin", read_dataflash, none),

@@ -23,7 +23,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importers import open_recording
 from fieldcal.importing.ingest import bring_in
-from fieldcal.importing.recording import Wanted
+from fieldcal.importing.recording import ReadOptions
 from fieldcal.session import description
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
@@ -74,30 +74,32 @@ def recordings() -> dict[str, Callable[[], Made]]:
         return out
     for i in range(5):
         path = REAL / "mikoff_mpu9150_x5" / f"imu{i}.log.gz"
-        wanted = Wanted(SIX, 100.0)
+        wanted = ReadOptions(SIX, 100.0)
         out[f"mikoff {i}"] = partial(_imported, path, wanted, 2.0)
     out["ferraris counts"] = _ferraris_counts
     out["ferraris"] = _ferraris
     for repeat in (2, 6):
         for unit in range(1, 9):
             path = REAL / "mpu9150_array" / f"exp{repeat}_imu{unit}.csv.gz"
-            wanted = Wanted(("t", *SIX), acc_unit="g", gyr_unit="deg/s")
+            wanted = ReadOptions(("t", *SIX), acc_unit="g", gyr_unit="deg/s")
             out[f"array {repeat}.{unit}"] = partial(_imported, path, wanted, 5.0)
     out["pyulog"] = _autopilot_on_the_bench
     out["sunsided"] = _ten_minutes
     for name, file in (("static", "tinit_calc"), ("positions", "calibration")):
         path = REAL / "tomisuarez_mpu6050" / f"example_data_{file}.csv.gz"
-        counts = Wanted(SIX, 100.0, **MPU6050)  # type: ignore[arg-type]
+        counts = ReadOptions(SIX, 100.0, **MPU6050)  # type: ignore[arg-type]
         out[f"tomisuarez {name}"] = partial(_imported, path, counts, 1.0)
     for message in ("RAW_IMU", "HIGHRES_IMU"):
         path = REAL / "autopilot_streams" / "autopilot_12_positions.tlog.gz"
         stream = f"{message}.0"
-        out[f"autopilot {message}"] = partial(_imported, path, Wanted(), 1.0, stream)
+        out[f"autopilot {message}"] = partial(
+            _imported, path, ReadOptions(), 1.0, stream
+        )
     out["psim"] = _bursts
     return out
 
 
-def _imported(path: Path, wanted: Wanted, still: float, stream: str = "") -> Made:
+def _imported(path: Path, wanted: ReadOptions, still: float, stream: str = "") -> Made:
     """Bring a file in as `fieldcal import` does; `still` is the shortest rest, s."""
     recording = open_recording(path, wanted)
     stream = stream or recording.streams()[0].name
@@ -162,7 +164,7 @@ def _ferraris() -> Made:
 def _autopilot_on_the_bench() -> Made:
     """An autopilot that lies still after it has been moved about, one window."""
     path = REAL / "pyulog_samples" / "sample.ulg.gz"
-    block, _ = _imported(path, Wanted(), 1.0, "sensor_combined.0")
+    block, _ = _imported(path, ReadOptions(), 1.0, "sensor_combined.0")
     start = float(block.t[0]) + MOVED_S
     return block, _said([{"start_s": start, "end_s": float(block.t[-1])}])
 

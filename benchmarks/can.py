@@ -16,7 +16,7 @@ from fieldcal.core.samples import Block
 from fieldcal.drivers.can_frames import FRAME, Frames, Packed
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import SHIPPED, load, read_map
-from fieldcal.drivers.can_samples import Samples
+from fieldcal.drivers.can_samples import CanAssembler
 from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.options import Options
 from fieldcal.sim_device import Profile, VirtualDevice
@@ -70,7 +70,7 @@ def numbers(rows: Frames) -> int:
 def samples(rows: Frames) -> int:
     """Decode, put together and time samples; the number of their frames."""
     options = Options("can", "dbc=virtual")
-    decoder = Samples(read_map(options), CanHealth(), options)
+    decoder = CanAssembler(read_map(options), CanHealth(), options)
     got = 0
     for i in range(0, len(rows), BATCH):
         some = rows[i : i + BATCH]
@@ -138,7 +138,7 @@ def spoilt(lost: float, doubled: float, moved: float) -> tuple[int, int, int]:
     late = np.arange(len(rows)) + 1.5 * (rng.uniform(size=len(rows)) < moved)
     rows = np.repeat(rows, copies)[np.argsort(np.repeat(late, copies), kind="stable")]
     options, health = Options("can", "dbc=virtual"), CanHealth()
-    decoder = Samples(read_map(options), health, options)
+    decoder = CanAssembler(read_map(options), health, options)
     whole = wrong = 0
     for i in range(0, len(rows), BATCH):
         some = rows[i : i + BATCH]

@@ -15,7 +15,7 @@ from time import monotonic
 import numpy as np
 import pexpect
 
-from fieldcal.run.movers import VirtualDevice
+from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 
 RATE = 1000.0
@@ -49,7 +49,7 @@ class Seen:
 def watch(folder: Path, wire: str = "mip") -> Seen:
     """Take a device through two positions at a terminal, and note each drawing."""
     options = ["--serial", wire, "--rate", str(RATE), "--latitude", "50.45"]
-    with VirtualDevice([*options, "--height", "170"]) as device:
+    with VirtualMover([*options, "--height", "170"]) as device:
         url = f"serial:{device.port}?format={wire}"
         call = ["-m", "fieldcal", "run", "two_position", "--device", url]
         call += [

@@ -23,7 +23,7 @@ from benchmarks._logs import COLUMNS, ROWS, Log, samples, write_all, write_table
 from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
 from fieldcal.importing.ingest import bring_in
-from fieldcal.importing.recording import Wanted
+from fieldcal.importing.recording import ReadOptions
 
 RUNS = 5
 GOAL = 1.5
@@ -36,7 +36,7 @@ def timed(work: Callable[..., object], *arguments: object) -> float:
     return process_time() - began
 
 
-def ours(path: Path, wanted: Wanted, folder: Path | None) -> None:
+def ours(path: Path, wanted: ReadOptions, folder: Path | None) -> None:
     """Read all samples, or make a session of them."""
     recording = open_recording(path, wanted)
     stream = recording.streams()[0].name

@@ -21,7 +21,7 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.commands.table import concealed_values
 from fieldcal.core.positions import FIVE
-from fieldcal.run.movers import VirtualDevice
+from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import read_marks
 
 KILLED, PULLED = 200, 100
@@ -77,7 +77,7 @@ class Bench:
         port = folder / f"port-{seed}"
         options = ["--serial", "witmotion", "--speed", speed, "--seed", str(seed)]
         options += [TILT, "--port-link", str(port)]
-        self.device = VirtualDevice(options, once=False)
+        self.device = VirtualMover(options, once=False)
         self.plan = folder / f"plan-{seed}.toml"
         lines = ["[site]", "latitude_deg = 50.45", "height_m = 170.0", "[run]"]
         lines += [f"seconds = {SECONDS}", 'procedure = "five_position"']

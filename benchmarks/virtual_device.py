@@ -11,10 +11,10 @@ from time import perf_counter
 import numpy as np
 
 from fieldcal.sim_device import Profile, VirtualDevice
-from fieldcal.sim_device.replay import Window, simulate
+from fieldcal.sim_device.replay import HeldWindow, simulate
 
 SAMPLE = 33
-PLACES = [Window(0.1 * k, 0.05, 3.0 + 39 * k, 33.0 + 39 * k) for k in range(9)]
+PLACES = [HeldWindow(0.1 * k, 0.05, 3.0 + 39 * k, 33.0 + 39 * k) for k in range(9)]
 
 
 def _seconds(do: Callable[[], object]) -> float:

@@ -15,7 +15,7 @@ from scipy.signal import butter, lfilter
 
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows import Noise, Window, average
+from fieldcal.windows import LearnedNoise, Window, average
 
 SEEDS = 1000
 ACC, GYR = 0.05, 0.002
@@ -128,7 +128,7 @@ def pulls(kind: str, seconds: float, rate: float, known: bool = False) -> Array:
     n = round(seconds * rate)
     lead = 4 if known else 0
     for x in draws(kind, (lead + 2) * seconds, rate, SEEDS // 6 + 1):
-        noise: Noise | None = None
+        noise: LearnedNoise | None = None
         parts = [block_of(x[k * n : (k + 1) * n], rate) for k in range(lead + 2)]
         errors = []
         for k, part in enumerate(parts):

@@ -42,7 +42,7 @@ class CanHealth(Health):
     strange: int = 0
 
 
-class Rows(NamedTuple):
+class FrameGroups(NamedTuple):
     """Frames that belong to samples, in the order of their arrival.
 
     Attributes
@@ -60,16 +60,16 @@ class Rows(NamedTuple):
     arrived: Array
     values: Array
 
-    def take(self, which: Any) -> Rows:
+    def take(self, which: Any) -> FrameGroups:
         """Return some of the rows."""
-        return Rows(*(column[which] for column in self))
+        return FrameGroups(*(column[which] for column in self))
 
-    def then(self, more: Rows) -> Rows:
+    def then(self, more: FrameGroups) -> FrameGroups:
         """Return these rows and those after them."""
         if not len(self.key):
             return more
         pairs = zip(self, more, strict=True)
-        return Rows(*(np.concatenate(pair) for pair in pairs))
+        return FrameGroups(*(np.concatenate(pair) for pair in pairs))
 
 
 class Whole(NamedTuple):
@@ -104,24 +104,24 @@ class Groups(ABC):
 
     def __init__(self, parts: int, health: CanHealth) -> None:
         self._parts, self._health = parts, health
-        self._rest: Rows | None = None
+        self._rest: FrameGroups | None = None
 
     @abstractmethod
-    def feed(self, new: Rows) -> tuple[Rows, Whole]:
+    def feed(self, new: FrameGroups) -> tuple[FrameGroups, Whole]:
         """Return rows, some kept from before, and the samples that got whole."""
 
     def reset(self) -> None:
         """Forget what is not whole."""
         self._rest = None
 
-    def _after_rest(self, new: Rows) -> Rows:
+    def _after_rest(self, new: FrameGroups) -> FrameGroups:
         return self._rest.then(new) if self._rest else new
 
-    def _whole(self, rows: Rows) -> tuple[Whole, Index]:
+    def _whole(self, rows: FrameGroups) -> tuple[Whole, Index]:
         """Find keys that every part has, and the first row of each part and key."""
         return self._regular(rows) or self._any_order(rows)
 
-    def _regular(self, rows: Rows) -> tuple[Whole, Index] | None:
+    def _regular(self, rows: FrameGroups) -> tuple[Whole, Index] | None:
         """Find them where the parts come in turn, as they nearly always do."""
         n, left = divmod(len(rows.key), self._parts)
         if not n:
@@ -144,7 +144,7 @@ class Groups(ABC):
         whole = Whole(key[:, 0], begin[:, None] + place, last)
         return whole, np.arange(len(rows.key))
 
-    def _any_order(self, rows: Rows) -> tuple[Whole, Index]:
+    def _any_order(self, rows: FrameGroups) -> tuple[Whole, Index]:
         keys, places = [], []
         for number in range(self._parts):
             of = np.flatnonzero(rows.part == number)
@@ -182,7 +182,7 @@ class ByKey(Groups):
         self._raw, self._key = -1, 0
         self._newest = self._done = -1
 
-    def feed(self, new: Rows) -> tuple[Rows, Whole]:
+    def feed(self, new: FrameGroups) -> tuple[FrameGroups, Whole]:
         """Put frames of the same key together."""
         rows = self._after_rest(new._replace(key=self._unwrapped(new.key)))
         whole, firsts = self._whole(rows)
@@ -230,7 +230,7 @@ class ByTurns(Groups):
         super().__init__(parts, health)
         self._first, self._within = first, within
 
-    def feed(self, new: Rows) -> tuple[Rows, Whole]:
+    def feed(self, new: FrameGroups) -> tuple[FrameGroups, Whole]:
         """Put frames together that follow one another; a doubled one spoils them."""
         rows = self._after_rest(new)
         rows = rows._replace(key=np.cumsum(rows.part == self._first))

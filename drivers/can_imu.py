@@ -24,7 +24,7 @@ from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers.can_buses import Buses
 from fieldcal.drivers.can_frames import EXTENDED, FRAME, Frames
 from fieldcal.drivers.can_groups import CanHealth
-from fieldcal.drivers.can_log import Log, is_log
+from fieldcal.drivers.can_log import PlayedCanLog, is_log
 from fieldcal.drivers.driver import Driver, Health
 from fieldcal.drivers.options import split
 from fieldcal.drivers.pace import speed
@@ -45,7 +45,7 @@ class Imu(Driver):
         _check_installed()
         from fieldcal.drivers.can_bus import open_source, settings
         from fieldcal.drivers.can_map import read_map
-        from fieldcal.drivers.can_samples import Samples
+        from fieldcal.drivers.can_samples import CanAssembler
 
         channel, options = split(address, "can")
         if not channel:
@@ -54,17 +54,17 @@ class Imu(Driver):
         self._counts = CanHealth()
         self.health: Health = self._counts
         self._parts = read_map(options)
-        self._samples = Samples(self._parts, self._counts, options)
+        self._samples = CanAssembler(self._parts, self._counts, options)
         self._heard: set[int] = set()
         self._skew = Skew(self._counts)
-        self._log: Log | None = None
+        self._log: PlayedCanLog | None = None
         self._reader: Reader | None = None
         if is_log(channel):
             wanted = (part.identifier for part in self._parts)
             buses = Buses(channel, wanted, options.text("channel"))
             pace = speed(options)
             options.finish()
-            self._log = Log(Path(channel), buses, pace)
+            self._log = PlayedCanLog(Path(channel), buses, pace)
             return
         told = settings(options)
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
@@ -129,7 +129,7 @@ class Imu(Driver):
                 self.health.received += frames.nbytes
                 yield frames, arrived, bool(some) and some[0].broken
 
-    def _next(self, log: Log, timeout: float) -> Frames:
+    def _next(self, log: PlayedCanLog, timeout: float) -> Frames:
         """Return frames of the log; what is wrong if it ends without a sample."""
         try:
             return log.take(timeout)

@@ -39,7 +39,7 @@ def is_log(place: str) -> bool:
     return place.lower().removesuffix(".gz").endswith(tuple(READERS))
 
 
-class Log:
+class PlayedCanLog:
     """A log that is played.
 
     Parameters

@@ -24,9 +24,9 @@ from fieldcal.drivers.can_groups import (
     ByKey,
     ByTurns,
     CanHealth,
+    FrameGroups,
     Groups,
     Index,
-    Rows,
 )
 from fieldcal.drivers.can_map import COLUMNS, Channel, Part
 from fieldcal.drivers.clock import Clock
@@ -46,7 +46,7 @@ WIDEST = 60
 TEMPERATURE, STAMP, COUNTER = (COLUMNS.index(c) for c in ("temperature", "t", "seq"))
 
 
-class Samples:
+class CanAssembler:
     """Puts samples together, with a memory for what is not whole yet.
 
     Parameters
@@ -156,7 +156,7 @@ class Samples:
         acc, gyr, temperature = values[:, :3], values[:, 3:6], values[:, TEMPERATURE]
         return Block.of(t[new], acc, gyr, temperature, values[:, COUNTER], arrived[new])
 
-    def _read(self, frames: Frames, arrived: Array) -> Rows:
+    def _read(self, frames: Frames, arrived: Array) -> FrameGroups:
         """Decode the frames that the map knows."""
         identifiers = frames["id"]
         errors = int(np.count_nonzero(identifiers & ERROR))
@@ -181,7 +181,7 @@ class Samples:
                 else:
                     self._decode(number, of, data, part, raw, values)
         self.health.strange += len(frames) - known - errors
-        return self._held_rows(Rows(part, raw, frames["t"], arrived, values))
+        return self._held_rows(FrameGroups(part, raw, frames["t"], arrived, values))
 
     def _decode(
         self, number: int, of: Index, data: Bytes, part: Index, raw: Index, out: Array
@@ -198,7 +198,7 @@ class Samples:
         part[of] = np.where(named, number, -1)
         self.health.bad += int(np.count_nonzero(part[of] < 0))
 
-    def _held_rows(self, rows: Rows) -> Rows:
+    def _held_rows(self, rows: FrameGroups) -> FrameGroups:
         """Leave only the frames that make samples, with the last temperature."""
         needed = (rows.part >= 0) & (rows.part < len(self._needed))
         held = rows.part >= len(self._needed)

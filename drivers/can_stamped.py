@@ -12,13 +12,13 @@ from collections.abc import Sequence
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import Part
-from fieldcal.drivers.can_samples import STAMP, Samples
+from fieldcal.drivers.can_samples import STAMP, CanAssembler
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.stamps import Stamps
 
 
-class Stamped(Samples):
-    """Puts samples together as `Samples` does, timed by the bus."""
+class Stamped(CanAssembler):
+    """Puts samples together as `CanAssembler` does, timed by the bus."""
 
     def __init__(
         self, parts: Sequence[Part], health: CanHealth, options: Options

@@ -19,7 +19,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers import protocols
 from fieldcal.drivers.driver import Health
-from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, resolve
+from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, resolve
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
@@ -119,7 +119,7 @@ class Codec(ABC):
         """Say where frames may begin."""
 
     @abstractmethod
-    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+    def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Make samples of whole frames; `t_host` is the arrival of each one's end."""
 
     def _timed(

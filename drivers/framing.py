@@ -40,7 +40,7 @@ class Candidates(NamedTuple):
     undecided: int
 
 
-class Found(NamedTuple):
+class FrameScan(NamedTuple):
     """Whole frames, where the undecided rest begins, and what was refused."""
 
     starts: Index
@@ -65,7 +65,7 @@ def disjoint(starts: Index, ends: Index) -> Mask:
     return keep
 
 
-def resolve(candidates: Candidates, size: int) -> Found:
+def resolve(candidates: Candidates, size: int) -> FrameScan:
     """Take the frames in order out of `size` bytes.
 
     >>> starts = np.array([0, 3, 11])
@@ -86,7 +86,7 @@ def resolve(candidates: Candidates, size: int) -> Found:
         before = np.searchsorted(first, refused, side="right") - 1
         refused = refused[(before < 0) | (refused >= last[before])]
     skipped = rest - int(np.sum(last - first))
-    return Found(first, last, rest, len(refused), skipped)
+    return FrameScan(first, last, rest, len(refused), skipped)
 
 
 def headed(

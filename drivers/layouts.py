@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.framing import Bytes, Found, Index, rows, widened
+from fieldcal.drivers.framing import Bytes, FrameScan, Index, rows, widened
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ def in_order(parts: Iterable[Raw]) -> Raw | None:
 Walk = Callable[[bytes], Layout | None]
 
 
-def alike(data: Bytes, found: Found, walk: Walk) -> Iterator[Alike]:
+def alike(data: Bytes, found: FrameScan, walk: Walk) -> Iterator[Alike]:
     """Sort frames by layout; those that `walk` knows no layout for are left out."""
     left = np.arange(len(found.starts))
     lengths = found.ends - found.starts

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask
+from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask
 
 FIRST, SECOND = 0xFE, 0xFD
 """First bytes of packets of version 1 and 2."""
@@ -96,7 +96,7 @@ def _checked(
     return good
 
 
-def packets(data: Bytes, found: Found) -> Packets:
+def packets(data: Bytes, found: FrameScan) -> Packets:
     """Read the headers of whole packets."""
     starts = found.starts
     second = data[starts] == SECOND

@@ -25,7 +25,7 @@ import numpy as np
 from fieldcal.core.errors import DeviceError, FieldcalError, InputError
 from fieldcal.core.samples import Block, Grain
 from fieldcal.drivers.driver import Driver, Health
-from fieldcal.drivers.mavlink_log import Log, is_log
+from fieldcal.drivers.mavlink_log import PlayedMavlinkLog, is_log
 from fieldcal.drivers.mavlink_talk import Talk, listed
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.pace import speed
@@ -34,7 +34,7 @@ from fieldcal.drivers.skew import Skew
 
 if TYPE_CHECKING:
     from fieldcal.drivers.mavlink_installed import Installed
-    from fieldcal.drivers.mavlink_link import Line
+    from fieldcal.drivers.mavlink_link import TwoWaySource
 
 GREETING = 6.0
 """Longest time until it is known who is there and what it has installed, s."""
@@ -88,15 +88,15 @@ class Imu(Driver):
             self._decoder.wants,
             without == "identity",
         )
-        self._log: Log | None = None
+        self._log: PlayedMavlinkLog | None = None
         self._reader: Reader | None = None
         self._closed = False
-        self._line: Line | None = None
+        self._line: TwoWaySource | None = None
         self._early: list[Block] = []
         self._recent: deque[float] = deque(maxlen=RECENT)
         self._last = monotonic()
         if is_log(endpoint):
-            self._log = Log(Path(endpoint), speed(options))
+            self._log = PlayedMavlinkLog(Path(endpoint), speed(options))
             options.finish()
             return
         self._open(endpoint, options)
@@ -109,7 +109,7 @@ class Imu(Driver):
         options.finish()
         open_line = opener(endpoint, baud)
 
-        def connect() -> Line:
+        def connect() -> TwoWaySource:
             self._line = open_line()
             return self._line
 

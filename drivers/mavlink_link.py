@@ -15,7 +15,7 @@ from contextlib import suppress
 from typing import Protocol
 
 from fieldcal.core.errors import DeviceError, InputError
-from fieldcal.drivers.reader import Source
+from fieldcal.drivers.reader import ByteSource
 from fieldcal.drivers.serial_imu import SerialPort
 from fieldcal.drivers.tcp import POLL, Tcp, cannot
 
@@ -28,7 +28,7 @@ MOST = 512
 SIZE = 1 << 16
 
 
-class Line(Source, Protocol):
+class TwoWaySource(ByteSource, Protocol):
     """A source that can also be spoken to."""
 
     def write(self, data: bytes) -> None:
@@ -80,7 +80,7 @@ class Udp:
         self._socket.close()
 
 
-def opener(endpoint: str, baud: int) -> Callable[[], Line]:
+def opener(endpoint: str, baud: int) -> Callable[[], TwoWaySource]:
     """Return what opens an endpoint, and opens it again.
 
     Raises

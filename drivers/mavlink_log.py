@@ -56,7 +56,7 @@ def cut(data: bytes) -> tuple[list[Chunk], int]:
     return chunks, at
 
 
-class Log:
+class PlayedMavlinkLog:
     """A log that is played.
 
     Parameters

@@ -18,7 +18,7 @@ import numpy as np
 
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.mavlink_installed import PX4
-from fieldcal.drivers.mavlink_link import Line, opener
+from fieldcal.drivers.mavlink_link import TwoWaySource, opener
 from fieldcal.drivers.mavlink_talk import INT32, NO_AUTOPILOT, REAL32, STATION, listed
 from fieldcal.drivers.options import split
 
@@ -35,7 +35,7 @@ ARMED = 128
 """In a heartbeat's mode: motors may turn."""
 
 
-class Parameters:
+class ParameterLink:
     """The parameters of the one autopilot on a link; a context manager.
 
     Parameters
@@ -75,7 +75,7 @@ class Parameters:
         self._beat = -np.inf
         self.autopilot, self.armed = 0, False
         self._target = (0, 0)
-        self._line: Line = opener(endpoint, baud)()
+        self._line: TwoWaySource = opener(endpoint, baud)()
         try:
             self._greet()
         except BaseException:

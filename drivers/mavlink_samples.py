@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, Found, widened
+from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, widened
 from fieldcal.drivers.mavlink_frames import (
     LONGEST,
     Packets,
@@ -45,7 +45,7 @@ _HIGHRES = np.dtype(
 )
 
 
-class Kind(NamedTuple):
+class MessageKind(NamedTuple):
     """A message: its number, fields, tick of its time in s, whether in integers."""
 
     identifier: int
@@ -55,11 +55,11 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "HIGHRES_IMU": Kind(105, _HIGHRES, 1e-6, False),
-    "RAW_IMU": Kind(27, _RAW, 1e-6, True),
-    "SCALED_IMU": Kind(26, _SCALED, 1e-3, True),
-    "SCALED_IMU2": Kind(116, _SCALED, 1e-3, True),
-    "SCALED_IMU3": Kind(129, _SCALED, 1e-3, True),
+    "HIGHRES_IMU": MessageKind(105, _HIGHRES, 1e-6, False),
+    "RAW_IMU": MessageKind(27, _RAW, 1e-6, True),
+    "SCALED_IMU": MessageKind(26, _SCALED, 1e-3, True),
+    "SCALED_IMU2": MessageKind(116, _SCALED, 1e-3, True),
+    "SCALED_IMU3": MessageKind(129, _SCALED, 1e-3, True),
 }
 INSTANCES = {"SCALED_IMU": 0, "SCALED_IMU2": 1, "SCALED_IMU3": 2}
 """Which sensor a message speaks of that has no field for it."""
@@ -148,7 +148,7 @@ class Decoder(Codec):
         """Say where packets may begin."""
         return candidates(data, self._extras)
 
-    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+    def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Make samples of whole packets, and keep the others that matter."""
         whole = packets(data, found)
         self._put_aside(data, whole)

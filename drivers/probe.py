@@ -18,7 +18,7 @@ ENOUGH = 4000
 """Bytes after which a format shows."""
 
 
-class Finding(NamedTuple):
+class HeardDevice(NamedTuple):
     """What was heard on a port.
 
     Attributes
@@ -49,14 +49,14 @@ def bauds() -> list[int]:
     return sorted(ranked, key=lambda baud: -ranked[baud])
 
 
-def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> Finding:
+def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> HeardDevice:
     """Listen at one baud rate after the other, at most so many seconds each."""
     heard = silent = 0
     for baud in bauds() if rates is None else rates:
         try:
             data, found = _answer(port, baud, seconds)
         except (DeviceError, OSError) as fault:
-            return Finding(port, "", "", 0, 0.0, str(fault))
+            return HeardDevice(port, "", "", 0, 0.0, str(fault))
         heard += len(data)
         silent += not data
         if silent >= SILENT and not heard:
@@ -68,10 +68,10 @@ def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> Find
         if heard
         else "nothing comes; is the device powered and sending?"
     )
-    return Finding(port, "", "", 0, 0.0, says)
+    return HeardDevice(port, "", "", 0, 0.0, says)
 
 
-def _told(port: str, baud: int, data: bytes, took: float) -> Finding | None:
+def _told(port: str, baud: int, data: bytes, took: float) -> HeardDevice | None:
     """Say whose bytes these are; None if that is not known."""
     if known := recognise(data, took):
         name, like = known
@@ -79,7 +79,7 @@ def _told(port: str, baud: int, data: bytes, took: float) -> Finding | None:
         url = f"serial:{port}?format={name}&baud={baud}{query}"
         rate = like.samples / took
         says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
-        return Finding(port, url, name, baud, rate, says)
+        return HeardDevice(port, url, name, baud, rate, says)
     if heard := autopilot(data):
         query = f"&{heard.query}" if heard.query else ""
         url, rate = f"mavlink:{port}?baud={baud}{query}", heard.samples / took
@@ -87,11 +87,11 @@ def _told(port: str, baud: int, data: bytes, took: float) -> Finding | None:
         if heard.message:
             sends = f"{heard.message} about {rate:.0f} times a second"
         says = f"an autopilot (MAVLink) at {baud} baud, which sends {sends}"
-        return Finding(port, url, "mavlink", baud, rate, says)
+        return HeardDevice(port, url, "mavlink", baud, rate, says)
     return None
 
 
-def _answer(port: str, baud: int, seconds: float) -> tuple[bytes, Finding | None]:
+def _answer(port: str, baud: int, seconds: float) -> tuple[bytes, HeardDevice | None]:
     """Bytes of a port, and whose they are; it stays open until that is known."""
     link = open_port(port, baud)
     try:

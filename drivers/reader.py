@@ -33,7 +33,7 @@ class Chunk(NamedTuple):
     broken: bool = False
 
 
-class Source(Protocol):
+class ByteSource(Protocol):
     """What a reader reads: bytes, or nothing after a short while; OSError if gone."""
 
     def read(self) -> bytes:
@@ -58,7 +58,7 @@ class Reader:
     def __init__(
         self,
         name: str,
-        connect: Callable[[], Source],
+        connect: Callable[[], ByteSource],
         patience: float,
         limit: int = 1 << 20,
     ) -> None:

@@ -51,7 +51,7 @@ class Imu(Driver):
 
             self._player = mavlink_imu.Imu(address)
         else:
-            self._player = Samples(address)
+            self._player = ReplayedSamples(address)
         self.name, self.health = self._player.name, self._player.health
 
     def receive(self, timeout: float) -> Block | None:
@@ -84,7 +84,7 @@ class Imu(Driver):
         self._player.close()
 
 
-class Samples(Driver):
+class ReplayedSamples(Driver):
     """Samples of a recording, delivered when they are due."""
 
     def __init__(self, address: str) -> None:

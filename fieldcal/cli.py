@@ -45,7 +45,7 @@ exit codes:
 INTERRUPTED = 130
 
 
-class Command(Protocol):
+class CommandModule(Protocol):
     """What a module of `commands` offers."""
 
     EXAMPLE: str
@@ -53,8 +53,8 @@ class Command(Protocol):
     run: Callable[[argparse.Namespace], int]
 
 
-def _load(name: str) -> Command:
-    return cast(Command, import_module(f"fieldcal.commands.{COMMANDS[name][1]}"))
+def _load(name: str) -> CommandModule:
+    return cast(CommandModule, import_module(f"fieldcal.commands.{COMMANDS[name][1]}"))
 
 
 def _top(version: str) -> argparse.ArgumentParser:
@@ -73,7 +73,7 @@ def _top(version: str) -> argparse.ArgumentParser:
     return parser
 
 
-def _command_parser(name: str, command: Command) -> argparse.ArgumentParser:
+def _command_parser(name: str, command: CommandModule) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=f"fieldcal {name}",
         description=COMMANDS[name][0][0].upper() + COMMANDS[name][0][1:] + ".",

@@ -19,7 +19,7 @@ import pytest
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.drivers.driver import Driver
-    from fieldcal.run.movers import VirtualDevice
+    from fieldcal.run.movers import VirtualMover
 
 SIGMAS = 4.5
 """Standard uncertainties within which a value must agree with the truth."""
@@ -56,7 +56,7 @@ class VirtualImu:
     """
 
     def __init__(
-        self, device: VirtualDevice, url: str, folder: Path, latitude: float
+        self, device: VirtualMover, url: str, folder: Path, latitude: float
     ) -> None:
         self._latitude = latitude
         self._device, self._folder = device, folder
@@ -178,7 +178,7 @@ def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
     as an autopilot (mavlink). `effects` are written as for ``fieldcal sim --with``;
     options are those of ``fieldcal sim``, as in ``acc_bias=(0.2, -0.3, 0.1)``.
     """
-    devices: list[VirtualDevice] = []
+    devices: list[VirtualMover] = []
 
     def start(
         link: str = "serial",
@@ -188,7 +188,7 @@ def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
         seed: int = 1,
         **options: Any,
     ) -> VirtualImu:
-        from fieldcal.run.movers import VirtualDevice
+        from fieldcal.run.movers import VirtualMover
 
         if link not in LINKS:
             raise ValueError(f"link {link!r} is none of {', '.join(LINKS)}")
@@ -204,7 +204,7 @@ def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
             command += ["--with", effect]
         options = {"latitude": LATITUDE, **options}
         command += [_option(name, value) for name, value in options.items()]
-        device = VirtualDevice(command, once=False)
+        device = VirtualMover(command, once=False)
         devices.append(device)
         query = format.replace("?", "&")
         address = url.format(port=device.port, query=query)

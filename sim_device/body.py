@@ -13,13 +13,20 @@ from fieldcal.core.samples import Array
 from fieldcal.sim_device import earth
 from fieldcal.sim_device.influences import Life
 from fieldcal.sim_device.joints import Joints, Swing
-from fieldcal.sim_device.motion import Felt, Frame, Stand, base_attitude, carried, feel
+from fieldcal.sim_device.motion import (
+    Felt,
+    MovingFrame,
+    Stand,
+    base_attitude,
+    carried,
+    feel,
+)
 from fieldcal.sim_device.noise import stream
 from fieldcal.sim_device.profile import Profile, mounting_axes
-from fieldcal.sim_device.rocking import Bump, Sway
+from fieldcal.sim_device.rocking import Push, SwayMotion
 from fieldcal.sim_device.temperature import course
 from fieldcal.sim_device.vocabulary import AXES
-from fieldcal.sim_device.way import REST, Way
+from fieldcal.sim_device.way import REST, Manoeuvre
 
 Angles = tuple[float, float]
 
@@ -47,7 +54,7 @@ class Body:
         self.joints = Joints(self._set(self.asked))
         self.bumps = [_bump(profile, k) for k in range(len(profile.every("bump")))]
         self._sways = [
-            Sway(
+            SwayMotion(
                 np.deg2rad(e["amplitude_deg"]),
                 e["hz"],
                 np.deg2rad(e["phase_deg"]),
@@ -59,7 +66,7 @@ class Body:
         self._shaking = stream(seed, "vibration")
         self._strength = stream(seed, "vibration level")
         self.levels = [self._level()]
-        self.ways: list[Way] = []
+        self.ways: list[Manoeuvre] = []
         self._start_temperature = float(course(profile.temperature, np.zeros(1))[0][0])
 
     def turn(self, start: float, seconds: float, angles: Angles) -> Angles:
@@ -81,7 +88,7 @@ class Body:
         there = self._set(self.asked)
         return self.joints.spin(start, seconds, there, rate)
 
-    def frame(self, t: Array) -> Frame:
+    def frame(self, t: Array) -> MovingFrame:
         """Frame of the procedure axes at ascending instants, (n,) s."""
         rocking = [s.rocking() for s in self._sways]
         rocking += [b.rocking() for b in self.bumps]
@@ -180,9 +187,9 @@ def stand(profile: Profile) -> Stand:
     )
 
 
-def _bump(profile: Profile, k: int) -> Bump:
+def _bump(profile: Profile, k: int) -> Push:
     e = profile.every("bump")[k]
-    return Bump(
+    return Push(
         e["at_s"],
         e["for_s"],
         e["push"],

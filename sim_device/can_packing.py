@@ -30,14 +30,14 @@ IDENTIFIERS = (0x100, 0x101, 0x102)
 Integers = NDArray[np.unsignedinteger[Any]]
 
 
-class Frame(NamedTuple):
+class CanPacket(NamedTuple):
     """A frame of the device: eleven bits and eight bytes."""
 
     identifier: int
     data: bytes
 
 
-def frames(block: Block) -> list[Frame]:
+def frames(block: Block) -> list[CanPacket]:
     """Frames of the samples, sample by sample in the order of the identifiers."""
     count = np.nan_to_num(block.seq).astype(np.uint64) % np.uint64(16)
     force = [_whole(axis, FORCE_LSB, 20) for axis in block.acc.T]
@@ -56,7 +56,7 @@ def frames(block: Block) -> list[Frame]:
         strict=True,
     )
     return [
-        Frame(identifier, bytes(data))
+        CanPacket(identifier, bytes(data))
         for row in rows
         for identifier, data in zip(IDENTIFIERS, row, strict=True)
     ]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.noise import stream
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.vocabulary import SIX, Effect
+from fieldcal.sim_device.vocabulary import SIX, SimulatedEffect
 
 STANDARD_GRAVITY = 9.80665
 ACC_FULL_SCALE = 16 * STANDARD_GRAVITY
@@ -41,7 +41,7 @@ def rows(channel: str) -> list[int]:
     return groups[channel] if channel in groups else [SIX.index(channel)]
 
 
-class Chain:
+class SignalChain:
     """The signal chain of one device; it remembers what is stuck."""
 
     def __init__(self, profile: Profile, seed: int) -> None:
@@ -85,7 +85,7 @@ class Chain:
             at = rows(effect.words["channel"])
             x[at] = np.clip(x[at], -effect["limit"], effect["limit"])
 
-    def _decode_wrongly(self, x: Array, effect: Effect) -> None:
+    def _decode_wrongly(self, x: Array, effect: SimulatedEffect) -> None:
         for row in rows(effect.words["channel"]):
             kind = effect.words["kind"]
             full = effect["full_scale"] or self._full_scale(row, kind)
@@ -102,7 +102,7 @@ class Chain:
             return scale.acceleration or ACC_FULL_SCALE
         return scale.angular_rate or GYR_FULL_SCALE
 
-    def _stick(self, x: Array, t: Array, k: int, effect: Effect) -> None:
+    def _stick(self, x: Array, t: Array, k: int, effect: SimulatedEffect) -> None:
         stuck = (t >= effect["from_s"]) & (t < effect["to_s"])
         if not stuck.any():
             return
@@ -111,7 +111,7 @@ class Chain:
             x[row, stuck] = value
 
 
-def _round(x: Array, effect: Effect) -> None:
+def _round(x: Array, effect: SimulatedEffect) -> None:
     for channel in ("acc", "gyr"):
         lsb = effect[channel]
         if lsb:

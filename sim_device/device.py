@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.sim_device.body import Body
-from fieldcal.sim_device.chain import Chain, rows
+from fieldcal.sim_device.chain import SignalChain, rows
 from fieldcal.sim_device.influences import outputs
-from fieldcal.sim_device.noise import Noise, Walk, stream
+from fieldcal.sim_device.noise import RandomErrors, Walk, stream
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.rocking import Bump
+from fieldcal.sim_device.rocking import Push
 from fieldcal.sim_device.vocabulary import SIX
 
 PIECE = 4096
@@ -119,7 +119,7 @@ class VirtualDevice:
         if not (seconds > 0 and np.isfinite([push, tilt, seconds]).all()):
             raise InputError(f"a bump lasts more than 0 s, not {seconds:g} s")
         start = self.time / self.sensing.pace
-        self.body.bumps.append(Bump(start, seconds, push, tilt, np.deg2rad(30.0)))
+        self.body.bumps.append(Push(start, seconds, push, tilt, np.deg2rad(30.0)))
         return (start + seconds) * self.sensing.pace
 
     def take(self, n: int) -> Block:
@@ -177,9 +177,9 @@ class Sensing:
         skew = profile.one("clock_skew")
         self.pace = 1 + 1e-6 * skew["ppm"] if skew else 1.0
         self.body = Body(profile, seed)
-        self.chain = Chain(profile, seed)
+        self.chain = SignalChain(profile, seed)
         rate = profile.sampling.rate_hz
-        self._noise = Noise(profile.noise, rate, seed, _noise_ratio(profile))
+        self._noise = RandomErrors(profile.noise, rate, seed, _noise_ratio(profile))
         walk = profile.one("random_walk")
         size = np.array(walk.vector(SIX)) if walk else np.zeros(6)
         self._walk = Walk(size, rate, stream(seed, "random_walk")) if walk else None

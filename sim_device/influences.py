@@ -35,7 +35,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.profile import Truth
-from fieldcal.sim_device.vocabulary import AXES, SIX, Effect
+from fieldcal.sim_device.vocabulary import AXES, SIX, SimulatedEffect
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Life:
     vibration: Array
 
 
-def outputs(truth: Truth, effects: tuple[Effect, ...], life: Life) -> Array:
+def outputs(truth: Truth, effects: tuple[SimulatedEffect, ...], life: Life) -> Array:
     """Outputs of the six channels without noise, (6, n)."""
     felt = life.f + life.vibration
     acc = _column(truth.acc_bias) + _column(truth.acc_scale) * felt
@@ -84,7 +84,7 @@ def _column(values: tuple[float, ...]) -> Array:
     return np.array(values)[:, None]
 
 
-def _matrix(effect: Effect, letter: str, v: Array) -> Array:
+def _matrix(effect: SimulatedEffect, letter: str, v: Array) -> Array:
     """Coefficients ``<letter>ij``, absent ones zero, times a vector (3, n)."""
     rows = []
     for i in "123":
@@ -99,28 +99,28 @@ def _pairs(v: Array) -> Array:
     return np.stack([v[0] * v[1], v[1] * v[2], v[0] * v[2]])
 
 
-def _xyz(effect: Effect) -> Array:
+def _xyz(effect: SimulatedEffect) -> Array:
     return _column(effect.vector(AXES))
 
 
-def _six(effect: Effect) -> Array:
+def _six(effect: SimulatedEffect) -> Array:
     return _column(effect.vector(SIX))
 
 
-def _settling(effect: Effect, life: Life) -> Array:
+def _settling(effect: SimulatedEffect, life: Life) -> Array:
     after = np.exp(-np.maximum(life.since, 0.0) / effect["tau_s"])
     turned = np.where(life.progress > 0, 1.0, 0.0)
     left: Array = turned * np.where(life.since < 0, life.progress, after)
     return _six(effect) * left
 
 
-def _hum(effect: Effect, life: Life) -> Array:
+def _hum(effect: SimulatedEffect, life: Life) -> Array:
     phase = 2 * np.pi * effect["hz"] * life.t + np.deg2rad(effect["phase_deg"])
     wave: Array = np.sin(phase)
     return _six(effect) * wave
 
 
-Influence = Callable[[Effect, Life], Array]
+Influence = Callable[[SimulatedEffect, Life], Array]
 
 ACC: Mapping[str, Influence] = {
     "cross_coupling": lambda e, life: _matrix(e, "k", life.f),

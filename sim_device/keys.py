@@ -10,7 +10,7 @@ from typing import IO, Any, Self
 
 import numpy as np
 
-from fieldcal.sim_device.stream import Stream
+from fieldcal.sim_device.stream import DeviceStream
 
 HELP = "←→ turn alpha   ↑↓ turn beta   h home   b bump   q quit"
 
@@ -38,7 +38,7 @@ class Keys:
 
     def __init__(
         self,
-        stream: Stream,
+        stream: DeviceStream,
         steps: tuple[float, float],
         keyboard: int = 0,
         screen: IO[str] = sys.stderr,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.sim_device.can_packing import Frame
+from fieldcal.sim_device.can_packing import CanPacket
 from fieldcal.sim_device.noise import stream
 
 KINDS = ("garbage_bytes", "flip_bits", "lose_bytes", "double_bytes")
@@ -53,7 +53,7 @@ class LineFaults:
         self._orders.clear()
         return out.tobytes()
 
-    def spoil_frames(self, frames: Sequence[Frame]) -> list[Frame]:
+    def spoil_frames(self, frames: Sequence[CanPacket]) -> list[CanPacket]:
         """Carry out what was ordered on frames of a bus, each in place of a byte.
 
         A bus checks its frames: one with a flipped bit is lost. Garbage is frames that
@@ -67,7 +67,7 @@ class LineFaults:
             chosen = set(at_each.tolist())
             if kind == "garbage_bytes":
                 others = self._rng.integers(*OTHERS, count).tolist()
-                out[:0] = [Frame(other, self._rng.bytes(8)) for other in others]
+                out[:0] = [CanPacket(other, self._rng.bytes(8)) for other in others]
             elif kind == "double_bytes":
                 out = [f for i, f in enumerate(out) for _ in range(1 + (i in chosen))]
             else:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Block
 from fieldcal.sim_device.adapter import Adapter
-from fieldcal.sim_device.can_packing import Frame, frames
+from fieldcal.sim_device.can_packing import CanPacket, frames
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
 from fieldcal.sim_device.link_serial import SerialLink
@@ -85,7 +85,7 @@ class BusLink(Link):
     def __init__(self, interface: str, channel: str, faults: LineFaults) -> None:
         self._interface, self._channel = interface, channel
         self._faults = faults
-        self._out: deque[Frame] = deque()
+        self._out: deque[CanPacket] = deque()
         self._bus: BusABC | None = None
         self.come_back()
 

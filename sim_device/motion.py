@@ -58,7 +58,7 @@ class Rocking:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class MovingFrame:
     """Attitude q (4, n), rate w (3, n) and its derivative, in the frame's own axes."""
 
     q: Array
@@ -66,17 +66,17 @@ class Frame:
     dw: Array
 
     @classmethod
-    def level(cls, n: int) -> Frame:
+    def level(cls, n: int) -> MovingFrame:
         """Frame of the local level: East, down, north."""
         zero = np.zeros((3, n))
         return cls(STILL + np.zeros((4, n)), zero, zero)
 
-    def turned(self, axis: Array, angle: Angle) -> Frame:
+    def turned(self, axis: Array, angle: Angle) -> MovingFrame:
         """Next frame, turned by `angle` about `axis` of this one."""
         about, speeding = axis * angle.rate, axis * angle.acceleration
         return self.then(turn(axis, angle.x), about, speeding)
 
-    def then(self, step: Array, about: Array, speeding: Array) -> Frame:
+    def then(self, step: Array, about: Array, speeding: Array) -> MovingFrame:
         """Next frame, in any motion against this one.
 
         Parameters
@@ -88,7 +88,7 @@ class Frame:
         """
         w = into(step, self.w)
         dw = into(step, self.dw) - cross(about, w) + speeding
-        return Frame(multiply(self.q, step), w + about, dw)  # (m1) (m2) (m3)
+        return MovingFrame(multiply(self.q, step), w + about, dw)  # (m1) (m2) (m3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,10 +139,12 @@ class Felt:
     w: Array
 
 
-def carried(stand: Stand, rocking: Sequence[Rocking], t: Array, swing: Swing) -> Frame:
+def carried(
+    stand: Stand, rocking: Sequence[Rocking], t: Array, swing: Swing
+) -> MovingFrame:
     """Frame of the procedure axes at instants `t`, (n,) s."""
-    frame = Frame.level(len(t))
-    frame = Frame(stand.base + np.zeros_like(frame.q), frame.w, frame.dw)
+    frame = MovingFrame.level(len(t))
+    frame = MovingFrame(stand.base + np.zeros_like(frame.q), frame.w, frame.dw)
     for rock in rocking:
         frame = frame.turned(rock.axis, rock.angle(t))
     for axis, joint in ((Z, ALPHA), (X, BETA)):
@@ -152,7 +154,7 @@ def carried(stand: Stand, rocking: Sequence[Rocking], t: Array, swing: Swing) ->
     return frame
 
 
-def feel(stand: Stand, frame: Frame, acceleration: Array) -> Felt:
+def feel(stand: Stand, frame: MovingFrame, acceleration: Array) -> Felt:
     """What the sensors feel, with the base accelerated by (3, n) m/s^2, level axes."""
     f = into(frame.q, acceleration - stand.gravity * Y)
     if np.any(stand.lever):

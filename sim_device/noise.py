@@ -92,7 +92,7 @@ class GaussMarkov:
         return x.reshape(-1, 6)
 
 
-class Noise:
+class RandomErrors:
     """All random errors of a device."""
 
     def __init__(

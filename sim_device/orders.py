@@ -13,12 +13,12 @@ from fieldcal.sim_device.line_faults import KINDS, MOST
 from fieldcal.sim_device.vocabulary import AXES
 
 if TYPE_CHECKING:
-    from fieldcal.sim_device.stream import Stream
+    from fieldcal.sim_device.stream import DeviceStream
 
 Reply = dict[str, Any]
 
 
-def carry_out(stream: Stream, request: Mapping[str, Any]) -> Reply:
+def carry_out(stream: DeviceStream, request: Mapping[str, Any]) -> Reply:
     """Do what one request says; the keys are those of the control socket.
 
     Raises
@@ -42,14 +42,14 @@ def carry_out(stream: Stream, request: Mapping[str, Any]) -> Reply:
     return {"time_s": time, **_ORDERS[name](stream, values)}
 
 
-def _turn(stream: Stream, given: dict[str, Any]) -> Reply:
+def _turn(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     where = _angles(stream, given)
     at, seconds = _optional(given, "at_s"), _optional(given, "seconds")
     _nothing_else("turn", given, ("alpha_deg", "beta_deg", "seconds", "at_s"))
     return {"until_s": stream.device.turn(*where, seconds=seconds, at=at)}
 
 
-def _spin(stream: Stream, given: dict[str, Any]) -> Reply:
+def _spin(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     where = _angles(stream, given)
     at, seconds = _optional(given, "at_s"), _optional(given, "seconds")
     rate = given.pop("rate_deg_s", None)
@@ -61,14 +61,14 @@ def _spin(stream: Stream, given: dict[str, Any]) -> Reply:
     return {"until_s": stream.device.spin(turning, where, seconds, at)}
 
 
-def _bump(stream: Stream, given: dict[str, Any]) -> Reply:
+def _bump(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     push, tilt = _number(given, "push", 2.0), _number(given, "tilt_deg", 0.5)
     seconds = _number(given, "seconds", 0.5)
     _nothing_else("bump", given, ("push", "tilt_deg", "seconds"))
     return {"until_s": stream.device.bump(push, math.radians(tilt), seconds)}
 
 
-def _fault(stream: Stream, given: dict[str, Any]) -> Reply:
+def _fault(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     times = {name: _at_least_0(given, name) for name in ("silence_s", "hangup_s")}
     times["reboot_s"] = _at_least_0(given, "reboot_s")
     counts = {name: _count(given, name) for name in ("duplicate_stamps", "late_stamps")}
@@ -93,7 +93,7 @@ def _fault(stream: Stream, given: dict[str, Any]) -> Reply:
     return {"until_s": max(until, default=stream.device.time)}
 
 
-def _status(stream: Stream, given: dict[str, Any]) -> Reply:
+def _status(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     _nothing_else("status", given, ())
     device = stream.device
     alpha, beta = np.rad2deg(device.angles)
@@ -107,13 +107,13 @@ def _status(stream: Stream, given: dict[str, Any]) -> Reply:
     }
 
 
-def _stop(stream: Stream, given: dict[str, Any]) -> Reply:
+def _stop(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     _nothing_else("stop", given, ())
     stream.stop()
     return {"stopped": True}
 
 
-_ORDERS: Mapping[str, Callable[[Stream, dict[str, Any]], Reply]] = {
+_ORDERS: Mapping[str, Callable[[DeviceStream, dict[str, Any]], Reply]] = {
     "turn": _turn,
     "spin": _spin,
     "bump": _bump,
@@ -123,7 +123,7 @@ _ORDERS: Mapping[str, Callable[[Stream, dict[str, Any]], Reply]] = {
 }
 
 
-def _angles(stream: Stream, given: dict[str, Any]) -> tuple[float, float]:
+def _angles(stream: DeviceStream, given: dict[str, Any]) -> tuple[float, float]:
     """Angles asked for, rad; one that is not given stays as it is."""
     now = np.rad2deg(stream.device.angles)
     alpha = _number(given, "alpha_deg", float(now[0]))

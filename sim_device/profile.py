@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device import earth
-from fieldcal.sim_device.vocabulary import Effect, check_together
+from fieldcal.sim_device.vocabulary import SimulatedEffect, check_together
 
 Triad = tuple[float, float, float]
 Grade = Literal["tactical", "navigation"]
@@ -56,7 +56,7 @@ class Site:
 
 
 @dataclass(frozen=True, slots=True)
-class Mounting:
+class MountingAxes:
     """[frame]: the device axis along each procedure axis."""
 
     mounting: tuple[str, str, str] = ("+x", "+y", "+z")
@@ -147,13 +147,13 @@ class Profile:
     device: Identity = Identity()
     sampling: Sampling = Sampling()
     site: Site = Site()
-    frame: Mounting = Mounting()
+    frame: MountingAxes = MountingAxes()
     range: FullScale = FullScale()
     truth: Truth = Truth()
     noise: NoiseFigures = NoiseFigures()
     temperature: Climate = Climate()
     motion: Handling = Handling()
-    effects: tuple[Effect, ...] = field(default=())
+    effects: tuple[SimulatedEffect, ...] = field(default=())
 
     def __post_init__(self) -> None:
         check_together(self.effects)
@@ -165,15 +165,15 @@ class Profile:
                 "navigation, or give it earth_rate as well"
             )
 
-    def having(self, *more: Effect) -> Profile:
+    def having(self, *more: SimulatedEffect) -> Profile:
         """Return the same device with more effects."""
         return replace(self, effects=(*self.effects, *more))
 
-    def every(self, id_: str) -> tuple[Effect, ...]:
+    def every(self, id_: str) -> tuple[SimulatedEffect, ...]:
         """All effects of that id."""
         return tuple(e for e in self.effects if e.id == id_)
 
-    def one(self, id_: str) -> Effect | None:
+    def one(self, id_: str) -> SimulatedEffect | None:
         """Return the effect of that id, if the device has it."""
         return next((e for e in self.effects if e.id == id_), None)
 

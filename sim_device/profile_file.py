@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.vocabulary import CATALOGUE, Effect, effect
+from fieldcal.sim_device.vocabulary import CATALOGUE, SimulatedEffect, effect
 
 FORMAT = 1
 
@@ -160,7 +160,7 @@ _READERS: Mapping[str, Callable[[str, Any], Any]] = {
 """How a key is read, by the type that its dataclass declares."""
 
 
-def _effects(table: Mapping[str, Any]) -> tuple[Effect, ...]:
+def _effects(table: Mapping[str, Any]) -> tuple[SimulatedEffect, ...]:
     made = []
     for id_, given in table.items():
         for one in given if isinstance(given, list) else [given]:
@@ -170,7 +170,7 @@ def _effects(table: Mapping[str, Any]) -> tuple[Effect, ...]:
     return tuple(made)
 
 
-def _written(one: Effect) -> dict[str, Any]:
+def _written(one: SimulatedEffect) -> dict[str, Any]:
     """Parameters to write: the components of a vector that are not zero, and others."""
     vector = CATALOGUE[one.id].vector
     given = {k: v for k, v in one.numbers.items() if v or k not in vector}

@@ -13,7 +13,7 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.sim_device.device import PIECE, Sensing
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.temperature import recorded
-from fieldcal.sim_device.way import Way
+from fieldcal.sim_device.way import Manoeuvre
 
 SHARE = 0.6
 """A turn takes at most so much of the gap that it lies in."""
@@ -26,7 +26,7 @@ LONGEST_GAP = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class HeldWindow:
     """A stretch in which the device is held, or spun at a constant rate.
 
     Attributes
@@ -47,10 +47,10 @@ class Window:
     rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn: tuple[float, float] | None = None
     vibration: float | None = None
-    way: Way | None = None
+    way: Manoeuvre | None = None
 
 
-Schedule = Sequence[Window] | Sequence[tuple[float, float, float, float]]
+Schedule = Sequence[HeldWindow] | Sequence[tuple[float, float, float, float]]
 
 
 def simulate(
@@ -106,8 +106,8 @@ def _piece(sensing: Sensing, t: Array, ticks: NDArray[np.int64], noise: bool) ->
     return Block.of(t, six[:3].T, six[3:].T, degrees)
 
 
-def _windows(schedule: Schedule) -> list[Window]:
-    windows = [w if isinstance(w, Window) else Window(*w) for w in schedule]
+def _windows(schedule: Schedule) -> list[HeldWindow]:
+    windows = [w if isinstance(w, HeldWindow) else HeldWindow(*w) for w in schedule]
     if not windows:
         raise InputError("no window to play again: the session has no positions")
     for i, w in enumerate(windows):
@@ -129,7 +129,7 @@ def _ascending(times: Array) -> Array:
     return t
 
 
-def _standing_at(profile: Profile, first: Window) -> Profile:
+def _standing_at(profile: Profile, first: HeldWindow) -> Profile:
     """Return the device switched on in the first window's position."""
     angles = np.rad2deg([first.alpha, first.beta])
     motion = replace(
@@ -138,7 +138,7 @@ def _standing_at(profile: Profile, first: Window) -> Profile:
     return replace(profile, motion=motion)
 
 
-def _move(sensing: Sensing, windows: list[Window]) -> None:
+def _move(sensing: Sensing, windows: list[HeldWindow]) -> None:
     """Put the turns into the gaps, and vibration into the windows."""
     body, pace = sensing.body, sensing.pace
     usual = sensing.profile.motion.turn_s

@@ -33,7 +33,7 @@ def level_axis(azimuth: float) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Sway:
+class SwayMotion:
     """Amplitude rad, frequency Hz, phase rad, azimuth of the axis rad."""
 
     amplitude: float
@@ -53,7 +53,7 @@ class Sway:
 
 
 @dataclass(frozen=True, slots=True)
-class Bump:
+class Push:
     """A push that begins at `start` and lasts `seconds`.
 
     Attributes

@@ -48,7 +48,7 @@ class Watched(Protocol):
         """Do whatever can be done at once."""
 
 
-class Stream:
+class DeviceStream:
     """One device on one link.
 
     Parameters

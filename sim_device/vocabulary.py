@@ -25,7 +25,7 @@ UNITS = ("g", "mg", "deg/s", "mrad/s")
 
 
 @dataclass(frozen=True, slots=True)
-class Effect:
+class SimulatedEffect:
     """One thing that a virtual device is told to have."""
 
     id: str
@@ -168,7 +168,7 @@ _RULES: Mapping[str, _Rule] = {
 }
 
 
-def effect(id_: str, given: Mapping[str, Any]) -> Effect:
+def effect(id_: str, given: Mapping[str, Any]) -> SimulatedEffect:
     """Check the parameters of one effect and fill in the defaults.
 
     Raises
@@ -200,10 +200,10 @@ def effect(id_: str, given: Mapping[str, Any]) -> Effect:
         name: _word(id_, name, given.get(name, default), pattern)
         for name, (pattern, default) in entry.words.items()
     }
-    return Effect(id_, numbers, words)
+    return SimulatedEffect(id_, numbers, words)
 
 
-def parse(text: str) -> Effect:
+def parse(text: str) -> SimulatedEffect:
     """Read ``ID:param=value,…`` of the command line.
 
     Raises
@@ -226,7 +226,7 @@ def parse(text: str) -> Effect:
     return effect(id_.strip(), given)
 
 
-def check_together(effects: tuple[Effect, ...]) -> None:
+def check_together(effects: tuple[SimulatedEffect, ...]) -> None:
     """Refuse an effect given twice that can only be there once.
 
     Raises

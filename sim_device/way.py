@@ -35,7 +35,7 @@ REST = (STILL, np.zeros((3, 1)), np.zeros((3, 1)))
 
 
 @dataclass(frozen=True)
-class Way:
+class Manoeuvre:
     """A way between two places, from rest to rest.
 
     Attributes

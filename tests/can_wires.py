@@ -13,7 +13,7 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.drivers.can_frames import FRAME, Frames, pack
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import Part, read_map
-from fieldcal.drivers.can_samples import Samples
+from fieldcal.drivers.can_samples import CanAssembler
 from fieldcal.drivers.driver import Driver
 from fieldcal.drivers.options import Options
 
@@ -85,7 +85,7 @@ def decode(
     """Samples of the frames, given in pieces cut before these numbers."""
     mapped = f"dbc={dbc}&rate=100{query and '&'}{query}"
     health = CanHealth()
-    decoder = Samples(parts(mapped), health, Options("can", mapped))
+    decoder = CanAssembler(parts(mapped), health, Options("can", mapped))
     edges = [0, *(cuts or []), len(rows)]
     blocks = []
     for start, end in zip(edges[:-1], edges[1:], strict=True):

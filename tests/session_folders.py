@@ -13,7 +13,7 @@ import tomlkit
 from fieldcal.core.samples import Block
 from fieldcal.session.sample_files import to_batch
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.replay import Window, simulate
+from fieldcal.sim_device.replay import HeldWindow, simulate
 
 NINE = [(a, b) for b in (0.0, 5.0, -5.0) for a in (0.0, 45.0, -45.0)]
 SITE = {"latitude_deg": 50.45, "height_m": 170.0}
@@ -60,10 +60,10 @@ def recorded(
     return simulate(profile, windows_of(positions), seed=seed)
 
 
-def windows_of(positions: Sequence[dict[str, Any]]) -> list[Window]:
+def windows_of(positions: Sequence[dict[str, Any]]) -> list[HeldWindow]:
     """The same positions for the virtual device."""
     return [
-        Window(
+        HeldWindow(
             float(np.deg2rad(p.get("alpha_deg", 0.0))),
             float(np.deg2rad(p.get("beta_deg", 0.0))),
             p["start_s"],

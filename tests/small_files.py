@@ -10,7 +10,7 @@ from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulo
 
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import Wanted
+from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.validation import Judge
 from fieldcal.session.folder import Session
 
@@ -19,14 +19,14 @@ COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 
 def _mcap(path: Path, block: Block) -> None:
     from fieldcal.calibration import Calibration, Nominal
-    from fieldcal.exporters import Source, mcap
+    from fieldcal.exporters import ExportSource, mcap
     from fieldcal.session.recorder import Recorder
 
     with Recorder(path.parent / "made", {"format": 1}) as recorder:
         recorder.append(block)
     none = np.empty(0)
     unit = Calibration("joint", (), none, np.empty((0, 0)), (), 0.0, 0, 0.0)
-    mcap.write(Source(unit, Nominal(), Session.open(path.parent / "made")), path)
+    mcap.write(ExportSource(unit, Nominal(), Session.open(path.parent / "made")), path)
 
 
 def _hdf5(path: Path, block: Block) -> None:
@@ -68,9 +68,9 @@ class Small:
         (path.parent / "imu.dbc").write_text(dbc())
         options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
         options = options if name == "can_log" else ""
-        self.wanted = Wanted(COLUMNS, options=options)
+        self.wanted = ReadOptions(COLUMNS, options=options)
         if name == "mcap":
-            self.wanted = Wanted()
+            self.wanted = ReadOptions()
         self.content = path.read_bytes()
         self.expected = whole(path, self.wanted)
 
@@ -88,7 +88,9 @@ class Small:
         return True
 
 
-def whole(path: Path, wanted: Wanted, name: str = "", repair: bool = False) -> Block:
+def whole(
+    path: Path, wanted: ReadOptions, name: str = "", repair: bool = False
+) -> Block:
     opened = open_recording(path, wanted, name, repair)
     stream = opened.streams()[0].name
     opened.notes(stream)

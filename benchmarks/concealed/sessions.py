@@ -19,7 +19,7 @@ from fieldcal.session import description
 from fieldcal.session.description import Description
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.replay import Window, simulate
+from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.sim_device.vocabulary import effect
 
 LADDER = (
@@ -74,7 +74,7 @@ class Session:
 
     label: str
     profile: Profile
-    windows: tuple[Window, ...]
+    windows: tuple[HeldWindow, ...]
     place: str
     concealed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     angles: bool = True
@@ -160,7 +160,7 @@ def plain(
     one = Profile(
         sampling=device.Sampling(rate),
         site=device.Site(float(rng.uniform(-65, 65)), float(rng.uniform(0, 1500))),
-        frame=device.Mounting(MOUNTINGS[int(rng.integers(3))]),
+        frame=device.MountingAxes(MOUNTINGS[int(rng.integers(3))]),
         truth=device.Truth(
             acc_bias=_three(rng, 0.2),
             acc_scale=_three(rng, 0.01, 1.0),
@@ -199,7 +199,7 @@ def _three(rng: np.random.Generator, sd: float, mean: float = 0.0) -> device.Tri
 
 def _windows(
     rng: np.random.Generator, place: str, long: float, gap: float
-) -> tuple[Window, ...]:
+) -> tuple[HeldWindow, ...]:
     positions = list(SETS[place])
     if rng.random() < 0.5:
         positions = [positions[i] for i in rng.permutation(len(positions))]
@@ -208,6 +208,8 @@ def _windows(
         angles, rate = p if place == "table" else (p, (0.0, 0.0, 0.0))
         alpha, beta = np.deg2rad(angles)
         x, y, z = (float(r) for r in np.deg2rad(rate))
-        out.append(Window(float(alpha), float(beta), start, start + long, (x, y, z)))
+        out.append(
+            HeldWindow(float(alpha), float(beta), start, start + long, (x, y, z))
+        )
         start += long + gap
     return tuple(out)

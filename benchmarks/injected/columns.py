@@ -16,7 +16,7 @@ from benchmarks.injected.parts import Parts
 from fieldcal.core.frames import force_home, seen_after
 from fieldcal.core.positions import angles, forces
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.result import Found
+from fieldcal.diagnosis.result import FoundEffect
 from fieldcal.session.description import Description
 
 STEP = 1e-4
@@ -43,7 +43,9 @@ def plain(force: Array) -> Columns:
     return each(ones) + [at_channel(force[:, c], c) for c in range(3)]
 
 
-def named(found: Found, parts: Parts, force: Array, about: Description) -> Columns:
+def named(
+    found: FoundEffect, parts: Parts, force: Array, about: Description
+) -> Columns:
     """Columns of an effect that a diagnosis named."""
     numbers = {
         n: float(q.value)

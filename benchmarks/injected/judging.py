@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fieldcal.diagnosis import Diagnosis
-from fieldcal.diagnosis.result import Found
+from fieldcal.diagnosis.result import FoundEffect
 
 ALWAYS = frozenset({"earth_rate"})
 """True of every session, so never a false alarm."""
@@ -87,7 +87,7 @@ def invented(before: Diagnosis, after: Diagnosis, effect: str) -> tuple[str, ...
     return tuple(dict.fromkeys(out))
 
 
-def matches(found: Found, effect: str, where: Mapping[str, float | str]) -> bool:
+def matches(found: FoundEffect, effect: str, where: Mapping[str, float | str]) -> bool:
     """Whether an effect that was found is the one that was added."""
     if found.id != effect:
         return False

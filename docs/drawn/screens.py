@@ -27,7 +27,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.procedures.five_position import plan
 from fieldcal.run.engine import Engine
 from fieldcal.run.movers import Nobody
-from fieldcal.run.operator.protocol import View, Wish
+from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
 from fieldcal.session import description
 from fieldcal.session.recorder import Recorder
@@ -50,7 +50,7 @@ TABLES = {
     ],
 }
 
-MOMENTS: dict[str, Callable[[View], bool]] = {
+MOMENTS: dict[str, Callable[[OperatorView], bool]] = {
     "turning": lambda v: (
         v.phase == "turning"
         and v.hold.index == 1
@@ -86,7 +86,7 @@ class Filmed:
         """Show a sentence."""
         self._console.tell(text)
 
-    def show(self, view: View) -> None:
+    def show(self, view: OperatorView) -> None:
         """Show the state, and keep a picture of the moments that are wanted."""
         self._console.show(view)
         for name, wanted in MOMENTS.items():

@@ -20,7 +20,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
-from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, headed
+from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, headed
 from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
 from fieldcal.drivers.options import Options
 
@@ -53,7 +53,7 @@ class Codec(Base):
         super().reset()
         self._clock.broken()
 
-    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+    def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Take the samples out of whole packets."""
         parts = [
             _samples(some)

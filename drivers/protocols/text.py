@@ -28,7 +28,7 @@ from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.columns import guess
-from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask
+from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
@@ -136,7 +136,7 @@ class Codec(Base):
         self._seq.broken()
         self._clock.broken()
 
-    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+    def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Make samples of well-formed lines."""
         lines = ~self._passed(data, found.starts)
         if not lines.any():

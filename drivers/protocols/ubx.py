@@ -24,7 +24,15 @@ from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
 from fieldcal.drivers.codec import Likeness
-from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, headed, rows
+from fieldcal.drivers.framing import (
+    Bytes,
+    Candidates,
+    FrameScan,
+    Index,
+    Mask,
+    headed,
+    rows,
+)
 from fieldcal.drivers.layouts import Raw, in_order
 from fieldcal.drivers.options import Options
 
@@ -81,7 +89,7 @@ class Codec(Base):
         self._held = self._held[:0]
         self._clock.broken()
 
-    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+    def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Put the values of one tag together."""
         starts, sizes = found.starts, found.ends - found.starts
         ours = (data[starts + 2] == ESF) & (data[starts + 3] == self._number)

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
-from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, rows
+from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, rows
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS
@@ -37,7 +37,7 @@ TIME, ACC, GYR = 0x50, 0x51, 0x52
 Words: TypeAlias = NDArray[Any]
 
 
-class Samples(NamedTuple):
+class WitmotionSamples(NamedTuple):
     """Samples (n, 6), temperatures, stamps, periods since the last, arrivals, (n,)."""
 
     six: Array
@@ -81,7 +81,7 @@ class Codec(Base):
         self._frames = Frames(none, np.empty(0, np.int64), np.empty(0))
         self._cycle = 0
         self._paired: int | None = None
-        self._held = Samples(np.empty((0, 6)), *[np.empty(0)] * 4)
+        self._held = WitmotionSamples(np.empty((0, 6)), *[np.empty(0)] * 4)
         self._day: int | None = None
 
     @property
@@ -111,7 +111,7 @@ class Codec(Base):
         self._paired = None
         self._clock.broken()
 
-    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+    def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Put the halves of each sample together."""
         old = self._frames
         frames = Frames(
@@ -126,7 +126,7 @@ class Codec(Base):
         self._frames = frames.only(slice(-2, None))
         return self._deliver(self._pair(frames, len(old.at)))
 
-    def _pair(self, frames: Frames, old: int) -> Samples:
+    def _pair(self, frames: Frames, old: int) -> WitmotionSamples:
         """Samples whose second half is not among the first `old` frames."""
         kind, far = frames.raw[:, 1], np.diff(frames.at) >= 3 * SIZE
         begins = np.zeros(len(kind), dtype=np.int64)
@@ -148,7 +148,7 @@ class Codec(Base):
             before = cycle[at[0]] - 1 if self._paired is None else self._paired
             steps[:] = np.diff(cycle[at], prepend=before)
             self._paired = int(cycle[at[-1]])
-        return Samples(six, first[:, 3] / 100, stamp, steps, frames.t_host[at])
+        return WitmotionSamples(six, first[:, 3] / 100, stamp, steps, frames.t_host[at])
 
     def _seconds(self, words: Words) -> Array:
         """Time in s since midnight of the first day, from words of 0x50, (n,)."""
@@ -162,14 +162,16 @@ class Codec(Base):
         seconds: Array = ((clock * 60 + second) * 1000 + (words >> 48)) * 1e-3
         return seconds
 
-    def _deliver(self, samples: Samples) -> Block | None:
+    def _deliver(self, samples: WitmotionSamples) -> Block | None:
         """Give samples their time, once it is known whether the device tells it."""
         if not self._decided:
             both = zip(self._held, samples, strict=True)
-            samples = Samples(*(np.concatenate(columns) for columns in both))
+            samples = WitmotionSamples(*(np.concatenate(columns) for columns in both))
             stamped = np.flatnonzero(~np.isnan(samples.stamp))
             if len(stamped):
-                samples = Samples(*(column[stamped[0] :] for column in samples))
+                samples = WitmotionSamples(
+                    *(column[stamped[0] :] for column in samples)
+                )
             elif len(samples.stamp) < UNDECIDED:
                 self._held = samples
                 return None

@@ -22,7 +22,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import sums
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec as Base
-from fieldcal.drivers.framing import Bytes, Candidates, Found, Index, Mask, headed
+from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, headed
 from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
@@ -65,7 +65,7 @@ class Codec(Base):
         self._seq.broken()
         self._clock.broken()
 
-    def decode(self, data: Bytes, found: Found, t_host: Array) -> Block | None:
+    def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Take the samples out of whole messages."""
         parts = [_samples(some) for some in alike(data, found, walk)]
         raw = in_order(part for part in parts if part is not None)

@@ -18,7 +18,7 @@ import numpy as np
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
 from fieldcal.acceptance.verification import Verification, planned, verify
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.limits import Limits
+from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.samples import Block
 from fieldcal.evaluation.observations import Rests
@@ -31,7 +31,7 @@ def assess(
     found: Calibration,
     session: Session,
     still: Rests,
-    limits: Limits,
+    limits: GradeLimits,
     history: History | None,
 ) -> Calibration:
     """The calibration with the decision about it, and where and when it was taken.
@@ -106,7 +106,7 @@ def _verification(
     found: Calibration,
     session: Session,
     marks: Sequence[Mapping[str, Any]],
-    limits: Limits,
+    limits: GradeLimits,
 ) -> Verification | None:
     position = planned(session.about)
     window = verification_window(marks, len(session.positions))

@@ -17,7 +17,7 @@ from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.level import tilt_is_found, unsaid
 from fieldcal.acceptance.verification import Verification
 from fieldcal.calibration import COMPONENTS, Calibration
-from fieldcal.calibration.limits import Limits
+from fieldcal.calibration.limits import GradeLimits
 from fieldcal.history.family import expected
 from fieldcal.session.description import Description
 from fieldcal.solve.words import SUSPECT
@@ -88,7 +88,7 @@ class Circumstances:
 
 
 def decide(
-    found: Calibration, about: Description, limits: Limits, seen: Circumstances
+    found: Calibration, about: Description, limits: GradeLimits, seen: Circumstances
 ) -> Decision:
     """Check a calibration against limits."""
     checks = [
@@ -126,7 +126,7 @@ def _document(check: Check) -> dict[str, Any]:
     return out
 
 
-def _fit(found: Calibration, limits: Limits) -> Check:
+def _fit(found: Calibration, limits: GradeLimits) -> Check:
     from scipy.special import gammaincc
 
     if not found.good:
@@ -156,7 +156,7 @@ def _first(found: Calibration) -> str:
     return found.warnings[0] if found.warnings else "see the fit"
 
 
-def _uncertainty(found: Calibration, limits: Limits) -> list[Check]:
+def _uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
     checks = []
     for group in COMPONENTS:
         limit = limits.sigma(group)
@@ -183,7 +183,7 @@ def _uncertainty(found: Calibration, limits: Limits) -> list[Check]:
     return checks
 
 
-def _by_angles(found: Calibration, limits: Limits) -> str:
+def _by_angles(found: Calibration, limits: GradeLimits) -> str:
     """What to do about angles that nobody said are set better than the grade asks."""
     angles = float(found.info.get("angle_sigma_deg") or 0.0)
     if found.method == "scalar" or angles < limits.angle_setting_deg:
@@ -206,7 +206,7 @@ def _level(found: Calibration, about: Description) -> list[Check]:
 
 
 def _change(
-    found: Calibration, limits: Limits, family: Sequence[Calibration] | None
+    found: Calibration, limits: GradeLimits, family: Sequence[Calibration] | None
 ) -> list[Check]:
     if family is None:
         return [Check("change", None, "no serial number, so no history to compare")]
@@ -224,7 +224,7 @@ def _change(
 def _compared(
     found: Calibration,
     name: str,
-    limits: Limits,
+    limits: GradeLimits,
     family: Sequence[Calibration],
     together: int,
 ) -> Check | None:
@@ -252,7 +252,7 @@ def _compared(
     return Check(f"{group} change", ok, says, chance, limit, "1")
 
 
-def _verification(seen: Verification | None, limits: Limits) -> Check:
+def _verification(seen: Verification | None, limits: GradeLimits) -> Check:
     if seen is None:
         return Check("verification", None, "no position was held to verify (--verify)")
     far = seen.largest > limits.verification_residual
@@ -270,7 +270,9 @@ def _verification(seen: Verification | None, limits: Limits) -> Check:
     return Check("verification", not (far or odd), says, seen.largest, limit, "m/s^2")
 
 
-def _temperature(temperatures: np.ndarray[Any, Any], limits: Limits) -> list[Check]:
+def _temperature(
+    temperatures: np.ndarray[Any, Any], limits: GradeLimits
+) -> list[Check]:
     known = temperatures[np.isfinite(temperatures)]
     if not len(known):
         return [Check("temperature", None, "the device tells no temperature")]
@@ -292,7 +294,7 @@ def _temperature(temperatures: np.ndarray[Any, Any], limits: Limits) -> list[Che
     ]
 
 
-def _link(link: Mapping[str, int] | None, limits: Limits) -> list[Check]:
+def _link(link: Mapping[str, int] | None, limits: GradeLimits) -> list[Check]:
     if not link or not link.get("samples"):
         return [Check("link", None, "what the link lost was not recorded")]
     samples, missing, bad = (link.get(k, 0) for k in ("samples", "missing", "bad"))

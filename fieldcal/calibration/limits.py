@@ -21,7 +21,7 @@ DEFAULTS = "limits.toml"
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class GradeLimits:
     """Bounds for one grade of device; units as in ``limits.toml``."""
 
     acc_bias_sigma: float
@@ -53,11 +53,11 @@ class Limits:
         return getattr(self, f"{group}_repeat", None)
 
 
-NAMES = tuple(f.name for f in fields(Limits))
+NAMES = tuple(f.name for f in fields(GradeLimits))
 _ANY_SIGN = ("temperature_min_c", "temperature_max_c")
 
 
-def read(grade: str, path: Path | None = None) -> Limits:
+def read(grade: str, path: Path | None = None) -> GradeLimits:
     """Limits of a grade, from a file over the defaults.
 
     Raises
@@ -70,7 +70,7 @@ def read(grade: str, path: Path | None = None) -> Limits:
     values = dict(_table(tomllib.loads(text), grade, DEFAULTS))
     if path is not None:
         values |= _table(_load(path), grade, str(path))
-    made = Limits(**values)
+    made = GradeLimits(**values)
     if made.temperature_min_c >= made.temperature_max_c:
         raise InputError(
             f"{path}: [{grade}] temperature_min_c = {made.temperature_min_c:g} °C must"

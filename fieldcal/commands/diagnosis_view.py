@@ -8,7 +8,7 @@ from fieldcal.calibration.wording import ranges
 from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.agreement import UNITS
-from fieldcal.diagnosis.result import Found, Mismatch
+from fieldcal.diagnosis.result import FoundEffect, Mismatch
 from fieldcal.diagnosis.words import said
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def sure(probability: float) -> str:
     return "above 0.99" if probability > 0.99 else f"{probability:.2f}"
 
 
-def _heading(found: Found) -> str:
+def _heading(found: FoundEffect) -> str:
     """An effect and what speaks for it."""
     gain = found.evidence.get("held_out_gain", float("nan"))
     squares = found.evidence.get("delta_chi2", float("nan"))
@@ -116,7 +116,7 @@ def _heading(found: Found) -> str:
     return "; ".join(about)
 
 
-def _effect(found: Found) -> object:
+def _effect(found: FoundEffect) -> object:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 

@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.calibration import Nominal
     from fieldcal.commands.compare import read
     from fieldcal.core.errors import InputError
-    from fieldcal.exporters import Source, exporter
+    from fieldcal.exporters import ExportSource, exporter
     from fieldcal.install.proposal import installed_in
     from fieldcal.session.folder import Session
 
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     if path.exists():
         raise InputError(f"{path}: is there already; name another file with -o")
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
-    source = Source(
+    source = ExportSource(
         read(args.calibration or args.session),
         nominal,
         session,

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fieldcal.calibration.limits import Limits
-    from fieldcal.history.store import History, Run
+    from fieldcal.calibration.limits import GradeLimits
+    from fieldcal.history.store import History, HistoryRun
     from fieldcal.history.trend import Point
 
 EXAMPLE = """\
@@ -96,7 +96,7 @@ def _devices(args: argparse.Namespace, history: History) -> int:
     return 0
 
 
-def _compare(args: argparse.Namespace, runs: Sequence[Run]) -> int:
+def _compare(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
     from fieldcal.calibration import compare
     from fieldcal.commands.compare import document, table
     from fieldcal.core.errors import InputError
@@ -119,7 +119,7 @@ def _compare(args: argparse.Namespace, runs: Sequence[Run]) -> int:
     return 0
 
 
-def _trends(args: argparse.Namespace, runs: Sequence[Run]) -> int:
+def _trends(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
     from fieldcal.calibration import limits
     from fieldcal.history.trend import names, trend
 
@@ -156,7 +156,7 @@ def _wanted(asked: Sequence[str] | None, known: Sequence[str]) -> list[str]:
     return list(asked)
 
 
-def _run(run: Run) -> dict[str, Any]:
+def _run(run: HistoryRun) -> dict[str, Any]:
     return {
         "number": run.number,
         "taken_at": run.taken_at,
@@ -170,15 +170,15 @@ def _run(run: Run) -> dict[str, Any]:
     }
 
 
-def _warm(run: Run) -> str:
+def _warm(run: HistoryRun) -> str:
     return "? °C" if run.temperature is None else f"{run.temperature:.1f} °C"
 
 
 def _show(
     serial: str,
-    runs: Sequence[Run],
+    runs: Sequence[HistoryRun],
     trends: dict[str, list[Point]],
-    bounds: Limits,
+    bounds: GradeLimits,
 ) -> None:
     say = sys.stdout.write
     say(f"{serial}: {len(runs)} calibrations\n")

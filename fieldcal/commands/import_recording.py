@@ -12,7 +12,7 @@ from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.importing.recording import Recording, Stream, Wanted
+    from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 
 EXAMPLE = """\
   fieldcal import log.csv --columns t,ax,ay,az,gx,gy,gz --acc-unit g --gyr-unit deg/s
@@ -109,12 +109,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _wanted(args: argparse.Namespace, i: int) -> Wanted:
-    from fieldcal.importing.recording import Wanted
+def _wanted(args: argparse.Namespace, i: int) -> ReadOptions:
+    from fieldcal.importing.recording import ReadOptions
 
     given = args.columns[min(i, len(args.columns) - 1)] if args.columns else ""
     columns = tuple(name.strip() for name in given.split(",")) if given else ()
-    return Wanted(
+    return ReadOptions(
         columns,
         args.rate,
         args.separator,
@@ -135,7 +135,7 @@ def _list(opened: list[Recording]) -> int:
     return 0
 
 
-def _chosen(recording: Recording, wanted: list[str]) -> list[Stream]:
+def _chosen(recording: Recording, wanted: list[str]) -> list[ImuStream]:
     """Return the streams that are brought in."""
     there = {stream.name: stream for stream in recording.streams()}
     for name in wanted:
@@ -147,7 +147,7 @@ def _chosen(recording: Recording, wanted: list[str]) -> list[Stream]:
 
 
 def _bring(
-    args: argparse.Namespace, recording: Recording, stream: Stream, folder: Path
+    args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
 ) -> None:
     from fieldcal.importing.ingest import bring_in
     from fieldcal.session.description import WORTHLESS

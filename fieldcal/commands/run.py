@@ -18,7 +18,7 @@ from fieldcal.core.errors import FieldcalError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
-    from fieldcal.calibration.limits import Limits
+    from fieldcal.calibration.limits import GradeLimits
     from fieldcal.run.companions import Beside
     from fieldcal.run.movers import Mover
     from fieldcal.run.operator.protocol import Operator
@@ -175,7 +175,7 @@ def _write_junit(
 
 
 def _record(
-    args: argparse.Namespace, task: Task, folder: Path, bounds: Limits
+    args: argparse.Namespace, task: Task, folder: Path, bounds: GradeLimits
 ) -> tuple[Calibration, dict[str, Any] | None, Sequence[Beside]]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
     from fieldcal.acceptance.level import level_unknown

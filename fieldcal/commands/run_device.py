@@ -34,11 +34,11 @@ def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
             turns = stack.enter_context(movers.Controlled(mover["control"]))
         elif mover["kind"] == "virtual":
             options = _virtual(task)
-            made = stack.enter_context(movers.VirtualDevice(options))
+            made = stack.enter_context(movers.VirtualMover(options))
             turns, url = made, address(options, made.port)
         elif mover["kind"] == "command":
             timeout = float(mover.get("timeout_s", TURN))
-            turns = stack.enter_context(movers.Command(mover["command"], timeout))
+            turns = stack.enter_context(movers.CommandMover(mover["command"], timeout))
         if not url:
             raise InputError(
                 'name the device: --device "serial:/dev/ttyUSB0?format=witmotion"'

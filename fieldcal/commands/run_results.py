@@ -11,14 +11,14 @@ from fieldcal.core.errors import DeviceError, FieldcalError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
-    from fieldcal.calibration.limits import Limits
+    from fieldcal.calibration.limits import GradeLimits
     from fieldcal.history.store import History
     from fieldcal.run.companions import Beside
     from fieldcal.session.folder import Session
 
 
 def concluded(
-    session: Session, bounds: Limits, history: History, method: str = "auto"
+    session: Session, bounds: GradeLimits, history: History, method: str = "auto"
 ) -> Calibration:
     """Solve what was recorded, decide, write it down and keep it.
 
@@ -46,7 +46,7 @@ def concluded(
 
 
 def first_result(
-    found: Calibration, folder: Path, bounds: Limits, history: History
+    found: Calibration, folder: Path, bounds: GradeLimits, history: History
 ) -> Calibration:
     """Result of the device that was led through the procedure."""
     from fieldcal.session.folder import Session
@@ -55,7 +55,7 @@ def first_result(
 
 
 def further_results(
-    others: Sequence[Beside], bounds: Limits, history: History
+    others: Sequence[Beside], bounds: GradeLimits, history: History
 ) -> dict[str, Calibration]:
     """Results of the further devices that were heard to the end, by folder."""
     from fieldcal.session.folder import Session

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fieldcal.sim_device.line_faults import LineFaults
     from fieldcal.sim_device.link import Link
     from fieldcal.sim_device.profile import Profile
-    from fieldcal.sim_device.stream import Stream, Watched
+    from fieldcal.sim_device.stream import DeviceStream, Watched
 
 HELP = "be a virtual device on a link"
 
@@ -144,7 +144,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.sim_device.device import VirtualDevice
     from fieldcal.sim_device.line_faults import LineFaults
     from fieldcal.sim_device.orders import carry_out
-    from fieldcal.sim_device.stream import Stream
+    from fieldcal.sim_device.stream import DeviceStream
 
     device = VirtualDevice(_profile(args), args.seed)
     speed, duration = _speed(args.speed), _duration(args.duration)
@@ -157,7 +157,9 @@ def run(args: argparse.Namespace) -> int:
             faults = LineFaults(args.seed)
             link = _link(args, faults, device.rate)
             stack.callback(link.close)
-            stream = Stream(device, link, faults, speed, duration, args.once, _say)
+            stream = DeviceStream(
+                device, link, faults, speed, duration, args.once, _say
+            )
             control = Control(lambda order: carry_out(stream, order), args.control)
             stack.callback(control.close)
             _say(link.address)
@@ -191,7 +193,7 @@ def _profile(args: argparse.Namespace) -> Profile:
 
     from fieldcal.sim_device import profile_file
     from fieldcal.sim_device.profile import Profile
-    from fieldcal.sim_device.vocabulary import Effect, effect, parse
+    from fieldcal.sim_device.vocabulary import SimulatedEffect, effect, parse
 
     # a real device always feels the Earth; a device file says for itself what it has
     default = Profile(effects=(effect("earth_rate", {}),))
@@ -212,7 +214,7 @@ def _profile(args: argparse.Namespace) -> Profile:
             for name, value in _triads(args, ("acc_noise", "gyr_noise")).items()
         },
     }
-    more: list[Effect] = []
+    more: list[SimulatedEffect] = []
     for option, id_, names in (
         ("base_tilt", "base_tilt", ("about_x_deg", "about_z_deg")),
         ("angle_offset", "angle_offset", ("alpha0_deg", "beta0_deg")),
@@ -283,7 +285,7 @@ def _say(line: str) -> None:
 
 
 @contextlib.contextmanager
-def _keys(stream: Stream, steps: tuple[float, float]) -> Iterator[list[Watched]]:
+def _keys(stream: DeviceStream, steps: tuple[float, float]) -> Iterator[list[Watched]]:
     """Listen to the keys, if there is somebody at a terminal."""
     if not sys.stdin.isatty():
         yield []

@@ -225,9 +225,9 @@ def opened(url: str) -> Any:
         )
     if not find_spec("pymavlink"):
         raise InputError("MAVLink needs pymavlink: pip install 'fieldcal[mavlink]'")
-    from fieldcal.drivers.mavlink_parameters import Parameters
+    from fieldcal.drivers.mavlink_parameters import ParameterLink
 
-    return Parameters(address)
+    return ParameterLink(address)
 
 
 def check_ready(link: Any, autopilot: int) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.result import Found
+from fieldcal.diagnosis.result import FoundEffect
 from fieldcal.diagnosis.telling import decided_by, telling_position
 from fieldcal.diagnosis.unknown import Unknown, listed
 from fieldcal.effects import catalogue
@@ -18,7 +18,7 @@ LESS_THAN = 3
 
 
 def advice(
-    explanation: Explanation, effects: Sequence[Found], unknown: Sequence[Unknown]
+    explanation: Explanation, effects: Sequence[FoundEffect], unknown: Sequence[Unknown]
 ) -> Iterator[str]:
     """Sentences, the most urgent first."""
     for one in effects:
@@ -40,7 +40,9 @@ def advice(
         yield f"record more than {held} position{'s' * (held > 1)}: few tell little."
 
 
-def _deciding(explanation: Explanation, effects: Sequence[Found]) -> Iterator[str]:
+def _deciding(
+    explanation: Explanation, effects: Sequence[FoundEffect]
+) -> Iterator[str]:
     """How to tell an effect from its aliases."""
     for one in effects:
         for other in one.aliases:
@@ -67,5 +69,5 @@ def _look(unknown: Unknown) -> str:
     )
 
 
-def _deterministic(found: Found) -> bool:
+def _deterministic(found: FoundEffect) -> bool:
     return not isinstance(catalogue()[found.id], Scatter | Chain)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.parts import rms
-from fieldcal.diagnosis.result import Found, number
+from fieldcal.diagnosis.result import FoundEffect, number
 from fieldcal.effects import catalogue
 from fieldcal.model.held_out import held_out
 from fieldcal.model.offers import Offer
@@ -65,7 +65,7 @@ class Candidate:
 
 
 def candidates(
-    explanation: Explanation, found: Sequence[Found]
+    explanation: Explanation, found: Sequence[FoundEffect]
 ) -> tuple[Candidate, ...]:
     """Every effect that was tried on the rows, the one that takes most first."""
     posterior = explanation.posterior

@@ -20,9 +20,9 @@ from fieldcal.model.reduce import masked, rate_of, spans, table_rate
 from fieldcal.model.vibration import usual_noise
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.recording import Fault, Recording, lsb_of
+from fieldcal.physics.recording import CheckedSamples, Fault, lsb_of
 from fieldcal.session.description import Description
-from fieldcal.windows.noise import Noise
+from fieldcal.windows.noise import ChannelNoise
 
 MENDING = ("decode_fault", "mounting")
 """In this order: a channel with wrong bytes looks like one of another axis."""
@@ -99,7 +99,7 @@ def checked_again(checked: Checked, block: Block, about: Description) -> Checked
     return replace(checked, faults=tuple(faults))
 
 
-def _find(name: str, seen: Recording) -> list[Fault]:
+def _find(name: str, seen: CheckedSamples) -> list[Fault]:
     effect = catalogue()[name]
     if not isinstance(effect, Chain):
         raise TypeError(f"{name} is no effect on samples")
@@ -131,7 +131,7 @@ def _mask(
                 usable[first:last, c] = False
 
 
-def _off_rails(found: list[Fault], seen: Recording) -> list[Fault]:
+def _off_rails(found: list[Fault], seen: CheckedSamples) -> list[Fault]:
     """Runs of equal values less those at a rail that a channel returns to.
 
     What stands still does so once and anywhere; what is clipped always stops there.
@@ -166,12 +166,14 @@ def _once(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault]]:
     ]
 
 
-def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Recording:
+def recording(
+    block: Block, usable: NDArray[np.bool_], about: Description
+) -> CheckedSamples:
     """What the checks look at."""
     windows, rate = spans(block, about), rate_of(block)
     block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
     unknown = np.full(6, np.nan)
-    noise = Noise(unknown, unknown)
+    noise = ChannelNoise(unknown, unknown)
     if len(held):
         noise = usual_noise(block, held, rate)
     if about.positions:
@@ -189,7 +191,7 @@ def recording(block: Block, usable: NDArray[np.bool_], about: Description) -> Re
         latitude=about.latitude,
     )
     limits = [about.limits.get(k, np.nan) for k in ("acceleration", "angular_rate")]
-    return Recording(
+    return CheckedSamples(
         block=block,
         windows=windows,
         x=x,

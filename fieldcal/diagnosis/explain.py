@@ -17,7 +17,7 @@ from fieldcal.model.held_out import HeldOut, in_question
 from fieldcal.model.inference import Inference, Inferred
 from fieldcal.model.noise import grain_of
 from fieldcal.model.posterior import Posterior, Standing
-from fieldcal.model.reduce import Rows, Source, rate_of, spans
+from fieldcal.model.reduce import Rows, RowSource, rate_of, spans
 from fieldcal.model.reported import reported
 from fieldcal.model.search import Search
 from fieldcal.model.sets import Set
@@ -132,7 +132,7 @@ def explain(prepared: Prepared) -> Explanation:
     return Explanation(prepared, found, best, base_of(inference), posterior)
 
 
-def inference_of(source: Source, rows: Rows, prepared: Prepared) -> Inference:
+def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference:
     """The inference of some rows, ready to run."""
     about = source.about
     swayed = any(t.effect.kind == "motion" for t in prepared.tones)
@@ -164,7 +164,7 @@ def nominal_of(about: Description, places: int, prepared: Prepared) -> State:
     )
 
 
-def origins(source: Source, rows: Rows) -> Array:
+def origins(source: RowSource, rows: Rows) -> Array:
     """Time since the turn, (o, n) s, from each instant that it may count from.
 
     That is the end of the motion, as each window shows it or a fixed time before each:

@@ -13,7 +13,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.instant import instant
 from fieldcal.diagnosis.line import Tone
 from fieldcal.diagnosis.parts import rms
-from fieldcal.diagnosis.result import Found, Quantity
+from fieldcal.diagnosis.result import FoundEffect, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import Group
@@ -85,7 +85,7 @@ def _of_turns(explanation: Explanation, fitted: Fitted) -> float:
 
 def of_rows(
     explanation: Explanation, standing: Standing, lost: Removed, then: Agreement
-) -> Found:
+) -> FoundEffect:
     """A cause of the catalogue that windows or turns show."""
     posterior = explanation.posterior
     delta = 2 * (posterior.best.state.score - _at(lost.set, posterior.best))
@@ -100,7 +100,7 @@ def of_rows(
         - posterior.evidence(lost.set),
     }
     known = tuple(n for n in standing.aliases if n in catalogue())
-    return Found(
+    return FoundEffect(
         standing.name,
         parameters(explanation, standing),
         known,
@@ -203,17 +203,17 @@ def gain(explanation: Explanation, lost: Removed, then: Agreement) -> float:
     return float(1 - now[c] / ahead[c]) if share[c] > 0 else np.nan
 
 
-def of_tone(tone: Tone, gained: float) -> Found:
+def of_tone(tone: Tone, gained: float) -> FoundEffect:
     """A line in the spectrum."""
     values = {
         n: Quantity(v, tone.sigmas[n], tone.effect.unit(n))
         for n, v in tone.values.items()
     }
     evidence = {"delta_chi2": tone.chi2, "held_out_gain": gained}
-    return Found(tone.effect.id, values, evidence=evidence)
+    return FoundEffect(tone.effect.id, values, evidence=evidence)
 
 
-def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[Found]:
+def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[FoundEffect]:
     """Effects on samples; steps of both triads are one."""
     steps: dict[str, Quantity] = {}
     for name, fault in faults:
@@ -229,9 +229,9 @@ def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[Found]:
         if name == "quantisation":
             steps |= values
             continue
-        yield Found(name, values, evidence={"delta_chi2": fault.sigma**2})
+        yield FoundEffect(name, values, evidence={"delta_chi2": fault.sigma**2})
     if steps:
-        yield Found("quantisation", steps)
+        yield FoundEffect("quantisation", steps)
 
 
 def _unit(name: str, fault: Fault, units: dict[str, str]) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.frames import turn
 from fieldcal.core.samples import Array
-from fieldcal.model.reduce import Rows, Source, rate_of, spans
+from fieldcal.model.reduce import Rows, RowSource, rate_of, spans
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.recording import medians
 
@@ -73,7 +73,7 @@ class Pieces:
     rate: float
 
 
-def held_in(source: Source, rows: Rows) -> list[tuple[int, int, int]]:
+def held_in(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
     """Windows that are long enough: the first of their rows, and their bounds."""
     first = {int(p): i for i, p in reversed(list(enumerate(rows.x.position)))}
     bounds = enumerate(spans(source.block, source.about))
@@ -84,7 +84,7 @@ def held_in(source: Source, rows: Rows) -> list[tuple[int, int, int]]:
     ]
 
 
-def pieces_of(source: Source, rows: Rows) -> Pieces:
+def pieces_of(source: RowSource, rows: Rows) -> Pieces:
     """Windows of a recording that are long enough.
 
     Outputs of which rows say nothing, as of gravity on a table that turns, are zero.

@@ -17,7 +17,7 @@ from fieldcal.diagnosis.spectrum import tones, without
 from fieldcal.effects import catalogue
 from fieldcal.model.dwell import arrivals
 from fieldcal.model.hand import rows_of
-from fieldcal.model.reduce import Rows, Source, spans
+from fieldcal.model.reduce import Rows, RowSource, spans
 from fieldcal.model.state import Term
 from fieldcal.model.thermometer import Thermometer
 from fieldcal.physics.effect import Chain, Line, Scatter
@@ -46,7 +46,7 @@ class Prepared:
     """
 
     checked: Checked
-    source: Source
+    source: RowSource
     rows: Rows
     known: tuple[Term, ...]
     tones: tuple[Tone, ...]
@@ -74,7 +74,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     checked = check(block, about)
     rest = arrivals(checked.block, about, checked.noise)
     warmth = Thermometer.of(checked.block)
-    source = Source(checked.block, about, checked.usable, rest, warmth, checked.pace)
+    source = RowSource(checked.block, about, checked.usable, rest, warmth, checked.pace)
     rows = rows_of(source)
     _refuse_turning(rows, about)
     lines = tones(source, rows)

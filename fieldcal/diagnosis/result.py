@@ -86,7 +86,7 @@ class Mismatch:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundEffect:
     """An effect that is there.
 
     Attributes
@@ -193,7 +193,7 @@ class Diagnosis:
     verdict: Verdict
     probability: float
     mismatch: tuple[Mismatch, ...]
-    effects: tuple[Found, ...]
+    effects: tuple[FoundEffect, ...]
     unit: str
     before: Quality
     after: Quality

@@ -27,7 +27,7 @@ from fieldcal.diagnosis.periodogram import (
     take_out,
 )
 from fieldcal.effects import catalogue
-from fieldcal.model.reduce import Rows, Source
+from fieldcal.model.reduce import Rows, RowSource
 from fieldcal.physics.effect import Line
 
 STEADY = 0.65
@@ -43,7 +43,7 @@ MOST, LOOKS = 4, 3
 """Lines looked for, and how often one that stands out may turn out to be none."""
 
 
-def tones(source: Source, rows: Rows) -> list[tuple[Tone, Remains]]:
+def tones(source: RowSource, rows: Rows) -> list[tuple[Tone, Remains]]:
     """Lines in a recording, the strongest first, with what is left of them."""
     pieces = pieces_of(source, rows)
     found: list[tuple[Tone, Remains]] = []
@@ -65,7 +65,9 @@ def tones(source: Source, rows: Rows) -> list[tuple[Tone, Remains]]:
     return found
 
 
-def without(block: Block, source: Source, rows: Rows, found: Sequence[Tone]) -> Block:
+def without(
+    block: Block, source: RowSource, rows: Rows, found: Sequence[Tone]
+) -> Block:
     """The samples less the lines: of all windows, and on the way what sensors add."""
     triads = [block.acc, block.gyr]
     held = held_in(source, rows)

@@ -22,7 +22,7 @@ from fieldcal.diagnosis.quality import OF_TURNS, after, before, in_turns, parted
 from fieldcal.diagnosis.result import (
     CalibrationGroup,
     Diagnosis,
-    Found,
+    FoundEffect,
     Mismatch,
     Quality,
     Verdict,
@@ -117,7 +117,7 @@ def _quality(
 
 def _effects(
     explanation: Explanation, lost: Mapping[str, Removed], then: Agreement
-) -> list[Found]:
+) -> list[FoundEffect]:
     prepared = explanation.prepared
     found = list(naming.of_samples(prepared.checked.faults))
     for tone, left in zip(prepared.tones, prepared.remains, strict=True):
@@ -127,7 +127,7 @@ def _effects(
             found.append(naming.of_rows(explanation, one, lost[one.name], then))
     if explanation.sees_earth:
         evidence = {"delta_chi2": 2 * explanation.earth}
-        found.append(Found("earth_rate", {}, evidence=evidence))
+        found.append(FoundEffect("earth_rate", {}, evidence=evidence))
     return found
 
 
@@ -143,7 +143,7 @@ def _strange(explanation: Explanation, lost: Mapping[str, Removed]) -> list[Unkn
 
 def _verdict(
     explanation: Explanation,
-    effects: Sequence[Found],
+    effects: Sequence[FoundEffect],
     strange: Sequence[Unknown],
     odd: Sequence[str],
 ) -> Verdict:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.result import Found, Mismatch, Quality, Quantity, Verdict
+from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quality, Quantity, Verdict
 from fieldcal.diagnosis.telling import decided_by, telling_position
 from fieldcal.diagnosis.unknown import Unknown, listed
 from fieldcal.effects import catalogue
@@ -46,7 +46,7 @@ def said(quantity: Quantity) -> str:
     return f"{quantity.value:.{max(digits, 0)}f} ± {sigma:.{max(digits, 0)}f}{unit}"
 
 
-def named(found: Found) -> str:
+def named(found: FoundEffect) -> str:
     """An effect with the parameters that stand out."""
     parts = []
     for name, q in found.parameters.items():
@@ -57,7 +57,7 @@ def named(found: Found) -> str:
 
 def paragraph(
     verdict: Verdict,
-    effects: Sequence[Found],
+    effects: Sequence[FoundEffect],
     mismatch: Sequence[Mismatch],
     unknown: Sequence[Unknown],
     quality: tuple[Quality, Quality, str],
@@ -87,7 +87,7 @@ def _wrong(odd: Sequence[str]) -> str:
 
 
 def _opening(
-    verdict: Verdict, effects: Sequence[Found], mismatch: Sequence[Mismatch]
+    verdict: Verdict, effects: Sequence[FoundEffect], mismatch: Sequence[Mismatch]
 ) -> str:
     listed = _listed(effects)
     if verdict == "consistent":
@@ -107,7 +107,7 @@ def _opening(
     )
 
 
-def _listed(effects: Sequence[Found]) -> str:
+def _listed(effects: Sequence[FoundEffect]) -> str:
     """The effects; one that happened often in a word."""
     often = Counter(f.id for f in effects)
     told = [
@@ -129,11 +129,11 @@ def _where(m: Mismatch) -> str:
     return f"{listed(m.positions, SHOWN_PLACES)}, {m.from_s:.0f} to {m.to_s:.0f} s"
 
 
-def _is_random(found: Found) -> bool:
+def _is_random(found: FoundEffect) -> bool:
     return isinstance(catalogue()[found.id], Scatter)
 
 
-def _how_random(found: Found) -> str:
+def _how_random(found: FoundEffect) -> str:
     return (
         f"{found.id} is random: it widens the intervals, and no equation is fitted to"
         " it."

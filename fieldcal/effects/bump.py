@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
-from fieldcal.physics.recording import Fault, Recording, medians, runs
+from fieldcal.physics.recording import CheckedSamples, Fault, medians, runs
 from fieldcal.physics.shape import Shape
 
 LARGEST = 6.5
@@ -130,7 +130,7 @@ class Bump(Chain):
     cure = "Take the window again; nothing else is lost."
     source = "model of this project"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """Disturbed stretches of every window."""
         rate = 1 / float(np.median(np.diff(recording.block.t)))
         held = enumerate(recording.windows)
@@ -138,7 +138,7 @@ class Bump(Chain):
         return [fault for p in some for fault in _touched(recording, p, rate)]
 
 
-def _touched(recording: Recording, p: int, rate: float) -> list[Fault]:
+def _touched(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
     """Disturbed stretches of one window."""
     out = []
     first, last = (int(i) for i in recording.windows[p])
@@ -254,7 +254,7 @@ def _course(n: int, centre: Array, level: Array) -> Array:
 
 
 def _fault(
-    recording: Recording, start: int, a: int, b: int, z: Array, rate: float
+    recording: CheckedSamples, start: int, a: int, b: int, z: Array, rate: float
 ) -> Fault:
     t = recording.block.t
     worst = int(np.argmax(np.abs(z[a:b]).max(axis=0)))

@@ -17,7 +17,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import Chain, Param
-from fieldcal.physics.recording import Fault, Recording
+from fieldcal.physics.recording import CheckedSamples, Fault
 
 STRETCHES = 60
 PPM = 5.0
@@ -56,7 +56,7 @@ class ClockSkew(Chain):
     )
     source = "Paxson 1998; 10 to 2000 ppm"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """Rate of the clock, where host times are there."""
         block = recording.block
         known = np.isfinite(block.t_host)

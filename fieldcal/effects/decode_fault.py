@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
-from fieldcal.physics.recording import Fault, Recording
+from fieldcal.physics.recording import CheckedSamples, Fault
 
 Counts = NDArray[np.int64]
 
@@ -94,13 +94,13 @@ class DecodeFault(Chain):
     cure = "Correct byte order, width or sign in the decoder."
     source = "model of this project"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """Channels that become smooth when a slip is undone."""
         found = (_fault(recording, c) for c in range(len(CHANNELS)))
         return [fault for fault in found if fault is not None]
 
 
-def _fault(recording: Recording, c: int) -> Fault | None:
+def _fault(recording: CheckedSamples, c: int) -> Fault | None:
     """What happened to one channel."""
     lsb = float(recording.steps[c])
     values, t = recording.channel(c), recording.block.t
@@ -140,7 +140,7 @@ def _within(values: Array, step: float) -> float:
     return float(gaps.sum() / np.round(BYTE * gaps / step).sum())
 
 
-def _nearer(recording: Recording, c: int, mended: Array) -> bool:
+def _nearer(recording: CheckedSamples, c: int, mended: Array) -> bool:
     """Whether outputs come much nearer to what the nominal calibration foretells.
 
     Where a force is not known, it is no larger than gravity.

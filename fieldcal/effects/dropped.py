@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import Chain, Param
-from fieldcal.physics.recording import Fault, Recording
+from fieldcal.physics.recording import CheckedSamples, Fault
 
 PAUSE_S = 5.0
 """A gap outside windows that is longer is a pause of the recording, not a loss."""
@@ -54,7 +54,7 @@ def missing(t: Array) -> NDArray[np.int_]:
     return lost
 
 
-def _paused(recording: Recording) -> NDArray[np.bool_]:
+def _paused(recording: CheckedSamples) -> NDArray[np.bool_]:
     """Whether the recording paused after each sample but the last, (n - 1,).
 
     A long time outside windows is a pause, and so is all the time between two windows.
@@ -79,7 +79,7 @@ class Dropped(Chain):
     cure = "Lower the rate or raise the baud rate; look at cable and connectors."
     source = "model of this project"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """Samples lost, as a fraction."""
         block = recording.block
         if len(block) < 10:

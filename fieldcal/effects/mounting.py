@@ -28,7 +28,7 @@ import numpy as np
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import Chain
-from fieldcal.physics.recording import Fault, Recording
+from fieldcal.physics.recording import CheckedSamples, Fault
 
 BIAS, SCALE, FLOOR = 1.0, 0.1, 0.1
 """Spread allowed: of bias in m/s^2, of scale, and of what other effects do, m/s^2."""
@@ -91,7 +91,7 @@ def _odds(measured: Array, f: Array) -> tuple[float, float]:
     return total - 0.5 * squares, squares
 
 
-def rate_unit(recording: Recording, held: Sequence[int]) -> str:
+def rate_unit(recording: CheckedSamples, held: Sequence[int]) -> str:
     """Unit of the gyroscopes, if it is not the declared one; empty if it is.
 
     Of the turns between windows by number; those that are too small say nothing.
@@ -116,7 +116,7 @@ def rate_unit(recording: Recording, held: Sequence[int]) -> str:
     return ""
 
 
-def _of_rates(recording: Recording, name: str) -> Fault:
+def _of_rates(recording: CheckedSamples, name: str) -> Fault:
     """Gyroscopes in another unit."""
     six = recording.block.six
     six[:, 3:] *= RATES[name]
@@ -140,7 +140,7 @@ class Mounting(Chain):
     cure = "Correct [frame] mounting, or the unit, by the drawing on the device."
     source = "model of this project"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """Axes or unit that are not the declared ones."""
         block, rows = recording.block, recording.windows
         known = recording.x.force_known
@@ -173,7 +173,7 @@ class Mounting(Chain):
         return ""
 
     @staticmethod
-    def _named(recording: Recording, undo: Array) -> list[str]:
+    def _named(recording: CheckedSamples, undo: Array) -> list[str]:
         """The mounting that session.toml should have had."""
         right = recording.x.mounting @ undo
         rows = [int(np.argmax(np.abs(r))) for r in right]
@@ -184,7 +184,10 @@ class Mounting(Chain):
 
     @staticmethod
     def _fault(
-        recording: Recording, values: dict[str, float | str], unit: float, undo: Array
+        recording: CheckedSamples,
+        values: dict[str, float | str],
+        unit: float,
+        undo: Array,
     ) -> Fault:
         six = recording.block.six
         acc = six[:, :3] @ undo.T * unit

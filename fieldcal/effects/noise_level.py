@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
-from fieldcal.physics.recording import Fault, Recording
+from fieldcal.physics.recording import CheckedSamples, Fault
 
 RATIO = 1.8
 """Ratio from which an axis counts as noisier: out-of-plane axes reach 1.5."""
@@ -42,7 +42,7 @@ class NoiseLevel(Chain):
     )
     source = "model of this project"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """The noisier axis of each triad."""
         out = []
         t = recording.block.t

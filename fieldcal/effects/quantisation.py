@@ -22,7 +22,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS
 from fieldcal.physics.effect import Chain, Param
-from fieldcal.physics.recording import Fault, Recording
+from fieldcal.physics.recording import CheckedSamples, Fault
 from fieldcal.windows import rounding
 
 MATTERS = 0.5
@@ -38,7 +38,7 @@ class Quantisation(Chain):
     cure = "Choose a smaller range, or an output with more digits."
     source = "Widrow and Kollar, Quantization Noise"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """The step of each triad, where it is coarse against the noise."""
         out = []
         for part, channels in (("acc", (0, 1, 2)), ("gyr", (3, 4, 5))):
@@ -59,7 +59,7 @@ class Quantisation(Chain):
                 )
         return out
 
-    def _step(self, recording: Recording, c: int) -> float:
+    def _step(self, recording: CheckedSamples, c: int) -> float:
         lsb = recording.steps[c]
         own = rounding.before(recording.noise[c], lsb)
         return float(lsb) if lsb > 2 * MATTERS * own else 0.0

@@ -18,7 +18,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
-from fieldcal.physics.recording import Fault, Recording, Rows
+from fieldcal.physics.recording import CheckedSamples, Fault, Rows
 
 FEWEST = 5
 """Samples at the rail from which it counts."""
@@ -67,7 +67,7 @@ class Saturation(Chain):
     cure = "Choose a larger range, or positions that load the axis less."
     source = "model of this project"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """Channels with samples at a rail, which the axes of a triad share."""
         out = []
         for first in (0, 3):
@@ -88,11 +88,11 @@ class Saturation(Chain):
         return out
 
 
-def _size(recording: Recording, c: int, rows: Rows) -> float:
+def _size(recording: CheckedSamples, c: int, rows: Rows) -> float:
     return float(np.abs(recording.channel(c)[rows]).max())
 
 
-def _fault(recording: Recording, c: int, rows: Rows) -> Fault:
+def _fault(recording: CheckedSamples, c: int, rows: Rows) -> Fault:
     limit, t = _size(recording, c, rows), recording.block.t
     return Fault(
         channel=CHANNELS[c],

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
-from fieldcal.physics.recording import Fault, Recording, runs
+from fieldcal.physics.recording import CheckedSamples, Fault, runs
 from fieldcal.physics.shape import Shape
 
 ODDS = 1e-6
@@ -68,7 +68,7 @@ class Stuck(Chain):
     cure = "Restart the device; if it comes back, the sensor is defective."
     source = "model of this project"
 
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """Runs of equal values in each channel."""
         t, out = recording.block.t, []
         step = float(np.median(np.diff(t)))
@@ -100,7 +100,7 @@ class Stuck(Chain):
         return out
 
 
-def _usual(recording: Recording, c: int, first: int, last: int) -> bool:
+def _usual(recording: CheckedSamples, c: int, first: int, last: int) -> bool:
     """Whether a run is no wonder where steps are as coarse as the noise.
 
     In a window whose mean is amid a step it is none; nor is it between windows as long

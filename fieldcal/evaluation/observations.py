@@ -20,7 +20,7 @@ from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve.observations import Observations
-from fieldcal.windows import Average, Noise
+from fieldcal.windows import Average, LearnedNoise
 
 
 def observations(
@@ -122,7 +122,7 @@ def rests(session: Session) -> Rests:
     block = session.block
     taken: dict[int, Average] = {}
     warnings = list(session.warnings)
-    noise: Noise | None = None
+    noise: LearnedNoise | None = None
     grain = grain_of(session)
     # each tells the noise for the next
     held = session.about.in_time()

@@ -16,7 +16,7 @@ from fieldcal.core.positions import rates
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.model.turntable import going_round
 from fieldcal.session.description import Description
-from fieldcal.windows import Average, Noise, Window, average
+from fieldcal.windows import Average, LearnedNoise, Window, average
 
 SHORTEST = 5.0
 """Shortest calm part of a disturbed window that is worth using, s."""
@@ -25,9 +25,9 @@ SHORTEST = 5.0
 def take(
     block: Block,
     span: tuple[float, float] | None,
-    noise: Noise | None,
+    noise: LearnedNoise | None,
     grain: Grain,
-) -> tuple[Average, Noise | None, str]:
+) -> tuple[Average, LearnedNoise | None, str]:
     """Average of a window, what it taught about the noise, and what must be said.
 
     Parameters
@@ -113,7 +113,7 @@ def take_on_a_table(
 
 
 def _calm(
-    block: Block, moved: Moved, noise: Noise | None, grain: Grain
+    block: Block, moved: Moved, noise: LearnedNoise | None, grain: Grain
 ) -> Average | None:
     """Average of the longest calm part, None if there is none worth it."""
     sides = [

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class ExportSource:
     """What is exported.
 
     Attributes
@@ -82,7 +82,7 @@ class Exporter(Protocol):
 
     WHAT: str
     ENDING: str
-    write: Callable[[Source, Path], list[str]]
+    write: Callable[[ExportSource, Path], list[str]]
 
 
 def formats() -> list[str]:

@@ -25,7 +25,7 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import Diagonal, diagonal
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, identity, names
-from fieldcal.exporters import Source
+from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_whole
 
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
@@ -35,7 +35,7 @@ WIDEST_OFFSET, WIDEST_SCALE = 3.5, 0.2
 """Largest offset, m/s^2, and difference of a scale from 1 that ArduPilot takes."""
 
 
-class Parameters(NamedTuple):
+class ArdupilotParameters(NamedTuple):
     """Parameters to install, and what the user must know of them.
 
     Attributes
@@ -54,7 +54,7 @@ def parameters(
     nominal: Nominal | None = None,
     installed: Installed | None = None,
     instance: int = 0,
-) -> Parameters:
+) -> ArdupilotParameters:
     """Return the parameters that take this calibration out of what the sensor sends.
 
     Parameters
@@ -81,7 +81,7 @@ def parameters(
         )
         or ("SCAL" in name and abs(value - 1) > WIDEST_SCALE)
     ]
-    return Parameters(found.values, (*found.says, *wide))
+    return ArdupilotParameters(found.values, (*found.says, *wide))
 
 
 def converted(
@@ -90,7 +90,7 @@ def converted(
     nominal: Nominal | None,
     installed: Installed | None,
     instance: int,
-) -> Parameters:
+) -> ArdupilotParameters:
     """Return offsets and scales of any autopilot that corrects by (1) and (2)."""
     if installed is not None and installed.autopilot != autopilot:
         raise InputError(
@@ -110,7 +110,7 @@ def converted(
     if not kept:
         raise InputError("the calibration has neither biases nor scales to install")
     says = _left_out(calibration, acc, gyr)
-    return Parameters({name: every[name] for name in kept}, tuple(says))
+    return ArdupilotParameters({name: every[name] for name in kept}, tuple(says))
 
 
 def _without(autopilot: int, instance: int) -> Installed:
@@ -149,7 +149,7 @@ def _left_out(calibration: Calibration, acc: Diagonal, gyr: Diagonal) -> list[st
     return says
 
 
-def write(source: Source, path: Path) -> list[str]:
+def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
     found = parameters(
         source.calibration, source.nominal, source.installed, source.instance

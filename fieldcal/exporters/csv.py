@@ -12,14 +12,14 @@ import io
 from pathlib import Path
 
 from fieldcal.calibration.gauge import outward
-from fieldcal.exporters import Source
+from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_whole
 
 WHAT = "table of the parameters with their sigma and unit"
 ENDING = "_calibration.csv"
 
 
-def write(source: Source, path: Path) -> list[str]:
+def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")

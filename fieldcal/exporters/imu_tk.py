@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.exporters import Source
+from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_whole
 
 WHAT = "matrices of imu_tk (T, K, bias)"
@@ -34,7 +34,7 @@ def matrices(bias: Array, matrix: Array) -> tuple[Array, Array, Array]:
     return inverse @ np.linalg.inv(scale), scale, bias  # (2)
 
 
-def write(source: Source, path: Path) -> list[str]:
+def write(source: ExportSource, path: Path) -> list[str]:
     """Write both files; what the user must know."""
     name = path.name.replace("_acc", "_gyro")
     if name == path.name:

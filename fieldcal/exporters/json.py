@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.exporters import Source
+from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_whole
 
 WHAT = "one JSON object, with a JSON Schema"
@@ -24,7 +24,7 @@ ENDING = "_calibration.json"
 UNITS = {"acc": "m/s^2", "gyr": "rad/s"}
 
 
-def document(source: Source) -> dict[str, Any]:
+def document(source: ExportSource) -> dict[str, Any]:
     """Return the object."""
     found = source.calibration
     triads = {
@@ -53,7 +53,7 @@ def document(source: Source) -> dict[str, Any]:
     }
 
 
-def _triad(source: Source, sensor: str) -> dict[str, Any]:
+def _triad(source: ExportSource, sensor: str) -> dict[str, Any]:
     bias, matrix = source.linear(sensor)
     return {
         "bias": bias.tolist(),
@@ -62,7 +62,7 @@ def _triad(source: Source, sensor: str) -> dict[str, Any]:
     }
 
 
-def write(source: Source, path: Path) -> list[str]:
+def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
     text = json.dumps(document(source), indent=2, allow_nan=False)
     write_whole(path, text + "\n")

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.exporters import Source
+from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import Session, write_whole
 
 WHAT = "Kalibr's imu.yaml (noise, M, C, bias)"
@@ -66,7 +66,7 @@ def _means(block: Block) -> Array:
     return np.array([part.mean(axis=0) for part in whole]).reshape(-1, 6)
 
 
-def write(source: Source, path: Path) -> list[str]:
+def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
     noise = density(source.session)
     says = list(source.says)

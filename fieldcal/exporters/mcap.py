@@ -17,7 +17,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError, disk_says
 from fieldcal.core.samples import Block
-from fieldcal.exporters import Source
+from fieldcal.exporters import ExportSource
 
 WHAT = "MCAP, raw and calibrated samples, for Foxglove and PlotJuggler"
 ENDING = ".mcap"
@@ -52,7 +52,7 @@ def _definition(text: str, parts: dict[str, str]) -> str:
     return text + "".join(f"{rule}MSG: {n}\n{body}" for n, body in parts.items())
 
 
-def write(source: Source, path: Path) -> list[str]:
+def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know.
 
     Raises

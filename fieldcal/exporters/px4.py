@@ -19,8 +19,8 @@ from pathlib import Path
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.drivers.mavlink_installed import PX4, Installed
-from fieldcal.exporters import Source
-from fieldcal.exporters.ardupilot import Parameters, converted
+from fieldcal.exporters import ExportSource
+from fieldcal.exporters.ardupilot import ArdupilotParameters, converted
 from fieldcal.session.folder import write_whole
 
 WHAT = "PX4 parameters (CAL_ACC, CAL_GYRO), for QGroundControl"
@@ -35,7 +35,7 @@ def parameters(
     nominal: Nominal | None = None,
     installed: Installed | None = None,
     instance: int = 0,
-) -> Parameters:
+) -> ArdupilotParameters:
     """Return the parameters that take this calibration out of what the sensor sends.
 
     Arguments and errors as of `ardupilot.parameters`.
@@ -43,7 +43,7 @@ def parameters(
     return converted(PX4, calibration, nominal, installed, instance)
 
 
-def write(source: Source, path: Path) -> list[str]:
+def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
     found = parameters(
         source.calibration, source.nominal, source.installed, source.instance

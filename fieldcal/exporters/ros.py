@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.exporters import Source
+from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_whole
 
 WHAT = "yaml of ROS imu_calib (SM, bias)"
@@ -31,7 +31,7 @@ def matrices(bias: Array, matrix: Array) -> tuple[Array, Array]:
     return inverse, inverse @ bias  # (2)
 
 
-def write(source: Source, path: Path) -> list[str]:
+def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
     lines = ["# fieldcal: true = SM raw - bias (raw -> true), m/s^2 and rad/s"]
     for sensor, prefix in (("acc", ""), ("gyr", "gyro_")):

@@ -53,7 +53,7 @@ CREATE TABLE parameter (
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class HistoryRun:
     """One calibration.
 
     Attributes
@@ -92,7 +92,7 @@ def default_path() -> Path:
     return Path(data) / "fieldcal" / "history.sqlite"
 
 
-def family(runs: Sequence[Run]) -> tuple[Run, ...]:
+def family(runs: Sequence[HistoryRun]) -> tuple[HistoryRun, ...]:
     """The runs that a next one is compared with, in order."""
     begins = max((i for i, run in enumerate(runs) if run.accepted), default=0)
     return tuple(run for run in runs[begins:] if run.go or run.accepted)
@@ -160,7 +160,7 @@ class History:
             ).fetchall()
         return [(str(s), int(n), str(last)) for s, n, last in rows]
 
-    def runs(self, serial: str) -> tuple[Run, ...]:
+    def runs(self, serial: str) -> tuple[HistoryRun, ...]:
         """All calibrations of a device, oldest first.
 
         Raises
@@ -198,7 +198,7 @@ class History:
                     f" history {serial}"
                 )
 
-    def _run(self, row: tuple[Any, ...]) -> Run:
+    def _run(self, row: tuple[Any, ...]) -> HistoryRun:
         try:
             found = Calibration.from_json(json.loads(row[-1]))
         except (ValueError, InputError) as error:
@@ -208,7 +208,7 @@ class History:
             ) from error
         number, serial, at, session, go, accepted, *place, software = row[:10]
         temperature, latitude, height = place
-        return Run(
+        return HistoryRun(
             number,
             serial,
             at,

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.calibration.limits import Limits
+from fieldcal.calibration.limits import GradeLimits
 from fieldcal.history.family import expected
-from fieldcal.history.store import Run, family
+from fieldcal.history.store import HistoryRun, family
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Point:
 
     """
 
-    run: Run
+    run: HistoryRun
     value: float
     sigma: float
     unit: str
@@ -54,12 +54,12 @@ class Point:
         }
 
 
-def names(runs: Sequence[Run]) -> tuple[str, ...]:
+def names(runs: Sequence[HistoryRun]) -> tuple[str, ...]:
     """Parameters that any run has, in order."""
     return tuple(dict.fromkeys(n for run in runs for n in run.calibration.names))
 
 
-def trend(runs: Sequence[Run], name: str, limits: Limits) -> list[Point]:
+def trend(runs: Sequence[HistoryRun], name: str, limits: GradeLimits) -> list[Point]:
     """Values of one parameter, oldest first.
 
     Parameters
@@ -93,7 +93,7 @@ def trend(runs: Sequence[Run], name: str, limits: Limits) -> list[Point]:
     return points
 
 
-def _values(runs: Sequence[Run], name: str) -> np.ndarray[Any, Any]:
+def _values(runs: Sequence[HistoryRun], name: str) -> np.ndarray[Any, Any]:
     rows = [
         (run.calibration.value(name), run.calibration.uncertainty(name))
         for run in runs

@@ -15,7 +15,7 @@ from pkgutil import iter_modules
 
 from fieldcal.core.errors import InputError
 from fieldcal.importing.gzip_stream import head
-from fieldcal.importing.recording import Recording, Wanted
+from fieldcal.importing.recording import ReadOptions, Recording
 
 LAST = ("csv_like", "wire")
 """Formats without a mark of their own, tried last, in this order."""
@@ -29,7 +29,7 @@ def formats() -> tuple[str, ...]:
 
 
 def open_recording(
-    path: Path, wanted: Wanted, name: str = "", repair: bool = False
+    path: Path, wanted: ReadOptions, name: str = "", repair: bool = False
 ) -> Recording:
     """Open a file by its content.
 

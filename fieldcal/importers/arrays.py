@@ -19,7 +19,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns, headings
 from fieldcal.importing.gzip_stream import head, on_disk
-from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.recording import ImuStream, Recording
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
 
@@ -45,7 +45,7 @@ def _is_hdf5(head: bytes) -> bool:
     return head.startswith(HDF5) or head[512:520] == HDF5
 
 
-class Table(NamedTuple):
+class ArrayTable(NamedTuple):
     """An array of one or two dimensions.
 
     Attributes
@@ -64,7 +64,7 @@ class Table(NamedTuple):
 class File(Recording):
     """Arrays with names, with one IMU in them."""
 
-    _loaded: dict[str, Table] | None = None
+    _loaded: dict[str, ArrayTable] | None = None
     """Of a format whose reader gives all arrays at once, so that it does so once."""
     _units: dict[str, str] | None = None
     """Of the arrays of an HDF5 file, so that it is looked through once."""
@@ -73,12 +73,12 @@ class File(Recording):
         """h5py, where it is HDF5."""
         return (("h5py",) if _is_hdf5(head(self.path)) else ()), "hdf5"
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
         with self._opened() as tables:
             named = self._named(tables)
         columns.check(replace(self.wanted, columns=tuple(named)))
-        return [Stream("0", f"columns in {columns.units(self.wanted)}")]
+        return [ImuStream("0", f"columns in {columns.units(self.wanted)}")]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return the units."""
@@ -88,7 +88,7 @@ class File(Recording):
         """Samples, some rows at a time."""
         with self._opened() as tables:
             named = self._named(tables)
-            samples = columns.Samples(replace(self.wanted, columns=tuple(named)))
+            samples = columns.ColumnReader(replace(self.wanted, columns=tuple(named)))
             (rows,) = {tables[name].shape[0] for name, _ in named.values()}
             if not rows:
                 raise InputError(f"{self.path}: its arrays are empty")
@@ -109,7 +109,7 @@ class File(Recording):
                     ) from error
                 yield samples.block(got, some.stop - first)
 
-    def _named(self, tables: Mapping[str, Table]) -> dict[str, tuple[str, int]]:
+    def _named(self, tables: Mapping[str, ArrayTable]) -> dict[str, tuple[str, int]]:
         """Array and its column, by column of a session."""
         if not self.wanted.columns:
             self.wanted, says = headings.settle(
@@ -144,7 +144,7 @@ class File(Recording):
         return named
 
     def _of_one(
-        self, tables: Mapping[str, Table], given: tuple[str, ...]
+        self, tables: Mapping[str, ArrayTable], given: tuple[str, ...]
     ) -> dict[str, tuple[str, int]]:
         fitting = [n for n, table in tables.items() if table.shape[1] == len(given)]
         if len(fitting) != 1:
@@ -156,7 +156,7 @@ class File(Recording):
         return {c: place for c, place in pairs.items() if c != columns.SKIP}
 
     @contextmanager
-    def _opened(self) -> Iterator[dict[str, Table]]:
+    def _opened(self) -> Iterator[dict[str, ArrayTable]]:
         """Every array of numbers in the file."""
         if self._loaded is not None:
             yield self._loaded
@@ -181,7 +181,7 @@ class File(Recording):
                 ) from error
             yield tables
 
-    def _hdf5(self, path: Path, stack: ExitStack) -> dict[str, Table]:
+    def _hdf5(self, path: Path, stack: ExitStack) -> dict[str, ArrayTable]:
         import h5py
 
         file = stack.enter_context(h5py.File(path, "r"))
@@ -190,7 +190,7 @@ class File(Recording):
         return {name: _table(file[name], unit) for name, unit in self._units.items()}
 
 
-def _columns(tables: Mapping[str, Table]) -> list[headings.Column]:
+def _columns(tables: Mapping[str, ArrayTable]) -> list[headings.Column]:
     """Columns of the arrays; those of a table of three are axes."""
     found = []
     for name, table in tables.items():
@@ -205,7 +205,7 @@ def _columns(tables: Mapping[str, Table]) -> list[headings.Column]:
     return found
 
 
-def _listed(tables: Mapping[str, Table]) -> str:
+def _listed(tables: Mapping[str, ArrayTable]) -> str:
     shapes = [f"{n} {t.shape[0]}x{t.shape[1]}" for n, t in list(tables.items())[:20]]
     return ", ".join(shapes) or "no arrays of numbers"
 
@@ -226,13 +226,13 @@ def _units(file: Any) -> dict[str, str]:
     return found
 
 
-def _matlab(path: Path) -> dict[str, Table]:
+def _matlab(path: Path) -> dict[str, ArrayTable]:
     from scipy.io import loadmat
 
     return _of_arrays(loadmat(path))
 
 
-def _numpy(path: Path) -> dict[str, Table]:
+def _numpy(path: Path) -> dict[str, ArrayTable]:
     loaded = np.load(path, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
         return _of_arrays({"array": loaded})
@@ -240,7 +240,7 @@ def _numpy(path: Path) -> dict[str, Table]:
         return _of_arrays({name: loaded[name] for name in loaded.files})
 
 
-def _of_arrays(arrays: Mapping[str, Any]) -> dict[str, Table]:
+def _of_arrays(arrays: Mapping[str, Any]) -> dict[str, ArrayTable]:
     return {
         name: _table(array)
         for name, array in arrays.items()
@@ -250,10 +250,10 @@ def _of_arrays(arrays: Mapping[str, Any]) -> dict[str, Table]:
     }
 
 
-def _table(array: Any, unit: str = "") -> Table:
+def _table(array: Any, unit: str = "") -> ArrayTable:
     """Rows and columns of an array of one or two dimensions, in memory or in a file."""
     if array.ndim == 1:
-        return Table((len(array), 1), lambda rows, _: [_floats(array[rows])], unit)
+        return ArrayTable((len(array), 1), lambda rows, _: [_floats(array[rows])], unit)
     long, wide = max(array.shape), min(array.shape)
     lies = array.shape[0] < long
 
@@ -263,7 +263,7 @@ def _table(array: Any, unit: str = "") -> Table:
         slab = array[:, rows] if lies else array[rows].T
         return [_floats(slab[i]) for i in some]
 
-    return Table((long, wide), read, unit)
+    return ArrayTable((long, wide), read, unit)
 
 
 def _floats(values: Any) -> Array:

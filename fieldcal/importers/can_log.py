@@ -18,7 +18,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.options import Options
 from fieldcal.importing.gzip_stream import head, unpacked
-from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.recording import ImuStream, Recording
 
 if TYPE_CHECKING:
     from fieldcal.drivers.can_buses import Buses
@@ -30,7 +30,7 @@ PIECE = 8192
 """Frames looked at together."""
 
 
-class Kind(NamedTuple):
+class CanLogKind(NamedTuple):
     """A kind of log: how it begins, and what python-can calls its reader."""
 
     name: str
@@ -39,12 +39,17 @@ class Kind(NamedTuple):
 
 
 KINDS = (
-    Kind("candump", re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#"),
-         "CanutilsLogReader"),
-    Kind("asc", re.compile(rb"\s*(date |base (hex|dec))", re.IGNORECASE), "ASCReader"),
-    Kind("blf", re.compile(rb"LOGG"), "BLFReader"),
-    Kind("trc", re.compile(rb"\s*;(\$FILEVERSION|#+)"), "TRCReader"),
-)  # fmt: skip
+    CanLogKind(
+        "candump",
+        re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#"),
+        "CanutilsLogReader",
+    ),
+    CanLogKind(
+        "asc", re.compile(rb"\s*(date |base (hex|dec))", re.IGNORECASE), "ASCReader"
+    ),
+    CanLogKind("blf", re.compile(rb"LOGG"), "BLFReader"),
+    CanLogKind("trc", re.compile(rb"\s*;(\$FILEVERSION|#+)"), "TRCReader"),
+)
 
 PRINTED = re.compile(rb"\s*(\([\d. :-]+\))?\s*\w+\s+[0-9A-Fa-f]+\s+\[\d+\]\s")
 """A line as candump shows it on a terminal."""
@@ -62,7 +67,7 @@ class File(Recording):
         """Return what reading it takes."""
         return ("can", "cantools"), "can"
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Return the one IMU that the map describes."""
         if PRINTED.match(head(self.path)):
             raise InputError(
@@ -70,7 +75,7 @@ class File(Recording):
             )
         options = Options("options", self.wanted.options)
         names = [part.name for part in self._parts(options)]
-        return [Stream("0", f"frames {', '.join(names)}, units of the dbc")]
+        return [ImuStream("0", f"frames {', '.join(names)}, units of the dbc")]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return how the frames were read."""

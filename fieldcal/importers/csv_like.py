@@ -22,7 +22,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns, headings
 from fieldcal.importing.gzip_stream import HEAD
-from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.session.arrow_stream import numbers
 
 WHAT = "text with columns"
@@ -67,11 +67,11 @@ class File(Recording):
 
     _skip = 0
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
         self._settle()
         columns.check(self.wanted)
-        return [Stream("0", f"columns in {columns.units(self.wanted)}")]
+        return [ImuStream("0", f"columns in {columns.units(self.wanted)}")]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return the units."""
@@ -96,7 +96,7 @@ class File(Recording):
         )
         self.says.append(says)
 
-    def _names(self, line: str) -> headings.Found | None:
+    def _names(self, line: str) -> headings.HeadingMatch | None:
         cells = line.lstrip("#% ").split(self._parted(line))
         return headings.read([headings.Column("", c) for c in cells], columns.SKIP)
 
@@ -106,7 +106,7 @@ class File(Recording):
         columns.check(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != columns.SKIP]
-        samples, separator, seen = columns.Samples(self.wanted), None, 0
+        samples, separator, seen = columns.ColumnReader(self.wanted), None, 0
         begun, t0, top = False, None, [""]
         for data in self._pieces():
             if not begun:

@@ -26,10 +26,10 @@ from fieldcal.importing.dataflash_messages import (
     HEAD,
     INSTANCES,
     MARK,
-    Messages,
+    DataflashMessages,
 )
 from fieldcal.importing.fifo_time import Batch, Batches
-from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.recording import ImuStream, Recording
 
 WHAT = "ArduPilot dataflash log, .bin"
 
@@ -49,7 +49,7 @@ class File(Recording):
         """Return what reading it takes."""
         return ("pymavlink",), "mavlink"
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Sensors that have samples in the log."""
         self._scan()
         if not self._sensors and not self._sampled:
@@ -58,9 +58,9 @@ class File(Recording):
                 " LOG_BITMASK to log the IMU, and record again"
             )
         says = "m/s^2, rad/s, calibrated, body's frame"
-        found = [Stream(f"IMU.{n}", says) for n in sorted(self._sensors)]
+        found = [ImuStream(f"IMU.{n}", says) for n in sorted(self._sensors)]
         says = f"m/s^2, rad/s, batches, {self._state()}"
-        return found + [Stream(f"{BODY}.{n}", says) for n in sorted(self._sampled)]
+        return found + [ImuStream(f"{BODY}.{n}", says) for n in sorted(self._sampled)]
 
     def _state(self) -> str:
         """What was done to the samples of batches before they were written."""
@@ -151,7 +151,7 @@ class File(Recording):
         """Walk through the log once: which sensors it has, and the parameters."""
         if self._scanned:
             return
-        self._log = Messages(self.damaged, self.pieces)
+        self._log = DataflashMessages(self.damaged, self.pieces)
         self._sensors: set[int] = set()
         self._sampled: dict[int, tuple[float, float]] = {}
         self._params: dict[str, float] = {}

@@ -19,7 +19,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importing.gzip_stream import head, on_disk
 from fieldcal.importing.mcap_messages import Decoders, messages
-from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.recording import ImuStream, Recording
 
 WHAT = "MCAP with sensor_msgs/Imu"
 
@@ -47,12 +47,12 @@ class File(Recording):
         """Return what reading it takes."""
         return ("mcap", "mcap_ros2"), "mcap"
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Topics with samples."""
         found = [topic for topic, kind in self._topics().items() if kind == IMU]
         if not found:
             raise InputError(f"{self.path}: has no topic of {IMU}")
-        return [Stream(topic, "m/s^2, rad/s") for topic in sorted(found)]
+        return [ImuStream(topic, "m/s^2, rad/s") for topic in sorted(found)]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return topic and units."""

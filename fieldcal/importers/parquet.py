@@ -12,7 +12,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns, headings
 from fieldcal.importing.gzip_stream import on_disk
-from fieldcal.importing.recording import ROWS, Recording, Stream
+from fieldcal.importing.recording import ROWS, ImuStream, Recording
 from fieldcal.session.arrow_stream import numbers
 
 WHAT = "Parquet and Arrow"
@@ -28,11 +28,11 @@ def recognises(head: bytes, path: Path) -> bool:
 class File(Recording):
     """A table with named columns, with one IMU in it."""
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
         with self._batches() as (schema, _):
             self._named(schema)
-        return [Stream("0", f"columns in {columns.units(self.wanted)}")]
+        return [ImuStream("0", f"columns in {columns.units(self.wanted)}")]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return the units."""
@@ -40,7 +40,7 @@ class File(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, a batch at a time."""
-        samples = columns.Samples(self.wanted)
+        samples = columns.ColumnReader(self.wanted)
         with self._batches() as (schema, batches):
             named = self._named(schema)
             for batch in batches:

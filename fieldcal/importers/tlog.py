@@ -22,7 +22,7 @@ from fieldcal.drivers.mavlink_installed import Installed, names
 from fieldcal.drivers.mavlink_log import STAMP, cut, split
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
-from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.recording import ImuStream, Recording
 
 if TYPE_CHECKING:
     from fieldcal.drivers.mavlink_samples import Decoder
@@ -57,7 +57,7 @@ class File(Recording):
         """Return what reading it takes."""
         return ("pymavlink", "fastcrc"), "mavlink"
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Messages of sensors that are in the log."""
         self._scan()
         if not self._found:
@@ -66,7 +66,7 @@ class File(Recording):
                 " or RAW_IMU, and record again"
             )
         says = "calibrated, body's frame; unit told by gravity"
-        return [Stream(name, says) for name in sorted(self._found)]
+        return [ImuStream(name, says) for name in sorted(self._found)]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return unit, rounding, and what the autopilot had installed."""

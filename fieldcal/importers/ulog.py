@@ -27,8 +27,8 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.drivers.mavlink_installed import PX4, Installed, names
 from fieldcal.importing.alignment import Pair
 from fieldcal.importing.fifo_time import Fifo
-from fieldcal.importing.recording import Recording, Stream
-from fieldcal.importing.ulog_messages import Messages, Table
+from fieldcal.importing.recording import ImuStream, Recording
+from fieldcal.importing.ulog_messages import Table, UlogMessages
 
 WHAT = "PX4 log, .ulg"
 
@@ -65,7 +65,7 @@ class File(Recording):
         """Return what reading it takes."""
         return ("pyulog",), "ulog"
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Sensors that have samples in the log."""
         there = self._log.topics
         some = [(t, n) for t, n in sorted(there) if t in SAYS and t != INTEGRALS]
@@ -75,7 +75,7 @@ class File(Recording):
                 f"{self.path}: has none of {', '.join(SAYS)}; log them"
                 " (SDLOG_PROFILE), and record again"
             )
-        return [Stream(f"{topic}.{n}", self._what(topic)) for topic, n in found]
+        return [ImuStream(f"{topic}.{n}", self._what(topic)) for topic, n in found]
 
     def _what(self, topic: str) -> str:
         if topic == "sensor_accel" and not self._raw(topic):
@@ -197,13 +197,13 @@ class File(Recording):
                 " again from where it came"
             ) from error
 
-    _read: Messages | None = None
+    _read: UlogMessages | None = None
 
     @property
-    def _log(self) -> Messages:
+    def _log(self) -> UlogMessages:
         """The log, walked through once."""
         if self._read is None:
-            self._read = Messages(self.path, self.damaged, self.pieces)
+            self._read = UlogMessages(self.path, self.damaged, self.pieces)
             if self._read.cut is not None:
                 self.says.append(
                     f"the log ends within a message, at byte {self._read.cut}"

@@ -14,7 +14,7 @@ from fieldcal.core.errors import FieldcalError, InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.codec import Codec, open_codec, recognise
 from fieldcal.drivers.options import Options
-from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.recording import ImuStream, Recording
 
 WHAT = "bytes of a serial port"
 
@@ -36,10 +36,10 @@ class File(Recording):
     _codec: Codec | None = None
     _name = ""
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
         self._opened()
-        return [Stream("0", f"{self._name}, units of its format")]
+        return [ImuStream("0", f"{self._name}, units of its format")]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return the format."""

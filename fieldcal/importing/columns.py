@@ -8,14 +8,14 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.recording import Wanted
+from fieldcal.importing.recording import ReadOptions
 from fieldcal.session.sample_files import COLUMNS
 
 SKIP = "_"
 """Stands for a column that is not wanted."""
 
 
-def check(wanted: Wanted) -> None:
+def check(wanted: ReadOptions) -> None:
     """Refuse columns that cannot give samples.
 
     Raises
@@ -40,7 +40,7 @@ def check(wanted: Wanted) -> None:
     _ = wanted.acc_scale, wanted.gyr_scale, wanted.time_scale
 
 
-class Samples:
+class ColumnReader:
     """Makes samples of columns, piece by piece.
 
     Parameters
@@ -49,7 +49,7 @@ class Samples:
 
     """
 
-    def __init__(self, wanted: Wanted) -> None:
+    def __init__(self, wanted: ReadOptions) -> None:
         self._wanted = wanted
         self._seen = 0
 
@@ -82,7 +82,7 @@ class Samples:
         )
 
 
-def units(wanted: Wanted) -> str:
+def units(wanted: ReadOptions) -> str:
     """Name the units of the columns that are wanted."""
     known = {c.partition("=")[0] for c in wanted.columns}
     says = []
@@ -95,7 +95,7 @@ def units(wanted: Wanted) -> str:
     return ", ".join(says) or "deg C"
 
 
-def notes(wanted: Wanted) -> dict[str, object]:
+def notes(wanted: ReadOptions) -> dict[str, object]:
     """What a session keeps of the units."""
     return {
         "acc_unit": wanted.acc_unit or "m/s^2",

@@ -51,7 +51,7 @@ class Format(NamedTuple):
 Tables = dict[str, NDArray[np.void]]
 
 
-class Messages:
+class DataflashMessages:
     """A log that is walked through from its beginning, as often as is wanted.
 
     Parameters

@@ -16,7 +16,7 @@ from shlex import quote
 from typing import NamedTuple
 
 from fieldcal.core.errors import InputError
-from fieldcal.importing.recording import Wanted
+from fieldcal.importing.recording import ReadOptions
 
 _ACC = r"a|f|acc|accel|accelerometer|acceleration"
 _GYR = r"g|w|gyr|gyro|gyroscope|omega|angular[_ ]?(?:velocity|rate)"
@@ -78,7 +78,7 @@ class Column(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class HeadingMatch:
     """What the names of some columns say.
 
     Attributes
@@ -91,7 +91,7 @@ class Found:
     columns: tuple[str, ...]
     units: Mapping[str, str | None]
 
-    def taken(self, wanted: Wanted) -> Wanted | None:
+    def taken(self, wanted: ReadOptions) -> ReadOptions | None:
         """Return what the user says, with what the names say; None if units lack."""
         given = {"a": wanted.acc_unit, "g": wanted.gyr_unit, "t": wanted.time_unit}
         units = {k: given.get(k) or unit for k, unit in self.units.items()}
@@ -105,7 +105,7 @@ class Found:
             time_unit=units.get("t") or "",
         )
 
-    def offer(self, wanted: Wanted) -> str:
+    def offer(self, wanted: ReadOptions) -> str:
         """Write the options that the user may give."""
         text = f"--columns {quote(','.join(self.columns))}"
         if "t" not in self.units and not wanted.rate_hz:
@@ -121,7 +121,7 @@ class Found:
         return text
 
 
-def read(columns: Sequence[Column], skip: str = "") -> Found | None:
+def read(columns: Sequence[Column], skip: str = "") -> HeadingMatch | None:
     """Understand the names of columns; None if they are not those of one IMU.
 
     Parameters
@@ -148,7 +148,7 @@ def read(columns: Sequence[Column], skip: str = "") -> Found | None:
     some = [triad for triad in axes if triad & set(named)]
     if len(set(named)) < len(named) or not whole or whole != some:
         return None
-    return Found(tuple(found), units)
+    return HeadingMatch(tuple(found), units)
 
 
 def _channel(column: Column) -> tuple[str, str, str | None]:
@@ -173,8 +173,8 @@ def _channel(column: Column) -> tuple[str, str, str | None]:
 
 
 def settle(
-    path: object, wanted: Wanted, found: Found | None, else_say: str
-) -> tuple[Wanted, str]:
+    path: object, wanted: ReadOptions, found: HeadingMatch | None, else_say: str
+) -> tuple[ReadOptions, str]:
     """Take what the names say, and put it into words; or say what to write.
 
     Raises

@@ -28,7 +28,7 @@ LONG = 5.0
 
 
 @dataclass(slots=True)
-class Facts:
+class StreamFacts:
     """What was found in a stream.
 
     Attributes
@@ -111,7 +111,7 @@ class Brought:
     """
 
     folder: Path
-    facts: Facts
+    facts: StreamFacts
     stretches: list[tuple[float, float]]
     says: list[str]
 
@@ -177,11 +177,11 @@ def _fill(
     stream: str,
     about: Mapping[str, Any],
     still: float,
-) -> tuple[Facts, list[tuple[float, float]], list[str]]:
+) -> tuple[StreamFacts, list[tuple[float, float]], list[str]]:
     import tomlkit
 
     judge = Judge(str(recording.path), recording.place, recording.repair)
-    facts, cells = Facts(), Cells()
+    facts, cells = StreamFacts(), Cells()
     with Written(part / "samples.parquet") as written, Spilled(part) as rows:
         for block in recording.blocks(stream):
             good = judge.good(block)
@@ -205,7 +205,9 @@ def _fill(
     return facts, stretches, [*repairs, *recording.says]
 
 
-def _marks(recording: Recording, stream: str, facts: Facts, repairs: list[str]) -> str:
+def _marks(
+    recording: Recording, stream: str, facts: StreamFacts, repairs: list[str]
+) -> str:
     """What is kept of where the samples come from."""
     parts = recording.parts if isinstance(recording, Joined) else [recording]
     now = round(time(), 3)

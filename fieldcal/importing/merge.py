@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.recording import Recording, Stream
+from fieldcal.importing.recording import ImuStream, Recording
 
 
 class Joined(Recording):
@@ -27,7 +27,7 @@ class Joined(Recording):
         first = parts[0]
         super().__init__(first.path, first.wanted, first.repair)
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
         found = []
         for part in self.parts:
@@ -35,7 +35,7 @@ class Joined(Recording):
             if len(streams) > 1:
                 raise InputError(f"{part.path}: holds several IMUs; import it alone")
             found += streams
-        return [Stream(found[0].name, "; ".join(s.says for s in found))]
+        return [ImuStream(found[0].name, "; ".join(s.says for s in found))]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return what each file says, by its name."""

@@ -28,7 +28,7 @@ TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ReadOptions:
     """What the user says of a file that does not say it itself.
 
     Attributes
@@ -76,7 +76,7 @@ def _unit(unit: str, known: dict[str, float]) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Stream:
+class ImuStream:
     """One IMU of a recording.
 
     Attributes
@@ -103,7 +103,7 @@ class Recording(ABC):
 
     ends_early = False
 
-    def __init__(self, path: Path, wanted: Wanted, repair: bool = False) -> None:
+    def __init__(self, path: Path, wanted: ReadOptions, repair: bool = False) -> None:
         self.path, self.wanted, self.repair = path, wanted, repair
         modules, extra = self.needs()
         if missing := [m for m in modules if find_spec(m) is None]:
@@ -120,7 +120,7 @@ class Recording(ABC):
         return (), ""
 
     @abstractmethod
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[ImuStream]:
         """The IMUs in it."""
 
     @abstractmethod

@@ -49,7 +49,7 @@ Table = dict[str, Array]
 Topic = tuple[str, int]
 
 
-class Messages:
+class UlogMessages:
     """A log, walked through once when it is opened.
 
     Parameters

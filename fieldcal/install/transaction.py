@@ -15,7 +15,7 @@ from typing import Any
 
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.mavlink_installed import Installed, identity
-from fieldcal.drivers.mavlink_parameters import Parameters, same
+from fieldcal.drivers.mavlink_parameters import ParameterLink, same
 from fieldcal.drivers.mavlink_talk import listed
 from fieldcal.session.folder import DESCRIPTION, Session, write_whole
 
@@ -28,7 +28,7 @@ class Undone(DeviceError):
 
 
 def check_unchanged(
-    link: Parameters,
+    link: ParameterLink,
     known: Mapping[str, float],
     since: str,
     other: Mapping[str, float] | None = None,
@@ -59,7 +59,7 @@ def check_unchanged(
 
 
 def install(
-    link: Parameters, old: Mapping[str, float], new: Mapping[str, float]
+    link: ParameterLink, old: Mapping[str, float], new: Mapping[str, float]
 ) -> None:
     """Write, read back, and undo it if anything is not as wanted.
 

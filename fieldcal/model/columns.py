@@ -29,7 +29,7 @@ Sides = Callable[[Experience, State], Iterator[Pair]]
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class RowView:
     """Rows as columns see them.
 
     Attributes
@@ -47,7 +47,7 @@ class View:
     state: State
 
     @classmethod
-    def of(cls, plain: Experience, since: Array, state: State) -> View:
+    def of(cls, plain: Experience, since: Array, state: State) -> RowView:
         """Rows at a base state."""
         return cls(plain, state.experienced(plain), since, state)
 
@@ -60,7 +60,7 @@ class Course:
     """
 
     name: str
-    of: Callable[[View], Array]
+    of: Callable[[RowView], Array]
     width: int
     timed: bool = False
 
@@ -79,14 +79,14 @@ class General:
     """
 
     name: str
-    of: Callable[[View], Array]
+    of: Callable[[RowView], Array]
     sides: Sides | None = None
 
 
 def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> General:
     """Columns of an effect of the catalogue."""
 
-    def sensor(view: View) -> Array:
+    def sensor(view: RowView) -> Array:
         seen = replace(view.x, since_turn=view.since[origin])
         design: Array = effect.design(seen, shape or NO_SHAPE)  # type: ignore[attr-defined]
         return design
@@ -98,7 +98,7 @@ def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> Genera
             up, down = (_with(plain, state, effect, s) for s in (step, -step))
             yield up, down, float(step[j])
 
-    def on_the_way(view: View) -> Array:
+    def on_the_way(view: RowView) -> Array:
         columns = []
         for j, param in enumerate(effect.params):
             step = np.zeros(len(effect.params))
@@ -119,7 +119,7 @@ def of_channels(
 ) -> Course:
     """Courses of an effect that does the same to every output, by shape and origin."""
 
-    def of(view: View) -> Array:
+    def of(view: RowView) -> Array:
         courses = []
         for shape, origin in grid:
             seen = replace(view.x, since_turn=view.since[origin])
@@ -129,10 +129,10 @@ def of_channels(
     return Course(effect.id, of, len(grid), True)
 
 
-def _of_sides(sides: Sides) -> Callable[[View], Array]:
+def _of_sides(sides: Sides) -> Callable[[RowView], Array]:
     """Columns as central differences of what is experienced."""
 
-    def of(view: View) -> Array:
+    def of(view: RowView) -> Array:
         columns = [
             _apart(up, down, step, view.state)
             for up, down, step in sides(view.plain, view.state)
@@ -162,12 +162,12 @@ def _with(plain: Experience, state: State, effect: Effect, more: Array) -> Exper
     return replace(state, terms=(*rest, term)).experienced(plain)
 
 
-def bias(view: View) -> Array:
+def bias(view: RowView) -> Array:
     """One on each output's own bias."""
     return np.broadcast_to(np.eye(6), (len(view.x), 6, 6))
 
 
-def scale(view: View) -> Array:
+def scale(view: RowView) -> Array:
     """Force and rate along each output's own axis."""
     return np.eye(6) * np.hstack([view.x.f, view.x.w])[:, :, None]
 
@@ -203,7 +203,7 @@ def aside_sides(plain: Experience, state: State) -> Iterator[Pair]:
             yield ends[0], ends[1], SMALL
 
 
-def aside(view: View) -> Array:
+def aside(view: RowView) -> Array:
     """The same as columns (n, 6, 2 p), all positions turned at once."""
     places = len(view.state.aside)
     out = np.zeros((len(view.x), 6, 2 * places))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.model.attitude import between
-from fieldcal.model.reduce import Source, rate_of
+from fieldcal.model.reduce import RowSource, rate_of
 from fieldcal.model.rotation import carry, small_turns
 from fieldcal.physics.experience import Experience
 
@@ -49,7 +49,7 @@ class Leg:
 
     """
 
-    source: Source
+    source: RowSource
     x: Experience
     bias: Array
     scale: Array

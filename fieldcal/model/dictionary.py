@@ -24,13 +24,13 @@ from fieldcal.model.columns import General
 from fieldcal.model.effect_causes import at_points, of_effects
 from fieldcal.model.evidence import Index
 from fieldcal.model.random_causes import flicker, of_chance
-from fieldcal.model.table import Table
+from fieldcal.model.table import ColumnTable
 from fieldcal.model.unknown_causes import of_no_effect
 from fieldcal.model.wander import Wander
 from fieldcal.physics.experience import Experience
 
 
-class Dictionary(Table):
+class Dictionary(ColumnTable):
     """All columns of a session, and the groups made of them.
 
     Parameters

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.reduce import Source, rate_of, spans
+from fieldcal.model.reduce import RowSource, rate_of, spans
 from fieldcal.session.description import Description
 
 PIECE_S = 0.2
@@ -53,7 +53,7 @@ def _moved(gap: Array, held: Array, noise: Array, m: int) -> int:
     return start + (int(at[-1]) + 1) * m if len(at) else 0
 
 
-def beginnings(source: Source) -> Array:
+def beginnings(source: RowSource) -> Array:
     """Where each window begins, (p,) s; a position without one has its arrival."""
     windows = source.about.windows
     given = [np.nan if w is None else w[0] for w in windows] or [source.block.t[0]]

@@ -12,12 +12,12 @@ from fieldcal.effects import catalogue
 from fieldcal.model import columns
 from fieldcal.model.causes import TRIADS, Cause, Group, Point
 from fieldcal.model.evidence import Index
-from fieldcal.model.table import Table
+from fieldcal.model.table import ColumnTable
 from fieldcal.physics.effect import Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
 
 
-def of_effects(table: Table) -> Iterator[Cause]:
+def of_effects(table: ColumnTable) -> Iterator[Cause]:
     """Every effect of the catalogue that has columns here."""
     for effect in catalogue().values():
         if not isinstance(effect, Motion | Sensor) or not effect.params:
@@ -27,7 +27,7 @@ def of_effects(table: Table) -> Iterator[Cause]:
 
 
 def _of_effect(
-    table: Table, effect: Motion | Sensor, grid: Sequence[Point]
+    table: ColumnTable, effect: Motion | Sensor, grid: Sequence[Point]
 ) -> Iterator[Cause]:
     """The causes that an effect is: one, or one a triad."""
     places = effect_columns(table, effect, grid)
@@ -41,7 +41,7 @@ def _of_effect(
             yield Cause(effect.id, part, effect.chance(table.x), variants)
 
 
-def at_points(table: Table, group: Group, grid: Sequence[Point]) -> list[Group]:
+def at_points(table: ColumnTable, group: Group, grid: Sequence[Point]) -> list[Group]:
     """The group of an effect at other points of its shape, with columns of its own."""
     effect = group.effect
     if not isinstance(effect, Motion | Sensor) or not grid:
@@ -53,7 +53,7 @@ def at_points(table: Table, group: Group, grid: Sequence[Point]) -> list[Group]:
 
 
 def _group(
-    table: Table,
+    table: ColumnTable,
     effect: Effect,
     part: str,
     some: tuple[int, ...],
@@ -70,7 +70,7 @@ def _group(
 
 
 def effect_columns(
-    table: Table, effect: Motion | Sensor, grid: Sequence[Point]
+    table: ColumnTable, effect: Motion | Sensor, grid: Sequence[Point]
 ) -> list[Index]:
     """Append the columns of an effect: those of its parameters, for each point."""
     count = len(effect.params)
@@ -85,7 +85,7 @@ def effect_columns(
     ]
 
 
-def _parts(table: Table, effect: Effect) -> list[tuple[str, tuple[int, ...]]]:
+def _parts(table: ColumnTable, effect: Effect) -> list[tuple[str, tuple[int, ...]]]:
     """Parameters that go together: those of a triad, where they are by channel."""
     names = [p.name for p in effect.params]
     if not set(names) <= set(CHANNELS):
@@ -99,7 +99,7 @@ def _parts(table: Table, effect: Effect) -> list[tuple[str, tuple[int, ...]]]:
 
 
 def _axes(
-    table: Table, effect: Motion | Sensor, at: tuple[int, ...]
+    table: ColumnTable, effect: Motion | Sensor, at: tuple[int, ...]
 ) -> list[tuple[int, ...]]:
     """Parameters that go together: all, or those of one output or of two alone."""
     if isinstance(effect, Motion) or not at:
@@ -112,7 +112,7 @@ def _axes(
     return [at, *(o for o in dict.fromkeys(more) if o != at)]
 
 
-def unit_of(table: Table, effect: Effect) -> float:
+def unit_of(table: ColumnTable, effect: Effect) -> float:
     """Outputs per SI unit, for what adds to outputs in counts or volts."""
     if isinstance(effect, Motion):
         return 1.0
@@ -120,7 +120,7 @@ def unit_of(table: Table, effect: Effect) -> float:
     return float(np.abs(table.unit[3 if gyro else 0]))
 
 
-def _grid(table: Table, effect: Effect) -> Iterator[Point]:
+def _grid(table: ColumnTable, effect: Effect) -> Iterator[Point]:
     """Values of the shape parameters to try, with the origin of times."""
     if not effect.shapes:
         yield {}, 0

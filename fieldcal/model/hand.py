@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.reduce import Rows, Source, averaged, rate_of, reduce, spans
+from fieldcal.model.reduce import Rows, RowSource, averaged, rate_of, reduce, spans
 
 WANDERS = 6.0
 """Standard deviations of what the squares across the force have too many."""
@@ -27,7 +27,7 @@ MORE = 1.5
 """And by how much more than along the force."""
 
 
-def rows_of(source: Source) -> Rows:
+def rows_of(source: RowSource) -> Rows:
     """Rows of a recording, one for each window of a device held by hand."""
     rows = reduce(source)
     held = np.unique(rows.x.position)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.reduce import Rows, Source, rate_of
+from fieldcal.model.reduce import Rows, RowSource, rate_of
 
 MARGIN_S = 0.6
 """Time before and after the motion that is taken along."""
@@ -24,7 +24,7 @@ AWAY = 5.0
 
 
 def moving(
-    source: Source, rows: Rows, pair: tuple[int, int], first: int, last: int
+    source: RowSource, rows: Rows, pair: tuple[int, int], first: int, last: int
 ) -> tuple[int, int] | None:
     """Bounds of the motion between two windows, in samples.
 

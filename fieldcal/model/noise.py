@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import noise
-from fieldcal.windows.noise import SHOWN, Noise, short_lag, steps_of
+from fieldcal.windows.noise import SHOWN, ChannelNoise, short_lag, steps_of
 from fieldcal.windows.rounding import least, of_few, of_mean
 
 
-def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Noise:
+def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> ChannelNoise:
     """Noise of one sample of each output inside windows, (6,)."""
     acc, gyr = (noise.noise_of(p, rate_hz) for p in _pieces(block, windows))
-    return Noise(
+    return ChannelNoise(
         np.concatenate([acc.white, gyr.white]), np.concatenate([acc.quick, gyr.quick])
     )
 

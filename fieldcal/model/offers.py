@@ -48,7 +48,7 @@ class Offer:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class OfferTable:
     """What may be added to a set beside one instability.
 
     Attributes
@@ -70,7 +70,7 @@ class Offers(Sets):
 
     def __init__(self, dictionary: Dictionary, gram: Gram) -> None:
         super().__init__(dictionary, gram)
-        self._tables: dict[tuple[tuple[str, int], ...], list[Table]] = {}
+        self._tables: dict[tuple[tuple[str, int], ...], list[OfferTable]] = {}
 
     def offers(self, there: Set) -> list[Offer]:
         """Every cause that a set has not, at its best variant, the best one first."""
@@ -82,12 +82,14 @@ class Offers(Sets):
                     best[name] = offer
         return sorted(best.values(), key=lambda o: -o.score)
 
-    def tables(self, there: Set) -> list[Table]:
+    def tables(self, there: Set) -> list[OfferTable]:
         """What a set may be given, beside each of some instabilities."""
         key = self.key(there.members)
         if key not in self._tables:
             self._tables[key] = [
-                Table(down, state, score, self._at_level(there, state, score, down))
+                OfferTable(
+                    down, state, score, self._at_level(there, state, score, down)
+                )
                 for down, state, score in self._levels(there)
             ]
         return self._tables[key]

@@ -16,7 +16,7 @@ from fieldcal.core.positions import Position, angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model import columns
-from fieldcal.model.columns import View
+from fieldcal.model.columns import RowView
 from fieldcal.model.state import State, Term
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.physics.experience import Experience
@@ -62,7 +62,7 @@ def predicted(
         *angles(positions), gravity, base_force=force_home(gravity),
         mounting=np.eye(3) if mounting is None else mounting,
     )  # fmt: skip
-    view = View.of(x, np.zeros((1, len(x))), state)
+    view = RowView.of(x, np.zeros((1, len(x))), state)
     parts = {"acc_bias": columns.bias(view), "acc_scale": columns.scale(view)}
     for term in state.terms:
         parts[term.effect.id] = columns.of_effect(term.effect, {}, 0).of(view)

@@ -24,7 +24,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import FEW, TRIADS, Cause, Group
-from fieldcal.model.columns import General, View
+from fieldcal.model.columns import General, RowView
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Eliminated
 from fieldcal.model.sets import Set
@@ -59,7 +59,7 @@ def _group(d: Dictionary, part: str, some: Array, left: Array) -> Group:
     middle = course[:, 0] * np.sqrt(len(left))
     directions = directions * typical(d)[some]  # (1), in outputs
 
-    def of(view: View) -> Array:
+    def of(view: RowView) -> Array:
         inside = np.equal.outer(view.x.position, d.held).astype(float)
         out = np.zeros((len(inside), 6, len(left) + len(directions) - 1))
         out[:, some, : len(left)] = inside[:, None] * directions[0][:, None]

@@ -10,11 +10,11 @@ from fieldcal.core.samples import CHANNELS
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, unknown
 from fieldcal.model.causes import TRIADS, Cause, Group
-from fieldcal.model.table import Table
+from fieldcal.model.table import ColumnTable
 from fieldcal.physics.effect import Scatter
 
 
-def of_chance(table: Table) -> Iterator[Cause]:
+def of_chance(table: ColumnTable) -> Iterator[Cause]:
     """Every random effect of the catalogue, and each position set elsewhere."""
     for effect in catalogue().values():
         if isinstance(effect, Scatter) and effect.applies(table.x):
@@ -32,7 +32,7 @@ def of_chance(table: Table) -> Iterator[Cause]:
         yield Cause("misset", "", priors.PRESENT, groups, "position")
 
 
-def _of_scatter(table: Table, effect: Scatter) -> Iterator[Cause]:
+def _of_scatter(table: ColumnTable, effect: Scatter) -> Iterator[Cause]:
     """A random effect by the kind of its parameters."""
     if not {p.name for p in effect.params} <= set(CHANNELS):  # of the positions' angles
         if len(table.held) < 3 or not table.x.oriented.all():
@@ -51,7 +51,7 @@ def _of_scatter(table: Table, effect: Scatter) -> Iterator[Cause]:
 
 
 def _walks(
-    table: Table,
+    table: ColumnTable,
     effect: Scatter,
     part: str,
     sets: Sequence[Sequence[int]],
@@ -75,7 +75,7 @@ def _walks(
     return Cause(effect.id, part, share * effect.chance(table.x), groups, "random")
 
 
-def flicker(table: Table) -> Iterator[Group]:
+def flicker(table: ColumnTable) -> Iterator[Group]:
     """Instability within the windows, where there are too few to have it between.
 
     Of equal power in every octave: a cosine k has a variance as 1/k.

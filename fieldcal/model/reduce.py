@@ -118,7 +118,7 @@ def edges(start: float, end: float, windows: int) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class RowSource:
     """What rows are made of.
 
     Attributes
@@ -152,7 +152,7 @@ def masked(block: Block, usable: NDArray[np.bool_]) -> Block:
     return replace(block, **new) if new else block
 
 
-def reduce(source: Source) -> Rows:
+def reduce(source: RowSource) -> Rows:
     """Cut the windows into blocks and average them."""
     block, rate = masked(source.block, source.usable), rate_of(source.block)
     windows = spans(block, source.about)
@@ -179,7 +179,7 @@ def reduce(source: Source) -> Rows:
 
 
 def averaged(
-    source: Source,
+    source: RowSource,
     bound: NDArray[np.intp],
     position: NDArray[np.intp],
     level: Array,

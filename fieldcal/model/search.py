@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.model.offers import Offer, Offers, Table
+from fieldcal.model.offers import Offer, Offers, OfferTable
 from fieldcal.model.pairs import pairs
 from fieldcal.model.sets import Set
 from fieldcal.model.sizing import Member
@@ -101,7 +101,7 @@ class Search(Offers):
         return self.chance(both) - self.chance(there.members)
 
 
-def _pairs(table: Table) -> Iterator[tuple[Offer, Offer, float]]:
+def _pairs(table: OfferTable) -> Iterator[tuple[Offer, Offer, float]]:
     """Every two offers of a table with their gain.
 
     Each with all its parameters as well: beside the other it may need them.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import CLOSURE
-from fieldcal.model.columns import Course, View
+from fieldcal.model.columns import Course, RowView
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Gram, Index
 from fieldcal.model.reduce import Rows
@@ -53,7 +53,7 @@ class System:
     ) -> list[Linear]:
         """Rows of every channel about a state, with all columns or those wanted."""
         rows, used = self.rows, self.rows.used
-        view = View.of(rows.x, self.dictionary.since, state)
+        view = RowView.of(rows.x, self.dictionary.since, state)
         off = rows.y - state.output(view.x, self.dictionary.since)
         parts: list[list[tuple[Index, Array]]] = [[] for _ in range(6)]
         for first, basis in self.dictionary.bases:
@@ -96,7 +96,7 @@ class System:
         parts: list[list[tuple[Index, Array]]],
         first: int,
         basis: Course,
-        view: View,
+        view: RowView,
         wanted: NDArray[np.bool_] | None,
     ) -> None:
         """Columns of a function that is the same on every channel."""

@@ -16,7 +16,7 @@ from fieldcal.model.wander import Wander
 from fieldcal.physics.experience import Experience
 
 
-class Table:
+class ColumnTable:
     """Columns of a session's rows.
 
     Parameters
@@ -50,7 +50,7 @@ class Table:
         self.held = np.unique(x.position)
         self.places = int(x.position.max()) + 1
         self.wander = wander
-        self.span = unknown.Span(x.t, int(wander.modes.max()))
+        self.span = unknown.CourseSpan(x.t, int(wander.modes.max()))
         self.bases: list[tuple[int, Basis]] = []
         self.width = 0
         self.bias = self.add(General("bias", columns.bias), 6)

@@ -31,7 +31,7 @@ from fieldcal.model.attitude import (
 from fieldcal.model.course import Integrated, Leg, divided, integrated
 from fieldcal.model.evidence import Index
 from fieldcal.model.motion import moving
-from fieldcal.model.reduce import Rows, Source, rate_of, spans
+from fieldcal.model.reduce import Rows, RowSource, rate_of, spans
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
@@ -134,7 +134,7 @@ class Turning:
 
     """
 
-    def __init__(self, source: Source, rows: Rows, since: Array) -> None:
+    def __init__(self, source: RowSource, rows: Rows, since: Array) -> None:
         self.source, self.rows, self.since = source, rows, since
         self.legs = list(self._found())
 

@@ -18,13 +18,13 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.model.attitude import between, geometry
-from fieldcal.model.columns import Course, General, View
+from fieldcal.model.columns import Course, General, RowView
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Index
 from fieldcal.model.sets import Set
 from fieldcal.model.state import State, Term
 from fieldcal.model.turn import Turn, Turning, moved, only
-from fieldcal.model.way import BUILT_UP, Way, on_the_way, settling
+from fieldcal.model.way import BUILT_UP, WayRows, on_the_way, settling
 from fieldcal.model.windows import Linear
 from fieldcal.physics.experience import Experience
 
@@ -119,7 +119,7 @@ class Turns:
         """Closure and way of one turn, by all columns that reach them."""
         d = self.dictionary
         since = self.turning.after(turn.x.t, turn.positions[1])
-        view = View(turn.x, turn.x, since, state)
+        view = RowView(turn.x, turn.x, since, state)
         _, seen, across = geometry(turn.ends, turn.positions, turn.attitude, turn.done)
         weights = turn.weights(state.scale[3:])
         at, closing, general = [], [], []
@@ -168,7 +168,7 @@ class Turns:
         way: Array = np.zeros(0)
         design: Array = np.zeros((0, len(index)))
         if self.known is not None:
-            seen_by = Way(turn, view, d, self.known, self.rows.noise)
+            seen_by = WayRows(turn, view, d, self.known, self.rows.noise)
             way, design = seen_by.rows(general, values, index)
         return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
 
@@ -195,7 +195,7 @@ class Turns:
             yield int(np.searchsorted(self.dictionary.held, p)), -bent @ across
 
     def _of_basis(
-        self, turn: Turn, state: State, view: View, one: General
+        self, turn: Turn, state: State, view: RowView, one: General
     ) -> tuple[Array, Array]:
         """Outputs at the edges (m + 1, 6, k), and by how much the closure moves."""
         width = len(turn.x)

@@ -29,7 +29,7 @@ SLOW = 4
 LONG_S = 1e4
 
 
-class Span:
+class CourseSpan:
     """The stretch of time that a session's courses are drawn over.
 
     Parameters
@@ -114,7 +114,7 @@ def since_turn(x: Experience) -> Array:
     return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
 
 
-def covariates(span: Span) -> Mapping[str, Callable[[Experience], Array]]:
+def covariates(span: CourseSpan) -> Mapping[str, Callable[[Experience], Array]]:
     """Functions of what is known of a row beside the time, by name."""
     return {
         "alpha": alpha,

@@ -9,10 +9,10 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.model import priors, unknown
 from fieldcal.model.causes import FEW, TRIADS, Cause, Group
-from fieldcal.model.table import Table
+from fieldcal.model.table import ColumnTable
 
 
-def of_no_effect(table: Table) -> Iterator[Cause]:
+def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
     """Functions that no effect makes, on each channel."""
     sizes = typical(table)
     for c in table.seen.tolist():
@@ -39,13 +39,13 @@ def of_no_effect(table: Table) -> Iterator[Cause]:
     yield from _of_covariates(table, sizes)
 
 
-def typical(table: Table) -> Array:
+def typical(table: ColumnTable) -> Array:
     """Size of what no effect makes on each channel, (6,)."""
     out: Array = np.repeat([priors.UNKNOWN_ACC, priors.UNKNOWN_GYR], 3) * table.unit
     return out
 
 
-def _together(table: Table, sizes: Array) -> Iterator[Cause]:
+def _together(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
     """The same on all axes of a triad: one cause, not one for each of them."""
     for part, channels in TRIADS:
         some = [c for c in channels if c in table.seen]
@@ -61,7 +61,7 @@ def _together(table: Table, sizes: Array) -> Iterator[Cause]:
         yield _cause("time", part, groups)
 
 
-def _of_covariates(table: Table, sizes: Array) -> Iterator[Cause]:
+def _of_covariates(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
     """Functions of what is known of a row beside the time."""
     for covariate, of in unknown.covariates(table.span).items():
         if not _shows(table, covariate):
@@ -78,7 +78,7 @@ def _cause(name: str, part: str, groups: Sequence[Group]) -> Cause:
     return Cause(name, part, priors.UNKNOWN, tuple(groups), "unknown")
 
 
-def _shows(table: Table, covariate: str) -> bool:
+def _shows(table: ColumnTable, covariate: str) -> bool:
     x = table.x
     if covariate in ("alpha", "beta", "joints"):
         return bool(x.oriented.all()) and len(table.held) > 3

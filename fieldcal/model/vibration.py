@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.noise import grain_of, noise_of
-from fieldcal.windows.noise import Noise, short_lag
+from fieldcal.windows.noise import ChannelNoise, short_lag
 
 LOUDER = 6.0
 """Significance from which a window counts as noisier than the others."""
@@ -79,14 +79,16 @@ def shaking(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Shaking:
     return Shaking(noise, levels, variance, block)
 
 
-def usual_noise(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Noise:
+def usual_noise(
+    block: Block, windows: NDArray[np.intp], rate_hz: float
+) -> ChannelNoise:
     """Noise of one sample in the quiet windows, (6,)."""
     return _compared(block, windows, rate_hz)[0]
 
 
 def _compared(
     block: Block, windows: NDArray[np.intp], rate_hz: float
-) -> tuple[Noise, Array, NDArray[np.bool_]]:
+) -> tuple[ChannelNoise, Array, NDArray[np.bool_]]:
     """Usual noise (6,), what windows have on top (w, 6), and which are loud (w,)."""
     out = np.empty((len(windows), 6))
     for i, (a, b) in enumerate(windows):
@@ -101,7 +103,7 @@ def _compared(
         np.where(grain > 0, np.fmax(n, grain), n) for n in (noise.white, noise.quick)
     )
     more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0)
-    return Noise(white, quick), more, loud
+    return ChannelNoise(white, quick), more, loud
 
 
 def without_lines(piece: Array, rate_hz: float) -> Array:

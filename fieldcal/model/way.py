@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.columns import Course, View
+from fieldcal.model.columns import Course, RowView
 from fieldcal.model.dictionary import Dictionary
 from fieldcal.model.evidence import Index
 from fieldcal.model.sets import Set
@@ -32,7 +32,7 @@ BUILT_UP, AFTERWARDS, BUILDS_S = 0.5, 0.15, 2.0
 smoothly, s."""
 
 
-class Way:
+class WayRows:
     """Rows of the accelerometers of one turn.
 
     Parameters
@@ -45,7 +45,12 @@ class Way:
     """
 
     def __init__(
-        self, turn: Turn, view: View, dictionary: Dictionary, known: Set, noise: Array
+        self,
+        turn: Turn,
+        view: RowView,
+        dictionary: Dictionary,
+        known: Set,
+        noise: Array,
     ) -> None:
         self.turn, self.view, self.dictionary = turn, view, dictionary
         self.known, self.noise, self.state = known, noise, view.state

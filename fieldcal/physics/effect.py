@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.recording import Fault, Recording
+from fieldcal.physics.recording import CheckedSamples, Fault
 from fieldcal.physics.shape import Shape
 
 Kind = Literal["motion", "sensor", "chain"]
@@ -185,7 +185,7 @@ class Chain(Effect):
     are put right is none of those that the device sends."""
 
     @abstractmethod
-    def find(self, recording: Recording) -> list[Fault]:
+    def find(self, recording: CheckedSamples) -> list[Fault]:
         """Look for it in the samples."""
 
 

@@ -18,7 +18,7 @@ ENOUGH = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class CheckedSamples:
     """Samples, and what was known about them.
 
     Attributes

@@ -17,7 +17,7 @@ from fieldcal.core.positions import Position, angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model import columns
-from fieldcal.model.columns import View
+from fieldcal.model.columns import RowView
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
@@ -55,7 +55,7 @@ def aliases(positions: Sequence[Position], gravity: float) -> Aliases:
     """
     x = Experience.at_rest(*angles(positions), gravity)
     perfect = State(np.zeros(6), np.ones(6), np.zeros((0, 2)), np.zeros(3))
-    view = View.of(x, np.full((1, len(x)), np.inf), perfect)
+    view = RowView.of(x, np.full((1, len(x)), np.inf), perfect)
     base = _calibration(view)
     left: dict[str, Array] = {}
     hidden = []
@@ -71,7 +71,7 @@ def aliases(positions: Sequence[Position], gravity: float) -> Aliases:
     return Aliases(tuple(hidden), tuple(_pairs(left)))
 
 
-def _columns(effect: Effect, view: View) -> Array | None:
+def _columns(effect: Effect, view: RowView) -> Array | None:
     """What an effect does to the six outputs at rest, (6n, k); None if nothing."""
     if effect.shapes or not isinstance(effect, Motion | Sensor) or not effect.params:
         return None
@@ -81,7 +81,7 @@ def _columns(effect: Effect, view: View) -> Array | None:
     return flat
 
 
-def _calibration(view: View) -> Array:
+def _calibration(view: RowView) -> Array:
     """Columns of bias (both sensors) and scale factor (accelerometers), (6n, 9)."""
     both = [columns.bias(view), columns.scale(view)[:, :, :3]]
     out: Array = np.concatenate(both, axis=2).reshape(-1, 9)

@@ -33,7 +33,7 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
+class Warned:
     """Something the reader must not pass over."""
 
     kind: ClassVar[str] = "note"
@@ -72,7 +72,7 @@ class Matrix:
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class NameValues:
     """Names with values."""
 
     kind: ClassVar[str] = "facts"
@@ -96,7 +96,7 @@ class Fold:
     blocks: tuple[Block, ...]
 
 
-Block = Text | Note | Table | Figure | Matrix | Facts | Code | Fold
+Block = Text | Warned | Table | Figure | Matrix | NameValues | Code | Fold
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,7 +65,7 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class LabelledSpan:
     """A stretch of the x axis with a label: a window."""
 
     start: float
@@ -100,7 +100,7 @@ class Chart:
     y: Axis
     series: tuple[Series, ...]
     levels: tuple[Mark, ...] = ()
-    spans: tuple[Span, ...] = ()
+    spans: tuple[LabelledSpan, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the object the page reads."""
@@ -129,7 +129,7 @@ class Record:
     panels: tuple[tuple[str, str, int], ...]
     clock: str
     store: Mapping[str, Any]
-    spans: tuple[Span, ...]
+    spans: tuple[LabelledSpan, ...]
     means: Array
     marks: tuple[Mark, ...]
 

@@ -23,12 +23,12 @@ from fieldcal.report import evidence
 from fieldcal.report.blocks import (
     Block,
     Cell,
-    Facts,
     Figure,
-    Note,
+    NameValues,
     Section,
     Text,
     Tone,
+    Warned,
     folded,
     table,
 )
@@ -65,8 +65,8 @@ def diagnosis(material: Material) -> Section | None:
     chance = real(found.get("probability"))
     sure = f" (probability {chance:.2f})" if math.isfinite(chance) else ""
     lead = f"{verdict.replace('_', ' ').capitalize()}{sure}. {said}"
-    blocks: list[Block] = [Note(lead.strip(), TONES.get(verdict, "warn"))]
-    blocks += [Note(str(w)) for w in list_at(found, "warnings")]
+    blocks: list[Block] = [Warned(lead.strip(), TONES.get(verdict, "warn"))]
+    blocks += [Warned(str(w)) for w in list_at(found, "warnings")]
     blocks += evidence.next_steps(found)
     mismatch = objects_at(found, "mismatch")
     if mismatch:
@@ -165,7 +165,7 @@ def _fit(fit: Json) -> list[Block]:
     ]
     blocks: list[Block] = [
         Text("How well the simulation does before and after the effects are added:"),
-        Facts(
+        NameValues(
             tuple(
                 (name, f"{shown(before.get(k), f)} → {shown(after.get(k), f)}")
                 for name, k, f in facts

@@ -14,12 +14,12 @@ from fieldcal.core.samples import Array
 from fieldcal.report.blocks import (
     Block,
     Cell,
-    Facts,
-    Note,
+    NameValues,
     Section,
     Table,
     Text,
     Tone,
+    Warned,
     table,
 )
 from fieldcal.report.gather import Material
@@ -45,7 +45,7 @@ class Head:
     verdict: str
     tone: Tone
     says: str
-    facts: Facts
+    facts: NameValues
 
 
 def head(material: Material) -> Head:
@@ -74,7 +74,7 @@ def _verdict(found: Calibration | None) -> tuple[str, Tone, str]:
     return "go" if decision.get("go") is True else "good", "good", says
 
 
-def _facts(material: Material) -> Facts:
+def _facts(material: Material) -> NameValues:
     block, found = material.block, material.calibration
     span = float(block.t[-1] - block.t[0])
     facts = [
@@ -96,7 +96,7 @@ def _facts(material: Material) -> Facts:
     if material.diagnosis is not None:
         said = str(material.diagnosis.get("verdict", "")).replace("_", " ")
         facts.append(("diagnosis", said))
-    return Facts(tuple(facts))
+    return NameValues(tuple(facts))
 
 
 def _duration(seconds: float) -> str:
@@ -132,7 +132,7 @@ def calibration(material: Material) -> Section | None:
         return None
     blocks: list[Block] = [_parameters(found, material.session.about.nominal)]
     if found.warnings:
-        blocks += [Note(w) for w in found.warnings]
+        blocks += [Warned(w) for w in found.warnings]
     blocks += _checks(found)
     left = _without(found)
     if left:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.core.version import __version__
-from fieldcal.report.blocks import Block, Code, Facts, Fold, Note, Section, table
+from fieldcal.report.blocks import Block, Code, Fold, NameValues, Section, Warned, table
 from fieldcal.report.gather import Material
 from fieldcal.session.folder import DESCRIPTION
 
@@ -37,8 +37,8 @@ def provenance(material: Material, made: datetime) -> Section:
         ("mounting", ", ".join(about.axes)),
         ("grade", about.grade),
     ]
-    blocks: list[Block] = [Note(w) for w in session.warnings]
-    blocks += [Facts(tuple(facts)), _files(session.folder)]
+    blocks: list[Block] = [Warned(w) for w in session.warnings]
+    blocks += [NameValues(tuple(facts)), _files(session.folder)]
     if material.marks:
         blocks.append(Fold("What happened", (_events(material.marks),)))
     text = (session.folder / DESCRIPTION).read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from fieldcal.calibration.wording import number
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.evaluation.observations import Rests
 from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
-from fieldcal.report.charts import Mark, Record, Span
+from fieldcal.report.charts import LabelledSpan, Mark, Record
 from fieldcal.report.gather import Material
 from fieldcal.report.loose import Json, objects_at, real
 from fieldcal.report.packing import Columns, around, pack
@@ -48,13 +48,13 @@ def recording(material: Material) -> Section:
     return Section("recording", "Recording", tuple(blocks))
 
 
-def windows(material: Material) -> tuple[Span, ...]:
+def windows(material: Material) -> tuple[LabelledSpan, ...]:
     """The windows that were averaged, with the number of their position."""
     if material.still is None:
         return ()
     pairs = zip(material.still.rows, material.still.averages, strict=True)
     off = material.epoch
-    return tuple(Span(a.start - off, a.end - off, str(row)) for row, a in pairs)
+    return tuple(LabelledSpan(a.start - off, a.end - off, str(row)) for row, a in pairs)
 
 
 def _chart(material: Material) -> Record:
@@ -116,7 +116,7 @@ def _alt(
     panels: Sequence[tuple[str, str, int]],
     values: Array,
     seconds: float,
-    spans: Sequence[Span],
+    spans: Sequence[LabelledSpan],
 ) -> str:
     ranges = [
         f"{name} from {np.nanmin(v):.4g} to {np.nanmax(v):.4g} {unit}"

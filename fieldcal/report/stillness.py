@@ -17,8 +17,8 @@ from fieldcal.report.blocks import Cell, Figure, Section, Tone, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
 from fieldcal.report.gather import Material
 from fieldcal.report.recording import windows
-from fieldcal.windows import Limits
-from fieldcal.windows.cells import CELL, Cells, Table
+from fieldcal.windows import StillnessLimits
+from fieldcal.windows.cells import CELL, Cells, CellTable
 from fieldcal.windows.verdict import judge
 
 SPAN = 10
@@ -57,7 +57,7 @@ def stillness(material: Material) -> Section | None:
     return Section("stillness", "Stillness", tuple(parts))
 
 
-def restlessness(cells: Table) -> tuple[Array, Array]:
+def restlessness(cells: CellTable) -> tuple[Array, Array]:
     """Middle of each second, s, and r of it, (m,) each."""
     means = cells.steady
     view = np.lib.stride_tricks.sliding_window_view(means, SPAN, axis=0)
@@ -73,7 +73,7 @@ def _thinned(t: Array, r: Array) -> tuple[Array, Array]:
     return t[first], np.maximum(np.maximum.reduceat(r, first), 1e-3)
 
 
-def _cells(block: Block) -> Table:
+def _cells(block: Block) -> CellTable:
     cells = Cells()
     cells.add(block)
     return cells.table
@@ -87,7 +87,7 @@ def _windows(material: Material, still: Rests) -> blocks.Table:
         rate = table_rate(material.session.about, row)
         if rate.any():
             window, _ = steadied(window, rate)
-        worst = judge(_cells(window), Limits()).worst
+        worst = judge(_cells(window), StillnessLimits()).worst
         tone: Tone = "bad" if worst.ratio > 1 else "warn" if worst.ratio > NEAR else ""
         share = Cell(f"{100 * worst.ratio:.0f} %", tone, min(1.0, worst.ratio))
         what = f"{worst.kind} on {CHANNELS[worst.channel]}"

@@ -22,13 +22,13 @@ from fieldcal.core.samples import Block, pieces
 from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Hold, Note, Plan, Step
 from fieldcal.run.interruptions import Again, begun_again, gap, restarted
-from fieldcal.run.link_marks import LinkMarks, Recording
+from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
 from fieldcal.run.operator.protocol import Display, Operator, Wish
 from fieldcal.run.position_check import Held
 from fieldcal.run.waiting import GAP, SETTLING, Placing, force
 from fieldcal.run.warm_up import Warmth
 from fieldcal.session.description import Description
-from fieldcal.windows import Average, Noise, Window
+from fieldcal.windows import Average, LearnedNoise, Window
 
 R = TypeVar("R")
 
@@ -59,7 +59,7 @@ class Engine:
         driver: Driver,
         operator: Operator,
         about: Description,
-        recorder: Recording,
+        recorder: MarkedRecorder,
         give_up: float | None = None,
         taken: dict[int, Average] | None = None,
         warmth: Warmth | None = None,
@@ -73,7 +73,7 @@ class Engine:
         self._warmth = warmth
         self._held: Held | None = None
         self._hold_now: Hold | None = None
-        self._noise: Noise | None = None
+        self._noise: LearnedNoise | None = None
         self._left: int | None = None
         self._before: int | None = None
         self._link = LinkMarks(driver, recorder)

@@ -37,7 +37,7 @@ class Marker(Protocol):
         """Append a mark."""
 
 
-class Recording(Marker, Protocol):
+class MarkedRecorder(Marker, Protocol):
     """Where an engine puts what happens."""
 
     def append(self, block: Block) -> Block:

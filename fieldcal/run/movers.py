@@ -79,7 +79,7 @@ class Controlled:
         self.close()
 
 
-class VirtualDevice(Controlled):
+class VirtualMover(Controlled):
     """A virtual device in a process of its own.
 
     Parameters
@@ -147,7 +147,7 @@ class VirtualDevice(Controlled):
         self._folder.cleanup()
 
 
-class Command:
+class CommandMover:
     """A command that is called for each position: that of a turntable.
 
     Parameters

@@ -237,12 +237,12 @@ def _check_further(about: Description, run: Mapping[str, Any], name: str) -> Non
 
 
 def _check_mover(made: Task, name: str) -> None:
-    from fieldcal.run.movers import Command
+    from fieldcal.run.movers import CommandMover
 
     mover = made.mover
     try:
         if mover["kind"] == "command":
-            Command(mover["command"], 1.0).close()
+            CommandMover(mover["command"], 1.0).close()
         elif mover["kind"] == "virtual":
             shlex.split(mover.get("options", ""))
     except PlanError as error:

@@ -15,7 +15,7 @@ from typing import Any
 
 from fieldcal import procedures
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.limits import Limits
+from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import (
     DeviceError,
     FieldcalError,
@@ -64,7 +64,7 @@ class Running:
         operator: Operator,
         recorder: Recorder | First,
         opened: Callable[[], Driver],
-        limits: Limits,
+        limits: GradeLimits,
         patience: float,
         give_up: float | None,
         taken: dict[int, Average] | None = None,

@@ -12,7 +12,7 @@ from fieldcal.drivers.driver import Driver
 from fieldcal.evaluation.observations import rests
 from fieldcal.evaluation.solution import solved
 from fieldcal.run import plan_file
-from fieldcal.run.movers import VirtualDevice
+from fieldcal.run.movers import VirtualMover
 from fieldcal.run.operator.script import ScriptOperator
 from fieldcal.run.session_run import Running
 from fieldcal.session import description
@@ -25,7 +25,7 @@ GIVE_UP = 90.0
 
 def recalibrate(
     driver: Driver,
-    device: VirtualDevice,
+    device: VirtualMover,
     folder: Path,
     procedure: str,
     seconds: float,

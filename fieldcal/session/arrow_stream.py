@@ -30,7 +30,7 @@ END = MARKER + b"\0\0\0\0"
 """What a stream that was closed in order ends with."""
 
 
-class Encoder:
+class ArrowEncoder:
     """Makes the bytes of a stream, a batch at a time.
 
     Parameters
@@ -101,7 +101,7 @@ def _numbers(chunk: pa.Array) -> Array:
     return np.frombuffer(whole.buffers()[1], dtype=float)[first:last]
 
 
-class Found(NamedTuple):
+class StreamContent(NamedTuple):
     """What a stream holds.
 
     Attributes
@@ -138,7 +138,7 @@ def whole(data: bytes) -> int:
         return end if batches else 0
 
 
-def decode(data: bytes, usual: pa.Schema | None = None) -> Found:
+def decode(data: bytes, usual: pa.Schema | None = None) -> StreamContent:
     """Read what is whole of a stream.
 
     Parameters
@@ -170,14 +170,14 @@ class _Decoder:
         self._says: list[str] = []
         self._expected, self._row, self._checked = 0, 0, True
 
-    def run(self) -> Found:
+    def run(self) -> StreamContent:
         at = self._read_head()
         if self._schema is not None:
             self._read_all(at)
         if not self._checked:
             self._expected = len(self._batches)
             self._row = sum(batch.num_rows for batch in self._batches)
-        return Found(
+        return StreamContent(
             self._schema,
             self._batches,
             self._says,

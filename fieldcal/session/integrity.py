@@ -27,7 +27,7 @@ SCHEMAS = {
 """Which schema a file is held to."""
 
 
-class Finding(NamedTuple):
+class FileFault(NamedTuple):
     """What is wrong with a file.
 
     Attributes
@@ -48,7 +48,7 @@ def schema(kind: str) -> dict[str, Any]:
     return found
 
 
-def findings(folder: Path) -> Iterator[Finding]:
+def findings(folder: Path) -> Iterator[FileFault]:
     """What is wrong with a session, file by file; nothing if all of it is whole.
 
     Raises
@@ -66,48 +66,48 @@ def findings(folder: Path) -> Iterator[Finding]:
     for path in sorted(folder.glob(".*.*")):
         if path.is_file():
             text = "was left by a program that was killed while it wrote; delete it"
-            yield Finding(path.name, text)
+            yield FileFault(path.name, text)
 
 
-def _description(folder: Path) -> Iterator[Finding]:
+def _description(folder: Path) -> Iterator[FileFault]:
     path = folder / DESCRIPTION
     try:
         description.read(path)
     except SessionError as error:
         if not path.exists():
             raise
-        yield Finding(DESCRIPTION, _without(path, str(error)))
+        yield FileFault(DESCRIPTION, _without(path, str(error)))
         return
     yield from _against(DESCRIPTION, tomllib.loads(path.read_text("utf-8")), "")
 
 
-def _samples(folder: Path) -> Iterator[Finding]:
+def _samples(folder: Path) -> Iterator[FileFault]:
     try:
         path = sample_files.find(folder)
     except SessionError as error:
-        yield Finding("samples", _without(folder, str(error)))
+        yield FileFault("samples", _without(folder, str(error)))
         return
     try:
         _, says = sample_files.read(path)
     except SessionError as error:
-        yield Finding(path.name, _without(path, str(error)))
+        yield FileFault(path.name, _without(path, str(error)))
         return
-    yield from (Finding(path.name, _without(Path(path.name), text)) for text in says)
+    yield from (FileFault(path.name, _without(Path(path.name), text)) for text in says)
 
 
-def _marks(path: Path) -> Iterator[Finding]:
+def _marks(path: Path) -> Iterator[FileFault]:
     says: list[str] = []
     marks = list(read_marks(path, says))
-    yield from (Finding(MARKS, _without(Path(MARKS), text)) for text in says)
+    yield from (FileFault(MARKS, _without(Path(MARKS), text)) for text in says)
     for number, mark in enumerate(marks, start=1):
         yield from _against(MARKS, mark, f"mark {number}, ")
 
 
-def _derived(path: Path) -> Iterator[Finding]:
+def _derived(path: Path) -> Iterator[FileFault]:
     try:
         document = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        yield Finding(path.name, f"is not JSON: {error}; make it again")
+        yield FileFault(path.name, f"is not JSON: {error}; make it again")
         return
     wrong = list(_against(path.name, document, ""))
     yield from wrong
@@ -115,13 +115,13 @@ def _derived(path: Path) -> Iterator[Finding]:
         try:
             Calibration.from_json(document)
         except InputError as error:
-            yield Finding(path.name, f"{error}; make it again")
+            yield FileFault(path.name, f"{error}; make it again")
 
 
-def _against(name: str, document: Any, place: str) -> Iterator[Finding]:
+def _against(name: str, document: Any, place: str) -> Iterator[FileFault]:
     for error in _validator(SCHEMAS[name]).iter_errors(document):
         text = f"{place}{_path(error.absolute_path)}: {_short(error.message)}"
-        yield Finding(name, text)
+        yield FileFault(name, text)
 
 
 @cache

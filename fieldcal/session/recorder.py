@@ -121,7 +121,7 @@ class Recorder:
     def _begin(self, about: Mapping[str, Any]) -> None:
         import tomlkit
 
-        from fieldcal.session.arrow_stream import Encoder
+        from fieldcal.session.arrow_stream import ArrowEncoder
 
         names = (DESCRIPTION, SAMPLES, MARKS)
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -140,23 +140,23 @@ class Recorder:
             with contextlib.suppress(OSError):
                 self.folder.rmdir()
             raise
-        self._encoder = Encoder(schema())
+        self._encoder = ArrowEncoder(schema())
 
     def _resume(self) -> None:
         """Cut off what is not whole, and go on behind it."""
-        from fieldcal.session.arrow_stream import Encoder, decode, whole
+        from fieldcal.session.arrow_stream import ArrowEncoder, decode, whole
 
         path = self.folder / SAMPLES
         data = path.read_bytes() if path.exists() else b""
         end = whole(data)
         if end:
             found = decode(data[:end], schema())
-            self._encoder = Encoder(schema(), found.number, found.row)
+            self._encoder = ArrowEncoder(schema(), found.number, found.row)
             block = read(path)[0]
             self._last = (float(block.t[-1]), float(block.t_host[-1]))
             self.rejoin()
         else:
-            self._encoder = Encoder(schema())
+            self._encoder = ArrowEncoder(schema())
         self._samples = _Growing(path, end)
         marks = self.folder / MARKS
         lines = marks.read_bytes() if marks.exists() else b""

@@ -15,7 +15,7 @@ from fieldcal.model.causes import CLOSURE
 from fieldcal.model.evidence import Gram
 from fieldcal.model.inference import Inference
 from fieldcal.model.mixture import Mixing, Mixture
-from fieldcal.model.reduce import Rows, Source
+from fieldcal.model.reduce import Rows, RowSource
 from fieldcal.model.search import Search
 from fieldcal.model.state import State
 from fieldcal.model.system import System
@@ -48,7 +48,7 @@ class Recorded:
 
     rows: Rows
     since: Array
-    source: Source | None = None
+    source: RowSource | None = None
 
     def turning(self) -> Turning | None:
         """Whoever follows the turns, if there are any."""

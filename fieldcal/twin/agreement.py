@@ -16,7 +16,7 @@ from fieldcal.twin.ways import Apart
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class ReplayRun:
     """How far one device's replay is from the recording.
 
     Attributes
@@ -65,7 +65,7 @@ class Rerun:
     """
 
     profile: Profile
-    runs: Mapping[str, Run]
+    runs: Mapping[str, ReplayRun]
     positions: tuple[int, ...]
     windows: Array
     random: tuple[str, ...]

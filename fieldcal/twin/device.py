@@ -21,7 +21,7 @@ from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.line import Tone
-from fieldcal.diagnosis.result import Found
+from fieldcal.diagnosis.result import FoundEffect
 from fieldcal.effects import catalogue
 from fieldcal.model.reduce import rate_of
 from fieldcal.model.state import State, Term
@@ -34,7 +34,7 @@ from fieldcal.sim_device.profile import (
     Climate,
     FullScale,
     Identity,
-    Mounting,
+    MountingAxes,
     NoiseFigures,
     Profile,
     Sampling,
@@ -72,7 +72,7 @@ def device_of(explanation: Explanation, found: Diagnosis, known: Settled) -> Pro
 
 
 def device(
-    explanation: Explanation, state: State, effects: list[vocabulary.Effect]
+    explanation: Explanation, state: State, effects: list[vocabulary.SimulatedEffect]
 ) -> Profile:
     """The device with some calibration and some effects."""
     source = explanation.prepared.source
@@ -93,7 +93,7 @@ def device(
         ),
         sampling=Sampling(float(f"{rate_of(source.block):.9g}")),
         site=Site(about.latitude_deg, about.height_m, about.gravity),
-        frame=Mounting((about.axes[0], about.axes[1], about.axes[2])),
+        frame=MountingAxes((about.axes[0], about.axes[1], about.axes[2])),
         range=FullScale(
             about.limits.get("acceleration"), about.limits.get("angular_rate")
         ),
@@ -109,7 +109,7 @@ def device(
     )
 
 
-def settled(terms: Sequence[Term], start: float) -> list[vocabulary.Effect]:
+def settled(terms: Sequence[Term], start: float) -> list[vocabulary.SimulatedEffect]:
     """Effects with an equation, with their values; those of one shape are one."""
     total: dict[tuple[str, tuple[tuple[str, float], ...]], Term] = {}
     for term in terms:
@@ -125,7 +125,7 @@ def settled(terms: Sequence[Term], start: float) -> list[vocabulary.Effect]:
     return out
 
 
-def of_earth(heading: float | None) -> Iterator[vocabulary.Effect]:
+def of_earth(heading: float | None) -> Iterator[vocabulary.SimulatedEffect]:
     """The Earth's rate as a fixture of some heading, rad, feels it, if it does."""
     if heading is not None:
         yield vocabulary.effect("earth_rate", {})
@@ -134,14 +134,14 @@ def of_earth(heading: float | None) -> Iterator[vocabulary.Effect]:
             yield vocabulary.effect("heading_error", {"psi_deg": psi})
 
 
-def known_chances(about: Description) -> Iterator[vocabulary.Effect]:
+def known_chances(about: Description) -> Iterator[vocabulary.SimulatedEffect]:
     """Random effects and those on samples that the simulation has already."""
     for name, given in about.model.items():
         if isinstance(catalogue()[name], Scatter | Chain):
             yield vocabulary.effect(name, given)
 
 
-def of_tone(tone: Tone, start: float) -> Iterator[vocabulary.Effect]:
+def of_tone(tone: Tone, start: float) -> Iterator[vocabulary.SimulatedEffect]:
     """A line, one effect for each of its causes, with its phase at the start.
 
     Re(c exp(2 pi i hz t)) = |c| sin(2 pi hz (t - start) + phase)
@@ -159,8 +159,8 @@ def of_tone(tone: Tone, start: float) -> Iterator[vocabulary.Effect]:
 
 
 def of_samples(
-    explanation: Explanation, found: Found, start: float
-) -> Iterator[vocabulary.Effect]:
+    explanation: Explanation, found: FoundEffect, start: float
+) -> Iterator[vocabulary.SimulatedEffect]:
     """What is random, and what happened to samples."""
     kind = catalogue()[found.id]
     if not isinstance(kind, Scatter | Chain):
@@ -196,7 +196,9 @@ def vibration(explanation: Explanation) -> Array:
     return out
 
 
-def _noise(explanation: Explanation, effects: list[vocabulary.Effect]) -> NoiseFigures:
+def _noise(
+    explanation: Explanation, effects: list[vocabulary.SimulatedEffect]
+) -> NoiseFigures:
     """White noise before what the signal chain adds to it."""
     noise = np.nan_to_num(explanation.rows.noise)
     for one in effects:
@@ -227,13 +229,17 @@ def _counted(given: Mapping[str, Any], start: float) -> dict[str, Any]:
     return {k: v - start if k in INSTANTS else v for k, v in given.items()}
 
 
-def _levelled(effect: vocabulary.Effect, level: float) -> vocabulary.Effect:
+def _levelled(
+    effect: vocabulary.SimulatedEffect, level: float
+) -> vocabulary.SimulatedEffect:
     return vocabulary.effect(effect.id, {**effect.parameters, "level": level})
 
 
-def _each_once(effects: list[vocabulary.Effect]) -> list[vocabulary.Effect]:
+def _each_once(
+    effects: list[vocabulary.SimulatedEffect],
+) -> list[vocabulary.SimulatedEffect]:
     """With several of what cannot be there twice put together: the last one counts."""
-    out: dict[object, vocabulary.Effect] = {}
+    out: dict[object, vocabulary.SimulatedEffect] = {}
     for i, one in enumerate(effects):
         again = vocabulary.CATALOGUE[one.id].repeats and one.id != "earth_rate"
         out[(one.id, i) if again else one.id] = one

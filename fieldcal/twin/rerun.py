@@ -33,10 +33,10 @@ from fieldcal.model.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.turn import Turn, Turning
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.replay import Window, simulate
+from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.twin import device as twin
 from fieldcal.twin import physical, schedule
-from fieldcal.twin.agreement import Rerun, Run
+from fieldcal.twin.agreement import ReplayRun, Rerun
 from fieldcal.twin.ways import apart
 
 RANDOM = ("random_walk", "angle_setting")
@@ -162,7 +162,7 @@ def _certain(profile: Profile) -> Profile:
     return replace(profile, effects=tuple(kept))
 
 
-def _run(explanation: Explanation, case: _Case) -> Run:
+def _run(explanation: Explanation, case: _Case) -> ReplayRun:
     """How far a device's replay is from the recording."""
     device, rows, turns = case.device, case.fitted.rows, case.turns
     source = explanation.prepared.source
@@ -182,7 +182,7 @@ def _run(explanation: Explanation, case: _Case) -> Run:
     replayed = np.mean([_means(b, t, rows.span) for b in blocks], axis=0)
     off = np.where(rows.used, rows.y - replayed - case.apart, np.nan)
     total = float(case.fitted.squares_of(off).sum())
-    return Run(
+    return ReplayRun(
         _triads(rms(rows, off)),
         total / max(case.fitted.dof, 1),
         *_by_position(case.fitted, off),
@@ -204,7 +204,7 @@ def _by_position(fitted: Fitted, off: Array) -> tuple[Array, Array]:
 
 
 def _lines(
-    explanation: Explanation, device: Profile, windows: Sequence[Window], rows: Rows
+    explanation: Explanation, device: Profile, windows: Sequence[HeldWindow], rows: Rows
 ) -> Array:
     """What is left of each line, (k, 2)."""
     tones, t = explanation.prepared.tones, explanation.prepared.source.block.t

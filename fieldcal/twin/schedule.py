@@ -20,7 +20,7 @@ from fieldcal.model.reduce import spans
 from fieldcal.model.state import State
 from fieldcal.model.turn import Turn, only
 from fieldcal.physics.experience import Experience
-from fieldcal.sim_device.replay import Window
+from fieldcal.sim_device.replay import HeldWindow
 from fieldcal.twin.ways import way_of
 
 ENOUGH = 24
@@ -39,7 +39,7 @@ def windows(
     fitted: Fitted,
     shaken: Array,
     turns: Sequence[Turn],
-) -> list[Window]:
+) -> list[HeldWindow]:
     """The session's windows in time order, from its start, with their turns.
 
     `state` says where the device was in each, `shaken` (p,) is its vibration there,
@@ -48,7 +48,7 @@ def windows(
     source, x = explanation.prepared.source, fitted.rows.x
     start, t = float(source.block.t[0]), source.block.t
     felt, arrived = state.experienced(x).f, _arrived(state, fitted)
-    out: list[Window] = []
+    out: list[HeldWindow] = []
     bounds = spans(source.block, source.about)
     ways = {turn.positions[1]: way_of(turn, start) for turn in turns}
     for p in sorted(np.unique(x.position), key=lambda p: int(bounds[p, 0])):
@@ -56,13 +56,13 @@ def windows(
         alpha, beta = _angles(state, only(x, [row]), felt[row])
         begin, end = (float(v) - start for v in (t[bounds[p, 0]], t[bounds[p, 1] - 1]))
         if not out and np.isfinite(arrived[row]):  # put there not long before
-            out.append(Window(alpha, beta, begin - PUT_S, begin - PUT_S + 1.0))
+            out.append(HeldWindow(alpha, beta, begin - PUT_S, begin - PUT_S + 1.0))
         before = out[-1].end if out else -PUT_S
         rest = float(np.clip(arrived[row] - start, before, begin))
         way = ways.get(p)
         moves = max(rest - TURN_S, before) if way is None else float(way.t[0])
         out.append(
-            Window(
+            HeldWindow(
                 alpha,
                 beta,
                 begin,

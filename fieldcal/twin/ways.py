@@ -22,7 +22,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.attitude import vee
 from fieldcal.model.turn import Turn
-from fieldcal.sim_device.way import Way
+from fieldcal.sim_device.way import Manoeuvre
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Apart:
     angle: float
 
 
-def way_of(turn: Turn, start: float) -> Way:
+def way_of(turn: Turn, start: float) -> Manoeuvre:
     """The way of a turn, in procedure axes and s since `start`."""
     steps = turn.attitude[1:] @ np.swapaxes(turn.attitude[:-1], 1, 2)
     sine = -vee(steps)
@@ -49,7 +49,7 @@ def way_of(turn: Turn, start: float) -> Way:
     small = sine * np.where(size > 0, longer, 1.0)[:, None]
     small = small - np.diff(turn.done)[:, None] * (turn.attitude[1:] @ turn.closure)
     total = np.vstack([np.zeros(3), np.cumsum(small, axis=0)])
-    return Way(turn.t - start, turn.x.mounting @ total.T)
+    return Manoeuvre(turn.t - start, turn.x.mounting @ total.T)
 
 
 def apart(turns: Sequence[Turn], recorded: Block, replayed: Block) -> Apart:

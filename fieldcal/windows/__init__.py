@@ -4,16 +4,16 @@ Here is the one measurement of white noise and rounding that everything uses. No
 here knows positions, parameters or files.
 """
 
-from fieldcal.windows.limits import Limits
+from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.mean import Average
 from fieldcal.windows.stillness import Stillness
 from fieldcal.windows.stretches import still_stretches
-from fieldcal.windows.window import Noise, Window, average
+from fieldcal.windows.window import LearnedNoise, Window, average
 
 __all__ = [
     "Average",
-    "Limits",
-    "Noise",
+    "StillnessLimits",
+    "LearnedNoise",
     "Stillness",
     "Window",
     "average",

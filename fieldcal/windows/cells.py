@@ -35,7 +35,7 @@ _GRACE = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class CellTable:
     """Cells in time order; empty ones are left out.
 
     Attributes
@@ -172,11 +172,11 @@ class Cells:
         self._sums = np.zeros((64, 34))
 
     @property
-    def table(self) -> Table:
+    def table(self) -> CellTable:
         """The cells so far, the last one while it fills."""
         return self._table(self._size)
 
-    def take_complete(self) -> Table:
+    def take_complete(self) -> CellTable:
         """Hand over the cells that no sample can come to any more, and forget them."""
         done = max(0, self._size - 1)
         taken = self._table(done)
@@ -242,9 +242,9 @@ class Cells:
         self._sums[self._size : end] = sums
         self._size = end
 
-    def _table(self, size: int) -> Table:
+    def _table(self, size: int) -> CellTable:
         times = self.start + CELL * self._index[:size]
-        return Table(times, self._sums[:size], self._origin)
+        return CellTable(times, self._sums[:size], self._origin)
 
 
 def resolution(finest: Array) -> Array:

@@ -10,7 +10,7 @@ from fieldcal.core.samples import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class StillnessLimits:
     """Bounds of sanity; stillness itself is judged against the device's own noise.
 
     Attributes

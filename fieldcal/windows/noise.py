@@ -46,7 +46,7 @@ ANCHOR_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class ChannelNoise:
     """Standard deviation of one sample of each channel, (c,); nan where unknown.
 
     Attributes
@@ -60,7 +60,7 @@ class Noise:
     quick: Array
 
 
-def noise_of(pieces: Sequence[Array], rate_hz: float) -> Noise:
+def noise_of(pieces: Sequence[Array], rate_hz: float) -> ChannelNoise:
     """Measure the noise of a sensor.
 
     Parameters
@@ -80,7 +80,7 @@ def noise_of(pieces: Sequence[Array], rate_hz: float) -> Noise:
     # outputs coarser than their noise may not change at all while the device is held
     least = rounding.least(steps_of(pieces))
     quick = np.maximum(np.sqrt(levels[:, -1]), least)
-    return Noise(np.maximum(white, least), quick)
+    return ChannelNoise(np.maximum(white, least), quick)
 
 
 def short_lag(values: Array) -> Array:

@@ -20,7 +20,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows.cells import CELL, Cells, resolution
-from fieldcal.windows.limits import Limits
+from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.rounding import shown
 
 SPAN = 8
@@ -62,7 +62,7 @@ class Stillness:
     """
 
     def __init__(self) -> None:
-        self._limits = Limits()
+        self._limits = StillnessLimits()
         self._cells = Cells()
         self._recent: deque[tuple[Array, Array]] = deque(maxlen=SPAN)
         self._finest = np.full(6, np.inf)

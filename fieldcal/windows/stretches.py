@@ -16,8 +16,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells, Table, held
-from fieldcal.windows.limits import Limits
+from fieldcal.windows.cells import CELL, Cells, CellTable, held
+from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.verdict import judge
 
 _SPAN = 10
@@ -53,7 +53,7 @@ Between = Callable[[float, float], Iterable[Block]]
 """Samples from a time up to another, s, in order, in blocks."""
 
 
-class Rows(Protocol):
+class CellRows(Protocol):
     """Rows of `summary` of all cells of a recording, in memory or elsewhere."""
 
     def __len__(self) -> int:
@@ -89,13 +89,13 @@ def still_stretches(
     return still_in(summary(table), table.origin, between, min_seconds)
 
 
-def summary(cells: Table) -> Array:
+def summary(cells: CellTable) -> Array:
     """Start of each cell, s, and its sums: (m, 35)."""
     return np.column_stack([cells.times, cells.sums])
 
 
 def still_in(
-    rows: Rows, origin: Array, between: Between, min_seconds: float
+    rows: CellRows, origin: Array, between: Between, min_seconds: float
 ) -> list[tuple[float, float]]:
     """`still_stretches` of a recording that does not fit into memory.
 
@@ -111,7 +111,7 @@ def still_in(
         return []
     shortest = max(1.0, min_seconds)
     found: list[tuple[float, float]] = []
-    for run in _at_rest(rows, Limits().noise):
+    for run in _at_rest(rows, StillnessLimits().noise):
         first, last = run.first + _SPAN // 2, run.last - 1 + _SPAN // 2
         cells = _table(rows[first : last + 1], origin)
         if clear := _clear(_table(rows[first:last], origin), shortest):
@@ -122,12 +122,12 @@ def still_in(
     return found
 
 
-def _table(rows: Array, origin: Array) -> Table:
+def _table(rows: Array, origin: Array) -> CellTable:
     """Cells of rows of `summary`."""
-    return Table(rows[:, 0], rows[:, 1:], origin)
+    return CellTable(rows[:, 0], rows[:, 1:], origin)
 
 
-def _clear(cells: Table, shortest: float) -> tuple[float, float] | None:
+def _clear(cells: CellTable, shortest: float) -> tuple[float, float] | None:
     """Take a stretch by the sums of the recording, if its own would be the same.
 
     They are but for the step into its first sample; so it must pass clearly.
@@ -135,16 +135,19 @@ def _clear(cells: Table, shortest: float) -> tuple[float, float] | None:
     if not len(cells) or not cells.on_edge:
         return None
     first, last = cells.span
-    if last - first < shortest or judge(cells, Limits()).worst.ratio > _CLEARLY:
+    if (
+        last - first < shortest
+        or judge(cells, StillnessLimits()).worst.ratio > _CLEARLY
+    ):
         return None
     return first, float(np.nextafter(last, np.inf))
 
 
-def _spans(rows: Rows, usual: Array) -> Iterator[Spans]:
+def _spans(rows: CellRows, usual: Array) -> Iterator[Spans]:
     """First span of a part, the spread and the mean of each of them, (k, 6).
 
     `usual` (6,) is the number of values in a cell. The mean of one with few is that of
-    the cell before: unlike `Table.steady`, that is true of a device that was turned
+    the cell before: unlike `CellTable.steady`, that is true of a device that was turned
     meanwhile, for no line goes through all of its positions.
     """
     before: Array = np.zeros((1, 6))
@@ -157,7 +160,7 @@ def _spans(rows: Rows, usual: Array) -> Iterator[Spans]:
         yield first, view.std(axis=-1), view.mean(axis=-1)
 
 
-def _usual(rows: Rows) -> Array:
+def _usual(rows: CellRows) -> Array:
     """Median number of values in a cell, (6,)."""
     every = -(-len(rows) // _SAMPLE)
     counts = [
@@ -168,7 +171,7 @@ def _usual(rows: Rows) -> Array:
     return usual
 
 
-def _at_rest(rows: Rows, bound: Array) -> list[_Run]:
+def _at_rest(rows: CellRows, bound: Array) -> list[_Run]:
     """Runs of spans at rest by (1), by their own noise and rate.
 
     `bound` (6,) is what no spread at rest exceeds.
@@ -261,7 +264,7 @@ def _passing(
     first, last = float(times[0]), float(times[1])
     if not last - first >= shortest:
         return []
-    worst = judge(sums.table, Limits()).worst
+    worst = judge(sums.table, StillnessLimits()).worst
     if worst.ratio <= 1:
         return [(first, float(np.nextafter(last, np.inf)))]
     after = max(worst.at + worst.seconds, first + CELL)

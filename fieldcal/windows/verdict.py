@@ -9,9 +9,9 @@ import numpy as np
 
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.windows.cells import CELL, Table
+from fieldcal.windows.cells import CELL, CellTable
 from fieldcal.windows.disturbance import Kind, Statistic, pushes, repeats, shakes, steps
-from fieldcal.windows.limits import Limits
+from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.quiet import Quiet, quiet
 from fieldcal.windows.trend import line
 
@@ -91,8 +91,8 @@ class Verdict:
 
 
 def judge(
-    cells: Table,
-    limits: Limits,
+    cells: CellTable,
+    limits: StillnessLimits,
     before: Quiet | None = None,
     shows: Array | None = None,
 ) -> Verdict:
@@ -122,7 +122,7 @@ def judge(
 
 
 def _tests(
-    cells: Table, means: Array, laid: Array, noise: Quiet, least: Array
+    cells: CellTable, means: Array, laid: Array, noise: Quiet, least: Array
 ) -> list[Statistic]:
     m = len(means)
     return [
@@ -132,7 +132,7 @@ def _tests(
     ]
 
 
-def _stuck(cells: Table) -> list[Departure]:
+def _stuck(cells: CellTable) -> list[Departure]:
     """Runs of one value, where the axes of a sensor are noisier than its resolution."""
     sampled = np.nan_to_num(cells.noise)
     sensor = np.repeat(np.median(sampled.reshape(2, 3), axis=1), 3)
@@ -152,7 +152,7 @@ def _stuck(cells: Table) -> list[Departure]:
     ]
 
 
-def _worst(cells: Table, test: Statistic, allowed: float) -> Departure:
+def _worst(cells: CellTable, test: Statistic, allowed: float) -> Departure:
     first, channel = divmod(int(np.argmax(test.z)), test.z.shape[1])
     cell = first + test.cells if test.kind == "step" else first
     return Departure(
@@ -166,7 +166,9 @@ def _worst(cells: Table, test: Statistic, allowed: float) -> Departure:
     )
 
 
-def _beyond_drift(cells: Table, laid: Array, noise: Quiet, limits: Limits) -> Departure:
+def _beyond_drift(
+    cells: CellTable, laid: Array, noise: Quiet, limits: StillnessLimits
+) -> Departure:
     """Change over the window, by the line, allowed for what noise can pretend."""
     change = laid[-1] - laid[0]
     ratio = np.abs(change) / (limits.drift + THRESHOLD * noise.allan[-1])
@@ -182,7 +184,9 @@ def _beyond_drift(cells: Table, laid: Array, noise: Quiet, limits: Limits) -> De
     )
 
 
-def _beyond_noise(cells: Table, scatter: Array, limits: Limits) -> Departure:
+def _beyond_noise(
+    cells: CellTable, scatter: Array, limits: StillnessLimits
+) -> Departure:
     ratio = scatter / limits.noise
     channel = int(np.argmax(ratio))
     means = np.abs(np.nan_to_num(cells.means[:, channel]))

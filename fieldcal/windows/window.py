@@ -20,7 +20,7 @@ from fieldcal.core.errors import InputError, Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows.cells import CELL, Cells
 from fieldcal.windows.grain import shows, variance
-from fieldcal.windows.limits import Limits
+from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.longrun import MeanError, error_of_mean
 from fieldcal.windows.mean import Average
 from fieldcal.windows.quiet import Quiet
@@ -37,7 +37,7 @@ WORTH = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class LearnedNoise:
     """What a window taught about the noise of the device, for the next one.
 
     Attributes
@@ -51,7 +51,7 @@ class Noise:
     seen: Array
 
     @property
-    def spectrum(self) -> Noise:
+    def spectrum(self) -> LearnedNoise:
         """What holds in more wind or another hand as well: the shape of the noise."""
         return replace(self, quiet=None)
 
@@ -76,11 +76,11 @@ class Window:
 
     def __init__(
         self,
-        limits: Limits | None = None,
-        noise: Noise | None = None,
+        limits: StillnessLimits | None = None,
+        noise: LearnedNoise | None = None,
         grain: Grain | None = None,
     ) -> None:
-        self._limits = limits or Limits()
+        self._limits = limits or StillnessLimits()
         self._before, self._grain = noise, grain or Grain()
         self._sum = Cells()
         self._cells = self._sum.table
@@ -155,10 +155,10 @@ class Window:
         return worst.error(self._sum.start) if worst.ratio > 1 else None
 
     @property
-    def noise(self) -> Noise | None:
+    def noise(self) -> LearnedNoise | None:
         """What is known of the noise for the window after this one, if anything."""
         quiet = self._judged().quiet
-        return Noise(quiet, self._mean_error().seen) if quiet else self._before
+        return LearnedNoise(quiet, self._mean_error().seen) if quiet else self._before
 
     def done(self, target: float | None = None) -> str | None:
         """Return why averaging can stop before its time, as a sentence, or None.
@@ -246,8 +246,8 @@ def _known_along(covariance: Array, n: Array, variance: float) -> Array:
 
 def average(
     block: Block,
-    limits: Limits | None = None,
-    noise: Noise | None = None,
+    limits: StillnessLimits | None = None,
+    noise: LearnedNoise | None = None,
     grain: Grain | None = None,
 ) -> Average:
     """Average a window of samples.

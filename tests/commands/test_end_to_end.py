@@ -16,7 +16,7 @@ from processes import RUN, Recalibrated, wait_for_samples
 from talking import talking
 
 from fieldcal.cli import main
-from fieldcal.run.movers import VirtualDevice
+from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations
 
@@ -211,7 +211,7 @@ def test_a_port_that_says_nothing_sensible(
     assert code == 3 and ("format" in said or "baud" in said)
 
 
-def silenced(device: VirtualDevice, folder: Path) -> None:
+def silenced(device: VirtualMover, folder: Path) -> None:
     """Silence a device once some of what it said is recorded."""
     wait_for_samples(folder, None, 60_000)
     device.ask(fault={"silence_s": 1e6})
@@ -221,7 +221,7 @@ def test_a_device_that_goes_silent_keeps_what_it_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "s"
-    with VirtualDevice(["--serial", "witmotion", "--speed", "20"]) as device:
+    with VirtualMover(["--serial", "witmotion", "--speed", "20"]) as device:
         threading.Thread(target=silenced, args=(device, folder), daemon=True).start()
         code, said = device_error(f"{device.port}?format=witmotion", folder, capsys)
     assert code == 3 and "silent" in said

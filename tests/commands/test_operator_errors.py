@@ -22,7 +22,7 @@ pytest.importorskip("sqlite3")
 
 from fieldcal.cli import main
 from fieldcal.drivers.driver import open_driver
-from fieldcal.run.movers import VirtualDevice
+from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 
 
@@ -40,19 +40,19 @@ def failed(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
 def test_the_wrong_baud_rate(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with VirtualDevice(["--serial", "mip", "--baud", "921600"]) as device:
+    with VirtualMover(["--serial", "mip", "--baud", "921600"]) as device:
         url = f"serial:{device.port}?format=mip&baud=115200"
         said = failed(url, tmp_path / "s", capsys)
     assert "no format that is known; check the baud rate" in said
     sends = ["--serial", "mip", "--baud", "921600"]
-    with VirtualDevice(sends, once=False) as device:  # a probe comes and goes
+    with VirtualMover(sends, once=False) as device:  # a probe comes and goes
         assert main(["ports", "--probe", "--seconds", "2", device.port]) == 0
     assert "?format=mip&baud=921600" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("soon_silent")
 def test_the_wrong_format(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with VirtualDevice(["--serial", "xsens"]) as device:
+    with VirtualMover(["--serial", "xsens"]) as device:
         said = failed(f"serial:{device.port}?format=mip", tmp_path / "s", capsys)
     assert said.endswith("these are no mip bytes; try format=xsens")
 
@@ -94,7 +94,7 @@ def test_a_port_of_somebody_else(
 def test_a_port_that_another_program_has(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with VirtualDevice(["--serial", "xsens"]) as device:
+    with VirtualMover(["--serial", "xsens"]) as device:
         with open_driver(f"serial:{device.port}?format=xsens"):
             said = failed(f"serial:{device.port}?format=xsens", tmp_path / "s", capsys)
     assert said.endswith("another program has it open; close that first")

@@ -24,7 +24,7 @@ from fieldcal.sim_device.profile import (
     Sampling,
     Triad,
 )
-from fieldcal.sim_device.replay import Window, simulate
+from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.sim_device.vocabulary import effect
 
 POSITIONS = (
@@ -162,7 +162,7 @@ def _device(name: str, case: Case) -> Profile:
     )
 
 
-def _windows(case: Case) -> list[Window]:
+def _windows(case: Case) -> list[HeldWindow]:
     out = []
     for i, (alpha, beta) in enumerate(POSITIONS):
         start = 3.0 + i * (case.long_s + GAP_S)
@@ -174,7 +174,7 @@ def _windows(case: Case) -> list[Window]:
         shaking = (1.5 if i % 3 == 1 else 0.0) if case.shaken else None
         a, b = np.deg2rad([alpha, beta]).tolist()
         end = start + case.long_s
-        out.append(Window(a, b, start, end, rate, vibration=shaking))
+        out.append(HeldWindow(a, b, start, end, rate, vibration=shaking))
     return out
 
 
@@ -190,7 +190,7 @@ def _recorded(block: Block, case: Case) -> Block:
     return Block.of(block.t[keep], *(c[keep] for c in columns))
 
 
-def _about(profile: Profile, windows: list[Window]) -> Description:
+def _about(profile: Profile, windows: list[HeldWindow]) -> Description:
     truth = profile.truth
     positions = []
     for w in windows:

@@ -115,7 +115,7 @@ def test_a_calibration_over_can_finds_the_truth_within_its_uncertainty(
     about = description.parse({"site": site, "position": where})
     options = ["--can", "slcan", "--speed", "max", "--latitude=50.45", "--height=170"]
     with (
-        movers.VirtualDevice(options) as device,
+        movers.VirtualMover(options) as device,
         open_driver(f"can:{device.port}?{SLCAN}&reconnect=0") as imu,
         Recorder(tmp_path / "s", {"format": 1}) as recorder,
     ):

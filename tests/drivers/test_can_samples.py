@@ -22,7 +22,7 @@ from fieldcal.core.samples import Block
 from fieldcal.drivers.can_frames import ERROR, pack
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_map import read_map
-from fieldcal.drivers.can_samples import Samples
+from fieldcal.drivers.can_samples import CanAssembler
 from fieldcal.drivers.options import Options
 
 
@@ -107,7 +107,7 @@ def test_a_lost_frame_costs_its_sample_and_no_other(dbc: Path) -> None:
 
 def test_a_stuck_counter_is_no_memory_leak(dbc: Path) -> None:
     options = Options("can", f"dbc={dbc}&rate=100&map={KEYED}")
-    decoder = Samples(read_map(options), CanHealth(), options)
+    decoder = CanAssembler(read_map(options), CanHealth(), options)
     some = frames([sample(7)[0]] * 1000)
     for _ in range(20):
         assert decoder.feed(some, some["t"]) is None

@@ -16,7 +16,7 @@ import pytest
 from processes import TWO_POSITION, wait_for_samples
 
 from fieldcal.commands.virtual import address
-from fieldcal.run.movers import VirtualDevice
+from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.remote import Remote
 
@@ -153,7 +153,7 @@ def test_a_link_that_loses_all_the_time_is_marked_now_and_then(tmp_path: Path) -
 
 
 def failed(
-    device: VirtualDevice, url: str, folder: Path, *faults: dict[str, float]
+    device: VirtualMover, url: str, folder: Path, *faults: dict[str, float]
 ) -> tuple[int, str]:
     """Exit code and last line of a run in whose midst faults happen."""
     run = subprocess.Popen(
@@ -194,7 +194,7 @@ ENDS = [
 def ended(folder: Path, link: str, fault: str) -> tuple[Path, int, str]:
     """Session, exit code and last line of a run that a fault ends."""
     options = [*LINKS[link].format(folder).split(), "--speed", "20"]
-    with VirtualDevice(options) as device:
+    with VirtualMover(options) as device:
         url = address(options, device.port) + "&reconnect=0"
         code, said = failed(device, url, folder / "s", {fault: 1e6})
     return folder / "s", code, said

@@ -19,7 +19,7 @@ from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
-from fieldcal.exporters import Source, ardupilot, exporter, formats, px4
+from fieldcal.exporters import ExportSource, ardupilot, exporter, formats, px4
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import schema
 from fieldcal.session.recorder import Recorder
@@ -142,18 +142,18 @@ def test_parameters_of_another_program_or_a_turned_board_are_refused() -> None:
         Installed.from_table({"parameters": 3})
 
 
-def source(folder: Path, cal: Calibration, raw: Block) -> Source:
+def source(folder: Path, cal: Calibration, raw: Block) -> ExportSource:
     about = {"format": 1, "device": {"name": "bench", "serial": "A1"}}
     end = float(raw.t[-1])
     about["position"] = [{"start_s": 0.0, "end_s": end}]
     with Recorder(folder, about) as recorder:
         recorder.append(raw)
     (folder / "result.json").write_text(json.dumps(cal.to_json()))
-    return Source(cal, Nominal(), Session.open(folder))
+    return ExportSource(cal, Nominal(), Session.open(folder))
 
 
 @pytest.fixture
-def made(tmp_path: Path) -> tuple[Source, Block, Block]:
+def made(tmp_path: Path) -> tuple[ExportSource, Block, Block]:
     """A full calibration, raw samples, and what `apply` makes of them."""
     rng = np.random.default_rng(5)
     cal, raw = calibration(rng, 0.004, 0.01), samples(rng, 2000)
@@ -161,7 +161,7 @@ def made(tmp_path: Path) -> tuple[Source, Block, Block]:
     return source(tmp_path / "s", cal, raw), raw, cal.apply(raw)
 
 
-def written(made: Source, name: str, folder: Path) -> Path:
+def written(made: ExportSource, name: str, folder: Path) -> Path:
     module = exporter(name)
     path = folder / f"out{module.ENDING}"
     module.write(made, path)
@@ -169,7 +169,7 @@ def written(made: Source, name: str, folder: Path) -> Path:
 
 
 def test_an_ardupilot_file_is_read_by_pymavlink(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     from pymavlink.mavparm import MAVParmDict
 
@@ -182,7 +182,7 @@ def test_an_ardupilot_file_is_read_by_pymavlink(
 
 
 def test_a_px4_file_has_a_parameter_a_line(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     lines = written(made[0], "px4", tmp_path).read_text().splitlines()
     rows = [line.split("\t") for line in lines if not line.startswith("#")]
@@ -192,7 +192,7 @@ def test_a_px4_file_has_a_parameter_a_line(
 
 
 def test_imu_tk_corrects_by_t_k_u_minus_b(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     path = written(made[0], "imu_tk", tmp_path)
     gyro = path.with_name(path.name.replace("_acc", "_gyro"))
@@ -208,7 +208,7 @@ def test_imu_tk_corrects_by_t_k_u_minus_b(
 
 
 def test_kalibr_predicts_what_was_recorded(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     told = yaml.safe_load(written(made[0], "kalibr", tmp_path).read_text())
     _, raw, true = made
@@ -226,7 +226,7 @@ def test_kalibr_predicts_what_was_recorded(
 
 
 def test_imu_calib_corrects_by_sm_u_minus_bias(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     told = yaml.safe_load(written(made[0], "ros", tmp_path).read_text())
     _, raw, true = made
@@ -236,7 +236,7 @@ def test_imu_calib_corrects_by_sm_u_minus_bias(
 
 
 def test_json_follows_its_schema_and_corrects(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     told = json.loads(written(made[0], "json", tmp_path).read_text())
     jsonschema.validate(told, schema("export"))
@@ -251,7 +251,7 @@ def test_json_follows_its_schema_and_corrects(
 
 
 def test_the_table_has_every_parameter(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     cal = made[0].calibration
     with written(made[0], "csv", tmp_path).open() as file:
@@ -262,7 +262,7 @@ def test_the_table_has_every_parameter(
 
 
 def test_mcap_is_read_by_ros_and_by_ourselves(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     path = written(made[0], "mcap", tmp_path)
     _, raw, true = made
@@ -288,7 +288,7 @@ def test_mcap_is_read_by_ros_and_by_ourselves(
 
 
 def test_what_was_not_determined_is_said_not_filled_in_silence(
-    made: tuple[Source, Block, Block], tmp_path: Path
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     whole = made[0].calibration
     keep = [i for i, n in enumerate(whole.names) if n.startswith("acc_bias")]
@@ -311,7 +311,7 @@ def test_what_was_not_determined_is_said_not_filled_in_silence(
 @pytest.mark.parametrize("name", formats())
 def test_the_command_writes_every_format_and_overwrites_none(
     name: str,
-    made: tuple[Source, Block, Block],
+    made: tuple[ExportSource, Block, Block],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -15,7 +15,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importers.csv_like import File
-from fieldcal.importing.recording import Wanted as Layout
+from fieldcal.importing.recording import ReadOptions as Layout
 from fieldcal.importing.validation import Judge
 from fieldcal.session.folder import Session
 

@@ -15,7 +15,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.headings import Column, read
-from fieldcal.importing.recording import Recording, Wanted
+from fieldcal.importing.recording import ReadOptions, Recording
 
 ROWS = np.column_stack([np.arange(4) * 1e3, np.arange(24).reshape(4, 6)])
 """Milliseconds, g, deg/s."""
@@ -35,8 +35,8 @@ def text(path: Path, names: tuple[str, ...], separator: str = ",") -> Path:
     return path
 
 
-def taken(path: Path, wanted: Wanted | None = None) -> tuple[Recording, Block]:
-    recording = open_recording(path, wanted or Wanted())
+def taken(path: Path, wanted: ReadOptions | None = None) -> tuple[Recording, Block]:
+    recording = open_recording(path, wanted or ReadOptions())
     (stream,) = recording.streams()
     return recording, concat(recording.blocks(stream.name))
 
@@ -66,10 +66,10 @@ def test_what_is_offered_is_what_is_needed(tmp_path: Path) -> None:
         " --time-unit s, with its units in place of these"
     )
     assert offered in str(caught.value)
-    _, block = taken(path, Wanted(acc_unit="g", gyr_unit="deg/s", time_unit="ms"))
+    _, block = taken(path, ReadOptions(acc_unit="g", gyr_unit="deg/s", time_unit="ms"))
     check(block)
     with pytest.raises(InputError, match="--columns t,ax,ay,az,gx,gy,gz --acc-unit g"):
-        taken(path, Wanted(acc_unit="g"))
+        taken(path, ReadOptions(acc_unit="g"))
 
 
 def test_columns_of_a_table_may_say_their_units_beside_their_names(
@@ -124,7 +124,7 @@ def test_names_that_are_not_those_of_one_imu_say_nothing(
 def test_units_that_differ_or_have_no_scale_are_none() -> None:
     for third in ("az [mg]", "az", "az [LSB]"):
         found = read([Column("", name) for name in ("ax [g]", "ay [g]", third)], "_")
-        assert found is not None and found.taken(Wanted()) is None
+        assert found is not None and found.taken(ReadOptions()) is None
 
 
 @given(st.lists(st.text(max_size=12), max_size=8))

@@ -12,7 +12,7 @@ import pytest
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importing.ingest import bring_in
-from fieldcal.importing.recording import Recording, Stream, Wanted
+from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 from fieldcal.importing.spool import IN_MEMORY, Spilled
 from fieldcal.importing.validation import Judge
 from fieldcal.session.folder import Session
@@ -26,8 +26,8 @@ class Long(Recording):
 
     hours = 1.0
 
-    def streams(self) -> list[Stream]:
-        return [Stream("0", "")]
+    def streams(self) -> list[ImuStream]:
+        return [ImuStream("0", "")]
 
     def blocks(self, stream: str) -> Iterator[Block]:
         n = int(REST * RATE)
@@ -42,7 +42,7 @@ class Long(Recording):
 def peak(folder: Path, hours: float) -> tuple[int, int]:
     """Most bytes at once, and how many stretches were found."""
     (folder / "log").write_bytes(b"log")
-    recording = Long(folder / "log", Wanted())
+    recording = Long(folder / "log", ReadOptions())
     recording.hours = hours
     tracemalloc.start()
     try:
@@ -83,13 +83,13 @@ def test_what_is_put_aside_comes_back(tmp_path: Path) -> None:
 
 
 def test_of_a_log_that_is_bad_all_over_only_the_number_is_kept(tmp_path: Path) -> None:
-    recording = Long(tmp_path / "x", Wanted(), repair=True)
+    recording = Long(tmp_path / "x", ReadOptions(), repair=True)
     for i in range(1000):
         recording.damaged(f"byte {i}", "is no message")
     assert len(recording.mended) == 13
     assert recording.mended[-1] == "988 more damaged places, left out"
     with pytest.raises(InputError, match="byte 5: is no message; copy"):
-        Long(tmp_path / "x", Wanted()).damaged("byte 5", "is no message")
+        Long(tmp_path / "x", ReadOptions()).damaged("byte 5", "is no message")
     judge = Judge("x", lambda row: f"row {row}", repair=True)
     t = np.arange(4000.0)
     acc = np.ones((4000, 3))

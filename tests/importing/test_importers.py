@@ -19,7 +19,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.importers import formats, open_recording
 from fieldcal.importing import recording as recordings
 from fieldcal.importing.ingest import bring_in
-from fieldcal.importing.recording import Wanted
+from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.validation import Judge
 from fieldcal.session import sample_files
 from fieldcal.session.folder import Session
@@ -39,7 +39,7 @@ SLOT = {
     "SENS_BOARD_ROT": 0.0,
 }  # fmt: skip
 COLUMNS = "t,ax,ay,az,gx,gy,gz"
-WANTED = Wanted(tuple(COLUMNS.split(",")))
+WANTED = ReadOptions(tuple(COLUMNS.split(",")))
 
 
 def session(folder: Path, *call: str) -> Session:
@@ -177,7 +177,7 @@ def test_what_candump_prints_is_named(tmp_path: Path, time: str) -> None:
     path = tmp_path / "log.txt"
     path.write_text(f" {time}  can0  123   [6]  00 00 00 00 52 26\n" * 50)
     with pytest.raises(InputError, match="record with candump -l"):
-        open_recording(path, Wanted()).streams()
+        open_recording(path, ReadOptions()).streams()
 
 
 @pytest.mark.parametrize("ending", [".npz", ".npy", ".mat", ".h5"])
@@ -382,7 +382,9 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, bytes]:
     six = np.random.default_rng(3).normal(0, 0.02, (n, 6)) + [0, 0, 9.8, 0, 0, 0]
     block = Block.of(np.arange(n) / 100, six[:, :3], six[:, 3:])
     SMALL["parquet"](folder / "x.parquet", block)
-    recording = open_recording(folder / "x.parquet", Wanted(tuple(COLUMNS.split(","))))
+    recording = open_recording(
+        folder / "x.parquet", ReadOptions(tuple(COLUMNS.split(",")))
+    )
     bring_in(recording, "0", folder / "s", {"format": 1}, 2.0)
     return block, (folder / "s" / "samples.parquet").read_bytes()
 

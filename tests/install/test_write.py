@@ -24,7 +24,7 @@ from fieldcal.cli import main
 from fieldcal.commands.write import prepared
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
-from fieldcal.drivers.mavlink_parameters import Parameters
+from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.install.proposal import changes, problems
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
@@ -146,13 +146,13 @@ def test_written_read_back_and_undone(
         assert main(["write", str(folder), "--device", url, "--yes", "--json"]) == 0
         said = json.loads(capsys.readouterr().out)
         assert {p["name"]: p["new"] for p in said["parameters"]} == wanted
-        with Parameters(url.removeprefix("mavlink:")) as link:
+        with ParameterLink(url.removeprefix("mavlink:")) as link:
             kept = link.read(wanted)
         np.testing.assert_allclose(
             list(kept.values()), list(wanted.values()), rtol=1e-6
         )
         assert main(["undo", str(folder), "--yes"]) == 0
-        with Parameters(url.removeprefix("mavlink:")) as link:
+        with ParameterLink(url.removeprefix("mavlink:")) as link:
             kept = link.read(wanted)
         old = [there.values[n] for n in wanted]
         np.testing.assert_allclose(list(kept.values()), old, rtol=1e-6)
@@ -175,7 +175,7 @@ def test_a_parameter_dropped_or_altered_is_noticed_and_all_is_undone(
         assert main(["write", str(session), "--device", url, "--yes"]) == 3
         said = capsys.readouterr().err
         assert says in said and "undone, all 9 are as before" in said
-        with Parameters(url.removeprefix("mavlink:")) as link:
+        with ParameterLink(url.removeprefix("mavlink:")) as link:
             kept = link.read(there.values)
     for name, value in there.values.items():
         assert kept[name] == pytest.approx(value, rel=1e-6), name

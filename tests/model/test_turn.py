@@ -28,8 +28,8 @@ from fieldcal.sim_device.profile import (
     Sampling,
     Truth,
 )
-from fieldcal.sim_device.replay import Window, simulate
-from fieldcal.sim_device.vocabulary import Effect, effect
+from fieldcal.sim_device.replay import HeldWindow, simulate
+from fieldcal.sim_device.vocabulary import SimulatedEffect, effect
 
 PLACES = ((0.0, 0.0), (60.0, 0.0), (60.0, -40.0), (-30.0, -40.0), (-30.0, 20.0),
           (20.0, 50.0))  # fmt: skip
@@ -75,12 +75,14 @@ class Ride:
     turns: list[TurnRows]
 
 
-def recorded(*errors: Effect) -> tuple[Block, list[Window]]:
+def recorded(*errors: SimulatedEffect) -> tuple[Block, list[HeldWindow]]:
     """A device with some errors in all places."""
     starts = SPACING_S * np.arange(len(PLACES)) + 1.0
     angles = np.deg2rad(PLACES)
     windows = [
-        Window(a, b, t, t + WINDOW_S, turn=None if t < 2 else (t - TURN_S - 1, t - 1))
+        HeldWindow(
+            a, b, t, t + WINDOW_S, turn=None if t < 2 else (t - TURN_S - 1, t - 1)
+        )
         for (a, b), t in zip(angles.tolist(), starts.tolist(), strict=True)
     ]
     device = Profile(

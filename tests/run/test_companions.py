@@ -15,7 +15,7 @@ from fieldcal.core.positions import Position
 from fieldcal.core.samples import Block
 from fieldcal.history.store import History
 from fieldcal.run.companions import Times
-from fieldcal.run.movers import VirtualDevice
+from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session, read_marks
 
 LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
@@ -23,7 +23,7 @@ BIASES = ["0.2,-0.3,0.1", "-0.1,0.4,0.2", "0.3,0.1,-0.2"]
 
 
 def led(
-    devices: Sequence[VirtualDevice],
+    devices: Sequence[VirtualMover],
     urls: Sequence[str],
     *options: str,
     killed_at: int | None = None,
@@ -56,13 +56,13 @@ def led(
 
 def started(
     stack: ExitStack, speed: str, *last: str, once: bool = True
-) -> tuple[list[VirtualDevice], list[str]]:
+) -> tuple[list[VirtualMover], list[str]]:
     devices, urls = [], []
     for link, bias in zip(LINKS, BIASES, strict=True):
         options = [*link.split(), "--speed", speed, f"--acc-bias={bias}"]
         options += ["--latitude=50.45", "--height=0"]
         options += last if link == LINKS[-1] else ()
-        devices.append(stack.enter_context(VirtualDevice(options, once)))
+        devices.append(stack.enter_context(VirtualMover(options, once)))
         urls.append(address(options, devices[-1].port))
     return devices, urls
 

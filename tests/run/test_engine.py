@@ -19,7 +19,7 @@ from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, hold
 from fieldcal.run.engine import Engine
 from fieldcal.run.interruptions import Again
-from fieldcal.run.operator.protocol import View, Wish
+from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.position_check import Held
 from fieldcal.run.waiting import Placing
 from fieldcal.run.warm_up import Warmth
@@ -42,7 +42,7 @@ class Turner:
     slips: list[tuple[float, float]] = field(default_factory=list)
     bump_at: list[float] = field(default_factory=list)
     told: list[str] = field(default_factory=list)
-    views: list[View] = field(default_factory=list)
+    views: list[OperatorView] = field(default_factory=list)
     late: Position | None = None
     corrects: bool = True
     bumped: list[float] = field(default_factory=list)
@@ -64,7 +64,7 @@ class Turner:
     def wish(self) -> Wish | None:
         return self.wishes.pop(0) if self.wishes else None
 
-    def show(self, view: View) -> None:
+    def show(self, view: OperatorView) -> None:
         self.views.append(view)
         if self.bump_at and view.elapsed > self.bump_at[0]:
             self.bump_at.pop(0)
@@ -387,7 +387,7 @@ def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
     class Leaning(Turner):
         leant = False
 
-        def show(self, view: View) -> None:
+        def show(self, view: OperatorView) -> None:
             super().show(view)
             if view.elapsed > 8.0 and not self.leant:
                 self.leant = True

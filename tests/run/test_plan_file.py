@@ -26,7 +26,7 @@ from fieldcal.commands.run_task import make_task
 from fieldcal.core.errors import InputError, MoverFailed, PlanError
 from fieldcal.core.positions import FIVE, Position
 from fieldcal.run import plan_file
-from fieldcal.run.movers import Command, VirtualDevice
+from fieldcal.run.movers import CommandMover, VirtualMover
 
 POSITIONS = [{"alpha_deg": 0.0, "beta_deg": 0.0}, {"alpha_deg": 45.0, "beta_deg": 5.0}]
 TABLE = {"alpha_deg": 0.0, "beta_deg": 0.0, "rate_deg_s": [20.0, 0.0, 0.0]}
@@ -157,7 +157,7 @@ def script(folder: Path, body: str) -> list[str]:
     return [sys.executable, str(path), "{position}", "{alpha}", "{beta}", "{name}"]
 
 
-def wait(mover: Command) -> None:
+def wait(mover: CommandMover) -> None:
     deadline = monotonic() + 20.0
     while mover.busy():
         assert monotonic() < deadline
@@ -167,7 +167,7 @@ def wait(mover: Command) -> None:
 def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
     out = tmp_path / "said"
     call = script(tmp_path, f"import sys; open({str(out)!r}, 'w').write(str(sys.argv))")
-    with Command(call, 20.0) as mover:
+    with CommandMover(call, 20.0) as mover:
         assert not mover.busy()
         mover.turn(FIVE[3], 3)
         wait(mover)
@@ -184,7 +184,7 @@ def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
 def test_a_command_that_fails_is_said(
     tmp_path: Path, body: str, timeout: float, says: str
 ) -> None:
-    with Command(script(tmp_path, body), timeout) as mover:
+    with CommandMover(script(tmp_path, body), timeout) as mover:
         mover.turn(Position.deg(1.0, 0.0), 0)
         with pytest.raises(MoverFailed, match=says):
             wait(mover)
@@ -192,7 +192,7 @@ def test_a_command_that_fails_is_said(
 
 def test_a_command_that_is_not_there_is_said() -> None:
     with (
-        Command(["/no/such/turntable"], 1.0) as mover,
+        CommandMover(["/no/such/turntable"], 1.0) as mover,
         pytest.raises(MoverFailed, match="cannot be called"),
     ):
         mover.turn(FIVE[0], 0)
@@ -208,7 +208,7 @@ if sys.argv[1] == {fails!r}:
 """
 
 
-def run(folder: Path, device: VirtualDevice, fails: str, junit: Path) -> int:
+def run(folder: Path, device: VirtualMover, fails: str, junit: Path) -> int:
     call = script(folder, CALLER.format(control=device.control, fails=fails))
     mover = {"kind": "command", "command": call, "timeout_s": 30.0}
     tables = {
@@ -239,7 +239,7 @@ def test_a_night_without_an_operator(
 ) -> None:
     """A plan, a turntable's command, a result and what CI reads of it."""
     junit = tmp_path / "run.xml"
-    with VirtualDevice(["--serial", "witmotion", "--speed", "20"], False) as device:
+    with VirtualMover(["--serial", "witmotion", "--speed", "20"], False) as device:
         assert run(tmp_path, device, "", junit) == 0
         said = capsys.readouterr()
         truth = device.truth
@@ -258,7 +258,7 @@ def test_a_turntable_that_jams_ends_the_run_with_3(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     junit = tmp_path / "run.xml"
-    with VirtualDevice(["--serial", "witmotion", "--speed", "20"], False) as device:
+    with VirtualMover(["--serial", "witmotion", "--speed", "20"], False) as device:
         assert run(tmp_path, device, "2", junit) == 3
     said = capsys.readouterr().err
     assert "the table is jammed" in said and "--resume" in said

@@ -13,14 +13,14 @@ from fieldcal.drivers.driver import Health
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import Nobody
 from fieldcal.run.operator.banner import drawable, large
-from fieldcal.run.operator.protocol import Phase, View
+from fieldcal.run.operator.protocol import OperatorView, Phase
 from fieldcal.run.operator.terminal import ConsoleOperator
 from fieldcal.run.position_check import Arrival
 
 HOLD = Hold(1, FIVE[1], 30.0)
 
 
-def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> View:
+def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> OperatorView:
     known: dict[str, object] = {
         "phase": phase,
         "hold": HOLD,
@@ -33,7 +33,7 @@ def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> View:
         "temperature": 24.5,
         "health": Health(samples=1234),
     }
-    return View(**(known | changes))  # type: ignore[arg-type]
+    return OperatorView(**(known | changes))  # type: ignore[arg-type]
 
 
 def screen(operator: ConsoleOperator, width: int = 80) -> str:

@@ -14,7 +14,7 @@ import pexpect
 import pyte
 import pytest
 
-from fieldcal.run.movers import VirtualDevice
+from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import read_marks
 
 SPEED = 16.0
@@ -23,9 +23,9 @@ SIM += ["--base-tilt=1,-0.5", "--latitude=50.45", "--height=170"]
 
 
 @pytest.fixture
-def device(tmp_path: Path) -> Iterator[VirtualDevice]:
+def device(tmp_path: Path) -> Iterator[VirtualMover]:
     link = tmp_path / "port"
-    with VirtualDevice([*SIM, "--port-link", str(link)], once=False) as made:
+    with VirtualMover([*SIM, "--port-link", str(link)], once=False) as made:
         made.port = str(link)
         yield made
 
@@ -33,7 +33,7 @@ def device(tmp_path: Path) -> Iterator[VirtualDevice]:
 class Console:
     """`fieldcal run` in a terminal, and what was ever on its screen."""
 
-    def __init__(self, device: VirtualDevice, folder: Path, *more: str) -> None:
+    def __init__(self, device: VirtualMover, folder: Path, *more: str) -> None:
         self.device, self.folder = device, folder
         url = f"serial:{device.port}?format=witmotion"
         call = ["-m", "fieldcal", "run", "five_position", "--device", url]
@@ -153,7 +153,7 @@ ERRORS: list[Callable[[Console], None]] = [
 
 
 def test_every_error_of_the_operator_is_said_and_the_result_is_right(
-    device: VirtualDevice, tmp_path: Path
+    device: VirtualMover, tmp_path: Path
 ) -> None:
     console = Console(device, tmp_path / "s", "--verify")
     for err in ERRORS:
@@ -174,7 +174,7 @@ def test_every_error_of_the_operator_is_said_and_the_result_is_right(
 
 
 def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
-    device: VirtualDevice, tmp_path: Path
+    device: VirtualMover, tmp_path: Path
 ) -> None:
     folder = tmp_path / "s"
     console = Console(device, folder)
@@ -208,7 +208,7 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
 
 
 def test_a_wrong_place_is_taken_only_if_insisted_on_and_then_it_is_no_go(
-    device: VirtualDevice, tmp_path: Path
+    device: VirtualMover, tmp_path: Path
 ) -> None:
     console = Console(device, tmp_path / "s")
     console.averaging()

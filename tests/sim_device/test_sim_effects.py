@@ -15,7 +15,7 @@ from fieldcal.core import frames
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import Profile, VirtualDevice
-from fieldcal.sim_device.chain import Chain
+from fieldcal.sim_device.chain import SignalChain
 from fieldcal.sim_device.profile import (
     ONE,
     ZERO,
@@ -343,7 +343,7 @@ def passed(text: str, row: list[float], channel: int = 0) -> list[float]:
     """What becomes of a channel's values in the signal chain, 1 s apart."""
     x = np.zeros((6, len(row)))
     x[channel] = row
-    chain = Chain(PLAIN.having(parse(text)), 0)
+    chain = SignalChain(PLAIN.having(parse(text)), 0)
     got: list[float] = chain.passes(np.arange(len(row), dtype=float), x)[
         channel
     ].tolist()

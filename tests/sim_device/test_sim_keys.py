@@ -16,7 +16,7 @@ from fieldcal.sim_device.keys import Keys
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link_serial import SerialLink
 from fieldcal.sim_device.orders import carry_out
-from fieldcal.sim_device.stream import Stream
+from fieldcal.sim_device.stream import DeviceStream
 from fieldcal.sim_device.wire import open_wire
 
 LEFT, RIGHT, UP, DOWN = b"\x1b[D", b"\x1b[C", b"\x1b[A", b"\x1b[B"
@@ -32,14 +32,16 @@ def terminal() -> Iterator[tuple[int, int]]:
 
 
 @pytest.fixture
-def stream() -> Iterator[Stream]:
+def stream() -> Iterator[DeviceStream]:
     faults = LineFaults(1)
     link = SerialLink(open_wire("witmotion"), faults)
-    yield Stream(VirtualDevice(), link, faults, speed=np.inf)
+    yield DeviceStream(VirtualDevice(), link, faults, speed=np.inf)
     link.close()
 
 
-def test_keys_turn_bump_and_quit(stream: Stream, terminal: tuple[int, int]) -> None:
+def test_keys_turn_bump_and_quit(
+    stream: DeviceStream, terminal: tuple[int, int]
+) -> None:
     person, program = terminal
     screen = io.StringIO()
     device = stream.device
@@ -63,7 +65,7 @@ def test_keys_turn_bump_and_quit(stream: Stream, terminal: tuple[int, int]) -> N
     assert "25.0 s   turning to α = 0°, β = 0°" in shown
 
 
-def test_orders_and_keys_do_the_same(stream: Stream) -> None:
+def test_orders_and_keys_do_the_same(stream: DeviceStream) -> None:
     carry_out(stream, {"bump": {"push": 1.5, "tilt_deg": 2.0, "seconds": 0.4}})
     bump = stream.device.body.bumps[-1]
     assert (bump.push, bump.seconds) == (1.5, 0.4)

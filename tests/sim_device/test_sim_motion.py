@@ -19,12 +19,12 @@ from fieldcal.sim_device.profile import (
     ZERO,
     Climate,
     Identity,
-    Mounting,
+    MountingAxes,
     NoiseFigures,
     Sampling,
     Truth,
 )
-from fieldcal.sim_device.rocking import Bump, Sway
+from fieldcal.sim_device.rocking import Push, SwayMotion
 from fieldcal.sim_device.vocabulary import parse
 
 PERFECT = Profile(
@@ -101,7 +101,10 @@ def test_the_rate_felt_while_base_and_joints_move_adds_up_too() -> None:
 
 @pytest.mark.parametrize(
     "rocking",
-    [Sway(0.02, 0.7, 0.3, 1.0).rocking(), Bump(1.0, 0.6, 2.0, 0.02, 0.5).rocking()],
+    [
+        SwayMotion(0.02, 0.7, 0.3, 1.0).rocking(),
+        Push(1.0, 0.6, 2.0, 0.02, 0.5).rocking(),
+    ],
 )
 def test_rates_of_the_rocking_base_are_derivatives_of_its_angle(
     rocking: Rocking,
@@ -162,7 +165,7 @@ def test_a_turn_told_in_a_turn_follows_it() -> None:
 def test_lever_arm_is_the_acceleration_of_where_the_sensors_are(
     names: tuple[str, str, str],
 ) -> None:
-    profile = replace(PERFECT, frame=Mounting(names))
+    profile = replace(PERFECT, frame=MountingAxes(names))
     to_procedure = frames.mounting_matrix(names)
     arm = to_procedure @ [0.3, -0.2, 0.1]
     plain, _ = turned(profile=profile)
@@ -183,7 +186,7 @@ def test_mounting_shows_the_axis_that_was_named() -> None:
     profile = Profile(
         truth=PERFECT.truth,
         noise=PERFECT.noise,
-        frame=Mounting(("+x", "-z", "+y")),
+        frame=MountingAxes(("+x", "-z", "+y")),
     )
     _, still = turned(profile=profile)
     axes = frames.mounting_matrix(["+x", "-z", "+y"])

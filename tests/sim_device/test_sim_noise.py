@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.sim_device.noise import GaussMarkov, Noise, Walk
+from fieldcal.sim_device.noise import GaussMarkov, RandomErrors, Walk
 from fieldcal.sim_device.profile import ONE, ZERO, Climate, NoiseFigures
 from fieldcal.sim_device.temperature import course, recorded
 
@@ -27,14 +27,14 @@ def deviations(x: Array) -> Array:
 
 def test_white_noise_falls_with_the_root_of_the_span() -> None:
     figures = NoiseFigures((0.3,) * 3, (0.3,) * 3)
-    x = Noise(figures, RATE, 1, np.ones(6)).white(50_000)
+    x = RandomErrors(figures, RATE, 1, np.ones(6)).white(50_000)
     expected = 0.3 / np.sqrt(RATE * SPANS)
     np.testing.assert_allclose(deviations(x), expected, rtol=0.06)
 
 
 def test_white_noise_can_be_given_by_its_density() -> None:
     figures = NoiseFigures(acc_density=(0.1,) * 3, gyr_density=(0.1,) * 3)
-    x = Noise(figures, RATE, 1, np.ones(6)).white(20_000)
+    x = RandomErrors(figures, RATE, 1, np.ones(6)).white(20_000)
     np.testing.assert_allclose(x.std(axis=1), 0.1 * np.sqrt(RATE), rtol=0.03)
 
 
@@ -48,7 +48,7 @@ def test_a_walk_of_the_profile_is_the_same_process() -> None:
     figures = NoiseFigures(
         ZERO, ZERO, acc_instability=ZERO, gyr_instability=ZERO, acc_walk=ONE
     )
-    x = Noise(figures, RATE, 3, np.ones(6)).slow(100_000)
+    x = RandomErrors(figures, RATE, 3, np.ones(6)).slow(100_000)
     assert not x[3:].any()
     np.testing.assert_allclose(deviations(x[:3]), np.sqrt(SPANS / 3), rtol=0.15)
 
@@ -73,7 +73,7 @@ def test_flicker_keeps_its_allan_deviation_over_two_decades() -> None:
         ZERO, ZERO, acc_instability=ZERO, gyr_instability=ZERO,
         acc_flicker=ONE, gyr_flicker=ONE,
     )  # fmt: skip
-    x = Noise(figures, RATE, 8, np.ones(6)).slow(400_000)
+    x = RandomErrors(figures, RATE, 8, np.ones(6)).slow(400_000)
     spans = np.array([8.0, 32.0, 128.0, 512.0])
     found = np.array([allan(x, span) for span in spans])
     np.testing.assert_allclose(found, 1.0, rtol=0.12)
@@ -81,9 +81,9 @@ def test_flicker_keeps_its_allan_deviation_over_two_decades() -> None:
 
 @pytest.mark.parametrize("pieces", [[100] * 10, [1, 63, 64, 65, 807], [1000]])
 def test_noise_is_the_same_in_any_pieces(pieces: list[int]) -> None:
-    def noise() -> Noise:
+    def noise() -> RandomErrors:
         figures = NoiseFigures(acc_walk=ONE, acc_flicker=ONE)
-        return Noise(figures, RATE, 2, np.ones(6))
+        return RandomErrors(figures, RATE, 2, np.ones(6))
 
     one, other = noise(), noise()
     whole = one.slow(1000)

@@ -14,14 +14,14 @@ from fieldcal.sim_device.profile import (
     FullScale,
     Handling,
     Identity,
-    Mounting,
+    MountingAxes,
     NoiseFigures,
     Profile,
     Sampling,
     Site,
     Truth,
 )
-from fieldcal.sim_device.vocabulary import CATALOGUE, Effect, parse
+from fieldcal.sim_device.vocabulary import CATALOGUE, SimulatedEffect, parse
 
 number = st.floats(-1e3, 1e3)
 positive = st.floats(1e-9, 1e3)
@@ -30,7 +30,7 @@ sizes = st.tuples(*[st.floats(0, 10)] * 3)
 words = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 
 
-def of_id(id_: str) -> st.SearchStrategy[Effect]:
+def of_id(id_: str) -> st.SearchStrategy[SimulatedEffect]:
     entry = CATALOGUE[id_]
     given_words = {
         "channel": st.sampled_from(["ax", "gz", "acc"]),
@@ -44,7 +44,7 @@ def of_id(id_: str) -> st.SearchStrategy[Effect]:
     }
     numbers |= dict.fromkeys(entry.vector, number)
     return st.builds(
-        Effect,
+        SimulatedEffect,
         st.just(id_),
         st.fixed_dictionaries(numbers),
         st.fixed_dictionaries({n: given_words[n] for n in entry.words}),
@@ -61,7 +61,7 @@ profiles = st.builds(
     st.builds(Identity, words, words, st.sampled_from(["tactical", "navigation"])),
     st.builds(Sampling, positive),
     st.builds(Site, st.floats(-90, 90), number, st.none() | positive),
-    st.builds(Mounting, st.sampled_from([("+x", "+y", "+z"), ("+x", "-z", "+y")])),
+    st.builds(MountingAxes, st.sampled_from([("+x", "+y", "+z"), ("+x", "-z", "+y")])),
     st.builds(FullScale, st.none() | positive, st.none() | positive),
     st.builds(Truth, triad, triad, triad, triad),
     st.builds(NoiseFigures, sizes, sizes, st.none() | sizes, st.none() | sizes),

@@ -23,8 +23,8 @@ from fieldcal.sim_device.profile import (
     Truth,
 )
 from fieldcal.sim_device.profile_file import from_tables
-from fieldcal.sim_device.replay import Window, simulate
-from fieldcal.sim_device.vocabulary import Effect, effect, parse
+from fieldcal.sim_device.replay import HeldWindow, simulate
+from fieldcal.sim_device.vocabulary import SimulatedEffect, effect, parse
 
 PLAIN = Profile(
     truth=Truth(ZERO, ONE, ZERO, ONE), temperature=Climate(self_heating_k=0.0)
@@ -44,8 +44,8 @@ def test_every_window_has_its_position() -> None:
 
 def test_the_turn_is_where_it_is_said_to_be() -> None:
     windows = [
-        Window(0.0, 0.0, 2.0, 12.0),
-        Window(0.7, 0.1, 20.0, 30.0, turn=(13.0, 15.0)),
+        HeldWindow(0.0, 0.0, 2.0, 12.0),
+        HeldWindow(0.7, 0.1, 20.0, 30.0, turn=(13.0, 15.0)),
     ]
     for profile in (PLAIN, PLAIN.having(parse("clock_skew:ppm=50000"))):
         block = simulate(profile, windows, noise=False)
@@ -60,8 +60,8 @@ def test_it_is_the_running_device_with_the_same_orders() -> None:
         parse("hum:hz=3,gx=1"),
     )
     windows = [
-        Window(0.0, 0.0, 0.0, 12.0),
-        Window(0.7, 0.1, 20.0, 30.0, turn=(13.0, 17.0)),
+        HeldWindow(0.0, 0.0, 0.0, 12.0),
+        HeldWindow(0.7, 0.1, 20.0, 30.0, turn=(13.0, 17.0)),
     ]
     device = VirtualDevice(profile, seed=4)
     device.turn(0.7, 0.1, at=13.0)
@@ -73,9 +73,9 @@ def test_it_is_the_running_device_with_the_same_orders() -> None:
 
 def test_windows_at_constant_rate() -> None:
     windows = [
-        Window(0.0, 0.0, 3.0, 6.0, rate=(0.0, 1.0, 0.0)),
-        Window(0.0, 0.0, 12.0, 15.0, rate=(0.5, 0.0, 0.5)),
-        Window(0.3, 0.0, 22.0, 25.0),
+        HeldWindow(0.0, 0.0, 3.0, 6.0, rate=(0.0, 1.0, 0.0)),
+        HeldWindow(0.0, 0.0, 12.0, 15.0, rate=(0.5, 0.0, 0.5)),
+        HeldWindow(0.3, 0.0, 22.0, 25.0),
     ]
     block = simulate(PLAIN, windows, noise=False)
     for w in windows:
@@ -89,7 +89,7 @@ def test_times_with_jitter_and_gaps_are_kept() -> None:
     rng = np.random.default_rng(1)
     t = np.sort(rng.uniform(0, 40, 2000))
     t[1000:] += 3600.0
-    windows = [Window(0.5, 0.0, 0.0, 4000.0)]
+    windows = [HeldWindow(0.5, 0.0, 0.0, 4000.0)]
     block = simulate(replace(PLAIN, noise=NoiseFigures(acc_walk=ONE)), windows, t)
     np.testing.assert_array_equal(block.t, t)
     walked = block.acc - frames.force(0.5, 0.0, PLAIN.gravity)
@@ -109,8 +109,8 @@ def test_a_recorded_temperature_is_followed() -> None:
 def test_vibration_can_be_set_for_each_window() -> None:
     profile = PLAIN.having(parse("vibration_rectification:x=1e-9"))
     windows = [
-        Window(0, 0, 0, 10, vibration=0.0),
-        Window(0, 0, 12, 22, vibration=0.4),
+        HeldWindow(0, 0, 0, 10, vibration=0.0),
+        HeldWindow(0, 0, 12, 22, vibration=0.4),
     ]
     block = simulate(profile, windows)
     assert block.between(0, 10).acc[:, 0].std() < 0.03
@@ -137,7 +137,7 @@ def test_times_that_cannot_be_are_refused(t: list[float]) -> None:
         simulate(PLAIN, PLACES, np.array(t))
 
 
-def concealed(id_: str, given: dict[str, Any]) -> Effect:
+def concealed(id_: str, given: dict[str, Any]) -> SimulatedEffect:
     """An effect of the practice sessions' answers in our words."""
     letters = {"cross_coupling": "k", "g_sensitivity": "g"}
     named = {"acc": "xyz" if id_ == "quadratic" else ("ax", "ay", "az"),
@@ -155,7 +155,7 @@ def concealed(id_: str, given: dict[str, Any]) -> Effect:
     return effect(id_, numbers)
 
 
-def told(path: Path) -> tuple[Profile, list[Window]]:
+def told(path: Path) -> tuple[Profile, list[HeldWindow]]:
     """Device and windows that a session.toml of another program says it simulated."""
     tables = tomllib.loads(path.read_text("utf-8"))
     model = tables["model"]
@@ -165,7 +165,7 @@ def told(path: Path) -> tuple[Profile, list[Window]]:
         | {"effects": {id_: model.get(id_, {}) for id_ in model["effects"]}}
     )
     windows = [
-        Window(
+        HeldWindow(
             float(np.deg2rad(row["alpha_deg"])),
             float(np.deg2rad(row["beta_deg"])),
             row["start_s"],

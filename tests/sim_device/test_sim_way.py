@@ -13,14 +13,14 @@ from fieldcal.sim_device.profile import (
     ONE,
     ZERO,
     Climate,
-    Mounting,
+    MountingAxes,
     Profile,
     Sampling,
     Truth,
 )
-from fieldcal.sim_device.replay import Window, simulate
+from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.sim_device.vocabulary import parse
-from fieldcal.sim_device.way import Way
+from fieldcal.sim_device.way import Manoeuvre
 
 PERFECT = Profile(
     truth=Truth(ZERO, ONE, ZERO, ONE),
@@ -28,7 +28,7 @@ PERFECT = Profile(
     sampling=Sampling(1000.0),
 )
 END = (0.9, -0.6)
-HOME, AWAY = Window(0.2, 0.1, 0.0, 2.0), (*END, 6.0, 8.0)
+HOME, AWAY = HeldWindow(0.2, 0.1, 0.0, 2.0), (*END, 6.0, 8.0)
 
 
 def summed(t: Array, w: Array) -> Array:
@@ -46,18 +46,20 @@ def test_a_way_read_from_perfect_gyroscopes_is_the_turn_itself(
         truth=PERFECT.truth,
         temperature=PERFECT.temperature,
         sampling=PERFECT.sampling,
-        frame=Mounting(mounting),
+        frame=MountingAxes(mounting),
         effects=(
             parse("lever_arm:x=0.1,y=-0.05,z=0.2"),
             parse("base_tilt:about_x_deg=2"),
         ),
     )
-    by_joints = simulate(device, [HOME, Window(*AWAY, turn=(2.5, 5.5))], noise=False)
+    by_joints = simulate(
+        device, [HOME, HeldWindow(*AWAY, turn=(2.5, 5.5))], noise=False
+    )
     on_way = by_joints.between(2.2, 5.8)
     rate = on_way.gyr @ frames.mounting_matrix(mounting).T
-    way = Way(on_way.t[::2], summed(on_way.t, rate)[:, : len(on_way.t[::2])])
+    way = Manoeuvre(on_way.t[::2], summed(on_way.t, rate)[:, : len(on_way.t[::2])])
     carried = simulate(
-        device, [HOME, Window(*AWAY, turn=(2.5, 5.5), way=way)], noise=False
+        device, [HOME, HeldWindow(*AWAY, turn=(2.5, 5.5), way=way)], noise=False
     )
     inside = slice(*np.searchsorted(by_joints.t, [2.3, 5.7]))
     np.testing.assert_allclose(carried.gyr[inside], by_joints.gyr[inside], atol=1e-6)
@@ -72,7 +74,7 @@ def test_a_turn_about_a_fixed_axis_is_one_rotation(
 ) -> None:
     t = np.linspace(0, seconds, 60)
     part = (1 - np.cos(np.pi * t / seconds)) / 2
-    attitude, rate, _ = Way(t, np.outer(axis, part)).at(np.array([seconds]))
+    attitude, rate, _ = Manoeuvre(t, np.outer(axis, part)).at(np.array([seconds]))
     s, x, y, z = attitude[:, 0]
     apart = Rotation.from_quat([x, y, z, s]) * Rotation.from_rotvec(axis).inv()
     assert apart.magnitude() < 1e-9
@@ -80,8 +82,10 @@ def test_a_turn_about_a_fixed_axis_is_one_rotation(
 
 
 def test_before_and_after_it_nothing_moves() -> None:
-    way = Way(np.linspace(3, 4, 20), np.outer([0.0, 0.0, 0.5], np.linspace(0, 1, 20)))
-    windows = [HOME, Window(0.7, 0.1, 6.0, 8.0, way=way, turn=(3.0, 4.0))]
+    way = Manoeuvre(
+        np.linspace(3, 4, 20), np.outer([0.0, 0.0, 0.5], np.linspace(0, 1, 20))
+    )
+    windows = [HOME, HeldWindow(0.7, 0.1, 6.0, 8.0, way=way, turn=(3.0, 4.0))]
     block = simulate(PERFECT, windows, noise=False)
     moving = block.t[np.abs(block.gyr).max(axis=1) > 1e-6]
     assert moving[0] == pytest.approx(3.0) and moving[-1] == pytest.approx(4.0)
@@ -91,4 +95,4 @@ def test_before_and_after_it_nothing_moves() -> None:
 @pytest.mark.parametrize("t", [[0.0, 1.0, 2.0], [0.0, 1.0, 1.0, 2.0]])
 def test_too_few_or_no_ascending_instants_are_refused(t: list[float]) -> None:
     with pytest.raises(InputError, match="one after the other"):
-        Way(np.array(t), np.zeros((3, len(t))))
+        Manoeuvre(np.array(t), np.zeros((3, len(t))))

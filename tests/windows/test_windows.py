@@ -13,7 +13,7 @@ from scipy.signal import butter, lfilter
 
 from fieldcal.core.errors import InputError, Moved
 from fieldcal.core.samples import CHANNELS, Array, Block, concat
-from fieldcal.windows import Average, Limits, Window, average
+from fieldcal.windows import Average, StillnessLimits, Window, average
 from fieldcal.windows.longrun import error_of_mean
 
 UNIT = np.repeat([0.05, 0.002], 3)
@@ -197,7 +197,7 @@ def test_a_device_in_motion_throughout_is_no_device_at_rest() -> None:
     block.acc[:, 0] += 3 * np.sin(2 * np.pi * 0.7 * t)
     moved = rejection(block)
     assert moved and "no device at rest" in str(moved)
-    assert average(block, Limits(acc=10.0)).n == 3000
+    assert average(block, StillnessLimits(acc=10.0)).n == 3000
 
 
 def same(a: Average, b: Average) -> bool:
@@ -266,7 +266,7 @@ def test_rounding_that_the_noise_does_not_hide_is_in_the_error(noise: float) -> 
         truth = rng.uniform(0, 1, 6)
         values = np.round(truth + noise * rng.standard_normal((3000, 6)))
         found = average(Block.of(np.arange(3000) / 100, values[:, :3], values[:, 3:]),
-                        Limits(10, 10, 10, 10))  # fmt: skip
+                        StillnessLimits(10, 10, 10, 10))  # fmt: skip
         errors.append(found.mean - truth)
         sigmas.append(found.sigma)
     rms = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(sigmas)))

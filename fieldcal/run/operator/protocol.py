@@ -25,7 +25,7 @@ UNKNOWN = np.full(6, np.nan)
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class OperatorView:
     """What there is to show now.
 
     Attributes
@@ -64,7 +64,7 @@ class Operator(Protocol):
     def tell(self, text: str) -> None:
         """Show a sentence that must not be missed."""
 
-    def show(self, view: View) -> None:
+    def show(self, view: OperatorView) -> None:
         """Show the state; called for every block, must not take long."""
 
     def wish(self) -> Wish | None:
@@ -122,5 +122,7 @@ class Display:
         reason: str = "",
     ) -> None:
         link = (self._rate, self._temperature, self._driver.health)
-        view = View(phase, hold, arrival, stillness, elapsed, sigma, reason, *link)
+        view = OperatorView(
+            phase, hold, arrival, stillness, elapsed, sigma, reason, *link
+        )
         self._operator.show(view)

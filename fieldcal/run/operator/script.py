@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import Mover
-from fieldcal.run.operator.protocol import View, Wish
+from fieldcal.run.operator.protocol import OperatorView, Wish
 
 EVERY = 5.0
 """Time between two lines of progress, s of device time."""
@@ -44,7 +44,7 @@ class ScriptOperator:
         """Wait for a mover that is still at work."""
         return "wait" if self._mover.busy() else None
 
-    def show(self, view: View) -> None:
+    def show(self, view: OperatorView) -> None:
         """Report progress: each change of phase, and now and then within one."""
         waits = view.reason.partition(":")[0]
         now = (view.phase, view.hold.index, int(view.elapsed // EVERY), waits)

@@ -22,7 +22,7 @@ from fieldcal.run.movers import Mover
 from fieldcal.run.operator import widgets
 from fieldcal.run.operator.banner import drawable, large
 from fieldcal.run.operator.keyboard import HELP, Keyboard
-from fieldcal.run.operator.protocol import View, Wish
+from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.widgets import alert
 
 FRAMES = 8.0
@@ -72,7 +72,7 @@ class ConsoleOperator:
         self._said: list[str] = []
         self._said_before: list[str] = []
         self._waited = ""
-        self._view: View | None = None
+        self._view: OperatorView | None = None
         self._hold: Hold | None = None
         self._drawn = 0.0
         self._lines: set[str] = set()
@@ -127,7 +127,7 @@ class ConsoleOperator:
         pressed = self._keyboard.pressed() if self._keyboard else None
         return pressed or ("wait" if self._mover.busy() else None)
 
-    def show(self, view: View) -> None:
+    def show(self, view: OperatorView) -> None:
         """Draw the view, unless the last drawing is too recent."""
         begins = view.phase == "averaging" and self._phase != "averaging"
         self._view = view
@@ -162,7 +162,7 @@ class ConsoleOperator:
         if self._live is None:
             self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
-    def _log_view(self, view: View) -> None:
+    def _log_view(self, view: OperatorView) -> None:
         where = f"position {view.hold.index + 1}"
         if view.phase == "averaging":
             step = 10 * int(view.elapsed // 10)

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fieldcal.core.positions import Position
-from fieldcal.run.operator.protocol import View
+from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.position_check import tenth
 from fieldcal.run.waiting import ORDINARY
 
@@ -33,12 +33,12 @@ NEAR = 1.0
 """Off by less than this, deg, an angle is not asked to be turned."""
 
 
-def alert(view: View) -> str:
+def alert(view: OperatorView) -> str:
     """Why it waits, where that wants the operator to do something; else empty."""
     return "" if view.reason in ORDINARY or view.phase == "taken" else view.reason
 
 
-def angles(view: View) -> list[tuple[str, Text]]:
+def angles(view: OperatorView) -> list[tuple[str, Text]]:
     """Name and inclinometer of both joints, where it can be told."""
     wanted, now = view.hold.position.degrees, view.arrival
     if now is None or wanted is None:
@@ -85,7 +85,7 @@ def stillness(level: float) -> Text:
     return Text.assemble(f"[{bar[:limit]}|{bar[limit:]}] ", (word, style))
 
 
-def sigma(view: View) -> str:
+def sigma(view: OperatorView) -> str:
     """Standard errors reached; of each sensor the worst axis."""
     acc, gyr = view.sigma[:3], view.sigma[3:]
     parts = []
@@ -96,7 +96,7 @@ def sigma(view: View) -> str:
     return ", ".join(parts) or ""
 
 
-def by_the_end(view: View) -> str:
+def by_the_end(view: OperatorView) -> str:
     """Standard error to be expected when the window is full, by white noise."""
     acc = view.sigma[:3][np.isfinite(view.sigma[:3])]
     if view.hold.sigma:
@@ -107,7 +107,7 @@ def by_the_end(view: View) -> str:
     return f", by the end about ± {1e3 * then:.2f} mm/s²"
 
 
-def gauges(view: View) -> Table:
+def gauges(view: OperatorView) -> Table:
     """Everything that is measured now."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(width=9)
@@ -162,7 +162,7 @@ def listing(
     return table
 
 
-def link(view: View) -> Text:
+def link(view: OperatorView) -> Text:
     """How the link does."""
     health = view.health
     rate = f"{view.rate_hz:.0f} Hz" if np.isfinite(view.rate_hz) else "no rate yet"

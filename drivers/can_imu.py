@@ -38,7 +38,7 @@ LIMIT = 1 << 24
 """Most bytes of rows that wait: a minute of a device at 1 kHz."""
 
 
-class Imu(Driver):
+class CanImu(Driver):
     """A CAN bus, or a log of one, and the samples that are in its frames."""
 
     def __init__(self, address: str) -> None:

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.plugins import class_in, names
 from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers import protocols
 from fieldcal.drivers.driver import Health
@@ -186,9 +185,9 @@ def recognise(data: bytes, seconds: float) -> tuple[str, Likeness] | None:
     return max(found, key=lambda pair: pair[1].score, default=None)
 
 
-def formats() -> list[str]:
+def formats() -> tuple[str, ...]:
     """Names of the wire formats there are."""
-    return sorted(module.name for module in iter_modules(protocols.__path__))
+    return names(protocols.__path__)
 
 
 def open_codec(name: str, options: Options) -> Codec:
@@ -208,5 +207,4 @@ def codec_class(name: str) -> type[Codec]:
     if name not in formats():
         known = ", ".join(formats())
         raise InputError(f"no wire format {name!r}: there are {known}")
-    codec: type[Codec] = import_module(f"{protocols.__name__}.{name}").Codec
-    return codec
+    return class_in(f"{protocols.__name__}.{name}", Codec)  # type: ignore[type-abstract]

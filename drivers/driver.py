@@ -14,12 +14,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib import import_module
 from importlib.util import find_spec
 from time import monotonic, time
 from typing import Any, ClassVar, NamedTuple, Self
 
 from fieldcal.core.errors import DeviceError, DeviceSilent, InputError
+from fieldcal.core.plugins import class_in
 from fieldcal.core.samples import Block, Grain, concat
 
 LOOK = 0.5
@@ -218,7 +218,7 @@ def open_driver(url: str) -> Driver:
         raise InputError(
             f"no driver for {url!r}: write a scheme first, such as serial:/dev/ttyUSB0"
         )
-    imu: type[Driver] = import_module(module).Imu
+    imu = class_in(module, Driver)  # type: ignore[type-abstract]
     try:
         return imu(address)
     except imu.faults as fault:

@@ -8,8 +8,9 @@ SCALED_IMU, 2, 3), ``system``, ``component`` and ``instance`` where there are se
 serial port, ``speed`` of a log.
 
 What an autopilot sends is not raw, whatever the message is called: the calibration it
-has is built in. That is read and kept in `Imu.installed`; with ``installed=identity``
-it is set to none meanwhile, and given back when the link is closed.
+has is built in. That is read and kept in `MavlinkImu.installed`; with
+``installed=identity`` it is set to none meanwhile, and given back when the link is
+closed.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ FEW, RECENT = 16, 256
 """Least and most samples that the rate is told from."""
 
 
-class Imu(Driver):
+class MavlinkImu(Driver):
     """A link to an autopilot, or a log of one, and the samples of one of its sensors.
 
     Attributes

@@ -35,7 +35,7 @@ CUT = 1 << 20
 """Bytes of a log decoded at once."""
 
 
-class Imu(Driver):
+class ReplayImu(Driver):
     """A recording that is played as if the device were there."""
 
     def __init__(self, address: str) -> None:
@@ -45,13 +45,13 @@ class Imu(Driver):
         if can_log.is_log(place) and not bytes_of_a_port:
             from fieldcal.drivers import can_imu
 
-            self._player = can_imu.Imu(address)
+            self._player = can_imu.CanImu(address)
         elif mavlink_log.is_log(place) and not bytes_of_a_port:
             from fieldcal.drivers import mavlink_imu
 
-            self._player = mavlink_imu.Imu(address)
+            self._player = mavlink_imu.MavlinkImu(address)
         else:
-            self._player = ReplayedSamples(address)
+            self._player = _ReplayedSamples(address)
         self.name, self.health = self._player.name, self._player.health
 
     def receive(self, timeout: float) -> Block | None:
@@ -84,7 +84,7 @@ class Imu(Driver):
         self._player.close()
 
 
-class ReplayedSamples(Driver):
+class _ReplayedSamples(Driver):
     """Samples of a recording, delivered when they are due."""
 
     def __init__(self, address: str) -> None:

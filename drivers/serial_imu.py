@@ -98,7 +98,7 @@ def open_port(port: str, baud: int) -> SerialPort | Tcp:
     return Tcp((host, int(number)))
 
 
-class Imu(Driver):
+class SerialImu(Driver):
     """A serial port and the codec of what comes from it."""
 
     faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)

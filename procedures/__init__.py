@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
-from pkgutil import iter_modules
 from typing import Protocol, cast
 
 from fieldcal.calibration import Calibration
+from fieldcal.core import plugins
 from fieldcal.core.positions import Position
 from fieldcal.planning.steps import Plan
 
@@ -29,7 +29,7 @@ class Procedure(Protocol):
 @cache
 def names() -> tuple[str, ...]:
     """Every procedure there is, in alphabetical order."""
-    return tuple(sorted(module.name for module in iter_modules(__path__)))
+    return plugins.names(__path__)
 
 
 def procedure(name: str) -> Procedure:

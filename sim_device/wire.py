@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import ClassVar
 from urllib.parse import parse_qsl
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.plugins import class_in
 from fieldcal.core.samples import Block
 
 
@@ -57,10 +57,11 @@ class Wire(ABC):
         return value
 
 
-def formats() -> list[str]:
+def formats() -> tuple[str, ...]:
     """Names of the wire formats there are."""
     here = Path(__file__).parent
-    return sorted(path.stem.removeprefix("wire_") for path in here.glob("wire_*.py"))
+    found = (path.stem.removeprefix("wire_") for path in here.glob("wire_*.py"))
+    return tuple(sorted(found))
 
 
 def open_wire(spec: str) -> Wire:
@@ -79,7 +80,7 @@ def open_wire(spec: str) -> Wire:
             f"no wire format {name!r} for the virtual device; there are "
             f"{', '.join(formats())}"
         )
-    encoder: type[Wire] = import_module(module).Encoder
+    encoder = class_in(module, Wire)  # type: ignore[type-abstract]
     try:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError as error:

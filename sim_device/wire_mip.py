@@ -24,7 +24,7 @@ PACKET = np.dtype(
 PAYLOAD = PACKET.itemsize - 6
 
 
-class Encoder(Wire):
+class MipWire(Wire):
     """Packets of data set 0x80."""
 
     def encode(self, block: Block) -> bytes:

@@ -27,7 +27,7 @@ ACC = {"m/s^2": 1.0, "g": 1 / STANDARD_GRAVITY, "mg": 1e3 / STANDARD_GRAVITY}
 GYR = {"rad/s": 1.0, "deg/s": 180 / np.pi, "mrad/s": 1e3}
 
 
-class Encoder(Wire):
+class TextWire(Wire):
     """Lines of numbers."""
 
     options = {

@@ -25,7 +25,7 @@ TICK_S = 39.0625e-6
 FULL = 2**23
 
 
-class Encoder(Wire):
+class UbxWire(Wire):
     """ESF-RAW messages."""
 
     def encode(self, block: Block) -> bytes:

@@ -27,7 +27,7 @@ PRESSURE = 101.3
 """What the device would see of the rest: gauss, kPa."""
 
 
-class Encoder(Wire):
+class VectornavWire(Wire):
     """Binary output messages of the common group."""
 
     def encode(self, block: Block) -> bytes:

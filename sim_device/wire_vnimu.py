@@ -20,7 +20,7 @@ LINE = "VNIMU,+00.2200,+00.0800,-00.5300" + ",%+07.3f" * 3 + ",%+010.6f" * 3
 REST = ",%+05.1f,+101.300"
 
 
-class Encoder(Wire):
+class VnimuWire(Wire):
     """Lines of IMU measurements."""
 
     def encode(self, block: Block) -> bytes:

@@ -26,7 +26,7 @@ SWITCHED_ON = np.datetime64("2024-01-01T00:00:00", "ms")
 """What the device's clock shows at device time 0."""
 
 
-class Encoder(Wire):
+class WitmotionWire(Wire):
     """Frames of time, acceleration and angular rate."""
 
     options = {"acc_range": "16", "gyr_range": "2000", "time": "1"}

@@ -24,7 +24,7 @@ Bytes = NDArray[np.uint8]
 Numbers: TypeAlias = NDArray[Any]
 
 
-class Encoder(Wire):
+class XsensWire(Wire):
     """MTData2 messages."""
 
     options = {"numbers": "float"}

@@ -19,7 +19,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
-from fieldcal.drivers.codec import Codec as Base
+from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, headed
 from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
 from fieldcal.drivers.options import Options
@@ -34,7 +34,7 @@ WEEK = 604800.0
 """Span of the time of week, s."""
 
 
-class Codec(Base):
+class MipCodec(Codec):
     """Decoder of set 0x80; the option is the rate of a device that sends no time."""
 
     bauds = (115200, 921600, 230400, 460800)

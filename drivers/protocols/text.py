@@ -25,8 +25,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.drivers.clock import Clock
-from fieldcal.drivers.codec import Codec as Base
-from fieldcal.drivers.codec import Likeness
+from fieldcal.drivers.codec import Codec, Likeness
 from fieldcal.drivers.columns import guess
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask
 from fieldcal.drivers.layouts import Raw
@@ -64,7 +63,7 @@ for _digit in hexdigits:
     HEX[ord(_digit)] = int(_digit, 16)
 
 
-class Codec(Base):
+class TextCodec(Codec):
     """Decoder of lines; the options are those of the module's text."""
 
     longest = LONGEST

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
-from fieldcal.drivers.codec import Codec as Base
-from fieldcal.drivers.codec import Likeness
+from fieldcal.drivers.codec import Codec, Likeness
 from fieldcal.drivers.framing import (
     Bytes,
     Candidates,
@@ -52,7 +51,7 @@ COLUMN = np.full(256, -1)
 COLUMN[list(COLUMNS)] = list(COLUMNS.values())
 
 
-class Codec(Base):
+class UbxCodec(Codec):
     """Decoder of ESF-RAW, or of ESF-MEAS with option message=meas."""
 
     bauds = (38400, 115200, 9600, 921600, 230400, 460800)

@@ -22,7 +22,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import crc16
 from fieldcal.drivers.clock import Clock
-from fieldcal.drivers.codec import Codec as Base
+from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index
 from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
 from fieldcal.drivers.options import Options
@@ -67,7 +67,7 @@ def _totals() -> Index:
 TOTALS = _totals()
 
 
-class Codec(Base):
+class VectornavCodec(Codec):
     """Decoder of the messages that carry accelerations and angular rates."""
 
     bauds = (115200, 921600, 230400, 460800, 57600, 128000)

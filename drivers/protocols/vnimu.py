@@ -11,10 +11,10 @@ from __future__ import annotations
 from fieldcal.core.samples import Grain
 from fieldcal.drivers.codec import Likeness
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.protocols.text import Codec as Lines
+from fieldcal.drivers.protocols.text import TextCodec
 
 
-class Codec(Lines):
+class VnimuCodec(TextCodec):
     """Decoder of lines with these columns."""
 
     bauds = (115200, 921600, 230400, 460800, 57600, 128000)

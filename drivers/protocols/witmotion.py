@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.drivers.clock import Clock
-from fieldcal.drivers.codec import Codec as Base
+from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, rows
 from fieldcal.drivers.layouts import Raw
 from fieldcal.drivers.options import Options
@@ -63,7 +63,7 @@ UNDECIDED = 3
 """Samples without a stamp after which the device is taken to send none."""
 
 
-class Codec(Base):
+class WitmotionCodec(Codec):
     """Decoder of 0x50 to 0x52; options acc_range (g), gyr_range (deg/s), rate (Hz)."""
 
     bauds = (115200, 9600, 921600, 230400, 460800, 57600, 38400, 19200)

@@ -21,7 +21,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import sums
 from fieldcal.drivers.clock import Clock
-from fieldcal.drivers.codec import Codec as Base
+from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, headed
 from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
 from fieldcal.drivers.options import Options
@@ -44,7 +44,7 @@ REALS = {ACC[0]: 3, ACC[1]: 3, GYR[0]: 3, GYR[1]: 3, TEMPERATURE: 1}
 COUNTERS = {COUNTER: 2, TIME: 4}
 
 
-class Codec(Base):
+class XsensCodec(Codec):
     """Decoder of MTData2; the option is the rate of a device that sends no time."""
 
     bauds = (115200, 921600, 460800, 230400, 57600, 2000000)

@@ -9,20 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from importlib import import_module
-from pkgutil import iter_modules
 
+from fieldcal.core.plugins import class_in, names
 from fieldcal.physics.effect import Effect
 
 
 @cache
 def catalogue() -> Mapping[str, Effect]:
     """Every effect by its id, in alphabetical order."""
-    found: dict[str, Effect] = {}
-    for name in sorted(m.name for m in iter_modules(__path__)):
-        module = f"{__name__}.{name}"
-        for thing in vars(import_module(module)).values():
-            if isinstance(thing, type) and thing.__module__ == module:
-                if issubclass(thing, Effect):
-                    found[name] = thing()
-    return found
+    return {n: class_in(f"{__name__}.{n}", Effect)() for n in names(__path__)}

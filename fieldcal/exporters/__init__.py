@@ -11,12 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Protocol, cast
 
 from fieldcal.calibration import COMPONENTS
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import InputError
+from fieldcal.core.plugins import names
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration, Nominal
@@ -85,9 +85,9 @@ class Exporter(Protocol):
     write: Callable[[ExportSource, Path], list[str]]
 
 
-def formats() -> list[str]:
+def formats() -> tuple[str, ...]:
     """Names of the formats there are."""
-    return sorted(module.name for module in iter_modules(__path__))
+    return names(__path__)
 
 
 def exporter(name: str) -> Exporter:

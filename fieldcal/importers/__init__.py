@@ -2,7 +2,7 @@
 
 To add one, write importers/<name>.py with ``WHAT`` (a line for the help),
 ``recognises(head, path)``, which judges a file by its first bytes, and a subclass of
-`recording.Recording` called ``File``. Nothing is guessed in silence: units and the
+`fieldcal.importing.recording.Recording`. Nothing is guessed in silence: units and the
 sensor of several are named by the file, or by the user.
 """
 
@@ -11,9 +11,9 @@ from __future__ import annotations
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.plugins import class_in, names
 from fieldcal.importing.gzip_stream import head
 from fieldcal.importing.recording import ReadOptions, Recording
 
@@ -24,8 +24,7 @@ LAST = ("csv_like", "wire")
 @cache
 def formats() -> tuple[str, ...]:
     """Names of the formats there are, those with a mark of their own first."""
-    names = sorted(module.name for module in iter_modules(__path__))
-    return (*(n for n in names if n not in LAST), *LAST)
+    return (*(n for n in names(__path__) if n not in LAST), *LAST)
 
 
 def open_recording(
@@ -54,8 +53,8 @@ def open_recording(
     for some in [name] if name else formats():
         module = import_module(f"{__name__}.{some}")
         if name or module.recognises(first, path):
-            opened: Recording = module.File(path, wanted, repair)
-            return opened
+            opened = class_in(module.__name__, Recording)  # type: ignore[type-abstract]
+            return opened(path, wanted, repair)
     raise InputError(
         f"{path}: is of no format that is known by its content: name one with --format"
         f" {'|'.join(formats())}"

@@ -61,7 +61,7 @@ class ArrayTable(NamedTuple):
     unit: str = ""
 
 
-class File(Recording):
+class ArrayFile(Recording):
     """Arrays with names, with one IMU in them."""
 
     _loaded: dict[str, ArrayTable] | None = None

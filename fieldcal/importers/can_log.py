@@ -60,7 +60,7 @@ def recognises(head: bytes, path: Path) -> bool:
     return any(p.match(head) for p in (*(kind.begins for kind in KINDS), PRINTED))
 
 
-class File(Recording):
+class CanLog(Recording):
     """A log of a bus."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:
@@ -158,7 +158,7 @@ class File(Recording):
                 yield from reader
 
 
-def _candump(recording: File, text: io.TextIOWrapper) -> Iterator[Any]:
+def _candump(recording: CanLog, text: io.TextIOWrapper) -> Iterator[Any]:
     """Frames of a candump log; a line that is none is named."""
     import can
 
@@ -175,7 +175,7 @@ def _candump(recording: File, text: io.TextIOWrapper) -> Iterator[Any]:
 class _Lines:
     """Lines of a text that are counted, without one that was cut off."""
 
-    def __init__(self, text: io.TextIOWrapper, recording: File) -> None:
+    def __init__(self, text: io.TextIOWrapper, recording: CanLog) -> None:
         self._text, self._recording, self.number = text, recording, 0
 
     def __iter__(self) -> Iterator[str]:

@@ -62,7 +62,7 @@ def _is_wide(head: bytes) -> bool:
     return head.startswith(WIDE) and head.count(0) > len(head) / 3
 
 
-class File(Recording):
+class TextColumns(Recording):
     """A text file, with one IMU in it."""
 
     _skip = 0

@@ -42,7 +42,7 @@ def recognises(head: bytes, path: Path) -> bool:
     return head.startswith(MARK + bytes((FMT,)))
 
 
-class File(Recording):
+class DataflashLog(Recording):
     """A dataflash log."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:

@@ -40,7 +40,7 @@ def recognises(head: bytes, path: Path) -> bool:
     return head.startswith((MAGIC, SQLITE))
 
 
-class File(Recording):
+class McapLog(Recording):
     """An MCAP file."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:

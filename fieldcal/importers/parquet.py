@@ -25,7 +25,7 @@ def recognises(head: bytes, path: Path) -> bool:
     return head.startswith((PARQUET, FEATHER, STREAM))
 
 
-class File(Recording):
+class ParquetFile(Recording):
     """A table with named columns, with one IMU in it."""
 
     def streams(self) -> list[ImuStream]:

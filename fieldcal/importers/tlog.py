@@ -50,7 +50,7 @@ def recognises(head: bytes, path: Path) -> bool:
     return many > 0
 
 
-class File(Recording):
+class TelemetryLog(Recording):
     """A telemetry log."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:

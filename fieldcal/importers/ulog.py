@@ -58,7 +58,7 @@ def recognises(head: bytes, path: Path) -> bool:
     return head.startswith(MAGIC)
 
 
-class File(Recording):
+class UlogFile(Recording):
     """A PX4 log."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:

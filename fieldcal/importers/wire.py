@@ -30,7 +30,7 @@ def recognises(head: bytes, path: Path) -> bool:
     return recognise(head, SECONDS) is not None
 
 
-class File(Recording):
+class WireStream(Recording):
     """The bytes of one device."""
 
     _codec: Codec | None = None

@@ -24,7 +24,7 @@ from fieldcal.core.errors import DeviceError, DeviceSilent
 from fieldcal.core.samples import Block, concat
 from fieldcal.drivers.can_bus import BusSource, why
 from fieldcal.drivers.can_groups import CanHealth
-from fieldcal.drivers.can_imu import Imu
+from fieldcal.drivers.can_imu import CanImu
 from fieldcal.drivers.driver import Driver, open_driver
 from fieldcal.procedures import two_position
 from fieldcal.run import movers
@@ -231,7 +231,7 @@ def test_a_bus_that_is_gone_is_said_by_the_device_and_mended_by_the_driver(
     bus: tuple[BusLink, Driver],
 ) -> None:
     link, imu = bus
-    assert isinstance(imu, Imu) and imu._reader is not None
+    assert isinstance(imu, CanImu) and imu._reader is not None
     device = VirtualDevice(Profile(), seed=2)
     pumped(link, device.take(30))
     some(imu, 30)

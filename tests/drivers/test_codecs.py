@@ -41,7 +41,7 @@ def same(one: Block, other: Block) -> None:
 
 
 def test_every_format_has_a_stream() -> None:
-    assert sorted(STREAMS) == formats()
+    assert tuple(sorted(STREAMS)) == formats()
 
 
 def test_an_unknown_format_is_refused_with_those_there_are() -> None:

@@ -21,7 +21,7 @@ from processes import RUN, simulated
 from fieldcal.core.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.drivers.driver import open_driver
-from fieldcal.drivers.mavlink_imu import Imu
+from fieldcal.drivers.mavlink_imu import MavlinkImu
 from fieldcal.sim_device.pty_port import PtyPort
 
 BIAS, SCALE = np.array([0.2, -0.3, 0.1]), np.array([1.006, 0.992, 1.008])
@@ -40,7 +40,7 @@ def order(control: str, **request: Any) -> None:
         assert b"error" not in line.recv(4096)
 
 
-def taken(imu: Imu, seconds: float) -> Block:
+def taken(imu: MavlinkImu, seconds: float) -> Block:
     """So much device time of samples."""
     blocks: list[Block] = []
     for block in imu.blocks():
@@ -50,9 +50,9 @@ def taken(imu: Imu, seconds: float) -> Block:
     return concat(blocks)
 
 
-def opened(url: str) -> Imu:
+def opened(url: str) -> MavlinkImu:
     imu = open_driver(url)
-    assert isinstance(imu, Imu)
+    assert isinstance(imu, MavlinkImu)
     return imu
 
 

@@ -6,16 +6,16 @@ import pytest
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.protocols.text import LONGEST, Codec
+from fieldcal.drivers.protocols.text import LONGEST, TextCodec
 
 G = 9.80665
 
 
-def codec(query: str = "") -> Codec:
-    return Codec(Options("serial", query))
+def codec(query: str = "") -> TextCodec:
+    return TextCodec(Options("serial", query))
 
 
-def fed(codec: Codec, *pieces: bytes) -> Block:
+def fed(codec: TextCodec, *pieces: bytes) -> Block:
     blocks = [codec.feed(piece, float(i)) for i, piece in enumerate(pieces)]
     return concat(block for block in blocks if block is not None)
 

@@ -12,7 +12,7 @@ from wires import wit_time as at
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.protocols.witmotion import Codec
+from fieldcal.drivers.protocols.witmotion import WitmotionCodec
 
 G = 9.80665
 
@@ -26,11 +26,11 @@ GYR = bytes.fromhex("55 52 00 40 00 c0 10 00 00 00 b7")
 ANGLE = bytes.fromhex("55 53 00 00 00 00 00 00 00 00 a8")
 
 
-def codec(query: str = "") -> Codec:
-    return Codec(Options("serial", query))
+def codec(query: str = "") -> WitmotionCodec:
+    return WitmotionCodec(Options("serial", query))
 
 
-def fed(codec: Codec, *pieces: bytes) -> Block:
+def fed(codec: WitmotionCodec, *pieces: bytes) -> Block:
     blocks = [codec.feed(piece, float(i)) for i, piece in enumerate(pieces)]
     return concat(block for block in blocks if block is not None)
 

@@ -14,7 +14,7 @@ from fieldcal.core.errors import FieldcalError, InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importers.csv_like import File
+from fieldcal.importers.csv_like import TextColumns
 from fieldcal.importing.recording import ReadOptions as Layout
 from fieldcal.importing.validation import Judge
 from fieldcal.session.folder import Session
@@ -23,7 +23,7 @@ ACC = ("ax", "ay", "az")
 
 
 def read(path: Path, layout: Layout) -> Block:
-    recording = File(path, layout)
+    recording = TextColumns(path, layout)
     judge = Judge(str(path), recording.place, repair=False)
     return concat(judge.good(block) for block in recording.blocks("0"))
 
@@ -77,7 +77,7 @@ def test_decimal_commas_are_read_and_told(
 ) -> None:
     rows = [["x", "y", "z"], ["-1,25", "2,5e1", "3"], ["4", "0,5", last]]
     path = file(tmp_path, "\n".join(separator.join(r) for r in rows))
-    recording = File(path, Layout(ACC, rate_hz=1))
+    recording = TextColumns(path, Layout(ACC, rate_hz=1))
     got = concat(recording.blocks("0")).acc
     third = 3.5 if last == "3,5" else np.nan
     np.testing.assert_array_equal(got, [[-1.25, 25, 3], [4, 0.5, third]])

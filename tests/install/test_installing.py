@@ -19,7 +19,7 @@ from processes import TWO_POSITION, simulated, wait_for_samples
 
 from fieldcal.cli import main
 from fieldcal.drivers.driver import open_driver
-from fieldcal.drivers.mavlink_imu import Imu
+from fieldcal.drivers.mavlink_imu import MavlinkImu
 from fieldcal.drivers.mavlink_installed import Installed
 from fieldcal.session.folder import mark_line
 
@@ -125,7 +125,7 @@ def begun(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
 def installed(url: str) -> Installed:
     """What the autopilot has now."""
     with open_driver(url) as imu:
-        assert isinstance(imu, Imu) and imu.installed is not None
+        assert isinstance(imu, MavlinkImu) and imu.installed is not None
         return imu.installed
 
 

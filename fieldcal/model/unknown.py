@@ -72,6 +72,11 @@ def smooth(span: float) -> Array:
     return even
 
 
+def along(axis: int) -> slice:
+    """Which columns of `Span.fading` are of the force along one axis."""
+    return slice(axis * SLOW, (axis + 1) * SLOW)
+
+
 def alpha(x: Experience) -> Array:
     """Harmonics of the first joint."""
     return _angle(x.alpha)

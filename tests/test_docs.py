@@ -7,14 +7,18 @@ import sys
 import tomllib
 from importlib import import_module
 from pathlib import Path
+from typing import get_args
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from bench import five_positions
 
+import fieldcal
+from fieldcal.calibration import wording
 from fieldcal.cli import COMMANDS
 from fieldcal.core.positions import SETS, Position
+from fieldcal.diagnosis.result import Verdict
 from fieldcal.effects import catalogue
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.vocabulary import parse
@@ -124,3 +128,47 @@ def test_the_picture_of_each_effect_is_one_the_virtual_device_can_make() -> None
     for name in ("cross_coupling", "quantisation", "clock_skew"):
         svg = effects.picture(catalogue()[name])
         assert svg.lstrip().startswith("<?xml") and svg.count("<path") > 10
+
+
+CODE = Path(fieldcal.__file__).parent
+ROOMS = {path.parent.name for path in CODE.glob("*/__init__.py")}
+
+
+@pytest.mark.parametrize(
+    "page", sorted([*PAGES, DOCS.parent / "CONTRIBUTING.md"]), ids=lambda p: p.stem
+)
+def test_each_module_that_is_named_exists(page: Path) -> None:
+    for room, module in re.findall(r"`(?:fieldcal/)?(\w+)/(\w+)`", page.read_text()):
+        if room in ROOMS:
+            place = CODE / room / module
+            assert place.is_dir() or place.with_suffix(".py").is_file(), place
+
+
+def test_each_room_is_named_where_the_rooms_are_described() -> None:
+    table = (DOCS.parent / "CONTRIBUTING.md").read_text()
+    assert set(re.findall(r"`(\w+)/`", table)) >= ROOMS
+
+
+@pytest.mark.usefixtures("drawn")
+def test_the_drawing_of_the_architecture_has_rooms_that_exist() -> None:
+    architecture = import_module("drawn.architecture")
+    named = {n for n, box in architecture.BOXES.items() if not box.outside}
+    assert named <= ROOMS
+    # those that all others use stand in the text beside it, the command line above it
+    assert ROOMS - named == {"core", "calibration", "planning", "twin", "commands"}
+    ends = {end for start, to, _ in architecture.ARROWS for end in (start, to)}
+    assert ends == set(architecture.BOXES)
+    texts = {e.text for e in ElementTree.fromstring(architecture.drawing()).iter()}
+    assert texts >= {box.title for box in architecture.BOXES.values()}
+
+
+@pytest.mark.usefixtures("drawn")
+def test_the_glossary_has_each_term_that_results_and_screens_use() -> None:
+    terms = {
+        term.lower()
+        for line in re.findall(r"^(\S.*)\n: ", (DOCS / "glossary.md").read_text(), re.M)
+        for term in line.split(", ")
+    }
+    verdicts = {verdict.replace("_", " ") for verdict in get_args(Verdict)}
+    groups = {re.sub(r"^(acc|gyro) ", "", title) for title in wording.TITLES.values()}
+    assert verdicts | groups - {"joints' offset"} | {"go", "no-go"} <= terms

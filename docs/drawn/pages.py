@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from pathlib import Path
 
+from drawn import architecture
 from drawn.effects import given, picture
 from drawn.positions import drawings
 from drawn.screens import screens
@@ -23,6 +24,7 @@ def make(folder: Path) -> None:
     """Write all of it; what has not changed is left as it is."""
     for part in ("effects", "screens"):
         (folder / part).mkdir(parents=True, exist_ok=True)
+    _write(folder / "architecture.html", architecture.drawing())
     for name, positions in SETS.items():
         _write(folder / f"positions_{name}.html", drawings(positions))
     for effect in catalogue().values():

@@ -29,6 +29,7 @@ from fieldcal.run.engine import Engine
 from fieldcal.run.movers import Nobody
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
+from fieldcal.run.wait_reason import WaitReason
 from fieldcal.session import description
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import Profile, VirtualDevice
@@ -85,6 +86,10 @@ class Filmed:
     def tell(self, text: str) -> None:
         """Show a sentence."""
         self._console.tell(text)
+
+    def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+        """Ring for what is waited for."""
+        self._console.alarm(reason, waited)
 
     def show(self, view: OperatorView) -> None:
         """Show the state, and keep a picture of the moments that are wanted."""

@@ -25,7 +25,8 @@ from fieldcal.run.interruptions import Again, begun_again, gap, restarted
 from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
 from fieldcal.run.operator.protocol import Display, Operator, Wish
 from fieldcal.run.position_check import Held
-from fieldcal.run.waiting import GAP, SETTLING, Placing, force
+from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
+from fieldcal.run.waiting import GAP, Placing, force
 from fieldcal.run.warm_up import Warmth
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window
@@ -150,6 +151,10 @@ class Engine:
         self._recorder.mark("told", text=text)
         self._operator.tell(text)
 
+    def _alarm(self, reason: WaitReason) -> None:
+        self._recorder.mark("told", text=reason.text)
+        self._operator.alarm(reason)
+
     def _record(self, driver: Driver) -> Iterator[Block]:
         for raw in driver.blocks():
             self._silence = 0
@@ -163,14 +168,15 @@ class Engine:
     def _silent(self) -> None:
         """Say that nothing comes, before anybody thinks that we are stuck."""
         self._silence += 1
-        said = (
+        reason = WaitReason(
+            WaitState.NO_SAMPLES,
             f"no samples come from {self._driver.name}: check cable and power; it"
-            " goes on by itself once they do"
+            " goes on by itself once they do",
         )
         if self._silence >= 2 and self._hold_now:
-            self._display.silent(self._hold_now, said)
+            self._display.silent(self._hold_now, reason)
         if self._silence == 2:
-            self._tell(said)
+            self._alarm(reason)
         if self._operator.wish() == "stop":
             raise Stopped("stopped by the operator")
 
@@ -178,7 +184,7 @@ class Engine:
         """Wait until the device rests where it should."""
         placing = Placing(hold, self._about, self._held, self._left == hold.index)
         asked = self._driver.host_time()
-        insisted = cold = False
+        insisted = warned = False
         for block in self._stream:
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before
@@ -193,13 +199,12 @@ class Engine:
                 insisted = self._ask_back(placing)
             waits = self._warmth is not None and self._warmth.waits
             reason = placing.reason
-            if placing.arrived and waits and self._warmth:
-                said = self._warmth.says
-                reason = f"{said}; Enter goes on" if said else SETTLING
+            if placing.arrived and self._warmth and self._warmth.says and waits:
+                reason = WaitReason(WaitState.WARMING_UP, self._warmth.says)
             self._display.turning(hold, placing, reason)
-            if reason.endswith("Enter goes on") and not cold:
-                cold = True
-                self._tell(reason)
+            if reason.state is WaitState.WARMING_UP and not warned:
+                warned = True
+                self._alarm(reason)
             if placing.arrived and not waits and wish != "wait":
                 return
             self._complain(hold, placing, quiet=wish == "wait")
@@ -207,9 +212,10 @@ class Engine:
 
     def _complain(self, hold: Hold, placing: Placing, quiet: bool) -> None:
         """Say that it rests at a wrong place, and give up in the end."""
-        if not quiet and (said := placing.complaint()):
-            self._recorder.mark("wrong", position=hold.index, text=said)
-            self._operator.tell(said)
+        if not quiet and (waited := placing.alarm()) is not None:
+            text = reminder(waited) + placing.problem
+            self._recorder.mark("wrong", position=hold.index, text=text)
+            self._operator.alarm(placing.reason, waited)
         if placing.arrived or not self._give_up:
             return
         if placing.waited_enough(self._give_up):
@@ -226,7 +232,7 @@ class Engine:
                 " the result is NO-GO"
             )
             return True
-        self._tell(f"not yet: {placing.problem or placing.reason}")
+        self._tell(f"not yet: {placing.problem or placing.reason.text}")
         return False
 
     def _insist(self, hold: Hold, placing: Placing) -> None:

@@ -14,6 +14,7 @@ from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.planning.steps import Hold
 from fieldcal.run.position_check import NORM, Arrival, Held, judge
+from fieldcal.run.wait_reason import WaitReason, WaitState
 from fieldcal.session.description import Description
 from fieldcal.windows import Stillness
 
@@ -25,11 +26,6 @@ PATIENCE = 3.0
 
 REMIND = 60.0
 """Time at the same wrong place after which it is said again, s."""
-
-LISTENING, MOVING = "listening to the noise", "moving: waiting for it to rest"
-SETTLING, TURNING = "settling", "waiting for the turn"
-ORDINARY = (LISTENING, MOVING, SETTLING, TURNING)
-"""What every turn waits for; any other reason wants the operator to do something."""
 
 GAP = 0.5
 """Longest time without samples that a rest may have, s."""
@@ -135,13 +131,16 @@ class Placing:
         return off <= NORM * self._about.gravity
 
     @property
-    def reason(self) -> str:
-        """What it waits for, for the operator."""
+    def reason(self) -> WaitReason:
+        """What it waits for."""
         if self._stillness.since is None:
-            return MOVING if np.isfinite(self.meter) else LISTENING
+            measured = np.isfinite(self.meter)
+            return WaitReason(WaitState.MOVING if measured else WaitState.LISTENING)
         if self.arrival is not None and not self.arrival.ok:
-            return self.problem if self.seconds >= PATIENCE else TURNING
-        return SETTLING
+            if self.seconds < PATIENCE:
+                return WaitReason(WaitState.TURNING)
+            return WaitReason(WaitState.MISPLACED, self.problem)
+        return WaitReason(WaitState.SETTLING)
 
     @property
     def problem(self) -> str:
@@ -158,14 +157,18 @@ class Placing:
         """Whether it was waited for so many s, and whoever turns it had the time to."""
         return self.waited > give_up and self.waited_host > min(give_up, LEAST)
 
-    def complaint(self) -> str:
-        """What is to be said aloud now: once for a rest, and again every minute."""
+    def alarm(self) -> float | None:
+        """Whether to call the operator now: once for a rest, and every minute again.
+
+        Returns the time waited if it is a reminder, s, 0 for the first time, and None
+        if there is nothing to say.
+        """
         since = self._last - self._told
-        if self.seconds < PATIENCE or since < REMIND or not (said := self.problem):
-            return ""
+        if self.reason.state is not WaitState.MISPLACED or since < REMIND:
+            return None
         again = np.isfinite(self._told)
         self._told = self._last
-        return f"still waiting, {self.waited:.0f} s: {said}" if again else said
+        return self.waited if again else 0.0
 
 
 def _others(hold: Hold, about: Description) -> dict[str, Position]:

@@ -21,6 +21,7 @@ from fieldcal.run.engine import Engine
 from fieldcal.run.interruptions import Again
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.position_check import Held
+from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import Placing
 from fieldcal.run.warm_up import Warmth
 from fieldcal.session import description
@@ -60,6 +61,9 @@ class Turner:
         if self.late and self.corrects:
             self.driver.place(self.late)
             self.late = None
+
+    def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+        self.tell(reminder(waited) + reason.text)
 
     def wish(self) -> Wish | None:
         return self.wishes.pop(0) if self.wishes else None
@@ -338,7 +342,8 @@ def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
         engine = Engine(driver, turner, ABOUT, recorder, warmth=warmth)
         engine.run(hold_all(TWO[:1], 10.0))
     assert "still warming up" in turner.told[0] and "Enter goes on" in turner.told[0]
-    waits = [v.reason for v in turner.views if "Enter goes" in v.reason]
+    states = [v.reason for v in turner.views]
+    waits = [r.text for r in states if r.state is WaitState.WARMING_UP]
     assert waits and "K/min" in waits[0]
     window = [m for m in Session.open(tmp_path / "s").marks() if m["event"] == "window"]
     assert 39.0 < window[0]["start_s"] < 43.0, "but not for ever"

@@ -16,7 +16,9 @@ from fieldcal.run.operator.banner import drawable, large
 from fieldcal.run.operator.protocol import OperatorView, Phase
 from fieldcal.run.operator.terminal import ConsoleOperator
 from fieldcal.run.position_check import Arrival
+from fieldcal.run.wait_reason import WaitReason, WaitState
 
+MISPLACED = WaitReason(WaitState.MISPLACED, "the device is at α = 3.0°")
 HOLD = Hold(1, FIVE[1], 30.0)
 
 
@@ -28,7 +30,7 @@ def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> OperatorView:
         "stillness": 0.4,
         "elapsed": elapsed,
         "sigma": np.array([1e-3, 2e-3, 3e-3, 1e-5, 1e-5, 2e-5]),
-        "reason": "the device is at α = 3.0°",
+        "reason": MISPLACED,
         "rate_hz": 100.0,
         "temperature": 24.5,
         "health": Health(samples=1234),
@@ -92,19 +94,20 @@ def test_what_was_wrong_with_the_turn_is_gone_once_it_is_done(
     operator: ConsoleOperator,
 ) -> None:
     operator.show(view("turning"))
-    operator.tell("still waiting, 60 s: the device is at α = 3.0°")
+    operator.alarm(MISPLACED, 60.0)
     assert screen(operator).count("the device is at α = 3.0°") == 1
     assert "still waiting, 60 s: the device is at" in screen(operator)
     operator.tell("not yet: it moves")
     assert "! not yet" in screen(operator)
-    operator.show(view("averaging", 1.0, reason=""))
+    operator.show(view("averaging", 1.0, reason=WaitReason()))
     assert "!" not in screen(operator)
 
 
 def test_a_link_that_is_silent_is_said_large_and_for_as_long_as_it_is(
     operator: ConsoleOperator,
 ) -> None:
-    operator.show(view("silent", reason="no samples come from ttyUSB0: check cable"))
+    silent = WaitReason(WaitState.NO_SAMPLES, "no samples come from ttyUSB0: check it")
+    operator.show(view("silent", reason=silent))
     said = screen(operator)
     assert "N O   S A M P L E S" in said and "! no samples come from ttyUSB0" in said
     operator.show(view("turning"))
@@ -113,13 +116,14 @@ def test_a_link_that_is_silent_is_said_large_and_for_as_long_as_it_is(
 
 def test_hands_off_does_not_ask_to_be_turned_on(operator: ConsoleOperator) -> None:
     there = Arrival(True, 21.0, 1.2, limit_deg=2.4)
-    operator.show(view("turning", arrival=there, reason="settling"))
+    operator.show(view("turning", arrival=there, reason=WaitReason(WaitState.SETTLING)))
     said = screen(operator)
     assert "H A N D S   O F F" in said and said.count("close enough") == 2
     assert "+21.0° to +22.5° ± 2.4°" in said
-    warms = "the device is still warming up: +4.0 ± 0.2 K/min; Enter goes on"
-    operator.show(view("turning", arrival=there, reason=warms))
-    assert "W A I T" in screen(operator) and warms in screen(operator)
+    warms = "the device is still warming up: +4.0 ± 0.2 K/min"
+    reason = WaitReason(WaitState.WARMING_UP, warms)
+    operator.show(view("turning", arrival=there, reason=reason))
+    assert "W A I T" in screen(operator) and f"{warms}; Enter" in screen(operator)
 
 
 @pytest.mark.parametrize("phase", ["turning", "averaging", "taken"])

@@ -11,6 +11,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.driver import Driver, Health
 from fieldcal.planning.steps import Hold
 from fieldcal.run.position_check import Arrival
+from fieldcal.run.wait_reason import WaitReason, WaitState
 from fieldcal.run.waiting import Placing
 from fieldcal.windows import Average, Window
 
@@ -22,6 +23,8 @@ Wish = Literal["confirm", "repeat", "skip", "stop", "wait"]
 
 UNKNOWN = np.full(6, np.nan)
 """Standard error before there is one."""
+
+NOTHING, TAKEN_BEFORE = WaitReason(), WaitReason(WaitState.TAKEN_BEFORE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +39,7 @@ class OperatorView:
     stillness : present motion over the limit for rest; below 1 is still
     elapsed : s of device time averaged so far
     sigma : (6,) standard error reached so far, nan before there is one
-    reason : why it waits, empty when it does not
+    reason : why it waits
     rate_hz : samples a second of device time
     temperature : deg C, nan where unknown
     health : of the link
@@ -49,7 +52,7 @@ class OperatorView:
     stillness: float
     elapsed: float
     sigma: Array
-    reason: str
+    reason: WaitReason
     rate_hz: float
     temperature: float
     health: Health
@@ -63,6 +66,12 @@ class Operator(Protocol):
 
     def tell(self, text: str) -> None:
         """Show a sentence that must not be missed."""
+
+    def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+        """Call the operator: the reason that is shown needs something to be done.
+
+        `waited` is the time since the position was asked for if this is a reminder, s.
+        """
 
     def show(self, view: OperatorView) -> None:
         """Show the state; called for every block, must not take long."""
@@ -91,7 +100,7 @@ class Display:
             self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
         self._temperature = float(block.temperature[-1])
 
-    def turning(self, hold: Hold, placing: Placing, reason: str) -> None:
+    def turning(self, hold: Hold, placing: Placing, reason: WaitReason) -> None:
         """Show where the device is on its way, and what is waited for."""
         self._show("turning", hold, placing.where, placing.meter, reason=reason)
 
@@ -105,11 +114,11 @@ class Display:
 
     def taken_before(self, hold: Hold, average: Average) -> None:
         """Show what was reached when the position was taken before."""
-        self._show("taken", hold, sigma=average.sigma, reason="taken before")
+        self._show("taken", hold, sigma=average.sigma, reason=TAKEN_BEFORE)
 
-    def silent(self, hold: Hold, said: str) -> None:
+    def silent(self, hold: Hold, reason: WaitReason) -> None:
         """Show that nothing comes."""
-        self._show("silent", hold, reason=said)
+        self._show("silent", hold, reason=reason)
 
     def _show(
         self,
@@ -119,7 +128,7 @@ class Display:
         stillness: float = np.nan,
         elapsed: float = 0.0,
         sigma: Array = UNKNOWN,
-        reason: str = "",
+        reason: WaitReason = NOTHING,
     ) -> None:
         link = (self._rate, self._temperature, self._driver.health)
         view = OperatorView(

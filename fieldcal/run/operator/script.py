@@ -11,6 +11,7 @@ import numpy as np
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import Mover
 from fieldcal.run.operator.protocol import OperatorView, Wish
+from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 
 EVERY = 5.0
 """Time between two lines of progress, s of device time."""
@@ -29,7 +30,7 @@ class ScriptOperator:
     def __init__(self, mover: Mover, out: IO[str] | None = None) -> None:
         self._mover = mover
         self._out = out or sys.stderr
-        self._shown: tuple[str, int, int, str] = ("", -1, -1, "")
+        self._shown: tuple[str, int, int, WaitState | None] = ("", -1, -1, None)
 
     def place(self, hold: Hold) -> None:
         """Begin to turn."""
@@ -40,14 +41,18 @@ class ScriptOperator:
         """Report a sentence."""
         self._say("tell", text=text)
 
+    def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+        """Report what is waited for."""
+        self.tell(reminder(waited) + reason.text)
+
     def wish(self) -> Wish | None:
         """Wait for a mover that is still at work."""
         return "wait" if self._mover.busy() else None
 
     def show(self, view: OperatorView) -> None:
         """Report progress: each change of phase, and now and then within one."""
-        waits = view.reason.partition(":")[0]
-        now = (view.phase, view.hold.index, int(view.elapsed // EVERY), waits)
+        step = int(view.elapsed // EVERY)
+        now = (view.phase, view.hold.index, step, view.reason.state)
         if now == self._shown:
             return
         self._shown = now
@@ -57,7 +62,7 @@ class ScriptOperator:
             elapsed_s=round(view.elapsed, 2),
             of_s=view.hold.seconds,
             sigma=[_number(s) for s in view.sigma],
-            waiting_for=view.reason or None,
+            waiting_for=view.reason.text or None,
         )
 
     def _say(self, event: str, **what: Any) -> None:

@@ -24,6 +24,7 @@ from fieldcal.run.operator.banner import drawable, large
 from fieldcal.run.operator.keyboard import HELP, Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.widgets import alert
+from fieldcal.run.wait_reason import WaitReason, reminder
 
 FRAMES = 8.0
 """Drawings a second."""
@@ -71,7 +72,7 @@ class ConsoleOperator:
         self._taken: dict[int, float] = {}
         self._said: list[str] = []
         self._said_before: list[str] = []
-        self._waited = ""
+        self._reminder = ""
         self._view: OperatorView | None = None
         self._hold: Hold | None = None
         self._drawn = 0.0
@@ -112,12 +113,16 @@ class ConsoleOperator:
         self._draw()
 
     def tell(self, text: str) -> None:
-        """Keep a sentence on the screen, unless it is the reason that stands there."""
-        shown = alert(self._view) if self._view else ""
-        if shown and text.endswith(shown):
-            self._waited = text.removesuffix(shown)
-        else:
-            self._said = [*(t for t in self._said[-1:] if t != text), text]
+        """Keep a sentence on the screen."""
+        self._said = [*(t for t in self._said[-1:] if t != text), text]
+        self._ring(text)
+
+    def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+        """Ring for the reason that stands on the screen."""
+        self._reminder = reminder(waited)
+        self._ring(self._reminder + reason.text)
+
+    def _ring(self, text: str) -> None:
         self._bell()
         self._log(f"! {text}")
         self._draw()
@@ -131,7 +136,7 @@ class ConsoleOperator:
         """Draw the view, unless the last drawing is too recent."""
         begins = view.phase == "averaging" and self._phase != "averaging"
         self._view = view
-        self._waited = self._waited if alert(view) else ""
+        self._reminder = self._reminder if alert(view) else ""
         if begins:
             self._said = self._said_before  # what was said of the turn is done
         if view.phase == "taken":
@@ -170,7 +175,7 @@ class ConsoleOperator:
         elif view.phase == "taken":
             self._log(f"{where}: taken, ± {widgets.sigma(view) or 'not known'}")
         elif not alert(view):
-            self._log_state(f"{where}: {view.reason}")
+            self._log_state(f"{where}: {view.reason.text}")
 
     def _draw(self) -> None:
         if self._live:
@@ -184,7 +189,7 @@ class ConsoleOperator:
         if view and self._hold is view.hold:
             above.append(widgets.gauges(view))
         why = alert(view) if view else ""
-        said = [*self._said, self._waited + why]
+        said = [*self._said, self._reminder + why]
         above += [Text(f"! {text}", style="bold yellow") for text in said if text]
         above.append(Text())
         below: list[RenderableType] = []

@@ -15,7 +15,6 @@ from rich.text import Text
 from fieldcal.core.positions import Position
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.position_check import tenth
-from fieldcal.run.waiting import ORDINARY
 
 METER = 20
 """Width of the stillness meter, characters."""
@@ -35,7 +34,7 @@ NEAR = 1.0
 
 def alert(view: OperatorView) -> str:
     """Why it waits, where that wants the operator to do something; else empty."""
-    return "" if view.reason in ORDINARY or view.phase == "taken" else view.reason
+    return view.reason.text if view.reason.needs_operator else ""
 
 
 def angles(view: OperatorView) -> list[tuple[str, Text]]:
@@ -115,7 +114,7 @@ def gauges(view: OperatorView) -> Table:
     if view.phase in ("turning", "silent"):
         for name, scale in angles(view):
             grid.add_row(name, scale)
-        grid.add_row("status", "see below" if alert(view) else view.reason)
+        grid.add_row("status", "see below" if alert(view) else view.reason.text)
     else:
         seconds = view.hold.seconds
         share = min(1.0, view.elapsed / seconds)

@@ -1,0 +1,66 @@
+"""Why a run waits: a state, and what an operator reads of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+
+class WaitState(Enum):
+    """What a run waits for."""
+
+    NOTHING = auto()
+    LISTENING = auto()
+    MOVING = auto()
+    SETTLING = auto()
+    TURNING = auto()
+    MISPLACED = auto()
+    WARMING_UP = auto()
+    NO_SAMPLES = auto()
+    TAKEN_BEFORE = auto()
+
+
+TEXTS = {
+    WaitState.NOTHING: "",
+    WaitState.LISTENING: "listening to the noise",
+    WaitState.MOVING: "moving: waiting for it to rest",
+    WaitState.SETTLING: "settling",
+    WaitState.TURNING: "waiting for the turn",
+    WaitState.TAKEN_BEFORE: "taken before",
+}
+"""What is shown of the states that need no explanation."""
+
+FOR_OPERATOR = {WaitState.MISPLACED, WaitState.WARMING_UP, WaitState.NO_SAMPLES}
+"""States in which the operator has to do something."""
+
+
+@dataclass(frozen=True, slots=True)
+class WaitReason:
+    """A state with its explanation.
+
+    Attributes
+    ----------
+    state : what the run waits for
+    detail : one sentence about a state that needs the operator; empty otherwise
+
+    """
+
+    state: WaitState = WaitState.NOTHING
+    detail: str = ""
+
+    @property
+    def needs_operator(self) -> bool:
+        """Whether the operator has to do something."""
+        return self.state in FOR_OPERATOR
+
+    @property
+    def text(self) -> str:
+        """What the operator reads; empty where nothing is waited for."""
+        if self.state is WaitState.WARMING_UP:
+            return f"{self.detail}; Enter goes on"
+        return self.detail or TEXTS[self.state]
+
+
+def reminder(waited: float) -> str:
+    """What stands before a reason that has been shown for `waited` s already."""
+    return f"still waiting, {waited:.0f} s: " if waited else ""

@@ -20,9 +20,9 @@ PIECE = 300 * RATE
 CHILD = """
 import sys
 from pathlib import Path
-from fieldcal.importing import bring_in
+from fieldcal.importing.ingest import bring_in
 from fieldcal.importers import open_recording
-from fieldcal.recording import Wanted
+from fieldcal.importing.recording import ReadOptions as Wanted
 names = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 recording = open_recording(Path(sys.argv[1]), Wanted(names))
 name = recording.streams()[0].name

@@ -25,6 +25,7 @@ import numpy as np
 from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.samples import Block, concat
 from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line, write_whole
+from fieldcal.session.lock import SessionLock
 from fieldcal.session.sample_files import read, schema, to_batch
 
 FLUSH = 0.2
@@ -86,8 +87,8 @@ class Recorder:
     Raises
     ------
     SessionError
-        If the folder holds a session already: nothing is ever overwritten. Or, from any
-        method, if the disk refuses.
+        If the folder holds a session already: nothing is ever overwritten. If another
+        process records into it. Or, from any method, if the disk refuses.
 
     """
 
@@ -102,10 +103,7 @@ class Recorder:
         self._written = monotonic()
         self._stop, self._closed = Event(), False
         try:
-            if about is None:
-                self._resume()
-            else:
-                self._begin(about)
+            self._open(about)
         except FileExistsError as error:
             raise SessionError(
                 f"{folder}: holds a session already; name another folder, or go on"
@@ -118,16 +116,35 @@ class Recorder:
         self._watch = Thread(target=self._keep_up, daemon=True, name="recorder")
         self._watch.start()
 
+    def _open(self, about: Mapping[str, Any] | None) -> None:
+        """Hold the folder and open its files, or leave it as it was found."""
+        new = not self.folder.exists()
+        if about is not None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self._held = SessionLock(self.folder)
+            try:
+                if about is None:
+                    self._resume()
+                else:
+                    self._begin(about)
+            except BaseException:
+                self._held.release()
+                raise
+        except BaseException:
+            if new:
+                with contextlib.suppress(OSError):
+                    self.folder.rmdir()
+            raise
+
     def _begin(self, about: Mapping[str, Any]) -> None:
         import tomlkit
 
         from fieldcal.session.arrow_stream import ArrowEncoder
 
         names = (DESCRIPTION, SAMPLES, MARKS)
-        self.folder.mkdir(parents=True, exist_ok=True)
         if any((self.folder / name).exists() for name in names):
             raise FileExistsError
-        # of two that begin at once, one gets the file
         self._samples = _Growing(self.folder / SAMPLES)
         try:
             write_whole(self.folder / DESCRIPTION, tomlkit.dumps(about))
@@ -137,8 +154,6 @@ class Recorder:
             self._samples.close()
             for name in names:
                 (self.folder / name).unlink(missing_ok=True)
-            with contextlib.suppress(OSError):
-                self.folder.rmdir()
             raise
         self._encoder = ArrowEncoder(schema())
 
@@ -242,6 +257,7 @@ class Recorder:
         finally:
             self._samples.close()
             self._marks.close()
+            self._held.release()
 
     def _keep_up(self) -> None:
         """Flush and sync in the background; a fault is told at the next call."""

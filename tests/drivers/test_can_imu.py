@@ -166,7 +166,7 @@ def test_hang_up_and_return_is_a_gap(
 
 HOST = """
 import sys
-from fieldcal.driver import open_driver
+from fieldcal.drivers.driver import open_driver
 with open_driver("can:239.74.163.2?interface=udp_multicast&dbc=virtual") as imu:
     print("listening", flush=True)
     got = 0

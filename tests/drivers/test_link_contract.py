@@ -66,8 +66,8 @@ ALL = 60_000
 
 HOST = """
 import pickle, sys
-from fieldcal.driver import open_driver
-from fieldcal.samples import concat
+from fieldcal.drivers.driver import open_driver
+from fieldcal.core.samples import concat
 url, wanted, out = sys.argv[1], int(sys.argv[2]), sys.stdout.buffer
 with open_driver(url) as imu:
     out.write(b"listening\\n")

@@ -187,7 +187,7 @@ def test_a_full_disk_is_said_and_what_was_recorded_is_kept(tmp_path: Path) -> No
 LIMITED = """
 import sys, resource, signal
 from pathlib import Path
-from fieldcal.errors import SessionError
+from fieldcal.core.errors import SessionError
 from recorded import record
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
@@ -256,7 +256,7 @@ def test_samples_of_a_device_that_falls_silent_are_written(tmp_path: Path) -> No
 def test_two_recorders_cannot_begin_in_one_folder(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", ABOUT):
         before = (tmp_path / "s" / "session.toml").read_bytes()
-        with pytest.raises(SessionError, match="holds a session already"):
+        with pytest.raises(SessionError, match="records into it"):
             Recorder(tmp_path / "s", {"format": 1})
         assert (tmp_path / "s" / "session.toml").read_bytes() == before
 

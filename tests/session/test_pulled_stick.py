@@ -37,7 +37,7 @@ MARKED = 550
 RECORDS = """
 import sys
 from pathlib import Path
-from fieldcal.errors import SessionError
+from fieldcal.core.errors import SessionError
 from recorded import record
 try:
     record(Path(sys.argv[1]))

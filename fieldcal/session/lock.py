@@ -1,0 +1,86 @@
+"""One writer a session: who records into a folder holds its lock until the end.
+
+The lock is the operating system's, so that it ends with the process, however that ends.
+Who holds it, and since when, stands beside it for whoever comes second.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from contextlib import suppress
+from getpass import getuser
+from pathlib import Path
+from platform import node
+from time import time
+
+from filelock import FileLock, Timeout
+
+from fieldcal.core.errors import SessionError
+
+LOCK, OWNER = ".lock", ".owner"
+
+
+class SessionLock:
+    """The lock of a session folder, held from the beginning until `release`.
+
+    Parameters
+    ----------
+    folder : exists
+
+    Raises
+    ------
+    SessionError
+        If another process holds it; says which, and since when.
+    OSError
+        If the folder cannot be written.
+
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._owner = folder / OWNER
+        self._path = folder / LOCK
+        self._lock = FileLock(self._path)
+        try:
+            self._lock.acquire(blocking=False)
+        except Timeout as error:
+            raise SessionError(
+                f"{folder}: {_holder(self._owner)} records into it: end that run first,"
+                " or name another folder"
+            ) from error
+        except NotImplementedError:
+            # a disk that knows no locks: the files' own O_EXCL is what there is
+            return
+        who = {"pid": os.getpid(), "host": node(), "user": _user(), "host_s": time()}
+        try:
+            self._owner.write_text(json.dumps(who) + "\n", "utf-8")
+        except OSError:
+            self.release()
+            raise
+
+    def release(self) -> None:
+        """Let the next one in; safe to call twice."""
+        if self._lock.is_locked:
+            with suppress(OSError):
+                self._owner.unlink(missing_ok=True)
+                self._path.unlink(missing_ok=True)
+            with suppress(OSError):
+                self._lock.release()
+
+
+def _user() -> str:
+    try:
+        return getuser()
+    except (KeyError, OSError):
+        return "?"
+
+
+def _holder(owner: Path) -> str:
+    """Who holds a lock, as far as it can be told."""
+    try:
+        held = json.loads(owner.read_text("utf-8"))
+        minutes = max(0.0, time() - float(held["host_s"])) / 60
+        who = f"process {held['pid']} of {held['user']} on {held['host']}"
+    except (OSError, ValueError, KeyError, TypeError):
+        return "another process"
+    return f"{who}, for {minutes:.0f} min,"

@@ -1,7 +1,7 @@
 """A device that is not ours: its own physics, sample by sample, from motion.
 
 Its physics is written apart from everything that estimates, so that a sign error on one
-side shows. To add an effect, see `vocabulary`; a wire format is wire_<name>.py.
+side shows. An effect is a file of `effects`; a wire format is wire_<name>.py.
 """
 
 from fieldcal.sim_device.device import VirtualDevice

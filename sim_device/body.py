@@ -1,7 +1,6 @@
 """The device's body: how it is held, moved, shaken and warmed, by its profile.
 
-What it is asked for and where it goes differ as on a real fixture: the gauge of a joint
-has a scale, its zero an offset, and whoever sets an angle does so a little off.
+What it is asked for and where it goes may differ, as on a real fixture: by its effects.
 """
 
 from __future__ import annotations
@@ -11,21 +10,22 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.sim_device import earth
-from fieldcal.sim_device.influences import Life
+from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.joints import Joints, Swing
+from fieldcal.sim_device.life import Life
 from fieldcal.sim_device.motion import (
+    BaseMotion,
     Felt,
     MovingFrame,
     Stand,
-    base_attitude,
     carried,
     feel,
+    mounting_axes,
 )
-from fieldcal.sim_device.noise import stream
-from fieldcal.sim_device.profile import Profile, mounting_axes
-from fieldcal.sim_device.rocking import Push, SwayMotion
+from fieldcal.sim_device.profile import Profile
+from fieldcal.sim_device.quaternion import STILL
+from fieldcal.sim_device.random_process import stream
 from fieldcal.sim_device.temperature import course
-from fieldcal.sim_device.vocabulary import AXES
 from fieldcal.sim_device.way import REST, Manoeuvre
 
 Angles = tuple[float, float]
@@ -37,7 +37,7 @@ class Body:
     Attributes
     ----------
     joints : its motion so far
-    bumps : of the base, so far and to come
+    moves : motions of the base, so far and to come
     asked : the angles it was last asked for
     levels : rms of the vibration in each position so far, m/s^2
     ways : that it is carried along, each from where the joints are when it begins
@@ -50,24 +50,25 @@ class Body:
             float(np.deg2rad(profile.motion.alpha_deg)),
             float(np.deg2rad(profile.motion.beta_deg)),
         )
-        self._hand = stream(seed, "angle_setting")
+        effects = profile.in_order
+        settings = (e.setting(stream(seed, e.id)) for e in effects)
+        self._settings = [setting for setting in settings if setting is not None]
         self.joints = Joints(self._set(self.asked))
-        self.bumps = [_bump(profile, k) for k in range(len(profile.every("bump")))]
-        self._sways = [
-            SwayMotion(
-                np.deg2rad(e["amplitude_deg"]),
-                e["hz"],
-                np.deg2rad(e["phase_deg"]),
-                np.deg2rad(e["azimuth_deg"]),
-            )
-            for e in profile.every("sway")
-        ]
+        self.moves: list[BaseMotion] = []
+        for effect in effects:
+            self.disturb(effect)
         self._stand = stand(profile)
         self._shaking = stream(seed, "vibration")
         self._strength = stream(seed, "vibration level")
         self.levels = [self._level()]
         self.ways: list[Manoeuvre] = []
         self._start_temperature = float(course(profile.temperature, np.zeros(1))[0][0])
+
+    def disturb(self, effect: SimulatedEffect) -> None:
+        """Move the base as the effect does, if it does."""
+        move = effect.base_motion()
+        if move is not None:
+            self.moves.append(move)
 
     def turn(self, start: float, seconds: float, angles: Angles) -> Angles:
         """Turn to `angles`; returns when it starts and ends."""
@@ -90,9 +91,7 @@ class Body:
 
     def frame(self, t: Array) -> MovingFrame:
         """Frame of the procedure axes at ascending instants, (n,) s."""
-        rocking = [s.rocking() for s in self._sways]
-        rocking += [b.rocking() for b in self.bumps]
-        frame = carried(self._stand, rocking, t, self.joints.at(self._held(t)))
+        frame = carried(self._stand, self.moves, t, self.joints.at(self._held(t)))
         for way in self.ways:
             if (on := way.lasts(t)).any():
                 frame = frame.then(
@@ -117,17 +116,18 @@ class Body:
 
     def _felt(self, t: Array) -> Felt:
         push = np.zeros((3, len(t)))
-        for bump in self.bumps:
-            push = push + bump.acceleration(t)
+        for move in self.moves:
+            if move.push is not None:
+                push = push + move.push(t)
         return feel(self._stand, self.frame(t), push)
 
     def _still(self, t: Array, swing: Swing) -> bool:
         """Whether nothing moves at any of the instants, so that one stands for all."""
         turned = swing.angle != swing.angle[:, :1]
-        shaken = any(b.start <= t[-1] and not b.over(t[0]) for b in self.bumps)
+        moved = any(move.lasts(t[0], t[-1]) for move in self.moves)
         carried = any(way.lasts(t).any() for way in self.ways)
         moving = swing.rate.any() or turned.any() or carried
-        return not (self._sways or shaken or moving)
+        return not (moved or moving)
 
     def temperature(self, t: Array) -> Array:
         """Temperature of the sensors, (n,) °C."""
@@ -144,55 +144,28 @@ class Body:
 
     def _set(self, angles: Angles) -> Angles:
         """Where the joints end up when asked for `angles`."""
-        scale = self.profile.one("angle_scale")
-        offset = self.profile.one("angle_offset")
-        setting = self.profile.one("angle_setting")
         there = np.array(angles)
-        if scale:
-            there = there * (1 + np.array(scale.vector(("alpha", "beta"))))
-        if offset:
-            there = there + np.deg2rad(offset.vector(("alpha0_deg", "beta0_deg")))
-        if setting:
-            sigma = np.deg2rad(setting["sigma_deg"])
-            there = there + sigma * self._hand.standard_normal(2)
+        for setting in self._settings:
+            there = setting(there)
         return float(there[0]), float(there[1])
 
     def _level(self) -> float:
-        effect = self.profile.one("vibration_rectification")
-        return effect["level"] * float(self._strength.random()) if effect else 0.0
+        return sum(e.shaking(self._strength) for e in self.profile.effects)
 
 
 def stand(profile: Profile) -> Stand:
     """How the device is held, apart from its joints."""
-    tilt = profile.one("base_tilt")
-    about_x, about_z = (
-        np.deg2rad(tilt.vector(("about_x_deg", "about_z_deg"))) if tilt else (0.0, 0.0)
-    )
-    heading = profile.one("heading_error")
-    psi = np.deg2rad(heading["psi_deg"]) if heading else 0.0
     latitude = np.deg2rad(profile.site.latitude_deg)
     rate = earth.RATE if profile.feels_earth else 0.0
-    mounting = profile.one("mounting")
-    wrong = mounting.words["axes"] if mounting else ""
-    names = [wrong[i : i + 2] for i in (0, 2, 4)] if wrong else profile.frame.mounting
-    index, signs = mounting_axes(names, right_handed=not wrong)
-    lever = profile.one("lever_arm")
-    return Stand(
+    index, signs = mounting_axes(profile.frame.mounting, right_handed=True)
+    held = Stand(
         gravity=profile.gravity,
         earth=rate * np.array([[0.0], [-np.sin(latitude)], [np.cos(latitude)]]),
-        base=base_attitude(float(psi), float(about_x), float(about_z)),
+        base=STILL,
         axes=index,
         signs=np.array(signs)[:, None],
-        lever=np.array(lever.vector(AXES) if lever else (0.0, 0.0, 0.0))[:, None],
+        lever=np.zeros((3, 1)),
     )
-
-
-def _bump(profile: Profile, k: int) -> Push:
-    e = profile.every("bump")[k]
-    return Push(
-        e["at_s"],
-        e["for_s"],
-        e["push"],
-        float(np.deg2rad(e["tilt_deg"])),
-        float(np.deg2rad(e["azimuth_deg"])),
-    )
+    for effect in profile.in_order:
+        held = effect.stands(held)
+    return held

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from time import monotonic
 
 from fieldcal.core.samples import Block
-from fieldcal.sim_device.noise import stream
+from fieldcal.sim_device.random_process import stream
 
 
 class Delay:

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.sim_device.body import Body
-from fieldcal.sim_device.chain import SignalChain, rows
-from fieldcal.sim_device.influences import outputs
-from fieldcal.sim_device.noise import RandomErrors, Walk, stream
-from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.rocking import Push
-from fieldcal.sim_device.vocabulary import SIX
+from fieldcal.sim_device.chain import SignalChain
+from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.noise import RandomErrors
+from fieldcal.sim_device.profile import Profile, Truth
+from fieldcal.sim_device.random_process import stream
+from fieldcal.sim_device.vocabulary import effect
 
 PIECE = 4096
 """Samples calculated at once: few enough to stay in the processor's cache."""
@@ -113,13 +113,14 @@ class VirtualDevice:
         return end * self.sensing.pace
 
     def bump(
-        self, push: float = 2.0, tilt: float = np.deg2rad(0.5), seconds: float = 0.5
+        self, push: float = 2.0, tilt_deg: float = 0.5, seconds: float = 0.5
     ) -> float:
-        """Bump the base now: peak m/s^2, rad, s; returns when it is over."""
-        if not (seconds > 0 and np.isfinite([push, tilt, seconds]).all()):
+        """Bump the base now: peaks in m/s^2 and degrees, s; returns when it is over."""
+        if not (seconds > 0 and np.isfinite([push, tilt_deg, seconds]).all()):
             raise InputError(f"a bump lasts more than 0 s, not {seconds:g} s")
         start = self.time / self.sensing.pace
-        self.body.bumps.append(Push(start, seconds, push, tilt, np.deg2rad(30.0)))
+        given = {"at_s": start, "for_s": seconds, "push": push, "tilt_deg": tilt_deg}
+        self.body.disturb(effect("bump", given))
         return (start + seconds) * self.sensing.pace
 
     def take(self, n: int) -> Block:
@@ -174,18 +175,17 @@ class Sensing:
 
     def __init__(self, profile: Profile, seed: int) -> None:
         self.profile = profile
-        skew = profile.one("clock_skew")
-        self.pace = 1 + 1e-6 * skew["ppm"] if skew else 1.0
+        self.pace = profile.pace
         self.body = Body(profile, seed)
         self.chain = SignalChain(profile, seed)
         rate = profile.sampling.rate_hz
-        self._noise = RandomErrors(profile.noise, rate, seed, _noise_ratio(profile))
-        walk = profile.one("random_walk")
-        size = np.array(walk.vector(SIX)) if walk else np.zeros(6)
-        self._walk = Walk(size, rate, stream(seed, "random_walk")) if walk else None
+        effects = profile.effects
+        ratio: Array = np.prod([e.noise_ratio() for e in effects], axis=0, initial=1.0)
+        self._noise = RandomErrors(profile.noise, rate, seed, ratio)
+        wanders = (e.wander(rate, stream(seed, e.id)) for e in effects)
+        self._wanders = [wander for wander in wanders if wander is not None]
         self._thermometer = stream(seed, "thermometer")
-        delay = profile.one("time_delay")
-        self._delay = delay["seconds"] if delay else 0.0
+        self._lag = sum(e.lag() for e in effects)
 
     def sense(
         self, true: Array, ticks: NDArray[np.int64], t: Array
@@ -210,24 +210,28 @@ class Sensing:
 
     def noiseless(self, true: Array) -> Array:
         """Outputs of the sensors without noise and signal chain, (6, n)."""
-        late = abs(self._delay)
+        late = abs(self._lag)
         vibration = self.body.vibration(true)
         now = self._outputs(true, vibration)
         if not late:
             return now
         before = self._outputs(true - late, vibration)
-        first, last = (now, before) if self._delay > 0 else (before, now)
+        first, last = (now, before) if self._lag > 0 else (before, now)
         return np.concatenate([first[:3], last[3:]])
 
     def _outputs(self, t: Array, vibration: Array) -> Array:
         life = self.body.life(t, vibration)
-        return outputs(self.profile.truth, self.profile.effects, life)
+        six = _plain(self.profile.truth, life)
+        for one in self.profile.in_order:
+            if (more := one.adds(life)) is not None:
+                six = six + more
+        return six
 
     def _wander(self, ticks: NDArray[np.int64]) -> Array:
         total = int(ticks.sum())
         slow = self._noise.slow(total)
-        if self._walk is not None:
-            slow = slow + self._walk.draw(total)
+        for process in self._wanders:
+            slow = slow + process.draw(total)
         if total == len(ticks):
             return slow
         picked: Array = slow[:, np.cumsum(ticks) - 1]
@@ -239,8 +243,10 @@ def _only(block: Block, kept: NDArray[np.bool_]) -> Block:
     return Block.of(block.t[kept], *(column[kept] for column in columns))
 
 
-def _noise_ratio(profile: Profile) -> Array:
-    ratio = np.ones(6)
-    for effect in profile.every("noise_level"):
-        ratio[rows(effect.words["channel"])] *= effect["ratio"]
-    return ratio
+def _plain(truth: Truth, life: Life) -> Array:
+    """Outputs (6, n) by bias and scale factor alone."""
+    bias = np.array([*truth.acc_bias, *truth.gyr_bias])[:, None]
+    scale = np.array([*truth.acc_scale, *truth.gyr_scale])[:, None]
+    true = np.concatenate([life.f + life.vibration, life.w])
+    six: Array = bias + scale * true
+    return six

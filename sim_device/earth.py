@@ -24,6 +24,9 @@ from fieldcal.core.errors import InputError
 RATE = 7.292115e-5
 """Angular rate of the Earth, rad/s."""
 
+STANDARD_GRAVITY = 9.80665
+"""What a device means by one g, m/s^2."""
+
 _SEMI_MAJOR = 6_378_137.0
 _SEMI_MINOR = _SEMI_MAJOR * (1 - 1 / 298.257223563)
 _GM = 3.986004418e14

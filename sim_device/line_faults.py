@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device.can_packing import CanPacket
-from fieldcal.sim_device.noise import stream
+from fieldcal.sim_device.random_process import stream
 
 KINDS = ("garbage_bytes", "flip_bits", "lose_bytes", "double_bytes")
 MOST = 100_000

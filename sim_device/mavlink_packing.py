@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.sim_device.chain import STANDARD_GRAVITY
+from fieldcal.sim_device.earth import STANDARD_GRAVITY
 
 HIGHRES, RAW, SCALED = 105, 27, (26, 116, 129)
 FULL = 2**15

@@ -26,11 +26,13 @@ kinematics in turning frames, e.g. Goldstein, Classical Mechanics, chapter 4.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.joints import ALPHA, BETA, SPIN, Swing
 from fieldcal.sim_device.quaternion import STILL, cross, into, multiply, turn
@@ -50,11 +52,27 @@ class Angle:
 
 
 @dataclass(frozen=True, slots=True)
-class Rocking:
-    """The base rocks about a level axis: its unit vector (3, 1) and the angle."""
+class BaseMotion:
+    """The base rocks about a level axis, and may be pushed, for a while.
+
+    Attributes
+    ----------
+    axis : unit vector (3, 1), level axes
+    angle : of the rocking, at instants (n,) s
+    push : acceleration (3, n) m/s^2, level axes, at instants (n,) s; None: none
+    start, end : s, between which it moves
+
+    """
 
     axis: Array
     angle: Callable[[Array], Angle]
+    push: Callable[[Array], Array] | None = None
+    start: float = -np.inf
+    end: float = np.inf
+
+    def lasts(self, first: float, last: float) -> bool:
+        """Whether it moves between two instants, s."""
+        return self.start <= last and first <= self.end
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,13 +158,13 @@ class Felt:
 
 
 def carried(
-    stand: Stand, rocking: Sequence[Rocking], t: Array, swing: Swing
+    stand: Stand, moves: Sequence[BaseMotion], t: Array, swing: Swing
 ) -> MovingFrame:
     """Frame of the procedure axes at instants `t`, (n,) s."""
     frame = MovingFrame.level(len(t))
     frame = MovingFrame(stand.base + np.zeros_like(frame.q), frame.w, frame.dw)
-    for rock in rocking:
-        frame = frame.turned(rock.axis, rock.angle(t))
+    for move in moves:
+        frame = frame.turned(move.axis, move.angle(t))
     for axis, joint in ((Z, ALPHA), (X, BETA)):
         frame = frame.turned(axis, _joint(swing, joint))
     if np.any(swing.angle[SPIN]):
@@ -165,15 +183,35 @@ def feel(stand: Stand, frame: MovingFrame, acceleration: Array) -> Felt:
     return Felt(stand.to_device(f), stand.to_device(w))
 
 
-def base_attitude(heading: float, about_x: float, about_z: float) -> Array:
-    """Attitude (4, 1) of a base tilted about z, then about its x, off north by heading.
+def level_axis(azimuth: float) -> Array:
+    """Unit vector (3, 1) in the level, `azimuth` rad from East towards north."""
+    return np.array([[np.cos(azimuth)], [0.0], [np.sin(azimuth)]])
 
-    Positive heading: the base's z points west of north by so many rad, so that the
-    Earth's rate shows +cos(phi) sin(heading) on its x.
+
+def mounting_axes(
+    names: Iterable[str], right_handed: bool
+) -> tuple[tuple[int, int, int], tuple[float, float, float]]:
+    """Index and sign of the device axis along each procedure axis.
+
+    Raises
+    ------
+    InputError
+        If they are not three different signed axes, or not right-handed.
+
     """
-    yaw = turn(Y, np.array([-heading]))
-    tilt = multiply(turn(Z, np.array([about_z])), turn(X, np.array([about_x])))
-    return multiply(yaw, tilt)
+    axes = tuple(names)
+    index = [("xyz" + "?").find(name[-1:] or "?") for name in axes]
+    signs = [-1.0 if name.startswith("-") else 1.0 for name in axes]
+    if sorted(index) != [0, 1, 2] or any(len(name) > 2 for name in axes):
+        raise InputError(
+            f'mounting {list(axes)} is not three signed axes such as ["+x", "-z", "+y"]'
+        )
+    cyclic = (index[1] - index[0]) % 3 == 1
+    if right_handed and math.prod(signs) * (1 if cyclic else -1) < 0:
+        raise InputError(
+            f"mounting {list(axes)} is left-handed, and no device is: check the signs"
+        )
+    return (index[0], index[1], index[2]), (signs[0], signs[1], signs[2])
 
 
 def _joint(swing: Swing, i: int) -> Angle:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
+from fieldcal.sim_device.effect import AXES
 from fieldcal.sim_device.line_faults import KINDS, MOST
-from fieldcal.sim_device.vocabulary import AXES
 
 if TYPE_CHECKING:
     from fieldcal.sim_device.stream import DeviceStream
@@ -62,10 +62,10 @@ def _spin(stream: DeviceStream, given: dict[str, Any]) -> Reply:
 
 
 def _bump(stream: DeviceStream, given: dict[str, Any]) -> Reply:
-    push, tilt = _number(given, "push", 2.0), _number(given, "tilt_deg", 0.5)
+    push, tilt_deg = _number(given, "push", 2.0), _number(given, "tilt_deg", 0.5)
     seconds = _number(given, "seconds", 0.5)
     _nothing_else("bump", given, ("push", "tilt_deg", "seconds"))
-    return {"until_s": stream.device.bump(push, math.radians(tilt), seconds)}
+    return {"until_s": stream.device.bump(push, tilt_deg, seconds)}
 
 
 def _fault(stream: DeviceStream, given: dict[str, Any]) -> Reply:

@@ -8,13 +8,14 @@ x, y, z of the device's axes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device import earth
-from fieldcal.sim_device.vocabulary import SimulatedEffect, check_together
+from fieldcal.sim_device.effect import SimulatedEffect
+from fieldcal.sim_device.motion import mounting_axes
+from fieldcal.sim_device.vocabulary import check_together
 
 Triad = tuple[float, float, float]
 Grade = Literal["tactical", "navigation"]
@@ -159,11 +160,12 @@ class Profile:
         check_together(self.effects)
         mounting_axes(self.frame.mounting, right_handed=True)
         _check_numbers(self)
-        if self.one("heading_error") and not self.feels_earth:
-            raise InputError(
-                "heading_error shows in the Earth's rate only: make the device's grade "
-                "navigation, or give it earth_rate as well"
-            )
+        for one in self.effects:
+            if one.NEEDS_EARTH and not self.feels_earth:
+                raise InputError(
+                    f"{one.id} shows in the Earth's rate only: make the device's grade "
+                    "navigation, or give it earth_rate as well"
+                )
 
     def having(self, *more: SimulatedEffect) -> Profile:
         """Return the same device with more effects."""
@@ -178,20 +180,28 @@ class Profile:
         return next((e for e in self.effects if e.id == id_), None)
 
     @property
-    def feels_earth(self) -> bool:
-        """Whether its gyroscopes feel the Earth's rate.
+    def in_order(self) -> tuple[SimulatedEffect, ...]:
+        """The effects in the order in which they act."""
+        return tuple(sorted(self.effects, key=lambda e: e.ORDER))
 
-        The noise of a tactical device hides it, and the plain simulation leaves it
-        out; there it is an effect like others.
-        """
-        return self.device.grade == "navigation" or self.one("earth_rate") is not None
+    @property
+    def feels_earth(self) -> bool:
+        """Whether its gyroscopes feel the Earth's rate."""
+        told = any(e.FEELS_EARTH for e in self.effects)
+        return told or self.device.grade == "navigation"
 
     @property
     def gravity(self) -> float:
         """True gravity where the device stands, m/s^2."""
-        error = self.one("gravity_error")
-        wrong = error["relative"] if error else 0.0
-        return self.site.local_gravity * (1 + wrong)
+        g = self.site.local_gravity
+        for one in self.effects:
+            g = one.gravity(g)
+        return g
+
+    @property
+    def pace(self) -> float:
+        """Seconds of the device's clock in a true second."""
+        return math.prod(one.pace() for one in self.effects)
 
     def concealed(self) -> dict[str, Any]:
         """Everything that a recalibration should find out, as JSON."""
@@ -205,32 +215,6 @@ class Profile:
             "mounting": list(self.frame.mounting),
             "effects": {k: v[0] if len(v) == 1 else v for k, v in effects.items()},
         }
-
-
-def mounting_axes(
-    names: Iterable[str], right_handed: bool
-) -> tuple[tuple[int, int, int], Triad]:
-    """Index and sign of the device axis along each procedure axis.
-
-    Raises
-    ------
-    InputError
-        If they are not three different signed axes, or not right-handed.
-
-    """
-    axes = tuple(names)
-    index = [("xyz" + "?").find(name[-1:] or "?") for name in axes]
-    signs = [-1.0 if name.startswith("-") else 1.0 for name in axes]
-    if sorted(index) != [0, 1, 2] or any(len(name) > 2 for name in axes):
-        raise InputError(
-            f'mounting {list(axes)} is not three signed axes such as ["+x", "-z", "+y"]'
-        )
-    cyclic = (index[1] - index[0]) % 3 == 1
-    if right_handed and math.prod(signs) * (1 if cyclic else -1) < 0:
-        raise InputError(
-            f"mounting {list(axes)} is left-handed, and no device is: check the signs"
-        )
-    return (index[0], index[1], index[2]), (signs[0], signs[1], signs[2])
 
 
 def _check_numbers(profile: Profile) -> None:

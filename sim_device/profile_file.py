@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
+from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.vocabulary import CATALOGUE, SimulatedEffect, effect
+from fieldcal.sim_device.vocabulary import effect
 
 FORMAT = 1
 
@@ -172,10 +173,9 @@ def _effects(table: Mapping[str, Any]) -> tuple[SimulatedEffect, ...]:
 
 def _written(one: SimulatedEffect) -> dict[str, Any]:
     """Parameters to write: the components of a vector that are not zero, and others."""
-    vector = CATALOGUE[one.id].vector
-    given = {k: v for k, v in one.numbers.items() if v or k not in vector}
-    if vector and not any(k in given for k in vector):
-        given[vector[0]] = 0.0
+    given = {k: v for k, v in one.numbers.items() if v or k not in one.VECTOR}
+    if one.VECTOR and not any(k in given for k in one.VECTOR):
+        given[one.VECTOR[0]] = 0.0
     words = {k: v for k, v in one.words.items() if v}
     return {**given, **words}
 

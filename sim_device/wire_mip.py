@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Block
-from fieldcal.sim_device.chain import STANDARD_GRAVITY
+from fieldcal.sim_device.earth import STANDARD_GRAVITY
 from fieldcal.sim_device.wire import Wire
 
 PACKET = np.dtype(

@@ -17,8 +17,8 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.sim_device.chain import STANDARD_GRAVITY
-from fieldcal.sim_device.vocabulary import SIX
+from fieldcal.sim_device.earth import STANDARD_GRAVITY
+from fieldcal.sim_device.effect import SIX
 from fieldcal.sim_device.wire import Wire
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.sim_device.chain import STANDARD_GRAVITY
+from fieldcal.sim_device.earth import STANDARD_GRAVITY
 from fieldcal.sim_device.wire import Wire
 
 Bytes = NDArray[np.uint8]

@@ -12,9 +12,10 @@ from typing import Any
 from fieldcal.core.positions import WIDE
 from fieldcal.core.samples import Array, Block
 from fieldcal.physics.effect import Effect
+from fieldcal.sim_device.effects import kind
 from fieldcal.sim_device.profile import Climate, Profile, Sampling
 from fieldcal.sim_device.replay import simulate
-from fieldcal.sim_device.vocabulary import CATALOGUE, parse
+from fieldcal.sim_device.vocabulary import parse
 
 GIVEN: dict[str, float | str] = {
     "tau_s": 8.0,
@@ -27,8 +28,8 @@ GIVEN: dict[str, float | str] = {
     "amplitude_deg": 0.1,
     "seconds": 0.05,
     "limit": 7.0,
-    "from_s": 26.0,
-    "to_s": 34.0,
+    "from_s": 3.0,
+    "to_s": 9.0,
     "fraction": 0.2,
     "ppm": 2000.0,
     "ratio": 3.0,
@@ -39,23 +40,8 @@ GIVEN: dict[str, float | str] = {
 }
 """What is given for parameters that have no typical size, for the pictures only."""
 
-SPECIAL = {
-    "mounting": "mounting:axes=+y-x+z",
-    "stuck": "stuck:channel=ax,from_s=3,to_s=9",
-}
-
 WINDOW, PAUSE = 12.0, 8.0
 """Length of the windows and of the turns between them, s."""
-
-CHAIN = (
-    "quantisation",
-    "saturation",
-    "stuck",
-    "dropped",
-    "decode_fault",
-    "noise_level",
-)
-"""Effects that are shown in the samples themselves."""
 
 COLOURS = ("#1f77c9", "#d9601a", "#1a9a7c")
 GREY = "#808890"
@@ -72,15 +58,15 @@ def windows() -> list[tuple[float, float, float, float]]:
 
 def given(effect: Effect) -> str:
     """The effect with parameters of typical size, as the virtual device takes it."""
-    if effect.id in SPECIAL:
-        return SPECIAL[effect.id]
-    entry = CATALOGUE[effect.id]
+    taken = kind(effect.id)
     typical = {p.name: p.typical for p in effect.params}
-    names = [n for n in entry.vector if n in typical] or list(entry.vector)
+    names = [n for n in taken.VECTOR if n in typical] or list(taken.VECTOR)
     parts = [f"{n}={_size(n, typical, i):.3g}" for i, n in enumerate(names[:6])]
-    needed = [n for n, default in entry.numbers.items() if default is None]
-    needed += [n for n, (_, default) in entry.words.items() if default is None]
-    parts += [f"{n}={GIVEN[n]}" for n in needed]
+    needed = [n for n, takes in taken.NUMBERS.items() if takes.default is None]
+    needed += [n for n, takes in taken.WORDS.items() if takes.default is None]
+    values = {**taken.EXAMPLE.given, **GIVEN}
+    parts += [f"{n}={values[n]}" for n in needed]
+    parts = parts or [f"{n}={v}" for n, v in taken.EXAMPLE.given.items()]
     return f"{effect.id}:{','.join(parts)}"
 
 
@@ -106,17 +92,18 @@ def _without(earth: bool) -> Block:
 
 def picture(effect: Effect) -> str:
     """The picture of an effect, SVG."""
-    earth = effect.id == "heading_error"
+    earth = kind(effect.id).NEEDS_EARTH
     profile = _plain(earth).having(parse(given(effect)))
-    if effect.id in CHAIN:
-        block = simulate(profile, windows(), seed=4)
-        return _raw(block.t, block.six)
-    if effect.id == "clock_skew":
+    if profile.pace != 1:
         return _clock(profile)
     block = simulate(profile, windows(), seed=4, noise=False)
     plain = _without(earth)
     n = min(len(block), len(plain))
-    return _drawn(block.t[:n], block.six[:n] - plain.six[:n])
+    more = block.six[:n] - plain.six[:n]
+    if more.any():
+        return _drawn(block.t[:n], more)
+    block = simulate(profile, windows(), seed=4)
+    return _raw(block.t, block.six)
 
 
 def _clock(profile: Profile) -> str:

@@ -192,8 +192,9 @@ def _profile(args: argparse.Namespace) -> Profile:
     from dataclasses import replace
 
     from fieldcal.sim_device import profile_file
+    from fieldcal.sim_device.effect import SimulatedEffect
     from fieldcal.sim_device.profile import Profile
-    from fieldcal.sim_device.vocabulary import SimulatedEffect, effect, parse
+    from fieldcal.sim_device.vocabulary import effect, parse
 
     # a real device always feels the Earth; a device file says for itself what it has
     default = Profile(effects=(effect("earth_rate", {}),))

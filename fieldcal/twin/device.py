@@ -30,6 +30,7 @@ from fieldcal.physics.effect import Chain, Effect, Scatter
 from fieldcal.physics.recording import lsb_of
 from fieldcal.session.description import Description
 from fieldcal.sim_device import vocabulary
+from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
     Climate,
     FullScale,
@@ -72,7 +73,7 @@ def device_of(explanation: Explanation, found: Diagnosis, known: Settled) -> Pro
 
 
 def device(
-    explanation: Explanation, state: State, effects: list[vocabulary.SimulatedEffect]
+    explanation: Explanation, state: State, effects: list[SimulatedEffect]
 ) -> Profile:
     """The device with some calibration and some effects."""
     source = explanation.prepared.source
@@ -109,7 +110,7 @@ def device(
     )
 
 
-def settled(terms: Sequence[Term], start: float) -> list[vocabulary.SimulatedEffect]:
+def settled(terms: Sequence[Term], start: float) -> list[SimulatedEffect]:
     """Effects with an equation, with their values; those of one shape are one."""
     total: dict[tuple[str, tuple[tuple[str, float], ...]], Term] = {}
     for term in terms:
@@ -125,7 +126,7 @@ def settled(terms: Sequence[Term], start: float) -> list[vocabulary.SimulatedEff
     return out
 
 
-def of_earth(heading: float | None) -> Iterator[vocabulary.SimulatedEffect]:
+def of_earth(heading: float | None) -> Iterator[SimulatedEffect]:
     """The Earth's rate as a fixture of some heading, rad, feels it, if it does."""
     if heading is not None:
         yield vocabulary.effect("earth_rate", {})
@@ -134,14 +135,14 @@ def of_earth(heading: float | None) -> Iterator[vocabulary.SimulatedEffect]:
             yield vocabulary.effect("heading_error", {"psi_deg": psi})
 
 
-def known_chances(about: Description) -> Iterator[vocabulary.SimulatedEffect]:
+def known_chances(about: Description) -> Iterator[SimulatedEffect]:
     """Random effects and those on samples that the simulation has already."""
     for name, given in about.model.items():
         if isinstance(catalogue()[name], Scatter | Chain):
             yield vocabulary.effect(name, given)
 
 
-def of_tone(tone: Tone, start: float) -> Iterator[vocabulary.SimulatedEffect]:
+def of_tone(tone: Tone, start: float) -> Iterator[SimulatedEffect]:
     """A line, one effect for each of its causes, with its phase at the start.
 
     Re(c exp(2 pi i hz t)) = |c| sin(2 pi hz (t - start) + phase)
@@ -160,7 +161,7 @@ def of_tone(tone: Tone, start: float) -> Iterator[vocabulary.SimulatedEffect]:
 
 def of_samples(
     explanation: Explanation, found: FoundEffect, start: float
-) -> Iterator[vocabulary.SimulatedEffect]:
+) -> Iterator[SimulatedEffect]:
     """What is random, and what happened to samples."""
     kind = catalogue()[found.id]
     if not isinstance(kind, Scatter | Chain):
@@ -196,9 +197,7 @@ def vibration(explanation: Explanation) -> Array:
     return out
 
 
-def _noise(
-    explanation: Explanation, effects: list[vocabulary.SimulatedEffect]
-) -> NoiseFigures:
+def _noise(explanation: Explanation, effects: list[SimulatedEffect]) -> NoiseFigures:
     """White noise before what the signal chain adds to it."""
     noise = np.nan_to_num(explanation.rows.noise)
     for one in effects:
@@ -229,19 +228,17 @@ def _counted(given: Mapping[str, Any], start: float) -> dict[str, Any]:
     return {k: v - start if k in INSTANTS else v for k, v in given.items()}
 
 
-def _levelled(
-    effect: vocabulary.SimulatedEffect, level: float
-) -> vocabulary.SimulatedEffect:
+def _levelled(effect: SimulatedEffect, level: float) -> SimulatedEffect:
     return vocabulary.effect(effect.id, {**effect.parameters, "level": level})
 
 
 def _each_once(
-    effects: list[vocabulary.SimulatedEffect],
-) -> list[vocabulary.SimulatedEffect]:
+    effects: list[SimulatedEffect],
+) -> list[SimulatedEffect]:
     """With several of what cannot be there twice put together: the last one counts."""
-    out: dict[object, vocabulary.SimulatedEffect] = {}
+    out: dict[object, SimulatedEffect] = {}
     for i, one in enumerate(effects):
-        again = vocabulary.CATALOGUE[one.id].repeats and one.id != "earth_rate"
+        again = one.REPEATS and one.id != "earth_rate"
         out[(one.id, i) if again else one.id] = one
     return list(out.values())
 

@@ -19,6 +19,7 @@ from fieldcal.model.state import Term
 from fieldcal.model.system import gram
 from fieldcal.model.turn_rows import TurnRows
 from fieldcal.session.description import parse
+from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
     ONE,
     ZERO,
@@ -29,7 +30,7 @@ from fieldcal.sim_device.profile import (
     Truth,
 )
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import SimulatedEffect, effect
+from fieldcal.sim_device.vocabulary import effect
 
 PLACES = ((0.0, 0.0), (60.0, 0.0), (60.0, -40.0), (-30.0, -40.0), (-30.0, 20.0),
           (20.0, 50.0))  # fmt: skip

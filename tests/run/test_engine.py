@@ -396,7 +396,7 @@ def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
             super().show(view)
             if view.elapsed > 8.0 and not self.leant:
                 self.leant = True
-                device.bump(push=0.0, tilt=np.deg2rad(0.1), seconds=20.0)
+                device.bump(push=0.0, tilt_deg=0.1, seconds=20.0)
 
     leaning = Leaning(turner.driver)
     Engine(turner.driver, leaning, ABOUT, bench.recorder).run(hold_all(TWO[:1], 20.0))

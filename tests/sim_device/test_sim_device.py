@@ -9,10 +9,10 @@ import pytest
 from fieldcal.core.errors import InputError
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Block, concat
-from fieldcal.sim_device import Profile, VirtualDevice
+from fieldcal.sim_device import Profile, VirtualDevice, effects
 from fieldcal.sim_device.in_process import InProcess
 from fieldcal.sim_device.profile import NoiseFigures
-from fieldcal.sim_device.vocabulary import CATALOGUE, parse
+from fieldcal.sim_device.vocabulary import parse
 
 RICH = Profile(
     noise=NoiseFigures(
@@ -83,7 +83,7 @@ def test_what_is_concealed_can_be_written_down() -> None:
     assert json.loads(json.dumps(concealed)) == concealed
     assert concealed["effects"]["angle_setting"] == {"sigma_deg": 0.2}
     assert concealed["seed"] == 5
-    assert set(concealed["effects"]) <= set(CATALOGUE)
+    assert set(concealed["effects"]) <= set(effects.ids())
 
 
 def test_the_driver_in_process_hands_out_blocks_and_moves() -> None:

@@ -13,7 +13,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import Profile, VirtualDevice, earth
 from fieldcal.sim_device.joints import Joints
-from fieldcal.sim_device.motion import Rocking
+from fieldcal.sim_device.motion import BaseMotion
 from fieldcal.sim_device.profile import (
     ONE,
     ZERO,
@@ -24,7 +24,6 @@ from fieldcal.sim_device.profile import (
     Sampling,
     Truth,
 )
-from fieldcal.sim_device.rocking import Push, SwayMotion
 from fieldcal.sim_device.vocabulary import parse
 
 PERFECT = Profile(
@@ -100,18 +99,18 @@ def test_the_rate_felt_while_base_and_joints_move_adds_up_too() -> None:
 
 
 @pytest.mark.parametrize(
-    "rocking",
+    "text",
     [
-        SwayMotion(0.02, 0.7, 0.3, 1.0).rocking(),
-        Push(1.0, 0.6, 2.0, 0.02, 0.5).rocking(),
+        "sway:amplitude_deg=1,hz=0.7,phase_deg=17,azimuth_deg=57",
+        "bump:at_s=1,for_s=0.6,tilt_deg=1",
     ],
 )
-def test_rates_of_the_rocking_base_are_derivatives_of_its_angle(
-    rocking: Rocking,
-) -> None:
+def test_rates_of_the_rocking_base_are_derivatives_of_its_angle(text: str) -> None:
     t = np.arange(0.9, 1.8, 1e-4)
-    angle = rocking.angle(t)
-    assert np.abs(angle.x).max() == pytest.approx(0.02, rel=0.01)
+    move = parse(text).base_motion()
+    assert isinstance(move, BaseMotion)
+    angle = move.angle(t)
+    assert np.abs(angle.x).max() == pytest.approx(np.deg2rad(1), rel=0.01)
     rate = np.gradient(angle.x, t)
     acceleration = np.gradient(angle.rate, t)
     np.testing.assert_allclose(angle.rate[1:-1], rate[1:-1], atol=1e-5)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.sim_device.noise import GaussMarkov, RandomErrors, Walk
+from fieldcal.sim_device.noise import RandomErrors
 from fieldcal.sim_device.profile import ONE, ZERO, Climate, NoiseFigures
+from fieldcal.sim_device.random_process import GaussMarkov, Walk
 from fieldcal.sim_device.temperature import course, recorded
 
 RATE = 10.0

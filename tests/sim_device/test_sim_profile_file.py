@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device import profile_file
+from fieldcal.sim_device.effect import Range, SimulatedEffect
+from fieldcal.sim_device.effects import catalogue
 from fieldcal.sim_device.profile import (
     Climate,
     FullScale,
@@ -21,7 +23,7 @@ from fieldcal.sim_device.profile import (
     Site,
     Truth,
 )
-from fieldcal.sim_device.vocabulary import CATALOGUE, SimulatedEffect, parse
+from fieldcal.sim_device.vocabulary import parse
 
 number = st.floats(-1e3, 1e3)
 positive = st.floats(1e-9, 1e3)
@@ -30,29 +32,28 @@ sizes = st.tuples(*[st.floats(0, 10)] * 3)
 words = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 
 
+def _within(limits: Range) -> st.SearchStrategy[float]:
+    good = (v for v in (0.5, 0.01) if limits.holds(v))
+    return positive if limits.holds(1e3) else st.just(next(good))
+
+
 def of_id(id_: str) -> st.SearchStrategy[SimulatedEffect]:
-    entry = CATALOGUE[id_]
-    given_words = {
-        "channel": st.sampled_from(["ax", "gz", "acc"]),
-        "kind": st.just("wrapped"),
-        "axes": st.sampled_from(["+x+y+z", "-z+x-y", ""]),
-        "unit": st.sampled_from(["g", "deg/s", ""]),
-    }
-    ranged = {"fraction": 0.5, "relative": 0.01, "seconds": 0.02}
-    numbers = {
-        n: st.just(ranged[n]) if n in ranged else positive for n in entry.numbers
-    }
-    numbers |= dict.fromkeys(entry.vector, number)
+    kind = catalogue()[id_]
+    numbers = {n: _within(takes.range) for n, takes in kind.NUMBERS.items()}
+    numbers |= dict.fromkeys(kind.VECTOR, number)
     return st.builds(
-        SimulatedEffect,
-        st.just(id_),
+        kind,
         st.fixed_dictionaries(numbers),
-        st.fixed_dictionaries({n: given_words[n] for n in entry.words}),
+        st.fixed_dictionaries(
+            {n: st.from_regex(w.pattern, fullmatch=True) for n, w in kind.WORDS.items()}
+        ),
     )
 
 
 effects = st.lists(
-    st.sampled_from(sorted(set(CATALOGUE) - {"heading_error"})).flatmap(of_id),
+    st.sampled_from(
+        [i for i, kind in catalogue().items() if not kind.NEEDS_EARTH]
+    ).flatmap(of_id),
     max_size=6,
     unique_by=lambda effect: effect.id,
 )

@@ -14,6 +14,7 @@ from fieldcal.core import frames
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
     ONE,
     ZERO,
@@ -24,7 +25,7 @@ from fieldcal.sim_device.profile import (
 )
 from fieldcal.sim_device.profile_file import from_tables
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import SimulatedEffect, effect, parse
+from fieldcal.sim_device.vocabulary import effect, parse
 
 PLAIN = Profile(
     truth=Truth(ZERO, ONE, ZERO, ONE), temperature=Climate(self_heating_k=0.0)

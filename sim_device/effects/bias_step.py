@@ -1,0 +1,26 @@
+"""The biases change at an instant.
+
+U_i += s_i,    W_i += s_i    from the instant at on
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import SIX, Example, Number, SimulatedEffect
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedBiasStep(SimulatedEffect):
+    """What has come by the step."""
+
+    VECTOR = SIX
+    NUMBERS = {"at_s": Number()}
+    REPEATS = True
+    EXAMPLE = Example({"ax": 0.01, "az": -0.008, "at_s": 101.0})
+
+    def adds(self, life: Life) -> Array:
+        """What has come by the step."""
+        more: Array = self.column(SIX) * np.where(life.t >= self["at_s"], 1.0, 0.0)
+        return more

@@ -1,0 +1,24 @@
+"""The gyroscopes feel the square of the force.
+
+    W_i += q_i f_i^2
+
+f specific force, m/s^2; q in rad/s/(m/s^2)^2.
+"""
+
+from __future__ import annotations
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import AXES, Example, SimulatedEffect, of_gyr
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedG2Sensitivity(SimulatedEffect):
+    """What the square of the force adds to the gyroscopes."""
+
+    VECTOR = AXES
+    EXAMPLE = Example({"x": 4e-6, "y": -5e-6, "z": 5e-6})
+
+    def adds(self, life: Life) -> Array:
+        """What the square of the force adds to the gyroscopes."""
+        more: Array = of_gyr(self.column(AXES) * life.f**2)
+        return more

@@ -1,0 +1,24 @@
+"""The gyroscopes feel the force.
+
+    W_i += sum_j g_ij f_j
+
+f specific force, m/s^2; g in rad/s/(m/s^2).
+"""
+
+from __future__ import annotations
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import Example, SimulatedEffect, matrix_names, of_gyr
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedGSensitivity(SimulatedEffect):
+    """What the force adds to the gyroscopes."""
+
+    VECTOR = matrix_names("g")
+    EXAMPLE = Example({"g12": 5e-5, "g23": -6e-5, "g31": 7e-5})
+
+    def adds(self, life: Life) -> Array:
+        """What the force adds to the gyroscopes."""
+        more: Array = of_gyr(self.matrix("g", life.f))
+        return more

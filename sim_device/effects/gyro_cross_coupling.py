@@ -1,0 +1,24 @@
+"""Each gyroscope feels the axes across.
+
+    W_i += sum_(j != i) s_ij w_j
+
+w angular rate, rad/s.
+"""
+
+from __future__ import annotations
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import Example, SimulatedEffect, matrix_names, of_gyr
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedGyroCrossCoupling(SimulatedEffect):
+    """What the axes across add to the gyroscopes."""
+
+    VECTOR = matrix_names("s", diagonal=False)
+    EXAMPLE = Example({"s13": 1e-2, "s31": -1.2e-2, "s23": 1.5e-2})
+
+    def adds(self, life: Life) -> Array:
+        """What the axes across add to the gyroscopes."""
+        more: Array = of_gyr(self.matrix("s", life.w))
+        return more

@@ -1,0 +1,30 @@
+"""The gyroscopes feel products of the rates.
+
+    W_i += p_i1 wx wy + p_i2 wy wz + p_i3 wx wz
+
+w angular rate, rad/s; p in 1/(rad/s).
+"""
+
+from __future__ import annotations
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import (
+    Example,
+    SimulatedEffect,
+    matrix_names,
+    of_gyr,
+    pairs,
+)
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedGyroProducts(SimulatedEffect):
+    """What products of the rates add."""
+
+    VECTOR = matrix_names("p")
+    EXAMPLE = Example({"p11": 5e-3, "p22": -6e-3, "p33": 4e-3}, turntable=True)
+
+    def adds(self, life: Life) -> Array:
+        """What products of the rates add."""
+        more: Array = of_gyr(self.matrix("p", pairs(life.w)))
+        return more

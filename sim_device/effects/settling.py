@@ -1,0 +1,30 @@
+"""The biases settle after each turn.
+
+    U_i += a_i exp(-(t - end of the turn) / tau),    W_i likewise
+
+Building up while the device is turned.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import ABOVE_ZERO, SIX, Example, Number, SimulatedEffect
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedSettling(SimulatedEffect):
+    """What is left of the last turn."""
+
+    VECTOR = SIX
+    NUMBERS = {"tau_s": Number(range=ABOVE_ZERO)}
+    REPEATS = True
+    EXAMPLE = Example({"ax": 0.03, "ay": 0.02, "az": -0.03, "tau_s": 4.0})
+
+    def adds(self, life: Life) -> Array:
+        """What is left of the last turn."""
+        after = np.exp(-np.maximum(life.since, 0.0) / self["tau_s"])
+        turned = np.where(life.progress > 0, 1.0, 0.0)
+        left: Array = turned * np.where(life.since < 0, life.progress, after)
+        return self.column(SIX) * left

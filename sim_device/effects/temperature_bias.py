@@ -1,0 +1,27 @@
+"""The biases follow the temperature.
+
+    U_i += c_i (T - T0),    W_i += c_i (T - T0)
+
+T temperature, T0 that at the start, K.
+"""
+
+from __future__ import annotations
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import SIX, Example, SimulatedEffect
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedTemperatureBias(SimulatedEffect):
+    """What the change of temperature adds."""
+
+    VECTOR = SIX
+    EXAMPLE = Example(
+        {"ax": 4e-3, "ay": -3e-3, "gz": 1e-4},
+        device={"temperature": {"ramp_k_s": 0.03}},
+    )
+
+    def adds(self, life: Life) -> Array:
+        """What the change of temperature adds."""
+        more: Array = self.column(SIX) * life.warmth
+        return more

@@ -1,0 +1,26 @@
+"""The accelerometers' scale factors follow the temperature.
+
+    U_i += k_i (T - T0) f_i
+
+T temperature, T0 that at the start, K; f specific force, m/s^2.
+"""
+
+from __future__ import annotations
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import AXES, Example, SimulatedEffect, of_acc
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedTemperatureScale(SimulatedEffect):
+    """What the change of temperature adds to the force."""
+
+    VECTOR = AXES
+    EXAMPLE = Example(
+        {"x": 4e-4, "y": -3e-4, "z": 3e-4}, device={"temperature": {"ramp_k_s": 0.03}}
+    )
+
+    def adds(self, life: Life) -> Array:
+        """What the change of temperature adds to the force."""
+        more: Array = of_acc(self.column(AXES) * life.warmth * life.f)
+        return more

@@ -1,0 +1,28 @@
+"""The biases settle after the device is switched on.
+
+    U_i += a_i exp(-t / tau),    W_i += a_i exp(-t / tau)
+
+t since the device was switched on, s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import ABOVE_ZERO, SIX, Example, Number, SimulatedEffect
+from fieldcal.sim_device.life import Life
+
+
+class SimulatedWarmUp(SimulatedEffect):
+    """What is left of the start."""
+
+    VECTOR = SIX
+    NUMBERS = {"tau_s": Number(range=ABOVE_ZERO)}
+    REPEATS = True
+    EXAMPLE = Example({"ax": 0.03, "ay": -0.02, "gx": 4e-4, "tau_s": 90.0})
+
+    def adds(self, life: Life) -> Array:
+        """What is left of the start."""
+        more: Array = self.column(SIX) * np.exp(-life.t / self["tau_s"])
+        return more

@@ -3,9 +3,10 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 DEV := .venv/.dev
+JOBS ?= 2
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test test-all lint bench docs setup clean
+.PHONY: demo test test-all mutants lint bench docs setup clean
 
 demo: $(READY)
 	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
@@ -16,6 +17,20 @@ test: $(DEV)
 # the whole catalogue and every seed, before a release or where diagnosis was changed
 test-all: $(DEV)
 	$(BIN)/python -m pytest -q -n 2 --dist loadgroup --all
+
+# faults put into the formulas one by one, and whether the tests of the same room notice;
+# `make mutants-core` does one room, a second call only what has changed since
+mutants: mutants-core mutants-windows mutants-model mutants-solve
+
+mutants-%: .venv/.mutants
+	@mkdir -p mutants/$*
+	@ln -sfn $(foreach f,fieldcal drivers procedures sim_device tests pyproject.toml,$(CURDIR)/$f) mutants/$*
+	@sed 's/ROOM/$*/' tests/mutmut.cfg > mutants/$*/setup.cfg
+	cd mutants/$* && OMP_NUM_THREADS=1 $(CURDIR)/$(BIN)/mutmut run --max-children $(JOBS)
+	@cd mutants/$* && $(CURDIR)/$(BIN)/mutmut results
+	@cd mutants/$* && $(CURDIR)/$(BIN)/mutmut results --all true | awk -F '[.:]' \
+	  'NF > 4 {n[$$3]++; killed[$$3] += /: (killed|timeout|segfault)/} \
+	  END {for (m in n) print m, killed[m] "/" n[m] " killed"}'
 
 lint: $(DEV)
 	$(BIN)/ruff check .
@@ -53,5 +68,10 @@ $(DEV): $(READY)
 	$(PIP) -e '.[docs]'
 	@touch $@
 
+# what puts faults into formulas
+.venv/.mutants: $(DEV)
+	$(PIP) -e '.[mutants]'
+	@touch $@
+
 clean:
-	rm -rf docs/made docs/_site .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis build *.egg-info
+	rm -rf mutants docs/made docs/_site .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis build *.egg-info

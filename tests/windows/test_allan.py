@@ -22,6 +22,7 @@ def still(seconds: float, walk: float = 0.0, seed: int = 0) -> Block:
     return Block.of(np.arange(n) / RATE, acc, gyr)
 
 
+@pytest.mark.statistical
 def test_white_noise_falls_with_the_root_of_time() -> None:
     ratios = []
     for seed in range(4):
@@ -37,6 +38,7 @@ def test_white_noise_falls_with_the_root_of_time() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.statistical
 def test_random_walk_tells_when_more_time_is_useless() -> None:
     """White N and walk K meet where N^2/tau = K^2 tau/3: here at 10 s."""
     density = 0.002 / np.sqrt(RATE)

@@ -3,60 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import butter, lfilter
 
 from fieldcal.core.errors import InputError, Moved
-from fieldcal.core.samples import CHANNELS, Array, Block, concat
+from fieldcal.core.samples import CHANNELS, Block, concat
 from fieldcal.windows import Average, StillnessLimits, Window, average
-from fieldcal.windows.longrun import error_of_mean
-
-UNIT = np.repeat([0.05, 0.002], 3)
-HOME = np.array([0.1, -9.81, 0.2, 0.01, -0.02, 0.005])
-
-
-def white(rng: np.random.Generator, n: int, c: int = 6) -> Array:
-    return rng.standard_normal((n, c))
-
-
-def low_passed(hz: float, rate: float = 100.0) -> Callable[..., Array]:
-    def source(rng: np.random.Generator, n: int, c: int = 6) -> Array:
-        b, a = butter(2, 2 * hz / rate)
-        x: Array = lfilter(b, a, white(rng, n + 200, c), axis=0)[200:]
-        scaled: Array = x / x.std()
-        return scaled
-
-    return source
-
-
-def markov(phi: float) -> Callable[..., Array]:
-    def source(rng: np.random.Generator, n: int, c: int = 6) -> Array:
-        e = np.sqrt(1 - phi**2) * white(rng, n + 300, c)
-        x: Array = lfilter([1], [1, -phi], e, axis=0)[300:]
-        return x
-
-    return source
-
-
-def flicker(knee: float, rate: float = 100.0) -> Callable[..., Array]:
-    def source(rng: np.random.Generator, n: int, c: int = 6) -> Array:
-        f = np.fft.rfftfreq(2 * n, 1 / rate)[1:, None]
-        spectrum = white(rng, n, c) + 1j * white(rng, n, c)
-        spectrum = np.vstack([np.zeros((1, c)), spectrum * np.sqrt((1 + knee / f) * n)])
-        return np.fft.irfft(spectrum, 2 * n, axis=0)[:n]
-
-    return source
-
-
-def block_of(noise: Array, rate: float = 100.0, start: float = 0.0) -> Block:
-    six = HOME + noise * UNIT
-    t = start + np.arange(len(six)) / rate
-    return Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), 25.0))
+from windows.signals import UNIT, block_of, flicker, low_passed, markov, white
 
 
 def rejection(block: Block) -> Moved | None:
@@ -67,38 +23,7 @@ def rejection(block: Block) -> Moved | None:
     return None
 
 
-def pulls(source: Callable[..., Array], channels: int = 900) -> Array:
-    """Difference of neighbouring 30 s means over its stated error."""
-    cells = []
-    for seed in range(channels // 300):
-        x = source(np.random.default_rng(seed), 6000, 300)
-        cells.append(x.reshape(600, 10, 300).mean(axis=1))
-    y = np.hstack(cells)
-    a, b = (error_of_mean(part, 0.1).covariance for part in (y[:300], y[300:]))
-    return np.asarray(
-        (y[:300].mean(axis=0) - y[300:].mean(axis=0)) / np.sqrt(np.diag(a) + np.diag(b))
-    )
-
-
-@pytest.mark.parametrize(
-    ("source", "least", "most"),
-    [
-        (white, 0.90, 1.04),
-        (low_passed(20), 0.90, 1.04),
-        (low_passed(5), 0.90, 1.04),
-        (markov(0.5), 0.90, 1.04),
-        (markov(0.95), 0.70, 1.0),
-        (flicker(1.0), 0.80, 1.1),
-    ],
-)
-def test_the_error_stated_is_the_error_made(
-    source: Callable[..., Array], least: float, most: float
-) -> None:
-    found = pulls(source)
-    assert least < found.std() < most
-    assert np.mean(np.abs(found) > 1.96) < 0.075
-
-
+@pytest.mark.statistical
 def test_white_noise_averages_with_the_root_of_the_number() -> None:
     sigmas = [average(block_of(white(np.random.default_rng(s), 6000))).sigma
               for s in range(20)]  # fmt: skip
@@ -130,6 +55,7 @@ def test_channels_that_wander_together_say_so() -> None:
     np.testing.assert_allclose(found, truth / np.outer(size, size), atol=0.1)
 
 
+@pytest.mark.statistical
 def test_noise_alone_is_not_rejected() -> None:
     rejected = 0
     for seed in range(60):
@@ -139,6 +65,7 @@ def test_noise_alone_is_not_rejected() -> None:
     assert rejected <= 2, "of 240 windows"
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(("rate", "seconds"), [(50.0, 30.0), (100.0, 60.0)])
 def test_five_sigma_for_half_a_second_are_caught(rate: float, seconds: float) -> None:
     n, long = int(rate * seconds), int(rate / 2)
@@ -207,6 +134,7 @@ def same(a: Average, b: Average) -> bool:
     )
 
 
+@pytest.mark.statistical
 @settings(max_examples=25)
 @given(
     cuts=st.lists(st.integers(0, 1500), max_size=12),
@@ -246,6 +174,7 @@ def test_a_nan_is_a_missing_value() -> None:
     assert found.sigma[0] == pytest.approx(0.05 / np.sqrt(2400), rel=0.35)
 
 
+@pytest.mark.statistical
 def test_lost_samples_are_no_disturbance() -> None:
     rejected = 0
     for seed in range(30):
@@ -258,6 +187,7 @@ def test_lost_samples_are_no_disturbance() -> None:
     assert rejected == 0
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("noise", [0.1, 0.3, 0.5, 1.0])
 def test_rounding_that_the_noise_does_not_hide_is_in_the_error(noise: float) -> None:
     errors, sigmas = [], []
@@ -328,6 +258,7 @@ def test_a_window_too_short_has_no_error() -> None:
         average(block_of(white(np.random.default_rng(0), 0)))
 
 
+@pytest.mark.statistical
 def test_a_device_that_turns_a_little_in_the_hand_is_known_along_gravity() -> None:
     """Across gravity its specific force wanders, along it only its noise is left."""
     pulls, across = [], []

@@ -47,6 +47,7 @@ def watch(block: Block, piece: float = 0.1) -> list[tuple[float, bool, float | N
     return seen
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("rate", [50.0, 100.0, 1000.0])
 @pytest.mark.parametrize(
     ("legs", "level"),
@@ -77,6 +78,7 @@ def test_a_turn_is_seen_and_rest_a_second_after_it(
     assert max(late) <= 1.25
 
 
+@pytest.mark.statistical
 def test_rest_is_known_from_the_first_second_and_holds() -> None:
     moving = 0
     for seed in range(20):
@@ -113,6 +115,7 @@ def test_a_device_carried_about_from_the_start_is_not_at_rest() -> None:
     assert not any(still for _, still, _ in watch(block))
 
 
+@pytest.mark.statistical
 @settings(max_examples=20)
 @given(cuts=st.lists(st.integers(0, 1000), max_size=10), seed=st.integers(0, 50))
 def test_how_samples_are_cut_into_blocks_does_not_matter(

@@ -34,6 +34,7 @@ def pulls(noise: float, centre: float, grain: Grain) -> tuple[Array, int]:
     return np.array(found), moved
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("grain", [CUT, ROUNDED], ids=["cut", "rounded"])
 @pytest.mark.parametrize("centre", [0.0, 1000.0])
 @pytest.mark.parametrize("noise", [0.0, 0.1, 0.3, 0.6, 1.0, 3.0])

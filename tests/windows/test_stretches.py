@@ -37,6 +37,7 @@ def recording(
     return Block.of(np.arange(n) / rate, acc, gyr), rests
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("tremor", [0.0, 0.001])
 def test_rests_are_found_between_the_turns(tremor: float) -> None:
     for seed in range(5):
@@ -67,6 +68,7 @@ def test_nothing_still_is_nothing_found() -> None:
     assert still_stretches(block[:5]) == []
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("name", ["p01", "p02", "p04", "p07", "p09", "p10"])
 def test_practice_positions_are_found(shared: Path, name: str) -> None:
     session = Session.open(shared / "practice" / name)

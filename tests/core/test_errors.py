@@ -1,0 +1,71 @@
+"""Exit codes, and what a disk says: as the operator meets them."""
+
+import doctest
+import errno
+
+import pytest
+
+from fieldcal.core import errors
+from fieldcal.core.errors import FieldcalError, Moved, disk_says
+
+CODES = {
+    "FieldcalError": 2,
+    "InputError": 2,
+    "SessionError": 2,
+    "PlanError": 2,
+    "NotObservable": 2,
+    "DeviceError": 3,
+    "DeviceSilent": 3,
+    "MoverFailed": 3,
+    "Moved": 1,
+    "WrongPosition": 1,
+    "CalibrationFailed": 1,
+    "Skipped": 1,
+    "Stopped": 130,
+}
+
+
+def test_every_error_ends_with_the_code_that_is_documented() -> None:
+    found = {
+        name: kind.exit_code
+        for name, kind in vars(errors).items()
+        if isinstance(kind, type) and issubclass(kind, FieldcalError)
+    }
+    assert found == CODES
+    assert errors.__doc__
+    for name, code in CODES.items():
+        (line,) = (x for x in errors.__doc__.splitlines() if f"{name} " in x)
+        assert line.split(name)[1].split()[0] == str(code)
+
+
+def test_a_disturbance_carries_its_text_instant_and_axis() -> None:
+    moved = Moved("disturbed on ax", 12.5, "ax")
+    assert (str(moved), moved.at, moved.axis) == ("disturbed on ax", 12.5, "ax")
+
+
+@pytest.mark.parametrize(
+    ("number", "why", "remedy"),
+    [
+        (errno.ENOSPC, "full", "make room"),
+        (errno.EROFS, "read-only", "name another"),
+        (errno.EACCES, "may not write", "name another folder"),
+        (errno.EIO, "does not answer", "put it in again"),
+        (errno.ENODEV, "gone", "put it in again"),
+        (errno.ENOENT, "not there", "make it"),
+    ],
+)
+def test_a_disk_says_why_and_what_to_do(number: int, why: str, remedy: str) -> None:
+    cause, _, action = disk_says(OSError(number, "as the system puts it")).partition(
+        ": "
+    )
+    assert why in cause and remedy in action
+
+
+def test_what_is_not_known_is_said_in_the_words_of_the_system() -> None:
+    assert disk_says(OSError(errno.EMLINK, "Too many links")) == "Too many links"
+    assert disk_says(OSError("no number at all")) == "no number at all"
+
+
+def test_examples() -> None:
+    failed, tried = doctest.testmod(errors)
+    assert tried and not failed

@@ -1,0 +1,83 @@
+"""Positions, their forces by vectors turned one by one, and the sets as published."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fieldcal.core.positions import (
+    FIVE,
+    SETS,
+    SIX_FACES,
+    TWO,
+    WIDE,
+    Position,
+    angles,
+    forces,
+    rates,
+)
+
+UNKNOWN = Position("as it lies")
+
+
+def test_a_position_in_degrees_is_told_in_degrees() -> None:
+    position = Position.deg(22.5, -5)
+    assert position.name == "α = 22.5°, β = -5°"
+    assert position.alpha == pytest.approx(np.pi / 8)
+    assert position.beta == pytest.approx(-np.pi / 36)
+    assert position.degrees == (22.5, -5.0) and position.rate is None
+    assert Position.deg(0, 90, "on its side").name == "on its side"
+
+
+def test_degrees_come_back_without_the_dust_of_the_conversion() -> None:
+    for alpha in np.arange(-180, 180, 0.1).round(1):
+        assert Position.deg(alpha, -alpha / 4).degrees == (alpha, round(-alpha / 4, 9))
+
+
+@pytest.mark.parametrize(
+    "position", [UNKNOWN, Position("a", alpha=0.0), Position("b", beta=0.0)]
+)
+def test_a_position_is_oriented_by_both_angles(position: Position) -> None:
+    assert not position.oriented and position.degrees is None
+    assert Position("level", 0.0, 0.0).oriented
+    assert Position("level", 0.0, 0.0).degrees == (0.0, 0.0)
+
+
+def test_angles_and_rates_that_are_not_known() -> None:
+    table = Position("turning", 0.1, 0.2, (0.0, 0.5, 0.0))
+    alpha, beta = angles([table, UNKNOWN])
+    np.testing.assert_array_equal(alpha, [0.1, np.nan])
+    np.testing.assert_array_equal(beta, [0.2, np.nan])
+    np.testing.assert_array_equal(rates([table, UNKNOWN]), [[0, 0.5, 0], [0, 0, 0]])
+
+
+def test_no_position_has_no_angles_and_no_rates() -> None:
+    assert angles([])[0].shape == angles([])[1].shape == (0,)
+    assert rates([]).shape == forces([], 9.81).shape == (0, 3)
+
+
+def test_forces_are_gravity_seen_from_the_turned_device() -> None:
+    found = forces([*WIDE, UNKNOWN], 9.79)
+    for position, force in zip(WIDE, found, strict=False):
+        # a frame turned by +a sees vectors turned by -a
+        assert position.degrees
+        seen = Rotation.from_euler("z", -position.degrees[0], degrees=True).apply(
+            [0, -9.79, 0]
+        )
+        seen = Rotation.from_euler("x", -position.degrees[1], degrees=True).apply(seen)
+        np.testing.assert_allclose(force, seen, atol=1e-12)
+    assert np.isnan(found[-1]).all()
+
+
+def test_the_sets_are_those_of_the_paper_and_a_ladder() -> None:
+    assert [p.degrees for p in TWO] == [(0, 0), (45, 5)]
+    assert [p.degrees for p in FIVE] == [(0, 0), (22.5, 0), (22.5, 2.5), (45, 2.5),
+                                         (45, 5)]  # fmt: skip
+    assert {p.degrees for p in WIDE} == {(0, 0), (45, 5), (45, -5), (-45, 5), (-45, -5)}
+    assert SETS == {"two": TWO, "five": FIVE, "wide": WIDE, "six_faces": SIX_FACES}
+    assert all(p.name for p in FIVE)
+
+
+def test_six_faces_are_each_axis_up_and_down() -> None:
+    up = (forces(SIX_FACES, 1.0).round(12) + 0.0).tolist()
+    faces = [*np.eye(3).tolist(), *(-np.eye(3)).tolist()]
+    assert sorted(up) == sorted((np.array(faces) + 0.0).tolist())

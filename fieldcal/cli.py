@@ -14,23 +14,9 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Protocol, cast
 
-COMMANDS = {
-    "run": ("recalibrate a device, at the console or headless", "run"),
-    "plan": ("choose positions and say what they will tell", "plan"),
-    "solve": ("calibrate from a recorded session", "solve"),
-    "apply": ("take a calibration out of a recording", "apply"),
-    "compare": ("say whether two calibrations differ", "compare"),
-    "history": ("show a device's calibrations from run to run", "history"),
-    "write": ("install a calibration on an autopilot", "write"),
-    "undo": ("give an autopilot back what it had before", "undo"),
-    "diagnose": ("say what physics the simulation leaves out", "diagnose"),
-    "report": ("make a page of a session that opens offline", "report"),
-    "import": ("make a session of a recording from elsewhere", "import_recording"),
-    "export": ("write a calibration for another program", "export"),
-    "verify": ("say whether a session is whole", "verify"),
-    "sim": ("be a virtual device on a link", "sim"),
-    "ports": ("list the devices that are plugged in", "ports"),
-}
+from fieldcal.commands import found
+
+COMMANDS = found()
 """Name, what it does, module."""
 
 EXIT_CODES = """\

@@ -1,4 +1,4 @@
-"""`fieldcal apply`: a session's samples with the calibration taken out of them."""
+"""`fieldcal apply`: take a calibration out of a recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`fieldcal compare`: whether two calibrations of a device differ significantly."""
+"""`fieldcal compare`: say whether two calibrations differ."""
 
 from __future__ import annotations
 

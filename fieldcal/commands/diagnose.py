@@ -1,4 +1,4 @@
-"""`fieldcal diagnose`: what physics the simulation leaves out of a recording."""
+"""`fieldcal diagnose`: say what physics the simulation leaves out."""
 
 from __future__ import annotations
 

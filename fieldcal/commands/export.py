@@ -1,4 +1,4 @@
-"""`fieldcal export`: a calibration for another program."""
+"""`fieldcal export`: write a calibration for another program."""
 
 from __future__ import annotations
 

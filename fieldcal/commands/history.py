@@ -1,4 +1,4 @@
-"""`fieldcal history`: the calibrations of a device from run to run."""
+"""`fieldcal history`: show a device's calibrations from run to run."""
 
 from __future__ import annotations
 

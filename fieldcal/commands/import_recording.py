@@ -1,4 +1,4 @@
-"""`fieldcal import`: session folders of recordings from elsewhere."""
+"""`fieldcal import`: make a session of a recording from elsewhere."""
 
 from __future__ import annotations
 

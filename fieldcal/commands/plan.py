@@ -1,4 +1,4 @@
-"""`fieldcal plan`: which positions to take, and what to expect of them."""
+"""`fieldcal plan`: choose positions and say what they will tell."""
 
 from __future__ import annotations
 

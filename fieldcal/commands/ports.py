@@ -1,4 +1,4 @@
-"""`fieldcal ports`: what is plugged in, and with --probe, what it speaks."""
+"""`fieldcal ports`: list the devices that are plugged in."""
 
 from __future__ import annotations
 

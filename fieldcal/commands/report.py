@@ -1,4 +1,4 @@
-"""`fieldcal report`: a session as one page that opens offline."""
+"""`fieldcal report`: make a page of a session that opens offline."""
 
 from __future__ import annotations
 

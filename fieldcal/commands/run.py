@@ -1,4 +1,4 @@
-"""`fieldcal run`: take a device through a procedure, at the console or headless."""
+"""`fieldcal run`: recalibrate a device, at the console or headless."""
 
 from __future__ import annotations
 

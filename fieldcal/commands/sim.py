@@ -1,4 +1,4 @@
-"""`fieldcal sim`: be a virtual device on a link, moved by a script or by keys."""
+"""`fieldcal sim`: be a virtual device on a link."""
 
 from __future__ import annotations
 

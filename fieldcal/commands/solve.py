@@ -1,4 +1,4 @@
-"""`fieldcal solve`: from a recorded session to a calibration with its uncertainty."""
+"""`fieldcal solve`: calibrate from a recorded session."""
 
 from __future__ import annotations
 

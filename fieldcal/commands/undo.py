@@ -1,4 +1,4 @@
-"""`fieldcal undo`: give an autopilot back what it had before `fieldcal write`."""
+"""`fieldcal undo`: give an autopilot back what it had before."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`fieldcal verify`: whether a session is whole, one line for each finding."""
+"""`fieldcal verify`: say whether a session is whole."""
 
 from __future__ import annotations
 

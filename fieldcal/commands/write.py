@@ -1,4 +1,4 @@
-"""`fieldcal write`: install a calibration on an autopilot, so that it can be undone."""
+"""`fieldcal write`: install a calibration on an autopilot."""
 
 from __future__ import annotations
 

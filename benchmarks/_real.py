@@ -22,7 +22,7 @@ from fieldcal.core.frames import angles_of
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.ingest import bring_in
+from fieldcal.importing.ingest import import_stream
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.session import description
 from fieldcal.session.description import Description
@@ -105,7 +105,7 @@ def _imported(path: Path, wanted: ReadOptions, still: float, stream: str = "") -
     stream = stream or recording.streams()[0].name
     with TemporaryDirectory() as folder:
         there = Path(folder) / "session"
-        bring_in(recording, stream, there, {"format": 1}, still)
+        import_stream(recording, stream, there, {"format": 1}, still)
         session = Session.open(there)
         return session.block, session.about
 

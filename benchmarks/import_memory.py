@@ -20,17 +20,17 @@ PIECE = 300 * RATE
 CHILD = """
 import sys
 from pathlib import Path
-from fieldcal.importing.ingest import bring_in
+from fieldcal.importing.ingest import import_stream
 from fieldcal.importers import open_recording
 from fieldcal.importing.recording import ReadOptions as Wanted
 names = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 recording = open_recording(Path(sys.argv[1]), Wanted(names))
 name = recording.streams()[0].name
-brought = bring_in(recording, name, Path(sys.argv[2]), {"format": 1}, 1.0)
+imported = import_stream(recording, name, Path(sys.argv[2]), {"format": 1}, 1.0)
 # ru_maxrss would begin with that of the process that started this one
 status = dict(line.split(":") for line in open("/proc/self/status") if "VmHWM" in line)
 peak = int(status["VmHWM"].split()[0]) / 1024
-print(peak, brought.facts.rows, len(brought.stretches))
+print(peak, imported.facts.rows, len(imported.stretches))
 """
 
 

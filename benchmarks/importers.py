@@ -22,7 +22,7 @@ from time import process_time
 from benchmarks._logs import COLUMNS, ROWS, Log, samples, write_all, write_tables
 from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.ingest import bring_in
+from fieldcal.importing.ingest import import_stream
 from fieldcal.importing.recording import ReadOptions
 
 RUNS = 5
@@ -46,7 +46,7 @@ def ours(path: Path, wanted: ReadOptions, folder: Path | None) -> None:
         for _ in recording.blocks(stream):
             pass
     else:
-        bring_in(recording, stream, folder, {"format": 1}, 1.0)
+        import_stream(recording, stream, folder, {"format": 1}, 1.0)
 
 
 def written(path: Path, block: Block) -> None:

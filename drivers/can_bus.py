@@ -105,7 +105,9 @@ def connect(channel: str, told: Settings) -> BusABC:
     except (OSError, can.CanError) as fault:
         if isinstance(fault.__cause__, ValueError):
             raise InputError(f"can: cannot open {at}: {fault}") from fault
-        raise DeviceError(f"cannot open {at}: {why(interface, fault)}") from fault
+        raise DeviceError(
+            f"cannot open {at}: {open_error(interface, fault)}"
+        ) from fault
 
 
 ONLY: Mapping[Any, int] = defaultdict(int)
@@ -192,7 +194,7 @@ def open_source(
     return SlcanSource(connect(channel, told), health)
 
 
-def why(interface: str, fault: BaseException) -> str:
+def open_error(interface: str, fault: BaseException) -> str:
     """Say why a bus did not open, and what to do."""
     if interface == "slcan":
         return reason(fault)

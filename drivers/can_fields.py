@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.framing import widened
+from fieldcal.drivers.framing import as_doubles
 
 if TYPE_CHECKING:
     from cantools.database.can import Signal
@@ -112,7 +112,7 @@ class Field:
         bits = self.bits(data)
         if self.floating:
             narrow = bits.astype(f"u{self.length // 8}")
-            return widened(narrow.view(_FLOATS[self.length]))
+            return as_doubles(narrow.view(_FLOATS[self.length]))
         if not self.signed:
             return bits
         sign = np.uint64(1 << (self.length - 1))

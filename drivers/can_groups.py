@@ -72,7 +72,7 @@ class FrameGroups(NamedTuple):
         return FrameGroups(*(np.concatenate(pair) for pair in pairs))
 
 
-class Whole(NamedTuple):
+class CompletedSamples(NamedTuple):
     """Samples in the order in which they got whole.
 
     Attributes
@@ -87,9 +87,9 @@ class Whole(NamedTuple):
     rows: Index
     last: Index
 
-    def take(self, which: Any) -> Whole:
+    def take(self, which: Any) -> CompletedSamples:
         """Return some of the samples."""
-        return Whole(self.key[which], self.rows[which], self.last[which])
+        return CompletedSamples(self.key[which], self.rows[which], self.last[which])
 
 
 class Groups(ABC):
@@ -107,7 +107,7 @@ class Groups(ABC):
         self._rest: FrameGroups | None = None
 
     @abstractmethod
-    def feed(self, new: FrameGroups) -> tuple[FrameGroups, Whole]:
+    def feed(self, new: FrameGroups) -> tuple[FrameGroups, CompletedSamples]:
         """Return rows, some kept from before, and the samples that got whole."""
 
     def reset(self) -> None:
@@ -117,11 +117,11 @@ class Groups(ABC):
     def _after_rest(self, new: FrameGroups) -> FrameGroups:
         return self._rest.then(new) if self._rest else new
 
-    def _whole(self, rows: FrameGroups) -> tuple[Whole, Index]:
+    def _whole(self, rows: FrameGroups) -> tuple[CompletedSamples, Index]:
         """Find keys that every part has, and the first row of each part and key."""
         return self._regular(rows) or self._any_order(rows)
 
-    def _regular(self, rows: FrameGroups) -> tuple[Whole, Index] | None:
+    def _regular(self, rows: FrameGroups) -> tuple[CompletedSamples, Index] | None:
         """Find them where the parts come in turn, as they nearly always do."""
         n, left = divmod(len(rows.key), self._parts)
         if not n:
@@ -141,10 +141,10 @@ class Groups(ABC):
             return None
         begin = self._parts * np.arange(n)
         last = begin + self._parts - 1
-        whole = Whole(key[:, 0], begin[:, None] + place, last)
+        whole = CompletedSamples(key[:, 0], begin[:, None] + place, last)
         return whole, np.arange(len(rows.key))
 
-    def _any_order(self, rows: FrameGroups) -> tuple[Whole, Index]:
+    def _any_order(self, rows: FrameGroups) -> tuple[CompletedSamples, Index]:
         keys, places = [], []
         for number in range(self._parts):
             of = np.flatnonzero(rows.part == number)
@@ -156,7 +156,7 @@ class Groups(ABC):
         table = np.column_stack([p[np.searchsorted(k, common)] for k, p in pairs])
         last = table.max(axis=1)
         order = np.argsort(last)
-        whole = Whole(common, table, last).take(order)
+        whole = CompletedSamples(common, table, last).take(order)
         return whole, np.sort(np.concatenate(places))
 
 
@@ -182,7 +182,7 @@ class ByKey(Groups):
         self._raw, self._key = -1, 0
         self._newest = self._done = -1
 
-    def feed(self, new: FrameGroups) -> tuple[FrameGroups, Whole]:
+    def feed(self, new: FrameGroups) -> tuple[FrameGroups, CompletedSamples]:
         """Put frames of the same key together."""
         rows = self._after_rest(new._replace(key=self._unwrapped(new.key)))
         whole, firsts = self._whole(rows)
@@ -230,7 +230,7 @@ class ByTurns(Groups):
         super().__init__(parts, health)
         self._first, self._within = first, within
 
-    def feed(self, new: FrameGroups) -> tuple[FrameGroups, Whole]:
+    def feed(self, new: FrameGroups) -> tuple[FrameGroups, CompletedSamples]:
         """Put frames together that follow one another; a doubled one spoils them."""
         rows = self._after_rest(new)
         rows = rows._replace(key=np.cumsum(rows.part == self._first))

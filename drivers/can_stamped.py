@@ -17,7 +17,7 @@ from fieldcal.drivers.options import Options
 from fieldcal.drivers.stamps import Stamps
 
 
-class Stamped(CanAssembler):
+class BusTimeAssembler(CanAssembler):
     """Puts samples together as `CanAssembler` does, timed by the bus."""
 
     def __init__(

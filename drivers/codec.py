@@ -19,7 +19,7 @@ from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers import protocols
 from fieldcal.drivers.driver import Health
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, resolve
-from fieldcal.drivers.layouts import Raw
+from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.drivers.timebase import Timebase
@@ -31,7 +31,7 @@ LIKELY = 0.25
 """Score from which a format is named."""
 
 
-class Likeness(NamedTuple):
+class FormatMatch(NamedTuple):
     """How well bytes fit a format, 0 to 1, the options it takes, samples found."""
 
     score: float
@@ -92,12 +92,12 @@ class Codec(ABC):
         return len(self._rest)
 
     @classmethod
-    def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
+    def likeness(cls, data: bytes, seconds: float) -> FormatMatch | None:
         """Judge whether bytes that came in so many seconds are of this format."""
         return cls.decoded(data)
 
     @classmethod
-    def decoded(cls, data: bytes, query: str = "") -> Likeness | None:
+    def decoded(cls, data: bytes, query: str = "") -> FormatMatch | None:
         """Judge bytes by the share that decodes with these options."""
         declared = f"{query}&rate=1" if query else "rate=1"
         codec = cls(Options("probe", declared))
@@ -106,7 +106,7 @@ class Codec(ABC):
         if health.samples < ENOUGH:
             return None
         share = 1 - health.skipped / health.received
-        return Likeness(share, query, health.samples)
+        return FormatMatch(share, query, health.samples)
 
     @property
     def grain(self) -> Grain:
@@ -124,7 +124,7 @@ class Codec(ABC):
     def _timed(
         self,
         clock: Timebase,
-        raw: Raw | None,
+        raw: RawSamples | None,
         t_host: Array,
         steps: Array | None = None,
     ) -> Block | None:
@@ -175,7 +175,7 @@ class Codec(ABC):
         return np.repeat(marks[:, 1], np.diff(done, prepend=0))
 
 
-def recognise(data: bytes, seconds: float) -> tuple[str, Likeness] | None:
+def recognise(data: bytes, seconds: float) -> tuple[str, FormatMatch] | None:
     """Name the format that bytes fit best, and how well; None if they fit none."""
     found = []
     for name in formats():

@@ -89,7 +89,7 @@ def resolve(candidates: Candidates, size: int) -> FrameScan:
     return FrameScan(first, last, rest, len(refused), skipped)
 
 
-def headed(
+def find_headed_frames(
     data: Bytes,
     sync: bytes,
     head: int,
@@ -132,7 +132,7 @@ def rows(data: Bytes, starts: Index, size: int) -> Bytes:
     return np.lib.stride_tricks.sliding_window_view(data, size)[starts]
 
 
-def widened(numbers: NDArray[Any]) -> Array:
+def as_doubles(numbers: NDArray[Any]) -> Array:
     """Return numbers of any width as doubles; a signalling nan is a nan like others."""
     with np.errstate(invalid="ignore"):
         return numbers.astype(float)

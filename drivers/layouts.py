@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.framing import Bytes, FrameScan, Index, rows, widened
+from fieldcal.drivers.framing import Bytes, FrameScan, Index, as_doubles, rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +55,14 @@ class Alike:
         first, _ = self.fields[key]
         size = n * np.dtype(kind).itemsize
         field = np.ascontiguousarray(self.frames[:, first : first + size])
-        return widened(field.view(kind))
+        return as_doubles(field.view(kind))
 
     def first_of(self, keys: tuple[int, ...]) -> int | None:
         """Return the first of the keys that these frames have."""
         return next((key for key in keys if key in self.fields), None)
 
 
-class Raw(NamedTuple):
+class RawSamples(NamedTuple):
     """Samples as frames carry them, without a common time.
 
     Attributes
@@ -82,7 +82,7 @@ class Raw(NamedTuple):
     seq: Array
 
 
-def in_order(parts: Iterable[Raw]) -> Raw | None:
+def in_order(parts: Iterable[RawSamples]) -> RawSamples | None:
     """Join samples of several layouts in the order of their frames."""
     some = list(parts)
     if not some:
@@ -91,13 +91,13 @@ def in_order(parts: Iterable[Raw]) -> Raw | None:
         return some[0]
     joined = [np.concatenate(column) for column in zip(*some, strict=True)]
     order = np.argsort(joined[0], kind="stable")
-    return Raw(*(column[order] for column in joined))
+    return RawSamples(*(column[order] for column in joined))
 
 
 Walk = Callable[[bytes], Layout | None]
 
 
-def alike(data: Bytes, found: FrameScan, walk: Walk) -> Iterator[Alike]:
+def sort_by_layout(data: Bytes, found: FrameScan, walk: Walk) -> Iterator[Alike]:
     """Sort frames by layout; those that `walk` knows no layout for are left out."""
     left = np.arange(len(found.starts))
     lengths = found.ends - found.starts

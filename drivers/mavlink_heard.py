@@ -11,7 +11,7 @@ from fieldcal.drivers.options import Options
 HEARTBEAT = "HEARTBEAT"
 
 
-class Heard(NamedTuple):
+class DetectedAutopilot(NamedTuple):
     """An autopilot: the options it takes, its message and how often that came.
 
     Attributes
@@ -27,7 +27,7 @@ class Heard(NamedTuple):
     samples: int
 
 
-def autopilot(data: bytes) -> Heard | None:
+def detect_autopilot(data: bytes) -> DetectedAutopilot | None:
     """Tell what an autopilot says; None if it is none, or pymavlink is not there."""
     if not all(find_spec(module) for module in ("pymavlink", "fastcrc")):
         return None
@@ -48,4 +48,4 @@ def autopilot(data: bytes) -> Heard | None:
         return None
     name = next((kind for kind in KINDS if kind in first.heard), "")
     query = f"message={name}" if name not in ("", usual) else ""
-    return Heard(query, name, decoded(name).health.samples if name else 0)
+    return DetectedAutopilot(query, name, decoded(name).health.samples if name else 0)

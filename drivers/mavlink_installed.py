@@ -56,7 +56,7 @@ def names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
     return {}
 
 
-def beside(autopilot: int, instance: int) -> tuple[str, ...]:
+def other_processing(autopilot: int, instance: int) -> tuple[str, ...]:
     """Parameters of what else is done to the samples: low-pass, temperature.
 
     Not every program has them; where one is not answered, nothing is concluded.

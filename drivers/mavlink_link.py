@@ -17,7 +17,7 @@ from typing import Protocol
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.reader import ByteSource
 from fieldcal.drivers.serial_imu import SerialPort
-from fieldcal.drivers.tcp import POLL, Tcp, cannot
+from fieldcal.drivers.tcp import POLL, Tcp, socket_error
 
 WAITING = 1 << 20
 """Bytes that the kernel is asked to keep for us."""
@@ -55,7 +55,7 @@ class Udp:
             self._socket.setblocking(False)
         except OSError as fault:
             self._socket.close()
-            raise DeviceError(cannot(place, fault)) from fault
+            raise DeviceError(socket_error(place, fault)) from fault
 
     def read(self) -> bytes:
         """Return all datagrams that are there, waiting `POLL` s for the first."""

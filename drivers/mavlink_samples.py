@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, widened
+from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, as_doubles
 from fieldcal.drivers.mavlink_frames import (
     LONGEST,
     Packets,
@@ -25,9 +25,9 @@ from fieldcal.drivers.mavlink_frames import (
 from fieldcal.drivers.mavlink_units import (
     ACCELERATIONS,
     RATES,
-    refuse,
-    told,
-    unbiased,
+    recognised_unit,
+    refuse_units,
+    untruncated_mean,
 )
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.stamps import Stamps
@@ -202,21 +202,21 @@ class Decoder(Codec):
         self._waiting.append((fields, t_host))
         fields = np.concatenate([some for some, _ in self._waiting])
         t_host = np.concatenate([some for _, some in self._waiting])
-        acc = widened(fields["acc"])
+        acc = as_doubles(fields["acc"])
         for end in range(FEW, min(len(acc), ENOUGH) + 1, FEW):
-            if unit := told(acc[end - FEW : end], self.kind.whole):
+            if unit := recognised_unit(acc[end - FEW : end], self.kind.whole):
                 self.acc_unit, self._waiting = unit, []
                 return self._block(fields, t_host)
         if len(acc) >= ENOUGH:
-            raise refuse(acc[:ENOUGH], self.kind.whole, self.message)
+            raise refuse_units(acc[:ENOUGH], self.kind.whole, self.message)
         return None
 
     def _block(self, fields: Fields, t_host: Array) -> Block | None:
         if not len(fields):
             return None
-        acc, gyr = widened(fields["acc"]), widened(fields["gyr"])
+        acc, gyr = as_doubles(fields["acc"]), as_doubles(fields["gyr"])
         if self.kind.whole and self._cut:
-            acc, gyr = unbiased(acc), unbiased(gyr)
+            acc, gyr = untruncated_mean(acc), untruncated_mean(gyr)
         stamps = fields["t"] * self.kind.tick
         t = self._clock.times(stamps, np.ones(len(stamps)), t_host)
         new = ~np.isnan(t)
@@ -235,7 +235,7 @@ class Decoder(Codec):
 
     def _temperature(self, fields: Fields) -> Array:
         """Temperature in deg C; nan where the message has none."""
-        degrees = widened(fields["temperature"])
+        degrees = as_doubles(fields["temperature"])
         if self.kind.whole:
             return np.where(degrees == 0, np.nan, degrees / 100)
         said = fields["updated"]

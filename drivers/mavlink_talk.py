@@ -18,9 +18,9 @@ from fieldcal.core.errors import DeviceError
 from fieldcal.drivers.mavlink_installed import (
     PX4,
     Installed,
-    beside,
     identity,
     names,
+    other_processing,
 )
 
 EVERY = 1.0
@@ -208,7 +208,7 @@ class Talk:
             )
             return b""
         target = self.vehicle or (0, 0)
-        more = beside(self.installed.autopilot, self._instance)
+        more = other_processing(self.installed.autopilot, self._instance)
         unheard = [name for name in more if name not in self.installed.values]
         return b"".join(
             self._packed(
@@ -246,7 +246,7 @@ class Talk:
         if installed is None:
             return
         known = names(installed.autopilot, installed.instance).values()
-        more = beside(installed.autopilot, installed.instance)
+        more = other_processing(installed.autopilot, installed.instance)
         if message.param_id not in {*more, *(name for some in known for name in some)}:
             return
         value = float(message.param_value)

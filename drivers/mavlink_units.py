@@ -37,12 +37,12 @@ CLOSE = 0.2
 """Share of g by which a device may be off that still tells its unit."""
 
 
-def unbiased(k: Array) -> Array:
+def untruncated_mean(k: Array) -> Array:
     """Return the mean of what was cut toward zero to `k`, (2)."""
     return k + 0.5 * np.sign(k)
 
 
-def told(acc: Array, whole: bool) -> str | None:
+def recognised_unit(acc: Array, whole: bool) -> str | None:
     """Name the unit of accelerations (n, 3), (3); None if none fits.
 
     >>> told(np.array([[0.0, 3.0, -1001.0]]), whole=True)
@@ -55,7 +55,7 @@ def told(acc: Array, whole: bool) -> str | None:
     return None
 
 
-def refuse(acc: Array, whole: bool, message: str) -> DeviceError:
+def refuse_units(acc: Array, whole: bool, message: str) -> DeviceError:
     """Say that no unit fits accelerations (n, 3)."""
     size = float(np.median(np.linalg.norm(acc, axis=1)))
     units = " nor ".join(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from fieldcal.core.errors import DeviceError
 from fieldcal.drivers.codec import codec_class, formats, recognise
-from fieldcal.drivers.mavlink_heard import autopilot
+from fieldcal.drivers.mavlink_heard import detect_autopilot
 from fieldcal.drivers.serial_imu import open_port
 
 SILENT = 2
@@ -18,7 +18,7 @@ ENOUGH = 4000
 """Bytes after which a format shows."""
 
 
-class HeardDevice(NamedTuple):
+class DetectedDevice(NamedTuple):
     """What was heard on a port.
 
     Attributes
@@ -49,14 +49,16 @@ def bauds() -> list[int]:
     return sorted(ranked, key=lambda baud: -ranked[baud])
 
 
-def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> HeardDevice:
+def probe(
+    port: str, seconds: float, rates: Iterable[int] | None = None
+) -> DetectedDevice:
     """Listen at one baud rate after the other, at most so many seconds each."""
     heard = silent = 0
     for baud in bauds() if rates is None else rates:
         try:
             data, found = _answer(port, baud, seconds)
         except (DeviceError, OSError) as fault:
-            return HeardDevice(port, "", "", 0, 0.0, str(fault))
+            return DetectedDevice(port, "", "", 0, 0.0, str(fault))
         heard += len(data)
         silent += not data
         if silent >= SILENT and not heard:
@@ -68,10 +70,10 @@ def probe(port: str, seconds: float, rates: Iterable[int] | None = None) -> Hear
         if heard
         else "nothing comes; is the device powered and sending?"
     )
-    return HeardDevice(port, "", "", 0, 0.0, says)
+    return DetectedDevice(port, "", "", 0, 0.0, says)
 
 
-def _told(port: str, baud: int, data: bytes, took: float) -> HeardDevice | None:
+def _told(port: str, baud: int, data: bytes, took: float) -> DetectedDevice | None:
     """Say whose bytes these are; None if that is not known."""
     if known := recognise(data, took):
         name, like = known
@@ -79,19 +81,21 @@ def _told(port: str, baud: int, data: bytes, took: float) -> HeardDevice | None:
         url = f"serial:{port}?format={name}&baud={baud}{query}"
         rate = like.samples / took
         says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
-        return HeardDevice(port, url, name, baud, rate, says)
-    if heard := autopilot(data):
+        return DetectedDevice(port, url, name, baud, rate, says)
+    if heard := detect_autopilot(data):
         query = f"&{heard.query}" if heard.query else ""
         url, rate = f"mavlink:{port}?baud={baud}{query}", heard.samples / took
         sends = "no message of an IMU until it is asked"
         if heard.message:
             sends = f"{heard.message} about {rate:.0f} times a second"
         says = f"an autopilot (MAVLink) at {baud} baud, which sends {sends}"
-        return HeardDevice(port, url, "mavlink", baud, rate, says)
+        return DetectedDevice(port, url, "mavlink", baud, rate, says)
     return None
 
 
-def _answer(port: str, baud: int, seconds: float) -> tuple[bytes, HeardDevice | None]:
+def _answer(
+    port: str, baud: int, seconds: float
+) -> tuple[bytes, DetectedDevice | None]:
     """Bytes of a port, and whose they are; it stays open until that is known."""
     link = open_port(port, baud)
     try:

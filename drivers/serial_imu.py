@@ -17,7 +17,7 @@ from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Block, Grain
 from fieldcal.drivers.codec import open_codec, recognise
 from fieldcal.drivers.driver import Driver
-from fieldcal.drivers.mavlink_heard import autopilot
+from fieldcal.drivers.mavlink_heard import detect_autopilot
 from fieldcal.drivers.options import split
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.drivers.skew import Skew
@@ -150,7 +150,7 @@ class SerialImu(Driver):
     def _garbage(self) -> str:
         data = b"".join(chunk.data for chunk in self._heard)[-RECENT:]
         known = recognise(data, self._heard[-1].t_host - self._heard[0].t_host)
-        if known is None and (heard := autopilot(data)):
+        if known is None and (heard := detect_autopilot(data)):
             query = f"&{heard.query}" if heard.query else ""
             return (
                 f"these are no {self._format} bytes but an autopilot's; try "

@@ -30,7 +30,7 @@ class Tcp:
         try:
             self._socket = socket.create_connection(place, CALL)
         except OSError as fault:
-            raise DeviceError(cannot(place, fault)) from fault
+            raise DeviceError(socket_error(place, fault)) from fault
 
     def read(self) -> bytes:
         """Return all that is there, waiting `POLL` seconds for the first byte.
@@ -58,7 +58,7 @@ class Tcp:
         self._socket.close()
 
 
-def cannot(place: tuple[str, int], fault: OSError) -> str:
+def socket_error(place: tuple[str, int], fault: OSError) -> str:
     """Say why a socket did not open, and what to do."""
     why = fault.strerror or str(fault)
     return (

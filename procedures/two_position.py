@@ -11,7 +11,7 @@ from __future__ import annotations
 from fieldcal.calibration import Calibration
 from fieldcal.core.positions import TWO, Position
 from fieldcal.evaluation.observations import angle_setting, observations
-from fieldcal.planning.holding import hold_each, with_left_out
+from fieldcal.planning.holding import hold_each, with_skipped_positions
 from fieldcal.planning.steps import Plan
 from fieldcal.session.description import Description
 from fieldcal.solve import solve
@@ -31,4 +31,4 @@ def plan(
         level_sigma_deg=about.level_deg,
         angle_sigma_deg=angle_setting(about),
     )
-    return with_left_out(found, about.positions, held)
+    return with_skipped_positions(found, about.positions, held)

@@ -14,7 +14,7 @@ from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fieldcal.run.movers import Controlled
+    from fieldcal.run.movers import RunningDevice
 
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
 RUN, SIM = [*FIELDCAL, "run"], [*FIELDCAL, "sim"]
@@ -44,7 +44,7 @@ def wait_for_samples(
         sleep(0.02)
 
 
-def turned(devices: Sequence[Controlled], alpha: float, beta: float) -> None:
+def turned(devices: Sequence[RunningDevice], alpha: float, beta: float) -> None:
     """Turn devices on one table; the first one last, when the others are there.
 
     Whoever waits for the first to rest finds all of them at rest, however late each of

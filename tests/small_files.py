@@ -11,7 +11,7 @@ from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulo
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.validation import Judge
+from fieldcal.importing.validation import RowValidator
 from fieldcal.session.folder import Session
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
@@ -94,5 +94,5 @@ def whole(
     opened = open_recording(path, wanted, name, repair)
     stream = opened.streams()[0].name
     opened.notes(stream)
-    judge = Judge(str(path), opened.place, repair)
+    judge = RowValidator(str(path), opened.place, repair)
     return concat(judge.good(block) for block in opened.blocks(stream))

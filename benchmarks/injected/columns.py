@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from benchmarks.injected.parts import Parts
-from fieldcal.core.frames import force_home, seen_after
+from fieldcal.core.frames import force_home, in_turned_axes
 from fieldcal.core.positions import angles, forces
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import FoundEffect
@@ -114,18 +114,18 @@ def _of_angles(name: str, parts: Parts, about: Description) -> Iterator[Array]:
     home = force_home(about.gravity)
 
     def changed(to: Array) -> Array:
-        change = (to - seen_after(alpha, beta, home)) / STEP
+        change = (to - in_turned_axes(alpha, beta, home)) / STEP
         return np.hstack([change @ about.mounting, np.zeros((len(alpha), 3))])
 
     if name == "gravity_error":
-        yield changed(seen_after(alpha, beta, home * (1 + STEP)))
+        yield changed(in_turned_axes(alpha, beta, home * (1 + STEP)))
     elif name == "base_tilt":
         for axis in ((STEP, 0.0, 0.0), (0.0, 0.0, STEP)):
-            yield changed(seen_after(alpha, beta, home + np.cross(axis, home)))
+            yield changed(in_turned_axes(alpha, beta, home + np.cross(axis, home)))
     else:
         by = (1.0, 1.0) if name == "angle_offset" else (alpha, beta)
-        yield changed(seen_after(alpha + STEP * by[0], beta, home))
-        yield changed(seen_after(alpha, beta + STEP * by[1], home))
+        yield changed(in_turned_axes(alpha + STEP * by[0], beta, home))
+        yield changed(in_turned_axes(alpha, beta + STEP * by[1], home))
 
 
 def force_said(parts: Parts, about: Description) -> Array:

@@ -26,7 +26,7 @@ from fieldcal.history.store import History
 from fieldcal.planning.steps import Hold
 from fieldcal.procedures.five_position import plan
 from fieldcal.run.engine import Engine
-from fieldcal.run.movers import Nobody
+from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
 from fieldcal.run.wait_reason import WaitReason
@@ -74,7 +74,7 @@ class Filmed:
             file=io.StringIO(), width=WIDTH, height=HEIGHT, force_terminal=True
         )
         self._console = ConsoleOperator(
-            "fieldcal · five_position", FIVE, Nobody(), console
+            "fieldcal · five_position", FIVE, ManualMover(), console
         )
         self.pictures: dict[str, str] = {}
 

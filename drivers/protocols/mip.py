@@ -20,8 +20,15 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, headed
-from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
+from fieldcal.drivers.framing import (
+    Bytes,
+    Candidates,
+    FrameScan,
+    Index,
+    Mask,
+    find_headed_frames,
+)
+from fieldcal.drivers.layouts import Alike, Layout, RawSamples, in_order, sort_by_layout
 from fieldcal.drivers.options import Options
 
 SYNC = b"\x75\x65"
@@ -46,7 +53,7 @@ class MipCodec(Codec):
 
     def scan(self, data: Bytes) -> Candidates:
         """Every 0x75 0x65."""
-        return headed(data, SYNC, HEAD, LONGEST, _size, _check)
+        return find_headed_frames(data, SYNC, HEAD, LONGEST, _size, _check)
 
     def reset(self) -> None:
         """Forget half a packet."""
@@ -57,7 +64,7 @@ class MipCodec(Codec):
         """Take the samples out of whole packets."""
         parts = [
             _samples(some)
-            for some in alike(data, found, walk)
+            for some in sort_by_layout(data, found, walk)
             if ACC in some.fields or GYR in some.fields
         ]
         return self._timed(self._clock, in_order(parts), t_host)
@@ -74,13 +81,13 @@ def _check(data: Bytes, starts: Index, ends: Index) -> Mask:
     return good
 
 
-def _samples(some: Alike) -> Raw:
+def _samples(some: Alike) -> RawSamples:
     six = np.hstack([some.numbers(ACC, ">f4", 3) * G0, some.numbers(GYR, ">f4", 3)])
     temperature = some.numbers(TEMPERATURE, ">f4", 3)[:, 2]
     stamps = some.numbers(REFERENCE, ">u8", 1)[:, 0] * 1e-9
     if REFERENCE not in some.fields:
         stamps = some.numbers(some.first_of(TIME_OF_WEEK), ">f8", 1)[:, 0]
-    return Raw(some.which, six, temperature, stamps, np.full(len(six), np.nan))
+    return RawSamples(some.which, six, temperature, stamps, np.full(len(six), np.nan))
 
 
 SIZES = {ACC: 12, GYR: 12, TEMPERATURE: 12, REFERENCE: 8, 0xD3: 12, 0x12: 12}

@@ -25,10 +25,10 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.drivers.clock import Clock
-from fieldcal.drivers.codec import Codec, Likeness
+from fieldcal.drivers.codec import Codec, FormatMatch
 from fieldcal.drivers.columns import guess
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask
-from fieldcal.drivers.layouts import Raw
+from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS
@@ -101,14 +101,14 @@ class TextCodec(Codec):
             )
 
     @classmethod
-    def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
+    def likeness(cls, data: bytes, seconds: float) -> FormatMatch | None:
         """Judge bytes by how their lines look; the columns are guessed."""
         query = guess(data, seconds)
         if query is None:
             return None
         like = cls.decoded(data, query)
         # lines of numbers may also be a format of their own
-        return like and Likeness(0.5 * like.score, query, like.samples)
+        return like and FormatMatch(0.5 * like.score, query, like.samples)
 
     def scan(self, data: Bytes) -> Candidates:
         """Every line that has ended."""
@@ -243,7 +243,7 @@ class TextCodec(Codec):
         six = np.column_stack([column.get(name, unknown) for name in CHANNELS])
         temperature = column.get("temperature", unknown)
         which = np.arange(len(values))
-        raw = Raw(which, six * self._scale, temperature, stamps, seq)
+        raw = RawSamples(which, six * self._scale, temperature, stamps, seq)
         return self._timed(self._clock, raw, t_host, self._seq.steps(seq))
 
 

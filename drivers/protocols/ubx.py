@@ -22,17 +22,17 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.drivers.checks import fletcher
 from fieldcal.drivers.clock import Clock
-from fieldcal.drivers.codec import Codec, Likeness
+from fieldcal.drivers.codec import Codec, FormatMatch
 from fieldcal.drivers.framing import (
     Bytes,
     Candidates,
     FrameScan,
     Index,
     Mask,
-    headed,
+    find_headed_frames,
     rows,
 )
-from fieldcal.drivers.layouts import Raw, in_order
+from fieldcal.drivers.layouts import RawSamples, in_order
 from fieldcal.drivers.options import Options
 
 Words = NDArray[np.uint32]
@@ -74,13 +74,13 @@ class UbxCodec(Codec):
         return Grain(float(SCALES[0]), float(SCALES[3]))
 
     @classmethod
-    def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
+    def likeness(cls, data: bytes, seconds: float) -> FormatMatch | None:
         """Judge whether bytes are one or the other message."""
         return cls.decoded(data) or cls.decoded(data, "message=meas")
 
     def scan(self, data: Bytes) -> Candidates:
         """Every 0xB5 0x62."""
-        return headed(data, SYNC, HEAD, LONGEST, _size, _check)
+        return find_headed_frames(data, SYNC, HEAD, LONGEST, _size, _check)
 
     def reset(self) -> None:
         """Forget half a message."""
@@ -111,7 +111,7 @@ class UbxCodec(Codec):
         raw, arrived = self._join(order, t_host[order.which])
         return self._timed(self._clock, raw, arrived)
 
-    def _join(self, raw: Raw, t_host: Array) -> tuple[Raw, Array]:
+    def _join(self, raw: RawSamples, t_host: Array) -> tuple[RawSamples, Array]:
         """Put samples of one tag together; hold back the last while it lacks values."""
         ahead = [raw.stamps, t_host, raw.six, raw.temperature]
         joined = _merged(np.vstack([self._held, np.column_stack(ahead)]))
@@ -120,7 +120,9 @@ class UbxCodec(Codec):
         joined = self._like_the_first(joined[: len(joined) - lacks])
         stamps, temperature = joined[:, 0] * self._tick, joined[:, 8]
         which, unknown = np.arange(len(joined)), np.full(len(joined), np.nan)
-        return Raw(which, joined[:, 2:8], temperature, stamps, unknown), joined[:, 1]
+        return RawSamples(which, joined[:, 2:8], temperature, stamps, unknown), joined[
+            :, 1
+        ]
 
     def _like_the_first(self, joined: Array) -> Array:
         """Leave out samples of ESF-RAW that lack what the first one had.
@@ -140,7 +142,7 @@ class UbxCodec(Codec):
         return joined[alike]
 
 
-def _samples(which: Index, words: Words, tags: Index) -> Raw:
+def _samples(which: Index, words: Words, tags: Index) -> RawSamples:
     """Samples of messages of k values, words and tags (m, k); stamps in ticks."""
     begins = np.ones(tags.shape, dtype=bool)
     begins[:, 1:] = tags[:, 1:] != tags[:, :-1]
@@ -157,7 +159,7 @@ def _samples(which: Index, words: Words, tags: Index) -> Raw:
     some = ~lacks.all(axis=1) if lacks.any() else slice(None)
     six, temperature = columns[some, :6], columns[some, 6]
     unknown = np.full(len(six), np.nan)
-    return Raw(message[some], six, temperature, stamps[some], unknown)
+    return RawSamples(message[some], six, temperature, stamps[some], unknown)
 
 
 def _merged(table: Array) -> Array:

@@ -24,7 +24,7 @@ from fieldcal.drivers.checks import crc16
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index
-from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
+from fieldcal.drivers.layouts import Alike, Layout, RawSamples, in_order, sort_by_layout
 from fieldcal.drivers.options import Options
 
 SYNC = 0xFA
@@ -97,21 +97,23 @@ class VectornavCodec(Codec):
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Take the samples out of whole messages."""
         parts = []
-        for some in alike(data, found, walk):
+        for some in sort_by_layout(data, found, walk):
             pair = next((p for p in self._pairs if set(p) <= set(some.fields)), None)
             if pair is not None:
                 parts.append(_samples(some, pair))
         return self._timed(self._clock, in_order(parts), t_host)
 
 
-def _samples(some: Alike, pair: tuple[int, int]) -> Raw:
+def _samples(some: Alike, pair: tuple[int, int]) -> RawSamples:
     acc, gyr = (some.numbers(key, "<f4", 6 if key == IMU else 3) for key in pair)
     temperature = some.numbers(TEMPERATURE, "<f4", 1)
     if MAG_PRES in some.fields:
         temperature = some.numbers(MAG_PRES, "<f4", 4)
     stamps = some.numbers(some.first_of(STARTUP + GPS), "<u8", 1)[:, 0] * 1e-9
     six = np.hstack([acc[:, :3], gyr[:, -3:]])
-    return Raw(some.which, six, temperature[:, -1], stamps, np.full(len(six), np.nan))
+    return RawSamples(
+        some.which, six, temperature[:, -1], stamps, np.full(len(six), np.nan)
+    )
 
 
 def _lengths(data: Bytes) -> tuple[Index, Index, int]:

@@ -9,7 +9,7 @@ Source: VectorNav UM001, asynchronous output type IMU measurements.
 from __future__ import annotations
 
 from fieldcal.core.samples import Grain
-from fieldcal.drivers.codec import Likeness
+from fieldcal.drivers.codec import FormatMatch
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.protocols.text import TextCodec
 
@@ -33,6 +33,6 @@ class VnimuCodec(TextCodec):
         return Grain(1e-3, 1e-6)
 
     @classmethod
-    def likeness(cls, data: bytes, seconds: float) -> Likeness | None:
+    def likeness(cls, data: bytes, seconds: float) -> FormatMatch | None:
         """Judge whether bytes are such lines."""
         return cls.decoded(data)

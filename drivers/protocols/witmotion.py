@@ -27,7 +27,7 @@ from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, rows
-from fieldcal.drivers.layouts import Raw
+from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS
 
@@ -178,7 +178,7 @@ class WitmotionCodec(Codec):
             self._decided = True
         six, temperature, stamp, steps, t_host = samples
         n = len(stamp)
-        raw = Raw(np.arange(n), six, temperature, stamp, np.full(n, np.nan))
+        raw = RawSamples(np.arange(n), six, temperature, stamp, np.full(n, np.nan))
         return self._timed(self._clock, raw, t_host, steps)
 
 

@@ -22,8 +22,15 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.checks import sums
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, headed
-from fieldcal.drivers.layouts import Alike, Layout, Raw, alike, in_order
+from fieldcal.drivers.framing import (
+    Bytes,
+    Candidates,
+    FrameScan,
+    Index,
+    Mask,
+    find_headed_frames,
+)
+from fieldcal.drivers.layouts import Alike, Layout, RawSamples, in_order, sort_by_layout
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
 
@@ -57,7 +64,7 @@ class XsensCodec(Codec):
 
     def scan(self, data: Bytes) -> Candidates:
         """Every 0xFA 0xFF."""
-        return headed(data, SYNC, HEAD, LONGEST, _size, _check)
+        return find_headed_frames(data, SYNC, HEAD, LONGEST, _size, _check)
 
     def reset(self) -> None:
         """Forget half a message."""
@@ -67,7 +74,7 @@ class XsensCodec(Codec):
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Take the samples out of whole messages."""
-        parts = [_samples(some) for some in alike(data, found, walk)]
+        parts = [_samples(some) for some in sort_by_layout(data, found, walk)]
         raw = in_order(part for part in parts if part is not None)
         steps = None if raw is None else self._seq.steps(raw.seq)
         return self._timed(self._clock, raw, t_host, steps)
@@ -104,13 +111,13 @@ def walk(message: bytes) -> Layout | None:
     return Layout(fields, tuple(marks))
 
 
-def _samples(some: Alike) -> Raw | None:
+def _samples(some: Alike) -> RawSamples | None:
     acc, gyr = _reals(some, *ACC), _reals(some, *GYR)
     if acc is None and gyr is None:
         return None
     unknown = np.full((len(some.frames), 3), np.nan)
     temperature = _reals(some, TEMPERATURE)
-    return Raw(
+    return RawSamples(
         some.which,
         np.hstack([unknown if part is None else part for part in (acc, gyr)]),
         unknown[:, 0] if temperature is None else temperature[:, 0],

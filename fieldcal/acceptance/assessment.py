@@ -67,15 +67,15 @@ def assess(
     made = decide(found, session.about, limits, seen)
     site = {"latitude_deg": session.about.latitude_deg}
     site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
-    info = {**found.info, "site": site, "taken_at": taken_at(marks)}
+    info = {**found.info, "site": site, "taken_at": start_time(marks)}
     return with_decision(replace(found, warnings=tuple(warnings), info=info), made)
 
 
-def remember(history: History, session: Session, found: Calibration) -> str:
+def store_in_history(history: History, session: Session, found: Calibration) -> str:
     """Keep a calibration in the history; what to tell the operator, if anything."""
     if not session.about.device.get("serial"):
         return ""
-    at = str(found.info.get("taken_at") or taken_at([]))
+    at = str(found.info.get("taken_at") or start_time([]))
     try:
         history.add(at, session.folder, found)
     except FieldcalError as error:
@@ -83,7 +83,7 @@ def remember(history: History, session: Session, found: Calibration) -> str:
     return ""
 
 
-def taken_at(marks: Sequence[Mapping[str, Any]]) -> str:
+def start_time(marks: Sequence[Mapping[str, Any]]) -> str:
     """When the first position was asked for, ISO 8601 in UTC; now without marks."""
     times = [m["host_s"] for m in marks if isinstance(m.get("host_s"), int | float)]
     at = datetime.fromtimestamp(times[0], UTC) if times else datetime.now(UTC)

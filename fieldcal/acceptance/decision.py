@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.acceptance.growth import TIMES, Growth, growth
-from fieldcal.acceptance.level import tilt_is_found, unsaid
+from fieldcal.acceptance.level import level_missing, tilt_is_found
 from fieldcal.acceptance.verification import Verification
 from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.calibration.limits import GradeLimits
@@ -200,7 +200,7 @@ def _level(found: Calibration, about: Description) -> list[Check]:
         return []
     level = found.info.get("level_sigma_deg")
     if level is None:
-        return [Check("level", False, unsaid(about))]
+        return [Check("level", False, level_missing(about))]
     says = f"the base is level to ± {level:.2g}°, as was said: the ± have it in them"
     return [Check("level", True, says)]
 

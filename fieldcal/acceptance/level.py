@@ -22,7 +22,7 @@ def tilt_is_found(found: Calibration) -> bool:
     return bool(tilted) or found.method == "scalar"
 
 
-def unsaid(about: Description) -> str:
+def level_missing(about: Description) -> str:
     """What is wrong where nobody said how level the base is, and what to do."""
     bias = about.gravity * np.deg2rad(1.0)
     return (
@@ -35,4 +35,4 @@ def unsaid(about: Description) -> str:
 def level_unknown(about: Description) -> str:
     """What to say before a run that will be NO-GO for it; empty where it is known."""
     known = sum(position.oriented for position in about.positions)
-    return unsaid(about) if known <= BLIND and about.level_deg is None else ""
+    return level_missing(about) if known <= BLIND and about.level_deg is None else ""

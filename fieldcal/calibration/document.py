@@ -14,7 +14,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from fieldcal.calibration.gauge import inward, outward
+from fieldcal.calibration.gauge import in_sample_units, in_si_units
 from fieldcal.calibration.parameters import COMPONENTS, Calibration, Method
 from fieldcal.core.errors import InputError
 
@@ -31,7 +31,7 @@ def schema() -> dict[str, Any]:
 
 def to_json(calibration: Calibration) -> dict[str, Any]:
     """Return the object, in the unit of the samples; what is not determined is null."""
-    calibration = outward(calibration)
+    calibration = in_sample_units(calibration)
     return {
         "format": FORMAT,
         "method": calibration.method,
@@ -87,7 +87,7 @@ def from_json(document: Any) -> Calibration:
         good=_verdict(top),
         info={k: v for k, v in top.items() if k not in KEYS},
     )
-    return inward(found)
+    return in_si_units(found)
 
 
 def _group(calibration: Calibration, group: str) -> dict[str, Any]:

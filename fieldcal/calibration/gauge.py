@@ -94,12 +94,12 @@ class Gauge:
         raise InputError("result.json: gauge is not two sizes above 0 and two units")
 
 
-def outward(calibration: Calibration) -> Calibration:
+def in_sample_units(calibration: Calibration) -> Calibration:
     """The calibration in the unit of the samples."""
     return _changed(calibration, 1)
 
 
-def inward(calibration: Calibration) -> Calibration:
+def in_si_units(calibration: Calibration) -> Calibration:
     """The calibration for outputs in m/s^2 and rad/s, from one of the samples' unit."""
     return _changed(calibration, -1)
 

@@ -38,7 +38,9 @@ def show(
     console = Console(file=out, highlight=False)
     verdict = diagnosis.verdict.replace("_", " ")
     head = Text(verdict.upper(), style=STYLES[diagnosis.verdict])
-    console.print(head + Text(f"  probability {sure(diagnosis.probability)}"))
+    console.print(
+        head + Text(f"  probability {format_probability(diagnosis.probability)}")
+    )
     console.print(diagnosis.says, markup=False)
     if diagnosis.mismatch:
         console.print(_mismatch(diagnosis.mismatch))
@@ -93,7 +95,7 @@ def _rms(names: list[str], rms: float) -> str:
     return "–" if unit is None else f"{rms:.3g} {unit}".strip()
 
 
-def sure(probability: float) -> str:
+def format_probability(probability: float) -> str:
     """A probability, without more digits than are worth saying.
 
     >>> sure(0.873), sure(0.9996)
@@ -106,7 +108,9 @@ def _heading(found: FoundEffect) -> str:
     """An effect and what speaks for it."""
     gain = found.evidence.get("held_out_gain", float("nan"))
     squares = found.evidence.get("delta_chi2", float("nan"))
-    about = [f"Left out: {found.id}, probability {sure(found.probability)}"]
+    about = [
+        f"Left out: {found.id}, probability {format_probability(found.probability)}"
+    ]
     if abs(squares) < float("inf"):
         about.append(f"Δχ² {squares:.0f}")
     if gain == gain:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fieldcal.calibration.limits import GradeLimits
     from fieldcal.history.store import History, HistoryRun
-    from fieldcal.history.trend import Point
+    from fieldcal.history.trend import TrendPoint
 
 EXAMPLE = """\
   fieldcal history
@@ -177,7 +177,7 @@ def _warm(run: HistoryRun) -> str:
 def _show(
     serial: str,
     runs: Sequence[HistoryRun],
-    trends: dict[str, list[Point]],
+    trends: dict[str, list[TrendPoint]],
     bounds: GradeLimits,
 ) -> None:
     say = sys.stdout.write
@@ -193,7 +193,7 @@ def _show(
         say(f"; out of family: {', '.join(odd)}\n" if odd else "; all in family\n")
 
 
-def lines(points: Sequence[Point]) -> list[str]:
+def lines(points: Sequence[TrendPoint]) -> list[str]:
     """A line for each calibration: number, date, value, and where that lies.
 
     The strip spans all values with twice their uncertainty; ``o`` is the value, ``-``

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.history.trend import Point
+    from fieldcal.history.trend import TrendPoint
 
 
-def plot(path: Path, serial: str, trends: Mapping[str, Sequence[Point]]) -> None:
+def plot(path: Path, serial: str, trends: Mapping[str, Sequence[TrendPoint]]) -> None:
     """Write the picture, in the format that the file's ending says.
 
     Raises

@@ -80,7 +80,7 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.importers import open_recording
-    from fieldcal.importing.merge import Joined
+    from fieldcal.importing.merge import MergedFiles
 
     if len(args.columns) not in (0, 1, len(args.files)):
         raise InputError("give --columns once, or once for each file")
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
         for i, path in enumerate(args.files)
     ]
     if args.join:
-        opened = [Joined(opened)]
+        opened = [MergedFiles(opened)]
     if args.list:
         return _list(opened)
     for recording in opened:
@@ -136,7 +136,7 @@ def _list(opened: list[Recording]) -> int:
 
 
 def _chosen(recording: Recording, wanted: list[str]) -> list[ImuStream]:
-    """Return the streams that are brought in."""
+    """Return the streams that are imported."""
     there = {stream.name: stream for stream in recording.streams()}
     for name in wanted:
         if name not in there:
@@ -149,7 +149,7 @@ def _chosen(recording: Recording, wanted: list[str]) -> list[ImuStream]:
 def _bring(
     args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
 ) -> None:
-    from fieldcal.importing.ingest import bring_in
+    from fieldcal.importing.ingest import import_stream
     from fieldcal.session.description import WORTHLESS
 
     name = recording.path.name.split(".")[0]
@@ -159,25 +159,25 @@ def _bring(
         about["units"] = kept
     if args.rate:
         about["sampling"] = {"rate_hz": args.rate}
-    brought = bring_in(recording, stream.name, folder, about, args.still)
+    imported = import_stream(recording, stream.name, folder, about, args.still)
     err = sys.stderr.write
     err(
-        f"{folder}: {stream.name}, {stream.says}: {brought.facts.sentence()},"
-        f" {_many(len(brought.stretches), 'still stretch', 'es')}"
+        f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"
+        f" {_many(len(imported.stretches), 'still stretch', 'es')}"
         f" of {args.still:g} s or more\n"
     )
-    for sentence in brought.says:
+    for sentence in imported.says:
         err(f"{folder}: {sentence}\n")
-    if brought.facts.left_out:
-        err(f"{folder}: left out: {_many(brought.facts.left_out, 'row', 's')}\n")
-    if not brought.stretches and kept:
+    if imported.facts.left_out:
+        err(f"{folder}: left out: {_many(imported.facts.left_out, 'row', 's')}\n")
+    if not imported.stretches and kept:
         err(
             f"nothing says what a {' or '.join(sorted(set(kept.values())))} is worth,"
             " so no still stretch was found: say how many make a g or deg/s, such as"
             " --acc-unit g --acc-lsb 2048 --gyr-unit deg/s --gyr-lsb 16.4, or write"
             " [nominal] scale factors and the positions into session.toml\n"
         )
-    elif not brought.stretches:
+    elif not imported.stretches:
         err(
             "no still stretch was found: write the positions into session.toml, or try"
             " --still with a shorter time\n"

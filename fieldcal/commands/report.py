@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from fieldcal.report import Earlier
+    from fieldcal.report import EarlierCalibration
 
 EXAMPLE = """\
   fieldcal report bench-7/2026-03-01
@@ -93,10 +93,10 @@ def write(
     return write_whole(output or session / REPORT, render(gather(session, before)))
 
 
-def _before(folder: Path, history: Path | None) -> list[Earlier]:
+def _before(folder: Path, history: Path | None) -> list[EarlierCalibration]:
     """What the history knows of the device, without this session."""
     from fieldcal.history.store import History, default_path
-    from fieldcal.report import Earlier
+    from fieldcal.report import EarlierCalibration
     from fieldcal.session.folder import Session
 
     path = history or default_path()
@@ -104,7 +104,7 @@ def _before(folder: Path, history: Path | None) -> list[Earlier]:
     if not serial or not path.exists():
         return []
     return [
-        Earlier(run.taken_at[:10], run.calibration)
+        EarlierCalibration(run.taken_at[:10], run.calibration)
         for run in History(path).runs(str(serial))
         if Path(run.session).resolve() != folder.resolve()
     ]

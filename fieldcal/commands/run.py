@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.run_task import make_task
-from fieldcal.commands.several import Several
+from fieldcal.commands.several import StoreSeveral
 from fieldcal.commands.site import add_site
 from fieldcal.core.errors import FieldcalError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.calibration.limits import GradeLimits
-    from fieldcal.run.companions import Beside
+    from fieldcal.run.companions import Companion
     from fieldcal.run.movers import Mover
     from fieldcal.run.operator.protocol import Operator
     from fieldcal.run.plan_file import Task
@@ -64,7 +64,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
         "--device",
-        action=Several,
+        action=StoreSeveral,
         metavar="URL",
         help='such as "serial:/dev/ttyUSB0?format=witmotion"; again for each further'
         " device that turns with the first",
@@ -145,7 +145,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.json:
         run_view.show_decisions(found, further)
     check_heard(others)
-    return 0 if all(map(run_view.go, (found, *further.values()))) else 1
+    return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
 
 
 def _broken_off(
@@ -176,23 +176,25 @@ def _write_junit(
 
 def _record(
     args: argparse.Namespace, task: Task, folder: Path, bounds: GradeLimits
-) -> tuple[Calibration, dict[str, Any] | None, Sequence[Beside]]:
+) -> tuple[Calibration, dict[str, Any] | None, Sequence[Companion]]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
     from fieldcal.acceptance.level import level_unknown
     from fieldcal.commands.run_device import device
-    from fieldcal.run.companions import beside
-    from fieldcal.run.session_run import Running, taken_before
+    from fieldcal.run.companions import record_companions
+    from fieldcal.run.session_run import SessionRun, recorded_averages
     from fieldcal.session.folder import Session
     from fieldcal.session.recorder import Recorder
 
     with device(task) as (opened, mover), contextlib.ExitStack() as stack:
         driver = opened()
         stack.callback(driver.close)
-        taken = taken_before(Session.open(folder), task) if args.resume else {}
+        taken = recorded_averages(Session.open(folder), task) if args.resume else {}
         own = stack.enter_context(
             Recorder(folder, None if args.resume else task.tables)
         )
-        recorder = stack.enter_context(beside(task.further, own, task.tables))
+        recorder = stack.enter_context(
+            record_companions(task.further, own, task.tables)
+        )
         operator = stack.enter_context(_operator(args, task, mover, folder))
         recorder.tell = operator.tell
         if unseen := level_unknown(task.about):
@@ -200,7 +202,7 @@ def _record(
         if args.resume:
             recorder.mark("resumed", taken=sorted(taken))
         how_long = (_patience(args), _give_up(args, task))
-        running = Running(task, operator, recorder, opened, bounds, *how_long, taken)
+        running = SessionRun(task, operator, recorder, opened, bounds, *how_long, taken)
         try:
             found = running.run(driver)
         except (FieldcalError, KeyboardInterrupt) as error:

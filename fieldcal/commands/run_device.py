@@ -29,9 +29,9 @@ def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
     mover, url = task.mover, str(task.run.get("device", ""))
     with contextlib.ExitStack() as stack:
         stack.enter_context(interruptible())
-        turns: Mover = movers.Nobody()
+        turns: Mover = movers.ManualMover()
         if mover["kind"] == "virtual" and "control" in mover:
-            turns = stack.enter_context(movers.Controlled(mover["control"]))
+            turns = stack.enter_context(movers.RunningDevice(mover["control"]))
         elif mover["kind"] == "virtual":
             options = _virtual(task)
             made = stack.enter_context(movers.VirtualMover(options))

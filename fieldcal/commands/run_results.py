@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.calibration.limits import GradeLimits
     from fieldcal.history.store import History
-    from fieldcal.run.companions import Beside
+    from fieldcal.run.companions import Companion
     from fieldcal.session.folder import Session
 
 
@@ -30,7 +30,7 @@ def concluded(
     method : of the procedure
 
     """
-    from fieldcal.acceptance.assessment import assess, remember
+    from fieldcal.acceptance.assessment import assess, store_in_history
     from fieldcal.commands.installing import with_installed
     from fieldcal.evaluation.observations import rests
     from fieldcal.evaluation.solution import solved
@@ -40,7 +40,7 @@ def concluded(
     found = with_installed(solved(session, still, method=method), session)
     found = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
-    if said := remember(history, session, found):
+    if said := store_in_history(history, session, found):
         sys.stderr.write(f"fieldcal run: {said}\n")
     return found
 
@@ -55,7 +55,7 @@ def first_result(
 
 
 def further_results(
-    others: Sequence[Beside], bounds: GradeLimits, history: History
+    others: Sequence[Companion], bounds: GradeLimits, history: History
 ) -> dict[str, Calibration]:
     """Results of the further devices that were heard to the end, by folder."""
     from fieldcal.session.folder import Session
@@ -71,7 +71,7 @@ def further_results(
     return found
 
 
-def check_heard(others: Sequence[Beside]) -> None:
+def check_heard(others: Sequence[Companion]) -> None:
     """Say which of the further devices failed.
 
     Raises

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.commands.site import given_tables, over, site_tables
+from fieldcal.commands.site import given_tables, overlay, site_tables
 from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,14 +43,14 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         name, tables = "the options", _tables_of_options(args)
     else:
         name, tables = args.procedure, _tables_of_file(args)
-    task = plan_file.task(over(tables, _site(args)), name)
+    task = plan_file.task(overlay(tables, _site(args)), name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
 
 
 def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
     from fieldcal.run import plan_file
-    from fieldcal.run.session_run import resumed
+    from fieldcal.run.session_run import resume
 
     if args.procedure or args.output:
         raise InputError("--resume goes on with what it finds: give it alone")
@@ -59,9 +59,9 @@ def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
             "--resume goes on with the device and place its session.toml names:"
             " leave those options out"
         )
-    session, tables = resumed(args.resume)
+    session, tables = resume(args.resume)
     tables["run"] = {**tables["run"], **_given(args)}
-    tables = over(tables, _site(args))
+    tables = overlay(tables, _site(args))
     return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder
 
 
@@ -81,7 +81,7 @@ def _tables_of_file(args: argparse.Namespace) -> dict[str, Any]:
     tables = plan_file.read(Path(args.procedure))
     if not isinstance(tables.get("run", {}), dict):
         raise InputError(f"{args.procedure}: run must be a table: write [run]")
-    tables = over(tables, given_tables(args))
+    tables = overlay(tables, given_tables(args))
     tables["run"] = {**tables.get("run", {}), **_given(args)}
     return tables
 

@@ -54,10 +54,10 @@ def show_decisions(found: Calibration, further: Mapping[str, Calibration]) -> No
         sys.stdout.write("\nthe first device\n")
     show_decision(found)
     for name, each in further.items():
-        sys.stdout.write(f"{name}: {'GO' if go(each) else 'NO-GO, see above'}\n")
+        sys.stdout.write(f"{name}: {'GO' if is_go(each) else 'NO-GO, see above'}\n")
 
 
-def go(found: Calibration) -> bool:
+def is_go(found: Calibration) -> bool:
     """Whether a device may be launched with."""
     return found.good and bool(found.info["decision"]["go"])
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 
-class Several(argparse.Action):
+class StoreSeveral(argparse.Action):
     """The first goes where the option says, the others to a list ``further_…``."""
 
     def __call__(

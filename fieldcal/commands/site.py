@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from fieldcal.commands.several import Several
+from fieldcal.commands.several import StoreSeveral
 
 
 def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
@@ -16,7 +16,7 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
     add("--name", help="name of the device")
     if several:
         what = "its serial number, the key of its history; again for each further one"
-        add("--serial", action=Several, help=what)
+        add("--serial", action=StoreSeveral, help=what)
     else:
         add("--serial", help="its serial number, the key of its history")
     add("--grade", choices=("tactical", "navigation"), help="default: tactical")
@@ -38,7 +38,7 @@ def site_tables(args: argparse.Namespace, name: str) -> dict[str, Any]:
         "site": {"latitude_deg": 45.0, "height_m": 0.0},
         "frame": {"mounting": ["+x", "+y", "+z"]},
     }
-    return over(tables, given_tables(args))
+    return overlay(tables, given_tables(args))
 
 
 def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
@@ -60,7 +60,7 @@ def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
     return {name: table for name, table in said.items() if table}
 
 
-def over(
+def overlay(
     tables: Mapping[str, Any], given: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Lay what is given over tables; what is no table is left to whoever parses it."""

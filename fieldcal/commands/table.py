@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import IO, TYPE_CHECKING, Any
 
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.gauge import outward
+from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.wording import number, title
 from fieldcal.commands.installing import lines
 
@@ -32,7 +32,7 @@ def show(
     from rich.console import Console
     from rich.table import Table
 
-    calibration = outward(calibration)
+    calibration = in_sample_units(calibration)
     console = Console(file=out, highlight=False)
     table = Table(title="Calibration", title_justify="left")
     columns = ["parameter", "value", "± 1σ", "unit"]

@@ -29,9 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.write import ask, check_ready, opened
-    from fieldcal.install.transaction import check_unchanged, install, note_done, saved
+    from fieldcal.install.transaction import (
+        check_unchanged,
+        install,
+        last_saved,
+        note_done,
+    )
 
-    path, known = saved(args.session)
+    path, known = last_saved(args.session)
     old, new = known["old"], known["new"]
     device = args.device or known["device"]
     with opened(device) as link:

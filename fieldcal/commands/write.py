@@ -27,7 +27,7 @@ SIGNIFICANT = 3.0
 """Standard uncertainties from which a change counts as one."""
 
 
-class Refused(FieldcalError):
+class InstallRefused(FieldcalError):
     """The calibration is not to be installed."""
 
     exit_code = 1
@@ -89,7 +89,7 @@ def prepared(
 
     """
     from fieldcal.calibration import Nominal
-    from fieldcal.install.proposal import changes, installed_in, left_out
+    from fieldcal.install.proposal import changes, installed_in, unsupported_parameters
 
     installed = installed_in(session)
     if installed is None:
@@ -98,7 +98,7 @@ def prepared(
             " record it over mavlink:, or write a file by fieldcal export"
         )
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
-    return changes(found, nominal, installed), installed, left_out(found)
+    return changes(found, nominal, installed), installed, unsupported_parameters(found)
 
 
 def _refuse(
@@ -115,7 +115,7 @@ def _refuse(
         reasons = []
     reasons += problems(tuple(wanted), installed)
     if reasons and not force:
-        raise Refused(
+        raise InstallRefused(
             f"NO-GO, nothing is written: {'; '.join(reasons)}; mend that and record"
             " again, or --force it"
         )
@@ -179,7 +179,7 @@ def _to_device(
     installed: Installed,
 ) -> None:
     from fieldcal.install.transaction import (
-        Undone,
+        WriteRolledBack,
         check_unchanged,
         install,
         note_done,
@@ -195,7 +195,7 @@ def _to_device(
         path = save(session.folder, args.device, old, new)
         try:
             install(link, old, new)
-        except Undone:
+        except WriteRolledBack:
             note_done(path, undone=True)
             raise
         note_done(path, done=True)
@@ -255,7 +255,7 @@ def ask(what: str, yes: bool) -> None:
     ------
     InputError
         If nobody is there to ask.
-    Refused
+    InstallRefused
         If the answer is no.
 
     """
@@ -266,4 +266,4 @@ def ask(what: str, yes: bool) -> None:
     sys.stderr.write(f"{what}? [y/N] ")
     sys.stderr.flush()
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise Refused("nothing was written, as you wished")
+        raise InstallRefused("nothing was written, as you wished")

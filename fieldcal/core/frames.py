@@ -41,10 +41,10 @@ def turn(alpha: ArrayLike, beta: ArrayLike) -> Array:
     array([0., 0., 1.])
     """
     alpha, beta = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(beta, float))
-    return np.stack([seen_after(alpha, beta, axis) for axis in np.eye(3)], axis=-1)
+    return np.stack([in_turned_axes(alpha, beta, axis) for axis in np.eye(3)], axis=-1)
 
 
-def seen_after(alpha: Array, beta: Array, vector: Array) -> Array:
+def in_turned_axes(alpha: Array, beta: Array, vector: Array) -> Array:
     """A vector (3,) in base axes as procedure axes see it after the turns, (..., 3).
 
     As `turn` times the vector, where only that is wanted.
@@ -76,7 +76,7 @@ def force(alpha: ArrayLike, beta: ArrayLike, gravity: float) -> Array:
     return at_rest
 
 
-def lasting(rates: Array) -> Array:
+def mean_rotation(rates: Array) -> Array:
     """What is left of another rate in the mean of whole turns, (n, 3, 3).
 
     Of a device that turns at `rates` (n, 3), all that lies across goes round in it; one

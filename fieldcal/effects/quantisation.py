@@ -61,5 +61,5 @@ class Quantisation(Chain):
 
     def _step(self, recording: CheckedSamples, c: int) -> float:
         lsb = recording.steps[c]
-        own = rounding.before(recording.noise[c], lsb)
+        own = rounding.noise_before_rounding(recording.noise[c], lsb)
         return float(lsb) if lsb > 2 * MATTERS * own else 0.0

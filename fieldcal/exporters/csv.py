@@ -11,7 +11,7 @@ import csv
 import io
 from pathlib import Path
 
-from fieldcal.calibration.gauge import outward
+from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_whole
 
@@ -24,7 +24,7 @@ def write(source: ExportSource, path: Path) -> list[str]:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["name", "value", "sigma", "unit"])
-    found = outward(source.calibration)
+    found = in_sample_units(source.calibration)
     for name, value, sigma, unit in zip(
         found.names, found.values, found.sigma, found.units, strict=True
     ):

@@ -29,7 +29,7 @@ USUAL = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Expected:
+class FamilySpread:
     """What earlier runs let expect of the next one.
 
     Attributes
@@ -60,7 +60,7 @@ class Expected:
         return float(2 * stdtr(self.dof, -z))
 
 
-def expected(values: Array, sigmas: Array, usual: float) -> Expected:
+def expected(values: Array, sigmas: Array, usual: float) -> FamilySpread:
     """What runs (n,) with their uncertainties (n,) let expect, (1)-(3).
 
     `usual` is r. There must be one run at least.
@@ -71,7 +71,7 @@ def expected(values: Array, sigmas: Array, usual: float) -> Expected:
         told = max(0.0, float(np.var(values, ddof=1) - np.mean(sigmas**2)))  # (1)
     spread2 = (USUAL * usual**2 + (n - 1) * told) / (USUAL + n - 1)  # (2)
     w = 1 / (spread2 + sigmas**2)  # (3)
-    return Expected(
+    return FamilySpread(
         float(w @ values / w.sum()),
         float(np.sqrt(spread2)),
         float(1 / np.sqrt(w.sum())),

@@ -18,7 +18,7 @@ from fieldcal.history.store import HistoryRun, family
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class TrendPoint:
     """One run's value of a parameter.
 
     Attributes
@@ -59,7 +59,9 @@ def names(runs: Sequence[HistoryRun]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(n for run in runs for n in run.calibration.names))
 
 
-def trend(runs: Sequence[HistoryRun], name: str, limits: GradeLimits) -> list[Point]:
+def trend(
+    runs: Sequence[HistoryRun], name: str, limits: GradeLimits
+) -> list[TrendPoint]:
     """Values of one parameter, oldest first.
 
     Parameters
@@ -89,7 +91,7 @@ def trend(runs: Sequence[HistoryRun], name: str, limits: GradeLimits) -> list[Po
             told = known if len(known) else np.array([[value, sigma]])
             spread = expected(told[:, 0], told[:, 1], usual).spread
         odd = bool(chance < limits.family_chance / together)
-        points.append(Point(run, value, sigma, unit, chance, odd, spread))
+        points.append(TrendPoint(run, value, sigma, unit, chance, odd, spread))
     return points
 
 

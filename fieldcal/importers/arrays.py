@@ -112,7 +112,7 @@ class ArrayFile(Recording):
     def _named(self, tables: Mapping[str, ArrayTable]) -> dict[str, tuple[str, int]]:
         """Array and its column, by column of a session."""
         if not self.wanted.columns:
-            self.wanted, says = headings.settle(
+            self.wanted, says = headings.resolve_headings(
                 self.path,
                 self.wanted,
                 headings.read(_columns(tables)),

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO, cast
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.options import Options
-from fieldcal.importing.gzip_stream import head, unpacked
+from fieldcal.importing.gzip_stream import head, open_unpacked
 from fieldcal.importing.recording import ImuStream, Recording
 
 if TYPE_CHECKING:
@@ -95,13 +95,13 @@ class CanLog(Recording):
         """Samples, some frames at a time."""
         from fieldcal.drivers.can_buses import Buses
         from fieldcal.drivers.can_groups import CanHealth
-        from fieldcal.drivers.can_stamped import Stamped
+        from fieldcal.drivers.can_stamped import BusTimeAssembler
 
         options, health = Options("options", self.wanted.options), CanHealth()
         parts = self._parts(options)
         wanted = (part.identifier for part in parts)
         buses = Buses(str(self.path), wanted, options.text("channel"))
-        samples = Stamped(parts, health, options)
+        samples = BusTimeAssembler(parts, health, options)
         options.finish()
         for packed in self._packed(buses):
             frames = buses.frames(packed)
@@ -145,7 +145,7 @@ class CanLog(Recording):
 
         first = head(self.path)
         kind = next(k for k in KINDS if k.begins.match(first))
-        with unpacked(self.path, self.cut_off) as file:
+        with open_unpacked(self.path, self.cut_off) as file:
             if kind.name == "blf":
                 with can.BLFReader(cast(BinaryIO, file)) as reader:
                     yield from reader

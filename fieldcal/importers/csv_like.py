@@ -87,7 +87,7 @@ class TextColumns(Recording):
             return
         lines = next((_top(data)[:NAMED] for data in self._pieces()), [""])
         found = (self._names(line) for line in lines)
-        self.wanted, says = headings.settle(
+        self.wanted, says = headings.resolve_headings(
             self.path,
             self.wanted,
             next((names for names in found if names), None),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
-from fieldcal.drivers.mavlink_units import unbiased
+from fieldcal.drivers.mavlink_units import untruncated_mean
 from fieldcal.importing.dataflash_messages import (
     AXES,
     BODY,
@@ -28,7 +28,7 @@ from fieldcal.importing.dataflash_messages import (
     MARK,
     DataflashMessages,
 )
-from fieldcal.importing.fifo_time import Batch, Batches
+from fieldcal.importing.fifo_time import Batch, FifoBatches
 from fieldcal.importing.recording import ImuStream, Recording
 
 WHAT = "ArduPilot dataflash log, .bin"
@@ -127,7 +127,7 @@ class DataflashLog(Recording):
 
     def _batches(self, number: int) -> Iterator[Block]:
         """Samples of the batches of one device."""
-        batches, scales = Batches(), dict[int, float]()
+        batches, scales = FifoBatches(), dict[int, float]()
         for found in self._log.tables({HEAD, BODY}):
             for row in found.get(HEAD, ()):
                 if row["instance"] == number and row["mul"] and row["smp_rate"] > 0:
@@ -136,7 +136,7 @@ class DataflashLog(Recording):
             for row in found.get(BODY, ()):
                 values = np.column_stack([row[axis] for axis in AXES]).astype(float)
                 scale = scales.get(int(row["N"]), np.nan)
-                part = scale * unbiased(values)
+                part = scale * untruncated_mean(values)
                 yield from batches.feed(int(row["N"]), int(row["seqno"]), part)
             batches.forget()
         yield from batches.rest()

@@ -87,7 +87,7 @@ class ParquetFile(Recording):
         if not self.wanted.columns:
             said = [headings.Column(f.name, f.name, _unit(f)) for f in schema]
             found = headings.read(said)
-            self.wanted, says = headings.settle(
+            self.wanted, says = headings.resolve_headings(
                 self.path, self.wanted, found, f"{self.path}: {ask}"
             )
             self.says.append(says)

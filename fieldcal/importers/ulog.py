@@ -25,7 +25,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.drivers.mavlink_installed import PX4, Installed, names
-from fieldcal.importing.alignment import Pair
+from fieldcal.importing.alignment import AlignedPair
 from fieldcal.importing.fifo_time import Fifo
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.ulog_messages import Table, UlogMessages
@@ -162,7 +162,7 @@ class UlogFile(Recording):
     def _pairs(self, topic: str, number: int) -> Iterator[Block]:
         mine = (topic, number)
         other = (PARTNERS[topic], self._partner(topic, number))
-        pair, reads = Pair(), {mine: _reader(topic), other: _reader(topic)}
+        pair, reads = AlignedPair(), {mine: _reader(topic), other: _reader(topic)}
         for tables in self._log.tables({mine, other} & self._log.topics):
             read = {some: reads[some](table) for some, table in tables.items()}
             if other not in self._log.topics:

@@ -15,7 +15,7 @@ PATIENCE = 10.0
 """Longest time that a sample waits for its partner, s: either sensor may end."""
 
 
-class Pair:
+class AlignedPair:
     """Puts each sample of an accelerometer beside the gyroscope's nearest in time.
 
     Attributes

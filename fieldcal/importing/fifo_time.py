@@ -93,7 +93,7 @@ class Batch:
         return Block.of(t, *((unknown, values) if self.gyro else (values, unknown)))
 
 
-class Batches:
+class FifoBatches:
     """Puts the batches of one device together from their parts.
 
     Attributes
@@ -134,7 +134,7 @@ class Batches:
         if before[0] != batch.gyro and block.t[0] <= before[1].t[-1]:
             pair = (before[1], block) if batch.gyro else (block, before[1])
             self._done = None
-            yield together(*pair)
+            yield in_time_order(*pair)
         else:
             yield before[1]
 
@@ -147,7 +147,7 @@ class Batches:
             self._done = None
 
 
-def together(acc: Block, gyr: Block) -> Block:
+def in_time_order(acc: Block, gyr: Block) -> Block:
     """Samples of two sensors in order of time.
 
     Each of the accelerometer goes with the gyroscope's nearest within half a period of

@@ -32,7 +32,7 @@ Cut = Callable[[str, str], None]
 """Told where a file ends too early, and how; refuses it, or lets that be enough."""
 
 
-def refuse(path: Path) -> Cut:
+def refuse_truncated(path: Path) -> Cut:
     """Refuse a file that ends too early."""
 
     def cut(where: str, what: str) -> None:
@@ -41,7 +41,7 @@ def refuse(path: Path) -> Cut:
     return cut
 
 
-def unpacked(path: Path, cut: Cut | None = None) -> IO[bytes]:
+def open_unpacked(path: Path, cut: Cut | None = None) -> IO[bytes]:
     """Open a file for reading, also .gz.
 
     Parameters
@@ -63,7 +63,7 @@ def unpacked(path: Path, cut: Cut | None = None) -> IO[bytes]:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     if magic != MAGIC:
         return file
-    raw = _Gunzip(file, refuse(path), cut or refuse(path))
+    raw = _Gunzip(file, refuse_truncated(path), cut or refuse_truncated(path))
     return io.BufferedReader(raw, 2 * _AT_ONCE)
 
 
@@ -128,7 +128,7 @@ def pieces(path: Path, size: int = PIECE, cut: Cut | None = None) -> Iterator[by
         If it cannot be read, or not be unpacked where `cut` refuses that.
 
     """
-    with unpacked(path, cut) as file:
+    with open_unpacked(path, cut) as file:
         at = 0
         while True:
             try:

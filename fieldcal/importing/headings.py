@@ -172,7 +172,7 @@ def _channel(column: Column) -> tuple[str, str, str | None]:
     return "", "", None
 
 
-def settle(
+def resolve_headings(
     path: object, wanted: ReadOptions, found: HeadingMatch | None, else_say: str
 ) -> tuple[ReadOptions, str]:
     """Take what the names say, and put it into words; or say what to write.

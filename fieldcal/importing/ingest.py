@@ -15,13 +15,13 @@ import numpy as np
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
 from fieldcal.core.samples import Block
-from fieldcal.importing.merge import Joined
+from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.recording import Recording
-from fieldcal.importing.spool import Spilled
-from fieldcal.importing.validation import Judge, Written, digest
+from fieldcal.importing.spool import SpooledRows
+from fieldcal.importing.validation import RowValidator, SampleWriter, digest
 from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
 from fieldcal.windows.cells import Cells
-from fieldcal.windows.stretches import still_in, summary
+from fieldcal.windows.stretches import still_stretches_of_file, summary
 
 LONG = 5.0
 """Mean periods without a sample that are a gap."""
@@ -98,8 +98,8 @@ class StreamFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class Brought:
-    """A session that was made.
+class ImportedSession:
+    """A session folder that an import wrote.
 
     Attributes
     ----------
@@ -116,18 +116,18 @@ class Brought:
     says: list[str]
 
 
-def bring_in(
+def import_stream(
     recording: Recording,
     stream: str,
     folder: Path,
     about: Mapping[str, Any],
     still: float,
-) -> Brought:
+) -> ImportedSession:
     """Make a session of one stream.
 
     Parameters
     ----------
-    recording, stream : what is brought in
+    recording, stream : what is imported
     folder : made new, or empty
     about : tables of session.toml but the positions
     still : shortest still stretch that counts as a position, s
@@ -146,7 +146,7 @@ def bring_in(
         folder.parent.mkdir(parents=True, exist_ok=True)
         part = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
         try:
-            brought = _fill(part, recording, stream, about, still)
+            imported = _fill(part, recording, stream, about, still)
             part.chmod(0o755)
             _settle(*part.iterdir(), part)
             part.replace(folder)
@@ -158,7 +158,7 @@ def bring_in(
         raise SessionError(
             f"{folder}: cannot be written: {disk_says(error)}"
         ) from error
-    return Brought(folder, *brought)
+    return ImportedSession(folder, *imported)
 
 
 def _settle(*paths: Path) -> None:
@@ -180,9 +180,9 @@ def _fill(
 ) -> tuple[StreamFacts, list[tuple[float, float]], list[str]]:
     import tomlkit
 
-    judge = Judge(str(recording.path), recording.place, recording.repair)
+    judge = RowValidator(str(recording.path), recording.place, recording.repair)
     facts, cells = StreamFacts(), Cells()
-    with Written(part / "samples.parquet") as written, Spilled(part) as rows:
+    with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
         for block in recording.blocks(stream):
             good = judge.good(block)
             if len(good):
@@ -196,7 +196,7 @@ def _fill(
         written.close()
         rest = cells.table
         rows.add(summary(rest))
-        stretches = still_in(rows, rest.origin, written.between, still)
+        stretches = still_stretches_of_file(rows, rest.origin, written.between, still)
     repairs = [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
     text = tomlkit.dumps({**about, "position": positions})
@@ -209,7 +209,7 @@ def _marks(
     recording: Recording, stream: str, facts: StreamFacts, repairs: list[str]
 ) -> str:
     """What is kept of where the samples come from."""
-    parts = recording.parts if isinstance(recording, Joined) else [recording]
+    parts = recording.parts if isinstance(recording, MergedFiles) else [recording]
     now = round(time(), 3)
     imported = {
         "event": "imported",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mcap.records import Channel, Message, Schema
 
 
-class Said(NamedTuple):
+class DecodedMessage(NamedTuple):
     """A message with what it is."""
 
     kind: str
@@ -34,7 +34,7 @@ class _Dictionary:
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
 
-    def take(self, record: Any) -> Said | None:
+    def take(self, record: Any) -> DecodedMessage | None:
         """Take note of a record, or say what message it is."""
         from mcap.records import Channel, Message, Schema
 
@@ -45,11 +45,13 @@ class _Dictionary:
         elif isinstance(record, Message) and record.channel_id in self._channels:
             channel = self._channels[record.channel_id]
             schema = self._schemas.get(channel.schema_id)
-            return Said(schema.name if schema else "", schema, channel, record)
+            return DecodedMessage(
+                schema.name if schema else "", schema, channel, record
+            )
         return None
 
 
-def messages(path: Path, damaged: Cut, cut: Cut) -> Iterator[Said]:
+def messages(path: Path, damaged: Cut, cut: Cut) -> Iterator[DecodedMessage]:
     """Messages in the order of the file.
 
     Parameters
@@ -110,7 +112,7 @@ class Decoders:
         self._factory = DecoderFactory()
         self._known: dict[int, Decoder | None] = {}
 
-    def read(self, said: Said) -> Any:
+    def read(self, said: DecodedMessage) -> Any:
         """What is in a message; None if it is of no kind that can be read."""
         number = said.channel.id
         if number not in self._known:

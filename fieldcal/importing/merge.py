@@ -13,7 +13,7 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing.recording import ImuStream, Recording
 
 
-class Joined(Recording):
+class MergedFiles(Recording):
     """Files with the same times, each with other channels.
 
     Parameters

@@ -13,7 +13,7 @@ IN_MEMORY = 1 << 21
 """Bytes that stay in memory."""
 
 
-class Spilled:
+class SpooledRows:
     """Rows that are added one after the other and read again in any order.
 
     A context manager; the disk space is given back at its end.
@@ -45,7 +45,7 @@ class Spilled:
         data = self._file.read(max(0, last - first) * size)
         return np.frombuffer(data).reshape(-1, self._width)
 
-    def __enter__(self) -> Spilled:
+    def __enter__(self) -> SpooledRows:
         return self
 
     def __exit__(self, *exc: object) -> None:

@@ -24,7 +24,7 @@ FEWEST, GROUP = 1 << 13, 1 << 15
 Rows = NDArray[np.bool_]
 
 
-class Judge:
+class RowValidator:
     """Looks at rows block by block.
 
     Parameters
@@ -161,7 +161,7 @@ def _all_zero(block: Block) -> Rows:
     return empty
 
 
-class Written:
+class SampleWriter:
     """A samples.parquet that is written piece by piece, and read back by time.
 
     A context manager; memory holds one group of rows.
@@ -241,7 +241,7 @@ class Written:
             self._read = (i, from_table(group))
         return self._read[1]
 
-    def __enter__(self) -> Written:
+    def __enter__(self) -> SampleWriter:
         return self
 
     def __exit__(self, *exc: object) -> None:

@@ -102,7 +102,7 @@ def _sigma(found: Calibration, group: str) -> Any:
     return np.nan_to_num(sigma)
 
 
-def left_out(found: Calibration) -> tuple[str, ...]:
+def unsupported_parameters(found: Calibration) -> tuple[str, ...]:
     """What the calibration has and the autopilot has no place for, a sentence each."""
     return tuple(
         f"{group} stays out: the autopilot has no parameter for it"

@@ -23,7 +23,7 @@ SAVED = "installed-before-"
 """What the name of a file with an old set begins with."""
 
 
-class Undone(DeviceError):
+class WriteRolledBack(DeviceError):
     """Writing failed, and the old set is back."""
 
 
@@ -80,7 +80,9 @@ def install(
                 f"{said}; and it could not be undone ({again}): set by hand"
                 f" {listed(old)}"
             ) from failed
-        raise Undone(f"{said}; undone, all {len(old)} are as before") from failed
+        raise WriteRolledBack(
+            f"{said}; undone, all {len(old)} are as before"
+        ) from failed
 
 
 def save(
@@ -106,7 +108,7 @@ def note_done(path: Path, **what: Any) -> None:
     write_whole(path, json.dumps({**document, **what}, indent=2) + "\n")
 
 
-def taken_out(folder: Path) -> list[Path]:
+def save_removed(folder: Path) -> list[Path]:
     """Save the set that a run set to no calibration; no file if it did not.
 
     A run gives it back when it ends; one that was killed, or lost the link, did not.
@@ -126,7 +128,7 @@ def taken_out(folder: Path) -> list[Path]:
     return []
 
 
-def saved(path: Path) -> tuple[Path, dict[str, Any]]:
+def last_saved(path: Path) -> tuple[Path, dict[str, Any]]:
     """The last set that was saved in a session and written, or the one of a file.
 
     Where nothing was written: what a run had taken out and could not give back.
@@ -139,7 +141,7 @@ def saved(path: Path) -> tuple[Path, dict[str, Any]]:
     """
     files = sorted(path.glob(f"{SAVED}*.json")) if path.is_dir() else [path]
     if not files and (path / DESCRIPTION).is_file():
-        files = taken_out(path)
+        files = save_removed(path)
     for file in reversed(files):
         try:
             document = json.loads(file.read_text("utf-8"))

@@ -17,7 +17,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from fieldcal.core.frames import force_home, lasting, seen_after
+from fieldcal.core.frames import force_home, in_turned_axes, mean_rotation
 from fieldcal.core.samples import Array
 
 STEADY = 1e-3
@@ -143,11 +143,11 @@ class Experience:
             changes.get(name, getattr(self, name))
             for name in ("alpha", "beta", "base_force", "base_rate")
         )
-        force = seen_after(alpha, beta, base_force) @ self.mounting
-        earth = seen_after(alpha, beta, base_rate) @ self.mounting
+        force = in_turned_axes(alpha, beta, base_force) @ self.mounting
+        earth = in_turned_axes(alpha, beta, base_rate) @ self.mounting
         if self.rate.any():
             table = self.rate @ self.mounting
-            earth = table + (lasting(table) @ earth[:, :, None])[:, :, 0]
+            earth = table + (mean_rotation(table) @ earth[:, :, None])[:, :, 0]
         known = np.isfinite(alpha + beta)[:, None]
         made = {
             "f": np.where(known, force, changes.get("f", self.f)),

@@ -22,7 +22,9 @@ def hold_each(
     averages = {}
     for index, position in enumerate(positions):
         try:
-            averages[index] = yield from steady(index, position, seconds, sigma)
+            averages[index] = yield from hold_until_still(
+                index, position, seconds, sigma
+            )
         except Skipped as skipped:
             yield from note(str(skipped))
     if not averages:
@@ -30,7 +32,7 @@ def hold_each(
     return averages
 
 
-def with_left_out(
+def with_skipped_positions(
     found: Calibration, positions: Sequence[Position], held: dict[int, Average]
 ) -> Calibration:
     """The calibration, saying which positions are not in it."""
@@ -39,7 +41,7 @@ def with_left_out(
     return replace(found, warnings=(*found.warnings, *said))
 
 
-def steady(
+def hold_until_still(
     index: int, position: Position, seconds: float, sigma: float | None
 ) -> Plan[Average]:
     """Hold one position until a window was not disturbed."""

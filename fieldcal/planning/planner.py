@@ -86,7 +86,7 @@ class Ladder:
         return [Position.deg(round(a, 3) + 0.0, round(b, 3) + 0.0) for a, b in pairs]
 
 
-def asked_of(n: int) -> tuple[str, ...]:
+def required_parameters(n: int) -> tuple[str, ...]:
     """Parameters that n positions are asked for: the tilt from three on."""
     return parameters(*(["angle_offset"] if n >= 3 else []))
 
@@ -108,7 +108,7 @@ def expected(
     by full name, in the units of a calibration; what is not determined is absent
 
     """
-    names = asked_of(len(positions))
+    names = required_parameters(len(positions))
     jacobian = design(names, positions, gravity).reshape(-1, len(names))
     sigma = grade.acc(seconds) * _sigma(jacobian)
     found = {n: float(s) for n, s in zip(names, sigma, strict=True)}
@@ -150,7 +150,7 @@ def best_positions(
     """
     if n + len(fixed) < 2:
         raise PlanError(f"{n} positions determine nothing: ask for two or more")
-    names = asked_of(n + len(fixed))
+    names = required_parameters(n + len(fixed))
     held = {p.degrees for p in fixed}
     candidates = [p for p in ladder.candidates() if p.degrees not in held]
     rows = design(names, candidates, gravity)

@@ -4,7 +4,7 @@ To add a section, write a module with a pure function of `Material` that returns
 and a line in `page.sections`. Nothing is estimated here.
 """
 
-from fieldcal.report.gather import Earlier, Material, gather
+from fieldcal.report.gather import EarlierCalibration, Material, gather
 from fieldcal.report.page import render
 
-__all__ = ["Earlier", "Material", "gather", "render"]
+__all__ = ["EarlierCalibration", "Material", "gather", "render"]

@@ -33,7 +33,7 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
-class Warned:
+class WarningBox:
     """Something the reader must not pass over."""
 
     kind: ClassVar[str] = "note"
@@ -96,7 +96,7 @@ class Fold:
     blocks: tuple[Block, ...]
 
 
-Block = Text | Warned | Table | Figure | Matrix | NameValues | Code | Fold
+Block = Text | WarningBox | Table | Figure | Matrix | NameValues | Code | Fold
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ def table(
     return Table(caption, tuple(columns), cells)
 
 
-def folded(
+def foldable_table(
     caption: str,
     columns: Sequence[str],
     rows: Sequence[Sequence[str | Cell]],

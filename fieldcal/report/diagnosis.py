@@ -28,19 +28,19 @@ from fieldcal.report.blocks import (
     Section,
     Text,
     Tone,
-    Warned,
-    folded,
+    WarningBox,
+    foldable_table,
     table,
 )
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
 from fieldcal.report.loose import (
     Json,
-    alike,
+    format_number,
+    group_alike,
     list_at,
     objects_at,
     real,
-    shown,
     table_at,
 )
 
@@ -65,8 +65,8 @@ def diagnosis(material: Material) -> Section | None:
     chance = real(found.get("probability"))
     sure = f" (probability {chance:.2f})" if math.isfinite(chance) else ""
     lead = f"{verdict.replace('_', ' ').capitalize()}{sure}. {said}"
-    blocks: list[Block] = [Warned(lead.strip(), TONES.get(verdict, "warn"))]
-    blocks += [Warned(str(w)) for w in list_at(found, "warnings")]
+    blocks: list[Block] = [WarningBox(lead.strip(), TONES.get(verdict, "warn"))]
+    blocks += [WarningBox(str(w)) for w in list_at(found, "warnings")]
     blocks += evidence.next_steps(found)
     mismatch = objects_at(found, "mismatch")
     if mismatch:
@@ -86,7 +86,7 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
     sigmas = [real(m.get("sigma")) for m in rows]
     most = max((s for s in sigmas if math.isfinite(s)), default=1.0) or 1.0
     cells: list[list[str | Cell]] = []
-    for names, m in alike(rows, "channel"):
+    for names, m in group_alike(rows, "channel"):
         sigma = real(m.get("sigma"))
         finite = math.isfinite(sigma)
         size = Cell(
@@ -114,7 +114,7 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
         ">rms",
         ">significance",
     )
-    return folded("Where recording and simulation part", columns, cells, MOST)
+    return foldable_table("Where recording and simulation part", columns, cells, MOST)
 
 
 def _rms(names: Sequence[str], rms: float) -> str:
@@ -128,8 +128,8 @@ def _effects(effects: Sequence[Json]) -> Block:
     for effect in effects:
         proof = table_at(effect, "evidence")
         weight = [
-            shown(proof.get("delta_chi2"), "{:.0f}"),
-            shown(-100 * real(proof.get("held_out_gain")), "{:+.0f} %"),
+            format_number(proof.get("delta_chi2"), "{:.0f}"),
+            format_number(-100 * real(proof.get("held_out_gain")), "{:+.0f} %"),
             ", ".join(str(a) for a in list_at(effect, "aliases")),
         ]
         values: list[tuple[str, Any]] = list(table_at(effect, "parameters").items())
@@ -167,7 +167,10 @@ def _fit(fit: Json) -> list[Block]:
         Text("How well the simulation does before and after the effects are added:"),
         NameValues(
             tuple(
-                (name, f"{shown(before.get(k), f)} → {shown(after.get(k), f)}")
+                (
+                    name,
+                    " → ".join(format_number(fit.get(k), f) for fit in (before, after)),
+                )
                 for name, k, f in facts
             )
         ),
@@ -209,8 +212,8 @@ def _calibration(groups: Json) -> list[Block]:
         triads = (list_at(group, k) for k in ("value", "sigma"))
         for axis, value, sigma in zip("xyz", *triads, strict=False):
             if isinstance(value, int | float):
-                shown = number(float(value), real(sigma))
-                rows.append([f"{TITLES.get(name, name)} {axis}", *shown, unit])
+                format_number = number(float(value), real(sigma))
+                rows.append([f"{TITLES.get(name, name)} {axis}", *format_number, unit])
     if not rows:
         return []
     columns = ("parameter", ">value", ">± 1σ", "unit")

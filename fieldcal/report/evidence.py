@@ -9,9 +9,16 @@ import numpy as np
 from fieldcal.calibration.wording import pretty
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
-from fieldcal.report.blocks import Block, Cell, Figure, folded, table
+from fieldcal.report.blocks import Block, Cell, Figure, foldable_table, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
-from fieldcal.report.loose import Json, list_at, objects_at, real, shown, table_at
+from fieldcal.report.loose import (
+    Json,
+    format_number,
+    list_at,
+    objects_at,
+    real,
+    table_at,
+)
 
 MOST_CURVES = 6
 MOST_CANDIDATES = 12
@@ -92,16 +99,18 @@ def candidates(found: Sequence[Json]) -> list[Block]:
     rows: list[list[str | Cell]] = [
         [
             str(c.get("id", "")).replace("_", " "),
-            shown(c.get("delta_chi2"), "{:.0f}"),
-            shown(c.get("delta_bic"), "{:.0f}"),
-            shown(-100 * real(c.get("held_out_gain")), "{:+.0f} %"),
+            format_number(c.get("delta_chi2"), "{:.0f}"),
+            format_number(c.get("delta_bic"), "{:.0f}"),
+            format_number(-100 * real(c.get("held_out_gain")), "{:+.0f} %"),
             Cell("chosen", "good")
             if c.get("chosen") is True
             else str(c.get("why", "")),
         ]
         for c in found
     ]
-    return folded("What was tried", columns, rows, MOST_CANDIDATES) if rows else []
+    return (
+        foldable_table("What was tried", columns, rows, MOST_CANDIDATES) if rows else []
+    )
 
 
 def next_steps(found: Json) -> list[Block]:

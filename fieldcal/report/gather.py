@@ -23,7 +23,7 @@ FAR = 1e6
 
 
 @dataclass(frozen=True, slots=True)
-class Earlier:
+class EarlierCalibration:
     """A calibration of the same device from another day.
 
     Attributes
@@ -61,7 +61,7 @@ class Material:
     calibration: Calibration | None
     diagnosis: Mapping[str, Any] | None
     marks: tuple[Mapping[str, Any], ...]
-    earlier: tuple[Earlier, ...] = ()
+    earlier: tuple[EarlierCalibration, ...] = ()
 
     @property
     def epoch(self) -> float:
@@ -80,7 +80,7 @@ class Material:
         return f"{row}" if name == f"position {row}" else f"{row} · {name}"
 
 
-def gather(folder: Path | str, earlier: Iterable[Earlier] = ()) -> Material:
+def gather(folder: Path | str, earlier: Iterable[EarlierCalibration] = ()) -> Material:
     """Read a session for its report.
 
     Raises
@@ -109,7 +109,7 @@ def gather(folder: Path | str, earlier: Iterable[Earlier] = ()) -> Material:
     )
 
 
-def earlier_result(path: Path) -> Earlier:
+def earlier_result(path: Path) -> EarlierCalibration:
     """A calibration from a session folder or a result.json.
 
     Raises
@@ -124,7 +124,7 @@ def earlier_result(path: Path) -> Earlier:
         raise SessionError(f"{file}: no result there; run fieldcal solve first")
     name = file.parent.name if file.name == RESULT else file.stem
     try:
-        return Earlier(name, Calibration.from_json(document))
+        return EarlierCalibration(name, Calibration.from_json(document))
     except InputError as error:
         raise SessionError(f"{file}: {error}") from error
 

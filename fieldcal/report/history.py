@@ -9,7 +9,7 @@ from fieldcal.calibration.wording import TITLES, pretty, title
 from fieldcal.core.errors import InputError
 from fieldcal.report.blocks import Block, Cell, Figure, Section, table
 from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.gather import Earlier, Material
+from fieldcal.report.gather import EarlierCalibration, Material
 
 
 def history(material: Material) -> Section | None:
@@ -17,7 +17,7 @@ def history(material: Material) -> Section | None:
     now = material.calibration
     if now is None or not material.earlier:
         return None
-    every = (*material.earlier, Earlier("now", now))
+    every = (*material.earlier, EarlierCalibration("now", now))
     blocks: list[Block] = []
     for group in COMPONENTS:
         if any(group in e.calibration.groups for e in every):
@@ -31,7 +31,7 @@ def history(material: Material) -> Section | None:
     return Section("history", "History of the device", tuple(blocks))
 
 
-def _chart(group: str, every: tuple[Earlier, ...]) -> Chart:
+def _chart(group: str, every: tuple[EarlierCalibration, ...]) -> Chart:
     x = np.arange(len(every), dtype=float)
     series = []
     for i, axis in enumerate(COMPONENTS[group][0]):
@@ -55,7 +55,7 @@ def _chart(group: str, every: tuple[Earlier, ...]) -> Chart:
     )
 
 
-def _changes(before: Earlier, now: Calibration) -> list[list[str | Cell]]:
+def _changes(before: EarlierCalibration, now: Calibration) -> list[list[str | Cell]]:
     try:
         found = compare(now, before.calibration)
     except InputError:

@@ -27,7 +27,7 @@ def objects_at(document: Json, key: str) -> list[Json]:
     return [item for item in list_at(document, key) if isinstance(item, Mapping)]
 
 
-def alike(rows: Sequence[Json], but: str) -> list[tuple[list[str], Json]]:
+def group_alike(rows: Sequence[Json], but: str) -> list[tuple[list[str], Json]]:
     """Objects that differ in one key only, together: all its values, and the first.
 
     >>> alike([{"at": 1, "of": "x"}, {"at": 1, "of": "y"}, {"at": 2, "of": "x"}], "of")
@@ -52,7 +52,7 @@ def real(value: object) -> float:
     return float(value)
 
 
-def shown(value: object, form: str) -> str:
+def format_number(value: object, form: str) -> str:
     """A number as a text; a dash where there is none.
 
     >>> shown(0.5, "{:.2f}"), shown(None, "{:.2f}")

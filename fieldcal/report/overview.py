@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.gauge import outward
+from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.wording import number, pretty, title
 from fieldcal.core.samples import Array
 from fieldcal.report.blocks import (
@@ -19,7 +19,7 @@ from fieldcal.report.blocks import (
     Table,
     Text,
     Tone,
-    Warned,
+    WarningBox,
     table,
 )
 from fieldcal.report.gather import Material
@@ -132,7 +132,7 @@ def calibration(material: Material) -> Section | None:
         return None
     blocks: list[Block] = [_parameters(found, material.session.about.nominal)]
     if found.warnings:
-        blocks += [Warned(w) for w in found.warnings]
+        blocks += [WarningBox(w) for w in found.warnings]
     blocks += _checks(found)
     left = _without(found)
     if left:
@@ -142,7 +142,7 @@ def calibration(material: Material) -> Section | None:
 
 def _parameters(found: Calibration, nominal: Mapping[str, Array]) -> Table:
     rows: list[list[str | Cell]] = []
-    shown = outward(found)
+    shown = in_sample_units(found)
     for i, (name, value, sigma, unit) in enumerate(
         zip(shown.names, shown.values, shown.sigma, shown.units, strict=True)
     ):

@@ -138,7 +138,9 @@ def quantised(values: Array) -> dict[str, str]:
     return {"q": _text(q.ravel()[:n]), "scale": _text(scale)}
 
 
-def around(instants: Sequence[float], seconds: float) -> list[tuple[float, float]]:
+def stretches_around(
+    instants: Sequence[float], seconds: float
+) -> list[tuple[float, float]]:
     """Stretches of `seconds` about each instant."""
     return [(at - seconds / 2, at + seconds / 2) for at in instants]
 

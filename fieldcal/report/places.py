@@ -8,7 +8,7 @@ from fieldcal.calibration.wording import number
 from fieldcal.report.blocks import Block, Figure, Section, Table, table
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
-from fieldcal.report.residuals import Reached, reached
+from fieldcal.report.residuals import MeasuredAngles, reached
 
 
 def places(material: Material) -> Section | None:
@@ -23,7 +23,7 @@ def places(material: Material) -> Section | None:
     return Section("positions", "Where the device was", tuple(blocks))
 
 
-def _caption(where: Reached, material: Material) -> str:
+def _caption(where: MeasuredAngles, material: Material) -> str:
     said = "Angles by the accelerometers"
     by = "calibrated" if material.calibration is not None else "nominal calibration"
     if np.isfinite(where.asked).any():
@@ -31,7 +31,7 @@ def _caption(where: Reached, material: Material) -> str:
     return f"{said} ({by}); no angles were asked for, so they serve to see the spread."
 
 
-def _chart(where: Reached) -> Chart:
+def _chart(where: MeasuredAngles) -> Chart:
     series = [
         Series("shown", where.shown[:, 0], where.shown[:, 1], 1),
     ]
@@ -50,7 +50,7 @@ def _chart(where: Reached) -> Chart:
     )
 
 
-def _misses(where: Reached) -> Chart:
+def _misses(where: MeasuredAngles) -> Chart:
     off = (where.shown - where.asked + 180) % 360 - 180
     x = np.arange(len(where.rows), dtype=float)
     series = tuple(
@@ -75,7 +75,7 @@ def _misses(where: Reached) -> Chart:
     )
 
 
-def _table(where: Reached, material: Material) -> Table:
+def _table(where: MeasuredAngles, material: Material) -> Table:
     rows = []
     for row, asked, shown, sigma in zip(
         where.rows, where.asked, where.shown, where.sigma, strict=True

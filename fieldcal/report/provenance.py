@@ -11,7 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.core.version import __version__
-from fieldcal.report.blocks import Block, Code, Fold, NameValues, Section, Warned, table
+from fieldcal.report.blocks import (
+    Block,
+    Code,
+    Fold,
+    NameValues,
+    Section,
+    WarningBox,
+    table,
+)
 from fieldcal.report.gather import Material
 from fieldcal.session.folder import DESCRIPTION
 
@@ -37,7 +45,7 @@ def provenance(material: Material, made: datetime) -> Section:
         ("mounting", ", ".join(about.axes)),
         ("grade", about.grade),
     ]
-    blocks: list[Block] = [Warned(w) for w in session.warnings]
+    blocks: list[Block] = [WarningBox(w) for w in session.warnings]
     blocks += [NameValues(tuple(facts)), _files(session.folder)]
     if material.marks:
         blocks.append(Fold("What happened", (_events(material.marks),)))

@@ -13,7 +13,7 @@ from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
 from fieldcal.report.charts import LabelledSpan, Mark, Record
 from fieldcal.report.gather import Material
 from fieldcal.report.loose import Json, objects_at, real
-from fieldcal.report.packing import Columns, around, pack
+from fieldcal.report.packing import Columns, pack, stretches_around
 
 CLOSE = 3.0
 """Stretch about each edge of a window that is packed sample by sample, s."""
@@ -78,7 +78,7 @@ def _chart(material: Material) -> Record:
         _alt(panels, values, float(block.t[-1] - block.t[0]), spans),
         tuple(panels),
         material.clock,
-        pack(Columns(block.t - material.epoch, values), around(edges, CLOSE)),
+        pack(Columns(block.t - material.epoch, values), stretches_around(edges, CLOSE)),
         spans,
         _means(material, used, values.shape[1]),
         marks,

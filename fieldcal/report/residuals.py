@@ -15,7 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.frames import EARTH_RATE, angles_of, earth_rate_home, lasting, turn
+from fieldcal.core.frames import (
+    EARTH_RATE,
+    angles_of,
+    earth_rate_home,
+    mean_rotation,
+    turn,
+)
 from fieldcal.core.positions import rates
 from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import observations
@@ -88,7 +94,7 @@ def _earth(seen: Observations, left: Array) -> Array:
         return np.zeros((len(seen), 3))
     away = np.zeros((len(seen), 3, 3))
     alpha, beta = seen.angles
-    away[known] = lasting(seen.rates[known]) @ (
+    away[known] = mean_rotation(seen.rates[known]) @ (
         seen.mounting.T @ turn(alpha[known], beta[known])
     )
     down = away[..., 1] * earth_rate_home(seen.latitude)[1]
@@ -108,7 +114,7 @@ def _sensors(seen: Observations) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
+class MeasuredAngles:
     """Angles the calibrated accelerometers show.
 
     Attributes
@@ -126,7 +132,7 @@ class Reached:
     sigma: Array
 
 
-def reached(material: Material) -> Reached | None:
+def reached(material: Material) -> MeasuredAngles | None:
     """Where the device was in each window; None without windows.
 
     Without a calibration the nominal one serves.
@@ -148,7 +154,7 @@ def reached(material: Material) -> Reached | None:
     force, spread = acc @ seen.mounting.T, spread @ np.abs(seen.mounting.T)
     shown = np.rad2deg([angles_of(f) for f in force])
     asked = np.rad2deg(np.column_stack(seen.angles))
-    return Reached(still.rows, asked, shown, _sigma(force, spread, shown))
+    return MeasuredAngles(still.rows, asked, shown, _sigma(force, spread, shown))
 
 
 def _sigma(force: Array, spread: Array, shown: Array) -> Array:

@@ -36,7 +36,7 @@ def stillness(material: Material) -> Section | None:
     cells = _cells(material.block)
     if len(cells) < 2 * SPAN:
         return None
-    t, r = restlessness(cells)
+    t, r = motion_by_second(cells)
     chart = Chart(
         "how-still",
         "Restlessness over device time",
@@ -57,7 +57,7 @@ def stillness(material: Material) -> Section | None:
     return Section("stillness", "Stillness", tuple(parts))
 
 
-def restlessness(cells: CellTable) -> tuple[Array, Array]:
+def motion_by_second(cells: CellTable) -> tuple[Array, Array]:
     """Middle of each second, s, and r of it, (m,) each."""
     means = cells.steady
     view = np.lib.stride_tricks.sliding_window_view(means, SPAN, axis=0)

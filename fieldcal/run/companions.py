@@ -64,7 +64,7 @@ class Times:
         return float(np.interp(host, hosts, times))
 
 
-class Beside:
+class Companion:
     """A device that is recorded while another one is led through a procedure.
 
     Attributes
@@ -120,7 +120,7 @@ class Beside:
                 self.mark("failed", text=str(fault))
 
 
-class First:
+class LeadRecorder:
     """The recording of the first device, whose windows hold for the others.
 
     Parameters
@@ -134,7 +134,7 @@ class First:
 
     """
 
-    def __init__(self, recorder: Recorder, others: Sequence[Beside]) -> None:
+    def __init__(self, recorder: Recorder, others: Sequence[Companion]) -> None:
         self._recorder, self.others = recorder, others
         self._times = Times()
         self._told: set[Path] = set()
@@ -170,9 +170,9 @@ class First:
 
 
 @contextmanager
-def beside(
+def record_companions(
     further: Mapping[str, str], recorder: Recorder, about: Mapping[str, Any]
-) -> Iterator[First]:
+) -> Iterator[LeadRecorder]:
     """Record further devices into ``device-2``, ``device-3``, … of a session.
 
     A session that is there already is gone on with.
@@ -202,6 +202,6 @@ def beside(
             known = (folder / DESCRIPTION).exists()
             tables = None if known else {**about, "device": device}
             own = stack.enter_context(Recorder(folder, tables))
-            others.append(Beside(driver, own))
+            others.append(Companion(driver, own))
             stack.callback(others[-1].end)
-        yield First(recorder, others)
+        yield LeadRecorder(recorder, others)

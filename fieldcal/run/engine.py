@@ -21,13 +21,13 @@ from fieldcal.core.errors import FieldcalError, Moved, Skipped, Stopped, WrongPo
 from fieldcal.core.samples import Block, pieces
 from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Hold, Note, Plan, Step
-from fieldcal.run.interruptions import Again, begun_again, gap, restarted
+from fieldcal.run.interruptions import RepeatPosition, gap, restart_notice, restarted
 from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
 from fieldcal.run.operator.protocol import Display, Operator, Wish
-from fieldcal.run.position_check import Held
+from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
-from fieldcal.run.waiting import GAP, Placing, force
-from fieldcal.run.warm_up import Warmth
+from fieldcal.run.waiting import GAP, PositionWait, force
+from fieldcal.run.warm_up import WarmUp
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window
 
@@ -51,7 +51,7 @@ class Engine:
         given up, if the host's clock has gone on as well; None waits for ever, and
         begins a window that was disturbed again for ever, as for a person
     taken : averages of positions taken before, by number; what is taken is added
-    warmth : judges whether the device is still warming up; None does not ask
+    warm_up : judges whether the device is still warming up; None does not ask
 
     """
 
@@ -63,7 +63,7 @@ class Engine:
         recorder: MarkedRecorder,
         give_up: float | None = None,
         taken: dict[int, Average] | None = None,
-        warmth: Warmth | None = None,
+        warm_up: WarmUp | None = None,
     ) -> None:
         self._driver = driver
         self._operator = operator
@@ -71,8 +71,8 @@ class Engine:
         self._recorder = recorder
         self._give_up = give_up
         self._taken = {} if taken is None else taken
-        self._warmth = warmth
-        self._held: Held | None = None
+        self._warm_up = warm_up
+        self._held: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
         self._noise: LearnedNoise | None = None
         self._left: int | None = None
@@ -122,7 +122,7 @@ class Engine:
                     self._display.taken_before(step, average)
                 if step.position.oriented:
                     f = force(average.mean[None, :3], self._about)
-                    self._held = Held(step.position, f)
+                    self._held = AcceptedPosition(step.position, f)
                 self._before = step.index
                 return average
             case Note(text):
@@ -142,7 +142,7 @@ class Engine:
                 if self._give_up is not None:
                     raise
                 tries += 1
-                self._tell(begun_again(moved, tries))
+                self._tell(restart_notice(moved, tries))
                 continue
             if average is not None:
                 return average
@@ -161,8 +161,8 @@ class Engine:
             block = self._recorder.append(raw)
             self._link.take(block)
             self._display.heard(block)
-            if self._warmth:
-                self._warmth.add(block)
+            if self._warm_up:
+                self._warm_up.add(block)
             yield from pieces(block, PIECE)
 
     def _silent(self) -> None:
@@ -182,61 +182,61 @@ class Engine:
 
     def _arrive(self, hold: Hold) -> None:
         """Wait until the device rests where it should."""
-        placing = Placing(hold, self._about, self._held, self._left == hold.index)
+        waiting = PositionWait(hold, self._about, self._held, self._left == hold.index)
         asked = self._driver.host_time()
         insisted = warned = False
         for block in self._stream:
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before
-            placing.add(block, self._driver.host_time())
+            waiting.add(block, self._driver.host_time())
             wish = self._wish(hold, averaging=False)
-            if wish == "confirm" and self._warmth and self._warmth.waits:
-                self._warmth.waived = True
-            elif wish == "confirm" and not placing.arrived:
-                if insisted and placing.usable:
-                    self._insist(hold, placing)
+            if wish == "confirm" and self._warm_up and self._warm_up.waits:
+                self._warm_up.waived = True
+            elif wish == "confirm" and not waiting.arrived:
+                if insisted and waiting.usable:
+                    self._insist(hold, waiting)
                     return
-                insisted = self._ask_back(placing)
-            waits = self._warmth is not None and self._warmth.waits
-            reason = placing.reason
-            if placing.arrived and self._warmth and self._warmth.says and waits:
-                reason = WaitReason(WaitState.WARMING_UP, self._warmth.says)
-            self._display.turning(hold, placing, reason)
+                insisted = self._ask_back(waiting)
+            waits = self._warm_up is not None and self._warm_up.waits
+            reason = waiting.reason
+            if waiting.arrived and self._warm_up and self._warm_up.says and waits:
+                reason = WaitReason(WaitState.WARMING_UP, self._warm_up.says)
+            self._display.turning(hold, waiting, reason)
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
                 self._alarm(reason)
-            if placing.arrived and not waits and wish != "wait":
+            if waiting.arrived and not waits and wish != "wait":
                 return
-            self._complain(hold, placing, quiet=wish == "wait")
+            self._complain(hold, waiting, quiet=wish == "wait")
         raise AssertionError("blocks() ends in an exception only")
 
-    def _complain(self, hold: Hold, placing: Placing, quiet: bool) -> None:
+    def _complain(self, hold: Hold, waiting: PositionWait, quiet: bool) -> None:
         """Say that it rests at a wrong place, and give up in the end."""
-        if not quiet and (waited := placing.alarm()) is not None:
-            text = reminder(waited) + placing.problem
+        if not quiet and (waited := waiting.alarm()) is not None:
+            text = reminder(waited) + waiting.problem
             self._recorder.mark("wrong", position=hold.index, text=text)
-            self._operator.alarm(placing.reason, waited)
-        if placing.arrived or not self._give_up:
+            self._operator.alarm(waiting.reason, waited)
+        if waiting.arrived or not self._give_up:
             return
-        if placing.waited_enough(self._give_up):
+        if waiting.waited_enough(self._give_up):
             what = (
-                placing.problem or f"it has not come to rest in {placing.waited:.0f} s"
+                waiting.problem or f"it has not come to rest in {waiting.waited:.0f} s"
             )
             raise WrongPosition(f"{hold.position.name}: {what}")
 
-    def _ask_back(self, placing: Placing) -> bool:
+    def _ask_back(self, waiting: PositionWait) -> bool:
         """Answer an operator who wants to go on at a wrong place."""
-        if placing.usable and placing.problem:
+        if waiting.usable and waiting.problem:
             self._tell(
-                f"{placing.problem}; press Enter once more to take it like this, and"
+                f"{waiting.problem}; press Enter once more to take it like this, and"
                 " the result is NO-GO"
             )
             return True
-        self._tell(f"not yet: {placing.problem or placing.reason.text}")
+        self._tell(f"not yet: {waiting.problem or waiting.reason.text}")
         return False
 
-    def _insist(self, hold: Hold, placing: Placing) -> None:
-        self._recorder.mark("insisted", position=hold.index, text=placing.problem)
+    def _insist(self, hold: Hold, waiting: PositionWait) -> None:
+        self._recorder.mark("insisted", position=hold.index, text=waiting.problem)
 
     def _wish(self, hold: Hold, averaging: bool) -> Wish | None:
         """What the operator wants; what ends the step is carried out at once."""
@@ -249,7 +249,7 @@ class Engine:
         if wish == "repeat" and not averaging:
             if self._before is not None:
                 self._recorder.mark("repeated", position=self._before)
-                raise Again(self._before)
+                raise RepeatPosition(self._before)
             self._operator.tell("nothing was taken yet that could be repeated")
         return wish
 
@@ -288,5 +288,5 @@ class Engine:
         return average
 
     def _say_if_cold(self) -> None:
-        if self._warmth and (said := self._warmth.says):
+        if self._warm_up and (said := self._warm_up.says):
             self._tell(said)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fieldcal.core.errors import Moved
 
 
-class Again(Exception):
+class RepeatPosition(Exception):
     """The operator wants a position that was taken once more.
 
     Attributes
@@ -23,7 +23,7 @@ OFTEN = 3
 """Disturbed windows in one position from which the remedy is said as well."""
 
 
-def begun_again(moved: Moved, times: int) -> str:
+def restart_notice(moved: Moved, times: int) -> str:
     """What an operator is told whose window was disturbed so many times."""
     said = f"{moved}; hold still, the window starts again"
     if times < OFTEN:

@@ -30,7 +30,7 @@ class Mover(Protocol):
         """Whether it is still at work; MoverFailed if it went wrong."""
 
 
-class Nobody:
+class ManualMover:
     """A person turns the device, or whatever else reads the instructions."""
 
     def turn(self, position: Position, number: int = 0) -> None:
@@ -41,7 +41,7 @@ class Nobody:
         return False
 
 
-class Controlled:
+class RunningDevice:
     """A virtual device that is there already, turned through its control socket.
 
     Raises
@@ -79,7 +79,7 @@ class Controlled:
         self.close()
 
 
-class VirtualMover(Controlled):
+class VirtualMover(RunningDevice):
     """A virtual device in a process of its own.
 
     Parameters

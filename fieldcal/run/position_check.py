@@ -34,7 +34,7 @@ NORM = 0.15
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class AcceptedPosition:
     """A position that was accepted, and the force measured there."""
 
     position: Position
@@ -42,7 +42,7 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
-class Arrival:
+class PositionCheck:
     """Where the device is, and whether that is where it should be.
 
     Attributes
@@ -62,13 +62,13 @@ class Arrival:
     limit_deg: float = np.nan
 
 
-def judge(
+def check_position(
     wanted: Position,
     f: Array,
     gravity: float,
-    held: Held | None,
+    held: AcceptedPosition | None,
     others: Mapping[str, Position] | None = None,
-) -> Arrival:
+) -> PositionCheck:
     """Compare measured force with a position asked for.
 
     Parameters
@@ -88,9 +88,9 @@ def judge(
             f"the accelerometers read {norm:.2f} m/s² in all, gravity is"
             f" {gravity:.2f} m/s²: check unit, range and wire format"
         )
-        return Arrival(False, *seen, problem)
+        return PositionCheck(False, *seen, problem)
     if not wanted.oriented:
-        return Arrival(True, *seen)
+        return PositionCheck(True, *seen)
     chord = _chord(wanted, held.position, gravity) if held else 0.0
     limit = NEAR + TILT * chord if held else FIRST
     miss = _miss(wanted, f, gravity, held)
@@ -98,12 +98,12 @@ def judge(
     slipped = slip_miss < min(miss / 2, limit) and miss > NEAR
     within = float(np.rad2deg(limit))
     if miss <= limit and not slipped:
-        return Arrival(True, *seen, limit_deg=within)
+        return PositionCheck(True, *seen, limit_deg=within)
     problem = _explain(wanted, seen, slip if slipped else "")
-    return Arrival(False, *seen, problem, within)
+    return PositionCheck(False, *seen, problem, within)
 
 
-def tenth(angle: float) -> float:
+def round_to_tenth(angle: float) -> float:
     """Round an angle as it is shown, deg; what is rounded to zero has no sign."""
     return round(float(angle), 1) + 0.0
 
@@ -119,14 +119,16 @@ def _chord(a: Position, b: Position, gravity: float) -> float:
     return float(np.linalg.norm(difference) / gravity)
 
 
-def _without_offset(f: Array, gravity: float, held: Held | None) -> Array:
+def _without_offset(f: Array, gravity: float, held: AcceptedPosition | None) -> Array:
     if held is None:
         return f
     clean: Array = f - (held.f - _force(held.position, gravity))
     return clean
 
 
-def _miss(wanted: Position, f: Array, gravity: float, held: Held | None) -> float:
+def _miss(
+    wanted: Position, f: Array, gravity: float, held: AcceptedPosition | None
+) -> float:
     """How far the device is off, rad."""
     clean = _without_offset(f, gravity, held)
     return float(np.linalg.norm(clean - _force(wanted, gravity)) / gravity)
@@ -136,7 +138,7 @@ def _nearest_slip(
     wanted: Position,
     f: Array,
     gravity: float,
-    held: Held | None,
+    held: AcceptedPosition | None,
     others: Mapping[str, Position],
 ) -> tuple[str, float]:
     """The slip that would put the device nearest to where it is, and how near, rad."""
@@ -163,10 +165,11 @@ def _nearest_slip(
 
 def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:
     a, b = wanted.degrees or (0.0, 0.0)
-    where = f"the device is at α = {tenth(seen[0]):.1f}°, β = {tenth(seen[1]):.1f}°"
+    now = [round_to_tenth(angle) for angle in seen]
+    where = f"the device is at α = {now[0]:.1f}°, β = {now[1]:.1f}°"
     asked = f"asked for is α = {a:g}°, β = {b:g}°"
     if slip:
         return f"{slip}: {where}, {asked}"
-    off = {"α": tenth(a - seen[0]), "β": tenth(b - seen[1])}
+    off = {"α": round_to_tenth(a - seen[0]), "β": round_to_tenth(b - seen[1])}
     turns = [f"{by:+.1f}° in {name}" for name, by in off.items() if by]
     return f"{where}, {asked}: turn it by {', '.join(turns) or 'a little'}"

@@ -26,14 +26,14 @@ from fieldcal.core.errors import (
 )
 from fieldcal.drivers.driver import Driver
 from fieldcal.evaluation.observations import rests
-from fieldcal.planning.holding import steady
+from fieldcal.planning.holding import hold_until_still
 from fieldcal.planning.steps import Plan, note
-from fieldcal.run.companions import First
+from fieldcal.run.companions import LeadRecorder
 from fieldcal.run.engine import Engine
-from fieldcal.run.interruptions import Again
+from fieldcal.run.interruptions import RepeatPosition
 from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, Task
-from fieldcal.run.warm_up import Warmth
+from fieldcal.run.warm_up import WarmUp
 from fieldcal.session.folder import RESULT, Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average, average
@@ -42,7 +42,7 @@ RETRY = 0.5
 """Time between two attempts to open the device again, s."""
 
 
-class Running:
+class SessionRun:
     """One task on one device.
 
     Parameters
@@ -62,7 +62,7 @@ class Running:
         self,
         task: Task,
         operator: Operator,
-        recorder: Recorder | First,
+        recorder: Recorder | LeadRecorder,
         opened: Callable[[], Driver],
         limits: GradeLimits,
         patience: float,
@@ -74,7 +74,7 @@ class Running:
         self._taken = {} if taken is None else taken
         self._lost: tuple[float, DeviceError] | None = None
         wait = float(task.run.get("warm_up_s", WARM_UP))
-        self._warmth = Warmth(limits.temperature_rate_k_min, wait)
+        self._warm_up = WarmUp(limits.temperature_rate_k_min, wait)
 
     def run(self, driver: Driver) -> Calibration:
         """Carry the task out, beginning with a device that is open; it is closed.
@@ -113,12 +113,12 @@ class Running:
             recorder,
             self._give_up,
             self._taken,
-            self._warmth,
+            self._warm_up,
         )
         while True:
             try:
                 return engine.run(self._plan())
-            except Again as again:
+            except RepeatPosition as again:
                 self._taken.pop(again.index, None)
 
     def _plan(self) -> Plan[Calibration]:
@@ -128,7 +128,9 @@ class Running:
         if task.verification is not None:
             number = len(task.about.positions)
             try:
-                yield from steady(number, task.verification, task.seconds, task.sigma)
+                yield from hold_until_still(
+                    number, task.verification, task.seconds, task.sigma
+                )
             except Skipped as skipped:
                 yield from note(str(skipped))
         return found
@@ -153,7 +155,7 @@ class Running:
         raise lost
 
 
-def taken_before(session: Session, task: Task) -> dict[int, Average]:
+def recorded_averages(session: Session, task: Task) -> dict[int, Average]:
     """Averages of the positions that a session has whole, by number."""
     from fieldcal.acceptance.assessment import verification_window
 
@@ -183,7 +185,7 @@ def _stands(marks: list[dict[str, Any]], number: int) -> bool:
     return bool(said) and said[-1] == "window"
 
 
-def resumed(folder: Path) -> tuple[Session, dict[str, Any]]:
+def resume(folder: Path) -> tuple[Session, dict[str, Any]]:
     """A session to go on with, and its tables.
 
     Raises

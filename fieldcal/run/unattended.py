@@ -14,7 +14,7 @@ from fieldcal.evaluation.solution import solved
 from fieldcal.run import plan_file
 from fieldcal.run.movers import VirtualMover
 from fieldcal.run.operator.script import ScriptOperator
-from fieldcal.run.session_run import Running
+from fieldcal.run.session_run import SessionRun
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
@@ -61,7 +61,7 @@ def recalibrate(
     with Recorder(folder, whole) as recorder:
         operator = ScriptOperator(device, io.StringIO())
         bounds = limits.read(task.about.grade)
-        running = Running(task, operator, recorder, once, bounds, 0.0, GIVE_UP)
+        running = SessionRun(task, operator, recorder, once, bounds, 0.0, GIVE_UP)
         found = running.run(driver)
     session = Session.open(folder)
     return solved(session, rests(session), method=found.method)

@@ -13,7 +13,12 @@ import numpy as np
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.planning.steps import Hold
-from fieldcal.run.position_check import NORM, Arrival, Held, judge
+from fieldcal.run.position_check import (
+    NORM,
+    AcceptedPosition,
+    PositionCheck,
+    check_position,
+)
 from fieldcal.run.wait_reason import WaitReason, WaitState
 from fieldcal.session.description import Description
 from fieldcal.windows import Stillness
@@ -38,7 +43,7 @@ reads it, have had 1.1 s.
 """
 
 
-class Placing:
+class PositionWait:
     """The way of the device to one position.
 
     Parameters
@@ -60,7 +65,11 @@ class Placing:
     """
 
     def __init__(
-        self, hold: Hold, about: Description, held: Held | None, left: bool = False
+        self,
+        hold: Hold,
+        about: Description,
+        held: AcceptedPosition | None,
+        left: bool = False,
     ) -> None:
         self._hold, self._about, self._held, self._left = hold, about, held, left
         self._others = _others(hold, about)
@@ -73,8 +82,8 @@ class Placing:
         self._stillness = Stillness()
         self._resting = _Resting()
         self._told = -np.inf
-        self.arrival: Arrival | None = None
-        self.where: Arrival | None = None
+        self.arrival: PositionCheck | None = None
+        self.where: PositionCheck | None = None
         self.f: Array | None = None
 
     @property
@@ -112,9 +121,9 @@ class Placing:
             now = self._judged(force(block.acc, self._about))
             self.where = replace(now, ok=False)
 
-    def _judged(self, f: Array) -> Arrival:
+    def _judged(self, f: Array) -> PositionCheck:
         wanted, g = self._hold.position, self._about.gravity
-        return judge(wanted, f, g, self._held, self._others)
+        return check_position(wanted, f, g, self._held, self._others)
 
     @property
     def arrived(self) -> bool:

@@ -12,7 +12,7 @@ from fieldcal.core.samples import Array
 from fieldcal.diagnosis.agreement import UNITS
 from fieldcal.diagnosis.result import number
 from fieldcal.sim_device.profile import Profile
-from fieldcal.twin.ways import Apart
+from fieldcal.twin.ways import WayDifference
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class ReplayRun:
     by_position: Array
     chi2_by_position: Array
     lines: Array
-    ways: Apart
+    ways: WayDifference
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
@@ -121,7 +121,7 @@ class Rerun:
             )
         return " ".join(out)
 
-    def _on_ways(self, old: Apart, new: Apart) -> Iterator[str]:
+    def _on_ways(self, old: WayDifference, new: WayDifference) -> Iterator[str]:
         if {"gyro_scale", "gyro_cross_coupling"} & {*self.found}:
             yield (
                 f"Turns come out {new.angle:.2g} rad off instead of"

@@ -43,7 +43,7 @@ from fieldcal.sim_device.profile import (
     Triad,
     Truth,
 )
-from fieldcal.twin.physical import Settled
+from fieldcal.twin.physical import TwinState
 
 INSTANTS = ("at_s", "from_s", "to_s")
 """Parameters that are instants of device time."""
@@ -59,12 +59,12 @@ POINTS = 200
 VIBRATION = "vibration_rectification"
 
 
-def device_of(explanation: Explanation, found: Diagnosis, known: Settled) -> Profile:
+def device_of(explanation: Explanation, found: Diagnosis, known: TwinState) -> Profile:
     """The device as a diagnosis knows it, with all that was found in it."""
     prepared = explanation.prepared
     start = float(prepared.source.block.t[0])
     effects = [*settled(known.state.terms, start), *of_earth(known.heading)]
-    effects += known_chances(prepared.source.about)
+    effects += known_random_effects(prepared.source.about)
     for tone in prepared.tones:
         effects += of_tone(tone, start)
     for one in found.effects:
@@ -135,7 +135,7 @@ def of_earth(heading: float | None) -> Iterator[SimulatedEffect]:
             yield vocabulary.effect("heading_error", {"psi_deg": psi})
 
 
-def known_chances(about: Description) -> Iterator[SimulatedEffect]:
+def known_random_effects(about: Description) -> Iterator[SimulatedEffect]:
     """Random effects and those on samples that the simulation has already."""
     for name, given in about.model.items():
         if isinstance(catalogue()[name], Scatter | Chain):

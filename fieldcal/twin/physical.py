@@ -38,7 +38,7 @@ HEADINGS = np.linspace(-np.pi, np.pi, 3601)
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
+class TwinState:
     """Where a device stands.
 
     Attributes
@@ -52,14 +52,14 @@ class Settled:
     heading: float | None = None
 
 
-def as_found(explanation: Explanation) -> Settled:
+def fitted_device(explanation: Explanation) -> TwinState:
     """The device with all that was found."""
     best, heading, rate = explanation.best, None, np.zeros(3)
     if explanation.shows_earth:
         heading = _heading(best)
         rate = _turned(best.rows.x, np.array([heading]))[0]
     state = _given(explanation, best, rate)
-    return Settled(from_one_instant(state, best.dictionary.since), heading)
+    return TwinState(from_one_instant(state, best.dictionary.since), heading)
 
 
 def without(explanation: Explanation, fitted: Fitted) -> State:

@@ -66,7 +66,7 @@ def rerun(explanation: Explanation, found: Diagnosis, raw: Fitted) -> Rerun:
         If the session's windows overlap, so that no device could go through them.
 
     """
-    known = physical.as_found(explanation)
+    known = physical.fitted_device(explanation)
     profile = twin.device_of(explanation, found, known)
     cases = _cases(explanation, profile, known.state, raw)
     followed = [{t.positions for t in cases[n].turns} for n in ("refitted", "twin")]

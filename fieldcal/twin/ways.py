@@ -26,7 +26,7 @@ from fieldcal.sim_device.way import Manoeuvre
 
 
 @dataclass(frozen=True, slots=True)
-class Apart:
+class WayDifference:
     """Recorded less replayed on the ways.
 
     Attributes
@@ -52,7 +52,7 @@ def way_of(turn: Turn, start: float) -> Manoeuvre:
     return Manoeuvre(turn.t - start, turn.x.mounting @ total.T)
 
 
-def apart(turns: Sequence[Turn], recorded: Block, replayed: Block) -> Apart:
+def apart(turns: Sequence[Turn], recorded: Block, replayed: Block) -> WayDifference:
     """How far a replay is from the recording on the ways.
 
     `replayed` has samples at the edges of every turn, `recorded` all there are.
@@ -68,8 +68,8 @@ def apart(turns: Sequence[Turn], recorded: Block, replayed: Block) -> Apart:
         forces.append((turn.acc - turn.means(again.acc)).ravel())
         angles.append(trapezoid(there.gyr, there.t) - trapezoid(again.gyr, again.t))
     if not forces:
-        return Apart(np.nan, np.nan)
-    return Apart(_rms(np.concatenate(forces)), _rms(np.concatenate(angles)))
+        return WayDifference(np.nan, np.nan)
+    return WayDifference(_rms(np.concatenate(forces)), _rms(np.concatenate(angles)))
 
 
 def trapezoid(values: Array, t: Array) -> Array:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.rounding import shown
+from fieldcal.windows.rounding import visible_steps
 from fieldcal.windows.sums import channels, finest, warmth
 from fieldcal.windows.trend import line
 
@@ -82,7 +82,7 @@ class CellTable:
         trust = np.sqrt(np.minimum(1.0, counts / np.where(usual > 0, usual, 1.0)))
         if (trust == 1.0).all():
             return means
-        laid = line(held(means))
+        laid = line(hold_last(means))
         steady: Array = laid + trust * np.where(counts > 0, means - laid, 0.0)
         return steady
 
@@ -149,7 +149,7 @@ class CellTable:
     @property
     def rounding(self) -> Array:
         """Resolution where the noise does not hide it, (6,); 0 elsewhere."""
-        return shown(self.resolution, self.noise)
+        return visible_steps(self.resolution, self.noise)
 
 
 class Cells:
@@ -259,7 +259,7 @@ def _ratio(sums: Array, counts: Array) -> Array:
     return ratio
 
 
-def held(means: Array, before: Array | None = None) -> Array:
+def hold_last(means: Array, before: Array | None = None) -> Array:
     """Means (m, c) with the one before where one is missing, 0 before the first.
 
     Parameters

@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.quiet import NORMAL, Quiet, running
+from fieldcal.windows.quiet import NORMAL, QuietNoise, running
 
 Kind = Literal["push", "step", "shake"]
 
@@ -58,7 +58,7 @@ class Statistic:
     z: Array
 
 
-def pushes(about: Array, noise: Quiet, least: Array) -> list[Statistic]:
+def pushes(about: Array, noise: QuietNoise, least: Array) -> list[Statistic]:
     """Deviations of cell means from their line, `about` (m, c), (1).
 
     `least` (c,) is the least that a spread can be, SI.
@@ -70,7 +70,7 @@ def pushes(about: Array, noise: Quiet, least: Array) -> list[Statistic]:
     ]
 
 
-def steps(means: Array, noise: Quiet, least: Array) -> list[Statistic]:
+def steps(means: Array, noise: QuietNoise, least: Array) -> list[Statistic]:
     """Changes between neighbouring running means, (2)."""
     levels = zip(running(means), np.sqrt(2.0) * noise.allan, strict=False)
     tests = []

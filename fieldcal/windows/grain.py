@@ -55,18 +55,18 @@ def variance(grain: Grain, mean: Array, sampled: Array, seen: Array) -> Array:
     if not grain.cut:
         return rounded
     per = np.where(grain.step > 0, grain.step, 1.0)
-    own = rounding.before(sampled, q)
+    own = rounding.noise_before_rounding(sampled, q)
     zone = _around_zero(np.nan_to_num(mean) / per, own / per)
     return rounded + np.where(grain.step > 0, grain.step**2 * zone, 0.0)
 
 
-def shows(grain: Grain, mean: Array, sampled: Array) -> Array:
+def visible_step(grain: Grain, mean: Array, sampled: Array) -> Array:
     """Largest jump between neighbouring values where noise does not hide it, (6,).
 
     0 where it does, or where the steps are not known; as for `variance`.
     """
     q = grain.step
-    fine = rounding.shown(q, sampled)
+    fine = rounding.visible_steps(q, sampled)
     if not grain.cut:
         return fine
     around = (np.abs(np.nan_to_num(mean)) < ZERO * q) & (sampled < WIDE * q)

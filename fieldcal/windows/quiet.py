@@ -39,7 +39,7 @@ _ENOUGH = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Quiet:
+class QuietNoise:
     """The noise of c channels at the levels that fit into a window.
 
     Attributes
@@ -67,7 +67,7 @@ def running(values: Array, levels: int = LEVELS) -> list[Array]:
     return [(sums[2**k :] - sums[: -(2**k)]) / 2**k for k in fit]
 
 
-def quiet(means: Array, before: Quiet | None = None) -> Quiet:
+def quiet(means: Array, before: QuietNoise | None = None) -> QuietNoise:
     """Noise of cell means (m, c), no nan, m >= 2; with that of the windows before."""
     levels = running(means)
     measured: list[Array] = []
@@ -79,11 +79,11 @@ def quiet(means: Array, before: Quiet | None = None) -> Quiet:
     known = np.array(measured)
     white, flat = _white_and_flat(known)
     tau = 2.0 ** np.arange(len(known), len(levels))[:, None]
-    own = Quiet(np.vstack([known, np.sqrt(white / tau + flat)]), len(means))  # (2)
+    own = QuietNoise(np.vstack([known, np.sqrt(white / tau + flat)]), len(means))  # (2)
     return own if before is None else _pooled(own, before)
 
 
-def _pooled(own: Quiet, before: Quiet) -> Quiet:
+def _pooled(own: QuietNoise, before: QuietNoise) -> QuietNoise:
     """Noise of a window with what was known before, which bounds what it can be."""
     common = min(len(own.allan), len(before.allan))
     known = before.allan[:common]
@@ -93,7 +93,7 @@ def _pooled(own: Quiet, before: Quiet) -> Quiet:
     total = own.cells + before.cells
     pooled = np.sqrt((own.cells * new**2 + before.cells * known**2) / total)
     rest = (own if len(own.allan) > common else before).allan[common:]
-    return Quiet(np.vstack([pooled, rest]), total)
+    return QuietNoise(np.vstack([pooled, rest]), total)
 
 
 def _white_and_flat(allan: Array) -> tuple[Array, Array]:

@@ -44,7 +44,7 @@ def least(step: Array) -> Array:
     return deviation
 
 
-def before(sampled: Array, step: Array) -> Array:
+def noise_before_rounding(sampled: Array, step: Array) -> Array:
     """Noise before rounding, (c,), as far as that of the samples tells it, (1)."""
     return np.sqrt(np.maximum(sampled**2 - least(step) ** 2, 0.0))
 
@@ -62,7 +62,7 @@ def of_mean(step: Array, sampled: Array) -> Array:
     h = np.arange(1.0, WAVES + 2)
     size = 1 / (2 * (np.pi * h) ** 2)
     size[-1] = 1 / 12 - size[:-1].sum()
-    s = before(sampled, step) / np.where(step > 0, step, 1.0)
+    s = noise_before_rounding(sampled, step) / np.where(step > 0, step, 1.0)
     fading = np.exp(-((2 * np.pi * h * s[..., None]) ** 2))
     variance: Array = step**2 * (fading @ size)  # (2)
     return variance
@@ -75,6 +75,6 @@ def of_few(step: Array, sampled: Array) -> Array:
     return variance
 
 
-def shown(step: Array, sampled: Array) -> Array:
+def visible_steps(step: Array, sampled: Array) -> Array:
     """Steps that the noise of the samples does not hide, (c,); 0 elsewhere."""
     return np.where(np.nan_to_num(sampled) < FINE * step, step, 0.0)

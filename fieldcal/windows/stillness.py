@@ -21,7 +21,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows.cells import CELL, Cells, resolution
 from fieldcal.windows.limits import StillnessLimits
-from fieldcal.windows.rounding import shown
+from fieldcal.windows.rounding import visible_steps
 
 SPAN = 8
 """Cells that are looked at together: 0.8 s."""
@@ -107,7 +107,9 @@ class Stillness:
 
     def _noise(self, sampled: Array) -> Array:
         smallest = _SMALLEST * np.quantile(self._noises, 0.1, axis=0)
-        noise: Array = np.maximum(smallest, shown(resolution(self._finest), sampled))
+        noise: Array = np.maximum(
+            smallest, visible_steps(resolution(self._finest), sampled)
+        )
         return noise
 
     def _unrest(self, y: Array, noise: Array) -> float:

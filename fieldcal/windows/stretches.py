@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells, CellTable, held
+from fieldcal.windows.cells import CELL, Cells, CellTable, hold_last
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.verdict import judge
 
@@ -86,7 +86,7 @@ def still_stretches(
     cells = Cells()
     cells.add(block)
     table = cells.table
-    return still_in(summary(table), table.origin, between, min_seconds)
+    return still_stretches_of_file(summary(table), table.origin, between, min_seconds)
 
 
 def summary(cells: CellTable) -> Array:
@@ -94,7 +94,7 @@ def summary(cells: CellTable) -> Array:
     return np.column_stack([cells.times, cells.sums])
 
 
-def still_in(
+def still_stretches_of_file(
     rows: CellRows, origin: Array, between: Between, min_seconds: float
 ) -> list[tuple[float, float]]:
     """`still_stretches` of a recording that does not fit into memory.
@@ -154,7 +154,9 @@ def _spans(rows: CellRows, usual: Array) -> Iterator[Spans]:
     for first in range(0, len(rows) - _SPAN + 1, _PART):
         part = rows[first : first + _PART + _SPAN - 1]
         cells = _table(part, np.zeros(6))
-        means = held(np.where(cells.counts < usual / 2, np.nan, cells.means), before)
+        means = hold_last(
+            np.where(cells.counts < usual / 2, np.nan, cells.means), before
+        )
         before = means[_PART - 1 : _PART]
         view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
         yield first, view.std(axis=-1), view.mean(axis=-1)

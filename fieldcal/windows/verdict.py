@@ -12,7 +12,7 @@ from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.windows.cells import CELL, CellTable
 from fieldcal.windows.disturbance import Kind, Statistic, pushes, repeats, shakes, steps
 from fieldcal.windows.limits import StillnessLimits
-from fieldcal.windows.quiet import Quiet, quiet
+from fieldcal.windows.quiet import QuietNoise, quiet
 from fieldcal.windows.trend import line
 
 THRESHOLD = 5.8
@@ -87,13 +87,13 @@ class Verdict:
 
     worst: Departure
     present: float
-    quiet: Quiet | None
+    quiet: QuietNoise | None
 
 
 def judge(
     cells: CellTable,
     limits: StillnessLimits,
-    before: Quiet | None = None,
+    before: QuietNoise | None = None,
     shows: Array | None = None,
 ) -> Verdict:
     """Judge the samples so far by their own noise and that of the windows before.
@@ -122,7 +122,7 @@ def judge(
 
 
 def _tests(
-    cells: CellTable, means: Array, laid: Array, noise: Quiet, least: Array
+    cells: CellTable, means: Array, laid: Array, noise: QuietNoise, least: Array
 ) -> list[Statistic]:
     m = len(means)
     return [
@@ -167,7 +167,7 @@ def _worst(cells: CellTable, test: Statistic, allowed: float) -> Departure:
 
 
 def _beyond_drift(
-    cells: CellTable, laid: Array, noise: Quiet, limits: StillnessLimits
+    cells: CellTable, laid: Array, noise: QuietNoise, limits: StillnessLimits
 ) -> Departure:
     """Change over the window, by the line, allowed for what noise can pretend."""
     change = laid[-1] - laid[0]

@@ -19,11 +19,11 @@ import numpy as np
 from fieldcal.core.errors import InputError, Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows.cells import CELL, Cells
-from fieldcal.windows.grain import shows, variance
+from fieldcal.windows.grain import variance, visible_step
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.longrun import MeanError, error_of_mean
 from fieldcal.windows.mean import Average
-from fieldcal.windows.quiet import Quiet
+from fieldcal.windows.quiet import QuietNoise
 from fieldcal.windows.verdict import Verdict, judge
 
 FEWEST = 10
@@ -47,7 +47,7 @@ class LearnedNoise:
 
     """
 
-    quiet: Quiet | None
+    quiet: QuietNoise | None
     seen: Array
 
     @property
@@ -208,7 +208,7 @@ class Window:
         if self._verdict is None:
             before = self._before.quiet if self._before else None
             sampled = np.nan_to_num(self._cells.noise)
-            jumps = shows(self._grain, self.mean, sampled)
+            jumps = visible_step(self._grain, self.mean, sampled)
             self._verdict = judge(self._cells, self._limits, before, jumps)
         return self._verdict
 

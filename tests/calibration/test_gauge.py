@@ -15,7 +15,7 @@ from session_folders import places, recorded, write_session
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.document import schema
-from fieldcal.calibration.gauge import Gauge, inward, outward
+from fieldcal.calibration.gauge import Gauge, in_sample_units, in_si_units
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device.profile import Profile
@@ -149,11 +149,11 @@ def test_out_and_in_again(acc: float, gyr: float, units: tuple[str, str]) -> Non
         0.1,
         info={"gauge": Gauge((acc, gyr), units).table()},
     )
-    again = inward(outward(made))
+    again = in_si_units(in_sample_units(made))
     np.testing.assert_allclose(again.values, made.values, rtol=1e-12)
     np.testing.assert_allclose(again.covariance, made.covariance, rtol=1e-12)
     assert again.units == made.units
-    assert outward(made).value("base_tilt.about_x_deg") == -0.3
+    assert in_sample_units(made).value("base_tilt.about_x_deg") == -0.3
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def test_angles_of_the_faces_and_edges(
 def test_of_another_rate_only_what_lies_along_the_turn_lasts() -> None:
     """The mean over a whole turn, by turning in small steps."""
     rates = np.array([[0.3, -0.2, 0.6], [0, 0, 0], [0, 0, 1e-3], [-5, 0, 0]])
-    found = frames.lasting(rates)
+    found = frames.mean_rotation(rates)
     for rate, left in zip(rates, found, strict=True):
         speed = np.linalg.norm(rate)
         axis = rate / speed if speed else rate

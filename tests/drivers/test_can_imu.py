@@ -22,7 +22,7 @@ from processes import FIELDCAL, SIM
 from fieldcal.cli import main
 from fieldcal.core.errors import DeviceError, DeviceSilent
 from fieldcal.core.samples import Block, concat
-from fieldcal.drivers.can_bus import BusSource, why
+from fieldcal.drivers.can_bus import BusSource, open_error
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.can_imu import CanImu
 from fieldcal.drivers.driver import Driver, open_driver
@@ -337,7 +337,7 @@ def test_a_kernel_without_can_and_channels_that_are_not_there(
         (19, "no such CAN channel"),
         (100, "is down"),
     ):
-        assert says in why("socketcan", OSError(number, "what the kernel says"))
+        assert says in open_error("socketcan", OSError(number, "what the kernel says"))
 
 
 def test_a_network_without_multicast(

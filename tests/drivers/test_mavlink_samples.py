@@ -18,7 +18,7 @@ from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.mavlink_samples import Decoder
-from fieldcal.drivers.mavlink_units import unbiased
+from fieldcal.drivers.mavlink_units import untruncated_mean
 from fieldcal.drivers.options import Options
 from fieldcal.sim_device.mavlink_packing import HIGHRES, RAW, messages
 
@@ -90,7 +90,7 @@ def test_high_resolution_comes_back_as_floats() -> None:
 def test_cutting_has_no_bias_left() -> None:
     x = np.random.default_rng(2).uniform(-50, 50, 200_000)
     k = np.trunc(x)
-    error = unbiased(k) - x
+    error = untruncated_mean(k) - x
     for some, share in ((k > 0, 1 / 12), (k < 0, 1 / 12), (k == 0, 1 / 3)):
         assert abs(error[some].mean()) < 5 * np.sqrt(share / some.sum())
         assert error[some].var() == pytest.approx(share, rel=0.05)

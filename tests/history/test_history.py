@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldcal.acceptance.assessment import assess, remember
+from fieldcal.acceptance.assessment import assess, store_in_history
 from fieldcal.calibration import Calibration, limits
 from fieldcal.cli import main
 from fieldcal.commands.history import lines
@@ -111,7 +111,7 @@ def test_a_damaged_file_is_said_and_a_run_goes_on(
     assert np.array_equal(made.values, found.values)
     if content:
         assert any("name another with --history" in w for w in made.warnings)
-        assert "not kept" in remember(History(path), session, made)
+        assert "not kept" in store_in_history(History(path), session, made)
 
 
 def test_a_history_of_another_version_is_refused(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importers.csv_like import TextColumns
 from fieldcal.importing.recording import ReadOptions as Layout
-from fieldcal.importing.validation import Judge
+from fieldcal.importing.validation import RowValidator
 from fieldcal.session.folder import Session
 
 ACC = ("ax", "ay", "az")
@@ -24,7 +24,7 @@ ACC = ("ax", "ay", "az")
 
 def read(path: Path, layout: Layout) -> Block:
     recording = TextColumns(path, layout)
-    judge = Judge(str(path), recording.place, repair=False)
+    judge = RowValidator(str(path), recording.place, repair=False)
     return concat(judge.good(block) for block in recording.blocks("0"))
 
 

@@ -59,7 +59,7 @@ def fifo(
     return rows
 
 
-def brought(path: Path, content: bytes, tmp_path: Path, *call: str) -> Path:
+def import_log(path: Path, content: bytes, tmp_path: Path, *call: str) -> Path:
     path.write_bytes(content)
     out = tmp_path / "out"
     assert main(["import", str(path), "-o", str(out), *call]) == 0
@@ -91,7 +91,7 @@ def test_every_sample_of_a_fifo_is_taken_with_its_partner(tmp_path: Path) -> Non
     topics = [f"sensor_{k}_fifo.{i}" for k in ("accel", "gyro") for i in (0, 1)]
     formats = dict.fromkeys(("sensor_accel_fifo", "sensor_gyro_fifo"), FIFO)
     content = log(formats, topics, [row for _, row in sorted(rows)])
-    out = brought(tmp_path / "f.ulg", content, tmp_path)
+    out = import_log(tmp_path / "f.ulg", content, tmp_path)
     for i in (0, 1):
         folder = out / f"sensor_accel_fifo.{i}"
         block = Session.open(folder).block
@@ -117,7 +117,7 @@ def test_a_gap_in_a_fifo_is_not_filled(tmp_path: Path) -> None:
     content = log(
         {"sensor_accel_fifo": FIFO}, ["sensor_accel_fifo.0"], [row for _, row in rows]
     )
-    out = brought(tmp_path / "f.ulg", content, tmp_path)
+    out = import_log(tmp_path / "f.ulg", content, tmp_path)
     block = Session.open(out).block
     assert np.isnan(block.gyr).all() and len(block) == len(values)
     # 47 ms between two readings: the samples of the second lie just before it
@@ -162,7 +162,7 @@ def test_integrals_are_read_where_there_is_nothing_else(tmp_path: Path) -> None:
         body += struct.pack("<3f", *(f[i] * 1e-6 * acc_us))
         rows.append(body + struct.pack("<IIB", gyr_us, acc_us if i else 0, 0))
     content = log({"vehicle_imu": INTEGRALS}, ["vehicle_imu.0"], rows)
-    out = brought(tmp_path / "v.ulg", content, tmp_path)
+    out = import_log(tmp_path / "v.ulg", content, tmp_path)
     block = Session.open(out).block
     assert np.isnan(block.acc[0]).all()
     np.testing.assert_allclose(block.acc[1:], f[1:], rtol=1e-6)
@@ -225,7 +225,7 @@ def test_batches_of_either_sensor_are_read_in_turn(tmp_path: Path) -> None:
         values, mul = ((f, 200), (w, 4000))[k % 2]
         rows += batch(k, bool(k % 2), 3 + 0.2 * k, values[part], mul, 1000.0)
     content = dataflash(rows)
-    out = brought(tmp_path / "b.bin", content, tmp_path)
+    out = import_log(tmp_path / "b.bin", content, tmp_path)
     block = Session.open(out).block
     acc = np.isfinite(block.acc[:, 0])
     assert (np.isfinite(block.gyr[:, 0]) == ~acc).all() and acc.sum() == 640
@@ -244,7 +244,7 @@ def test_batches_taken_at_once_are_put_side_by_side(tmp_path: Path) -> None:
     f, w = true(1, 64, 9.0), true(2, 128, 0.3)
     rows = batch(0, False, 3.0, f, 200, 1000.0) + batch(1, True, 3.0, w, 4000, 2000.0)
     content = dataflash(rows, option=0.0)
-    block: Block = Session.open(brought(tmp_path / "b", content, tmp_path)).block
+    block: Block = Session.open(import_log(tmp_path / "b", content, tmp_path)).block
     both = np.isfinite(block.acc[:, 0])
     assert len(block) == 128 and both.sum() == 64
     np.testing.assert_allclose(block.acc[both], f, atol=1.0001 / 200)
@@ -259,7 +259,7 @@ def test_a_batch_that_lacks_a_part_is_left_out_and_said(
     whole = batch(0, False, 3.0, f[:64], 200, 1000.0)
     broken = batch(1, False, 4.0, f[64:], 200, 1000.0)
     content = dataflash(whole + broken[:2], option=None)
-    out = brought(tmp_path / "b", content, tmp_path)
+    out = import_log(tmp_path / "b", content, tmp_path)
     assert len(Session.open(out).block) == 64
     assert (
         "1 batches of which a part is missing are left out" in capsys.readouterr().err

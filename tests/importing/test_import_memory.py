@@ -11,10 +11,10 @@ import pytest
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.ingest import bring_in
+from fieldcal.importing.ingest import import_stream
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
-from fieldcal.importing.spool import IN_MEMORY, Spilled
-from fieldcal.importing.validation import Judge
+from fieldcal.importing.spool import IN_MEMORY, SpooledRows
+from fieldcal.importing.validation import RowValidator
 from fieldcal.session.folder import Session
 from fieldcal.windows import still_stretches
 
@@ -46,8 +46,10 @@ def peak(folder: Path, hours: float) -> tuple[int, int]:
     recording.hours = hours
     tracemalloc.start()
     try:
-        brought = bring_in(recording, "0", folder / f"{hours}", {"format": 1}, 60.0)
-        return tracemalloc.get_traced_memory()[1], len(brought.stretches)
+        imported = import_stream(
+            recording, "0", folder / f"{hours}", {"format": 1}, 60.0
+        )
+        return tracemalloc.get_traced_memory()[1], len(imported.stretches)
     finally:
         tracemalloc.stop()
 
@@ -72,7 +74,7 @@ def test_stretches_of_a_stream_are_those_of_its_samples(tmp_path: Path) -> None:
 
 def test_what_is_put_aside_comes_back(tmp_path: Path) -> None:
     rows = np.arange(3.0 * (IN_MEMORY // 12)).reshape(-1, 3)
-    with Spilled(tmp_path) as spilled:
+    with SpooledRows(tmp_path) as spilled:
         for part in np.array_split(rows, 7):
             spilled.add(part)
         assert len(spilled) == len(rows)
@@ -90,7 +92,7 @@ def test_of_a_log_that_is_bad_all_over_only_the_number_is_kept(tmp_path: Path) -
     assert recording.mended[-1] == "988 more damaged places, left out"
     with pytest.raises(InputError, match="byte 5: is no message; copy"):
         Long(tmp_path / "x", ReadOptions()).damaged("byte 5", "is no message")
-    judge = Judge("x", lambda row: f"row {row}", repair=True)
+    judge = RowValidator("x", lambda row: f"row {row}", repair=True)
     t = np.arange(4000.0)
     acc = np.ones((4000, 3))
     acc[::2, 0] = np.inf

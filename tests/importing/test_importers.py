@@ -18,9 +18,9 @@ from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import formats, open_recording
 from fieldcal.importing import recording as recordings
-from fieldcal.importing.ingest import bring_in
+from fieldcal.importing.ingest import import_stream
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.validation import Judge
+from fieldcal.importing.validation import RowValidator
 from fieldcal.session import sample_files
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import findings
@@ -270,7 +270,7 @@ def test_rows_that_are_let_through_always_go_forward(
 ) -> None:
     t = np.array(times)
     block = Block.of(t, np.ones((len(t), 3)), np.ones((len(t), 3)))
-    judge = Judge("x", lambda row: f"row {row}", repair=True)
+    judge = RowValidator("x", lambda row: f"row {row}", repair=True)
     parts = [judge.good(block[i : i + cut]) for i in range(0, len(t), cut)]
     kept = concat(parts).t
     assert (np.diff(kept) > 0).all() and np.isfinite(kept).all()
@@ -385,7 +385,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, bytes]:
     recording = open_recording(
         folder / "x.parquet", ReadOptions(tuple(COLUMNS.split(",")))
     )
-    bring_in(recording, "0", folder / "s", {"format": 1}, 2.0)
+    import_stream(recording, "0", folder / "s", {"format": 1}, 2.0)
     return block, (folder / "s" / "samples.parquet").read_bytes()
 
 

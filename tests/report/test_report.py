@@ -20,7 +20,7 @@ from hypothesis.extra import numpy as hnp
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.report import Earlier, Material, gather, packing, render
+from fieldcal.report import EarlierCalibration, Material, gather, packing, render
 from fieldcal.report.agreement import correlations
 from fieldcal.report.blocks import Figure
 from fieldcal.report.packing import MISSING, PIECE, Columns, pack, quantised
@@ -97,7 +97,7 @@ def test_no_peak_of_a_long_recording_is_lost_and_the_edges_are_whole() -> None:
     t = 100.0 + np.arange(n) / 1000
     x = rng.standard_normal((n, 7))
     x[123_456, 2], x[200_000:201_000, 4] = 50.0, np.nan
-    packed = pack(Columns(t, x), packing.around([150.0, 151.0, 300.0], 3.0))
+    packed = pack(Columns(t, x), packing.stretches_around([150.0, 151.0, 300.0], 3.0))
     base = packed["base"]
     index = np.minimum((t - base["start"]) // base["dt"], base["n"] - 1).astype(int)
     for c in range(7):
@@ -154,7 +154,7 @@ def test_the_page_has_every_section_and_needs_nothing_from_elsewhere(
     main(["diagnose", str(session)])
     first = gather(bench)
     assert first.calibration is not None
-    earlier = [Earlier("May", first.calibration)]
+    earlier = [EarlierCalibration("May", first.calibration)]
     page = Tags(render(gather(session, earlier)))
     ids = [a["id"] for a in page.named("section")]
     assert ids == [
@@ -246,9 +246,9 @@ def test_a_decision_by_limits_stands_on_top(bench: Path, tmp_path: Path) -> None
     assert "not kept" in text and "not checked" in text
 
 
-def _earlier(session: Path) -> tuple[Earlier, ...]:
+def _earlier(session: Path) -> tuple[EarlierCalibration, ...]:
     found = gather(session).calibration
-    return (Earlier(HOSTILE, found),) if found else ()
+    return (EarlierCalibration(HOSTILE, found),) if found else ()
 
 
 leaf = (

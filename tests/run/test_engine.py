@@ -18,12 +18,12 @@ from fieldcal.drivers.driver import Driver, Health
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, hold
 from fieldcal.run.engine import Engine
-from fieldcal.run.interruptions import Again
+from fieldcal.run.interruptions import RepeatPosition
 from fieldcal.run.operator.protocol import OperatorView, Wish
-from fieldcal.run.position_check import Held
+from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
-from fieldcal.run.waiting import Placing
-from fieldcal.run.warm_up import Warmth
+from fieldcal.run.waiting import PositionWait
+from fieldcal.run.warm_up import WarmUp
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
@@ -269,7 +269,7 @@ def test_a_taken_position_is_wanted_again(bench: Bench) -> None:
     taken: dict[int, Average] = {}
     turner = bench.turner
     engine = Engine(turner.driver, turner, ABOUT, bench.recorder, 60.0, taken)
-    with pytest.raises(Again) as again:
+    with pytest.raises(RepeatPosition) as again:
         engine.run(_then_repeat(turner))
     assert again.value.index == 0 and list(taken) == [0]
 
@@ -293,13 +293,15 @@ def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
         tilt = turn(*np.deg2rad(rng.uniform(-1.5, 1.5, 2)))
         f = {i: _force(p, tilt) for i, p in enumerate(FIVE)}
         for wanted, there in itertools.permutations(range(5), 2):
-            known = Held(FIVE[wanted - 1], f[wanted - 1]) if wanted else None
-            placing = Placing(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
-            placing.add(_resting(f[there]), 4.0)
-            assert not placing.arrived, (wanted, there)
-            placing = Placing(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
-            placing.add(_resting(f[wanted]), 4.0)
-            assert placing.arrived, (wanted, placing.problem)
+            known = (
+                AcceptedPosition(FIVE[wanted - 1], f[wanted - 1]) if wanted else None
+            )
+            waiting = PositionWait(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
+            waiting.add(_resting(f[there]), 4.0)
+            assert not waiting.arrived, (wanted, there)
+            waiting = PositionWait(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
+            waiting.add(_resting(f[wanted]), 4.0)
+            assert waiting.arrived, (wanted, waiting.problem)
 
 
 FIVE_ABOUT = description.parse(
@@ -325,12 +327,12 @@ def _resting(f: Array) -> Block:
 
 
 def test_nothing_is_known_of_a_time_without_samples() -> None:
-    placing = Placing(Hold(0, FIVE[0], 10.0), FIVE_ABOUT, None)
+    waiting = PositionWait(Hold(0, FIVE[0], 10.0), FIVE_ABOUT, None)
     block = _resting(np.array([0.0, -9.81, 0.0]))
-    placing.add(block[:150], 1.5)
-    assert placing.seconds > 1.0
-    placing.add(block[300:], 3.0)
-    assert placing.seconds < 1.5 and not placing.arrived
+    waiting.add(block[:150], 1.5)
+    assert waiting.seconds > 1.0
+    waiting.add(block[300:], 3.0)
+    assert waiting.seconds < 1.5 and not waiting.arrived
 
 
 def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
@@ -338,8 +340,8 @@ def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
     driver = InProcess(VirtualDevice(replace(Profile(), temperature=warming), seed=3))
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         turner = Turner(driver)
-        warmth = Warmth(0.5, 40.0)
-        engine = Engine(driver, turner, ABOUT, recorder, warmth=warmth)
+        warm_up = WarmUp(0.5, 40.0)
+        engine = Engine(driver, turner, ABOUT, recorder, warm_up=warm_up)
         engine.run(hold_all(TWO[:1], 10.0))
     assert "still warming up" in turner.told[0] and "Enter goes on" in turner.told[0]
     states = [v.reason for v in turner.views]
@@ -353,23 +355,23 @@ def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("step", "rate"), [(0.0, 0.0), (1.0, 0.0), (0.01, 0.3)])
 def test_a_steady_temperature_is_no_warming_up(step: float, rate: float) -> None:
     for seed in range(20):
-        warmth = Warmth(0.5, 600.0)
+        warm_up = WarmUp(0.5, 600.0)
         for block in _temperatures(seed, step, rate):
-            warmth.add(block)
-            assert not warmth.says
+            warm_up.add(block)
+            assert not warm_up.says
 
 
 @pytest.mark.parametrize(("step", "within"), [(0.0, 15.0), (1.0, 70.0)])
 def test_warming_up_is_noticed_also_in_whole_degrees(
     step: float, within: float
 ) -> None:
-    warmth, said = Warmth(0.5, 600.0), np.inf
+    warm_up, said = WarmUp(0.5, 600.0), np.inf
     for block in _temperatures(1, step, 4.0):
-        warmth.add(block)
-        if warmth.says:
+        warm_up.add(block)
+        if warm_up.says:
             said = min(said, float(block.t[-1]))
     assert said < within
-    rate, sigma = warmth.rate
+    rate, sigma = warm_up.rate
     assert abs(rate - 4.0) < 4 * sigma + 0.05
 
 

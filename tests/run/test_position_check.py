@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from fieldcal.core.frames import force, turn
 from fieldcal.core.positions import FIVE, SETS, TWO, Position
 from fieldcal.core.samples import Array
-from fieldcal.run.position_check import Held, judge
+from fieldcal.run.position_check import AcceptedPosition, check_position
 
 G = 9.81
 BIAS = np.array([0.25, -0.15, 0.2])
@@ -27,13 +27,13 @@ def measured(alpha: float, beta: float, tilt: float = 0.0) -> Array:
 def test_the_right_positions_are_accepted_from_a_raw_device_on_a_tilted_base(
     name: str, tilt: float
 ) -> None:
-    held: Held | None = None
+    held: AcceptedPosition | None = None
     for position in SETS[name]:
         alpha, beta = position.degrees or (0, 0)
         f = measured(alpha, beta, tilt)
-        arrival = judge(position, f, G, held)
+        arrival = check_position(position, f, G, held)
         assert arrival.ok, (position.name, arrival.problem)
-        held = held or Held(position, f)
+        held = held or AcceptedPosition(position, f)
 
 
 @pytest.mark.parametrize(
@@ -50,34 +50,34 @@ def test_the_right_positions_are_accepted_from_a_raw_device_on_a_tilted_base(
     ],
 )
 def test_a_slip_is_named(alpha: float, beta: float, says: str) -> None:
-    held = Held(TWO[0], measured(0, 0))
-    arrival = judge(TWO[1], measured(alpha, beta), G, held)
+    held = AcceptedPosition(TWO[0], measured(0, 0))
+    arrival = check_position(TWO[1], measured(alpha, beta), G, held)
     assert not arrival.ok and says in arrival.problem
 
 
 def test_a_step_of_two_and_a_half_degrees_is_told_from_none() -> None:
-    held = Held(FIVE[1], measured(22.5, 0))
-    assert not judge(FIVE[2], measured(22.5, 0), G, held).ok
-    assert judge(FIVE[2], measured(22.5, 2.5), G, held).ok
-    assert not judge(FIVE[2], measured(22.5, -2.5), G, held).ok
+    held = AcceptedPosition(FIVE[1], measured(22.5, 0))
+    assert not check_position(FIVE[2], measured(22.5, 0), G, held).ok
+    assert check_position(FIVE[2], measured(22.5, 2.5), G, held).ok
+    assert not check_position(FIVE[2], measured(22.5, -2.5), G, held).ok
 
 
 def test_the_first_position_upside_down_or_in_a_wrong_unit() -> None:
-    over = judge(TWO[0], measured(180, 0), G, None)
+    over = check_position(TWO[0], measured(180, 0), G, None)
     assert not over.ok and "upside down" in over.problem
-    in_g = judge(TWO[0], measured(0, 0) / G, G, None)
+    in_g = check_position(TWO[0], measured(0, 0) / G, G, None)
     assert not in_g.ok and "unit" in in_g.problem
 
 
 def test_without_angles_only_the_norm_is_judged() -> None:
     anywhere = Position("as you like")
-    assert judge(anywhere, measured(77, 33), G, None).ok
-    assert not judge(anywhere, 2 * measured(77, 33), G, None).ok
+    assert check_position(anywhere, measured(77, 33), G, None).ok
+    assert not check_position(anywhere, 2 * measured(77, 33), G, None).ok
 
 
 @given(st.floats(-180, 180), st.floats(-90, 90))
 def test_angles_shown_are_the_angles_held(alpha: float, beta: float) -> None:
     f = force(np.deg2rad(alpha), np.deg2rad(beta), G)
-    seen = judge(Position("x"), f, G, None)
+    seen = check_position(Position("x"), f, G, None)
     again = force(np.deg2rad(seen.alpha_deg), np.deg2rad(seen.beta_deg), G)
     np.testing.assert_allclose(again, f, atol=1e-6)

@@ -20,7 +20,7 @@ from benchmarks.kills import Bench, windows
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
-from fieldcal.run.session_run import resumed, taken_before
+from fieldcal.run.session_run import recorded_averages, resume
 from fieldcal.session import description
 from fieldcal.session.folder import MARKS, Session
 from fieldcal.session.recorder import SAMPLES, Recorder
@@ -95,29 +95,29 @@ def test_what_was_taken_is_known_and_what_was_wanted_again_is_not(
     tmp_path: Path,
 ) -> None:
     recorded(tmp_path / "s")
-    session, tables = resumed(tmp_path / "s")
-    taken = taken_before(session, plan_file.task(tables, "s"))
+    session, tables = resume(tmp_path / "s")
+    taken = recorded_averages(session, plan_file.task(tables, "s"))
     assert list(taken) == [0] and taken[0].n == 1000
     with Recorder(tmp_path / "s", None) as recorder:
         recorder.mark("repeated", position=0)
-    session, tables = resumed(tmp_path / "s")
-    assert taken_before(session, plan_file.task(tables, "s")) == {}
+    session, tables = resume(tmp_path / "s")
+    assert recorded_averages(session, plan_file.task(tables, "s")) == {}
     assert session.windows == (None, None)
 
 
 def test_what_cannot_be_gone_on_with_is_said(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="is no session"):
-        resumed(tmp_path)
+        resume(tmp_path)
     (tmp_path / "session.toml").write_text("format = 1\n")
     with pytest.raises(SessionError, match="was not recorded by fieldcal run"):
-        resumed(tmp_path)
+        resume(tmp_path)
     recorded(tmp_path / "s")
     with Recorder(tmp_path / "s", None) as recorder:
         recorder.mark("finished")
-    resumed(tmp_path / "s")  # killed before the result was written
+    resume(tmp_path / "s")  # killed before the result was written
     (tmp_path / "s" / "result.json").write_text("{}")
     with pytest.raises(SessionError, match="is finished"):
-        resumed(tmp_path / "s")
+        resume(tmp_path / "s")
 
 
 def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:

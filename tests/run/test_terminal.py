@@ -11,11 +11,11 @@ from rich.console import Console
 from fieldcal.core.positions import FIVE
 from fieldcal.drivers.driver import Health
 from fieldcal.planning.steps import Hold
-from fieldcal.run.movers import Nobody
+from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator.banner import drawable, large
 from fieldcal.run.operator.protocol import OperatorView, Phase
 from fieldcal.run.operator.terminal import ConsoleOperator
-from fieldcal.run.position_check import Arrival
+from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
 MISPLACED = WaitReason(WaitState.MISPLACED, "the device is at α = 3.0°")
@@ -26,7 +26,7 @@ def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> OperatorView:
     known: dict[str, object] = {
         "phase": phase,
         "hold": HOLD,
-        "arrival": Arrival(False, 3.0, 0.2, "the device is at α = 3.0°"),
+        "arrival": PositionCheck(False, 3.0, 0.2, "the device is at α = 3.0°"),
         "stillness": 0.4,
         "elapsed": elapsed,
         "sigma": np.array([1e-3, 2e-3, 3e-3, 1e-5, 1e-5, 2e-5]),
@@ -49,7 +49,7 @@ def screen(operator: ConsoleOperator, width: int = 80) -> str:
 @pytest.fixture
 def operator() -> ConsoleOperator:
     console = Console(file=io.StringIO(), width=80, height=24, force_terminal=True)
-    made = ConsoleOperator("fieldcal · five_position", FIVE, Nobody(), console)
+    made = ConsoleOperator("fieldcal · five_position", FIVE, ManualMover(), console)
     made.place(HOLD)
     return made
 
@@ -115,7 +115,7 @@ def test_a_link_that_is_silent_is_said_large_and_for_as_long_as_it_is(
 
 
 def test_hands_off_does_not_ask_to_be_turned_on(operator: ConsoleOperator) -> None:
-    there = Arrival(True, 21.0, 1.2, limit_deg=2.4)
+    there = PositionCheck(True, 21.0, 1.2, limit_deg=2.4)
     operator.show(view("turning", arrival=there, reason=WaitReason(WaitState.SETTLING)))
     said = screen(operator)
     assert "H A N D S   O F F" in said and said.count("close enough") == 2
@@ -139,7 +139,7 @@ def test_everything_fits_80_by_24(operator: ConsoleOperator, phase: Phase) -> No
 def test_on_a_tall_screen_the_instruction_is_read_from_afar() -> None:
     out = io.StringIO()
     console = Console(file=out, width=100, height=40, force_terminal=True)
-    made = ConsoleOperator("t", FIVE, Nobody(), console)
+    made = ConsoleOperator("t", FIVE, ManualMover(), console)
     made.place(HOLD)
     made.show(view("turning"))
     console.print(made.screen())
@@ -152,7 +152,7 @@ def test_on_a_tall_screen_the_instruction_is_read_from_afar() -> None:
 
 def test_many_positions_leave_room_for_what_is_said() -> None:
     console = Console(file=io.StringIO(), width=80, height=24, force_terminal=True)
-    with ConsoleOperator("t", FIVE * 6, Nobody(), console) as made:
+    with ConsoleOperator("t", FIVE * 6, ManualMover(), console) as made:
         made.place(Hold(14, FIVE[4], 30.0))
         made.tell("a sentence of the usual length about what happened, and what to do")
         made.show(view("turning", hold=Hold(14, FIVE[4], 30.0)))
@@ -164,7 +164,7 @@ def test_many_positions_leave_room_for_what_is_said() -> None:
 def test_plain_lines_for_a_log() -> None:
     out = io.StringIO()
     console = Console(file=out, width=200)
-    with ConsoleOperator("t", FIVE, Nobody(), console, plain=True) as operator:
+    with ConsoleOperator("t", FIVE, ManualMover(), console, plain=True) as operator:
         operator.place(HOLD)
         operator.tell("bumped")
         for elapsed in np.arange(0, 30, 0.1):

@@ -10,9 +10,9 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.driver import Driver, Health
 from fieldcal.planning.steps import Hold
-from fieldcal.run.position_check import Arrival
+from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
-from fieldcal.run.waiting import Placing
+from fieldcal.run.waiting import PositionWait
 from fieldcal.windows import Average, Window
 
 Phase = Literal["turning", "averaging", "taken", "silent"]
@@ -48,7 +48,7 @@ class OperatorView:
 
     phase: Phase
     hold: Hold
-    arrival: Arrival | None
+    arrival: PositionCheck | None
     stillness: float
     elapsed: float
     sigma: Array
@@ -100,9 +100,9 @@ class Display:
             self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
         self._temperature = float(block.temperature[-1])
 
-    def turning(self, hold: Hold, placing: Placing, reason: WaitReason) -> None:
+    def turning(self, hold: Hold, waiting: PositionWait, reason: WaitReason) -> None:
         """Show where the device is on its way, and what is waited for."""
-        self._show("turning", hold, placing.where, placing.meter, reason=reason)
+        self._show("turning", hold, waiting.where, waiting.meter, reason=reason)
 
     def averaging(self, hold: Hold, window: Window) -> None:
         """Show how far a window is."""
@@ -124,7 +124,7 @@ class Display:
         self,
         phase: Phase,
         hold: Hold,
-        arrival: Arrival | None = None,
+        arrival: PositionCheck | None = None,
         stillness: float = np.nan,
         elapsed: float = 0.0,
         sigma: Array = UNKNOWN,

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from fieldcal.core.positions import Position
 from fieldcal.run.operator.protocol import OperatorView
-from fieldcal.run.position_check import tenth
+from fieldcal.run.position_check import round_to_tenth
 
 METER = 20
 """Width of the stillness meter, characters."""
@@ -59,7 +59,7 @@ def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
     ok : whether both angles together are close enough
 
     """
-    off = tenth(wanted - seen)
+    off = round_to_tenth(wanted - seen)
     span = next((s for s in SPANS if s >= abs(off)), SPANS[-1])
     middle = SCALE // 2
     place = int(np.clip(round(middle - off / span * middle), 0, SCALE - 1))
@@ -69,7 +69,8 @@ def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
     there = ok or abs(off) < NEAR
     way = "→" if off > 0 else "←"
     order = "close enough" if there else f"turn {off:+.1f}° {way}"
-    where = f"[{''.join(cells)}] {tenth(seen):+6.1f}° to {tenth(wanted):+.1f}°{within}"
+    there_now, asked = round_to_tenth(seen), round_to_tenth(wanted)
+    where = f"[{''.join(cells)}] {there_now:+6.1f}° to {asked:+.1f}°{within}"
     return Text.assemble(where, "  ", (order, "green" if there else "bold yellow"))
 
 

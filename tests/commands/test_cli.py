@@ -105,7 +105,7 @@ def test_a_session_that_cannot_be_solved_is_said_so_in_one_sentence(
         ("[run]\nseconds = -1\n", "[run] seconds = -1 cannot be: give the averaging"),
         (
             "[run]\nprocedure = 'magic'\n",
-            '[run] procedure = "magic" cannot be: write two',
+            '[run] procedure = "magic" cannot be: write one of five_position, ',
         ),
         ("run = 3\n", "write [run]"),
         ("x = [", "is no plan file"),

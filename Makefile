@@ -12,11 +12,11 @@ demo: $(READY)
 	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
 
 test: $(DEV)
-	$(BIN)/python -m pytest -q -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -q -n 2
 
 # the whole catalogue and every seed, before a release or where diagnosis was changed
 test-all: $(DEV)
-	$(BIN)/python -m pytest -q -n 2 --dist loadgroup --all
+	$(BIN)/python -m pytest -q -n 2 --all
 
 # faults put into the formulas one by one, and whether the tests of the same room notice;
 # `make mutants-core` does one room, a second call only what has changed since

@@ -18,6 +18,7 @@ from fieldcal.acceptance.level import level_missing, tilt_is_found
 from fieldcal.acceptance.verification import Verification
 from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.calibration.limits import GradeLimits
+from fieldcal.core.chances import chi2_tail
 from fieldcal.history.family import expected
 from fieldcal.session.description import Description
 from fieldcal.solve.words import SUSPECT
@@ -127,13 +128,11 @@ def _document(check: Check) -> dict[str, Any]:
 
 
 def _fit(found: Calibration, limits: GradeLimits) -> Check:
-    from scipy.special import gammaincc
-
     if not found.good:
         return Check("fit", False, "the estimate itself is bad: " + _first(found))
     if found.dof <= 0 or not np.isfinite(found.chi2):
         return Check("fit", None, "the positions leave nothing over to check the fit")
-    chance = float(gammaincc(found.dof / 2, found.chi2 / 2))
+    chance = chi2_tail(found.chi2, found.dof)
     ok = chance >= limits.fit_chance
     word = "agree" if ok else "do not agree"
     says = (

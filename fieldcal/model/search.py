@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
+from fieldcal.model.causes import Cause, Group
 from fieldcal.model.offers import Offer, Offers, OfferTable
 from fieldcal.model.pairs import pairs
 from fieldcal.model.sets import Set
@@ -52,7 +54,25 @@ class Search(Offers):
         for i in range(len(best.members)):
             less = self.without(best, i)
             best = max([best, less, self._followed(less, best.score)], key=_score)
-        return self._instead(best) if best is there else best
+        if best is not there:
+            return best
+        return max(self._instead(best), self._wider(best), key=_score)
+
+    def _wider(self, there: Set) -> Set:
+        """The best set with all the parameters of one of its causes and one more.
+
+        Alone a cause is given those that are worth it, which make up for others; beside
+        another one it may need all, and before it has them the other is worth nothing.
+        """
+        found = [there]
+        for i, (cause, group) in enumerate(there.members):
+            whole = _whole(cause, group)
+            if whole is not group:
+                members = list(there.members)
+                members[i] = (cause, whole)
+                wide = self.evaluated(tuple(members), there.sizes)
+                found.append(self._followed(wide, there.score))
+        return max(found, key=_score)
 
     def _instead(self, there: Set) -> Set:
         """The best set with two or three causes in the place of one without physics.
@@ -107,21 +127,30 @@ def _pairs(table: OfferTable) -> Iterator[tuple[Offer, Offer, float]]:
     Each with all its parameters as well: beside the other it may need them.
     """
     known = [o for o in table.offers if o.member[0].kind != "unknown"][:PROMISING]
-    wide = [_widened(o) for o in known]
-    for some in (known, wide) if wide != known else (known,):
-        groups, sizes = [o.member[1] for o in some], [o.size for o in some]
-        for gain, (i, j), (u, v) in pairs(table.state, groups, sizes):
-            if some is known or some[i] != known[i] or some[j] != known[j]:
-                yield replace(some[i], size=u), replace(some[j], size=v), gain
+    every = [*known, *(_widened(o) for o in known)]
+    new = [a is not b for a, b in zip(known, every[len(known) :], strict=True)]
+    wanted = []
+    for i, j in combinations(range(len(known)), 2):
+        wanted.append((i, j))
+        if new[i] or new[j]:
+            wanted.append((i + new[i] * len(known), j + new[j] * len(known)))
+    groups, sizes = [o.member[1] for o in every], [o.size for o in every]
+    for gain, (i, j), (u, v) in pairs(table.state, groups, sizes, wanted):
+        yield replace(every[i], size=u), replace(every[j], size=v), gain
 
 
 def _widened(offer: Offer) -> Offer:
     """An offer with all the parameters that its cause has."""
     cause, group = offer.member
+    whole = _whole(cause, group)
+    return offer if whole is group else replace(offer, member=(cause, whole))
+
+
+def _whole(cause: Cause, group: Group) -> Group:
+    """The variant of a cause with all its parameters, the group itself if it has."""
     whole = cause.variants[0]
-    if group.shape or group.params == whole.params:
-        return offer
-    return replace(offer, member=(cause, whole))
+    part = not group.shape and set(group.params) < set(whole.params)
+    return whole if part else group
 
 
 def _score(one: Set) -> float:

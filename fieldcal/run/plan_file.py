@@ -1,4 +1,4 @@
-"""Plan files: what is to be held, how, and by whom it is turned.
+"""Plan files: positions, averaging, device and mover of a run.
 
 A plan is a session.toml with positions and a table ``[run]``; ``plan.schema.json`` says
 what may stand there, and the description of each key there is the remedy that an error
@@ -34,7 +34,7 @@ APART = math.radians(0.5)
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is to be done.
+    """Content of a plan.
 
     Attributes
     ----------
@@ -160,7 +160,7 @@ def _check_schema(tables: Mapping[str, Any], name: str) -> None:
 
 
 def _check_positions(about: Description, name: str) -> None:
-    """Refuse positions that cannot end well."""
+    """Refuse positions that cannot give a calibration."""
     import numpy as np
 
     positions = about.positions

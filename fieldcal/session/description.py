@@ -1,4 +1,4 @@
-"""session.toml: what was known and planned about a recording.
+"""session.toml: description of a recording: device, site, frame, positions.
 
 `schemas/session.schema.json` says what each key may be: a key of another kind is an
 error that names file, key and remedy. Keys that it does not have are left alone, so
@@ -35,7 +35,7 @@ GYR_UNITS = {
     "V": 1.0,
     "count": 1.0,
 }
-"""SI units in one of each; what has no such relation is divided by the gauge."""
+"""SI units in one of each; outputs in V or counts are divided by the gauge."""
 
 UNSCALED = ("V", "count")
 """Units whose scale only the nominal scale factors give."""
@@ -48,7 +48,7 @@ NOMINAL = {"acc_bias": 0.0, "acc_scale": 1.0, "gyr_bias": 0.0, "gyr_scale": 1.0}
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What session.toml says, checked and in SI units.
+    """Content of session.toml, checked and in SI units.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Description:
     limits : full scale of the same two, in SI; absent where unknown
     latitude_deg, height_m, gravity : the site; gravity in m/s^2
     level_deg : how level the base was made, one sigma about each level axis; None where
-        nobody said
+        not stated
     angle_setting_deg : how well each position's angles are set, likewise
     axes : the mounting, procedure axis x, y, z is device axis ...
     nominal : (3,) for each key of `NOMINAL`: the calibration a simulation starts from

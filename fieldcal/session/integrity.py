@@ -1,4 +1,4 @@
-"""Whether a session folder is whole: each file against its checksums and its schema.
+"""Integrity of a session folder: each file against its checksums and its schema.
 
 The JSON Schemas are in ``schemas/``, one for each kind of file, for other programs too;
 session.toml is judged as TOML reads it, marks.jsonl line by line.
@@ -38,7 +38,7 @@ class FileFault(NamedTuple):
 
 
 def findings(folder: Path) -> Iterator[FileFault]:
-    """What is wrong with a session, file by file; nothing if all of it is whole.
+    """Faults of a session, file by file; none if it is intact.
 
     Raises
     ------

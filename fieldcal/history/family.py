@@ -11,9 +11,9 @@ A parameter changes from run to run by b_i ~ N(0, tau^2) and is known to sigma_i
     z = (x - m) / s ~ t(nu_0 + n - 1)                                               (5)
 
 r is the spread usual for the grade; it counts as nu_0 runs, so that one earlier run is
-enough to compare with, and r loses its weight with many. Units are the parameter's. Source: (1) is the
-moment estimate of a random effect (DerSimonian and Laird 1986, unweighted); (2) the
-mean of a scaled inverse chi-squared prior's posterior.
+enough to compare with, and r loses its weight with many. Units are the parameter's.
+Source: (1) is the moment estimate of a random effect (DerSimonian and Laird 1986,
+unweighted); (2) the mean of a scaled inverse chi-squared prior's posterior.
 """
 
 from __future__ import annotations

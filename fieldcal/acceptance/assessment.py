@@ -1,4 +1,4 @@
-"""From a recorded session and its calibration to GO or NO-GO, and into the history.
+"""GO or NO-GO of a recorded session and its calibration; stores it in the history.
 
 What is not in the calibration is read from the session: temperatures and missing
 samples of the windows, the position that was not fitted, the counts of the link, and
@@ -72,7 +72,7 @@ def assess(
 
 
 def store_in_history(history: History, session: Session, found: Calibration) -> str:
-    """Keep a calibration in the history; what to tell the operator, if anything."""
+    """Store a calibration in the history; returns a sentence for the operator."""
     if not session.about.device.get("serial"):
         return ""
     at = str(found.info.get("taken_at") or start_time([]))
@@ -136,7 +136,7 @@ def _link(
 
 
 def _doubts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the operator insisted on, where the position was not asked for again."""
+    """Positions that the operator confirmed although they looked wrong."""
     insisted: dict[int, str] = {}
     for mark in marks:
         number = mark.get("position")

@@ -1,8 +1,8 @@
 """GO or NO-GO: a calibration against the limits of its grade, with reasons.
 
 Each check says in a sentence what was measured and what is allowed. A check that could
-not be made, for want of a thermometer or of earlier calibrations, is said and does not
-stop anybody. The history is compared with, and nothing of it enters the calibration.
+not be made, without a thermometer or earlier calibrations, is reported and is no reason
+for NO-GO. The history is compared with; nothing of it enters the calibration.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Decision:
 
 @dataclass(frozen=True, slots=True)
 class Circumstances:
-    """What is known beside the calibration itself.
+    """Facts about the run that the calibration does not contain.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ def _fit(found: Calibration, limits: GradeLimits) -> Check:
     if not found.good:
         return Check("fit", False, "the estimate itself is bad: " + _first(found))
     if found.dof <= 0 or not np.isfinite(found.chi2):
-        return Check("fit", None, "the positions leave nothing over to check the fit")
+        return Check("fit", None, "no degree of freedom is left to check the fit")
     chance = chi2_tail(found.chi2, found.dof)
     ok = chance >= limits.fit_chance
     word = "agree" if ok else "do not agree"
@@ -144,7 +144,7 @@ def _fit(found: Calibration, limits: GradeLimits) -> Check:
 
 
 def _odd_positions(found: Calibration) -> list[Check]:
-    """Say beside the decision that a position does not fit the others."""
+    """Name a position that does not fit the others; the decision stays."""
     if max(found.info.get("bad_position", ()), default=0.0) < SUSPECT:
         return []
     told = [said for said in found.warnings if said.startswith("the position ")]
@@ -183,7 +183,7 @@ def _uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
 
 
 def _by_angles(found: Calibration, limits: GradeLimits) -> str:
-    """What to do about angles that nobody said are set better than the grade asks."""
+    """Remedy where the setting of the angles limits the uncertainty."""
     angles = float(found.info.get("angle_sigma_deg") or 0.0)
     if found.method == "scalar" or angles < limits.angle_setting_deg:
         return ""
@@ -194,13 +194,13 @@ def _by_angles(found: Calibration, limits: GradeLimits) -> str:
 
 
 def _level(found: Calibration, about: Description) -> list[Check]:
-    """Whether anybody knows how level the base was: a tilt is taken for a bias."""
+    """Whether the level of the base is known: an unseen tilt acts as a bias."""
     if tilt_is_found(found) or "acc_bias" not in found.groups:
         return []
     level = found.info.get("level_sigma_deg")
     if level is None:
         return [Check("level", False, level_missing(about))]
-    says = f"the base is level to ± {level:.2g}°, as was said: the ± have it in them"
+    says = f"the base is level to ± {level:.2g}°, as stated; each ± includes it"
     return [Check("level", True, says)]
 
 
@@ -227,7 +227,7 @@ def _compared(
     family: Sequence[Calibration],
     together: int,
 ) -> Check | None:
-    """One parameter against the runs that have it; the chance is shared by all."""
+    """One parameter against earlier runs; all parameters share the probability."""
     earlier = [c for c in family if name in c.names]
     group, _, axis = name.partition(".")
     repeat = limits.repeat(group)
@@ -246,14 +246,14 @@ def _compared(
         f"{group} {axis} differs from {usual.runs} earlier calibration"
         f"{'s' if usual.runs > 1 else ''} by {value - usual.mean:+.2g}"
         f" ± {usual.sigma(sigma):.2g}{unit}"
-        f"{'' if ok else ': out of family; look at the device before you trust it'}"
+        f"{'' if ok else ': out of family; inspect the device before you use it'}"
     )
     return Check(f"{group} change", ok, says, chance, limit, "1")
 
 
 def _verification(seen: Verification | None, limits: GradeLimits) -> Check:
     if seen is None:
-        return Check("verification", None, "no position was held to verify (--verify)")
+        return Check("verification", None, "no position was taken to verify (--verify)")
     far = seen.largest > limits.verification_residual
     odd = seen.chance < limits.verification_chance
     says = (
@@ -274,7 +274,7 @@ def _temperature(
 ) -> list[Check]:
     known = temperatures[np.isfinite(temperatures)]
     if not len(known):
-        return [Check("temperature", None, "the device tells no temperature")]
+        return [Check("temperature", None, "the device reports no temperature")]
     low, high = float(known.min()), float(known.max())
     least, most = limits.temperature_min_c, limits.temperature_max_c
     ok = least <= low and high <= most
@@ -295,7 +295,7 @@ def _temperature(
 
 def _link(link: Mapping[str, int] | None, limits: GradeLimits) -> list[Check]:
     if not link or not link.get("samples"):
-        return [Check("link", None, "what the link lost was not recorded")]
+        return [Check("link", None, "losses of the link were not recorded")]
     samples, missing, bad = (link.get(k, 0) for k in ("samples", "missing", "bad"))
     checks = []
     for name, count, limit in (

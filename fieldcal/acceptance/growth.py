@@ -1,4 +1,4 @@
-"""What a calibration's remaining uncertainty does to an inertial navigator.
+"""Errors of an inertial navigator that the calibration's uncertainty causes.
 
 The navigator is levelled at home with the accelerometers just calibrated, then flies on
 its own for t at about the attitude it was levelled in. In procedure axes (x and z
@@ -33,7 +33,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array
 
 TIMES = (60.0, 600.0)
-"""For which the growth is told, s."""
+"""Times for which the errors are given, s."""
 
 LEVEL, DOWN = [0, 2], 1
 """Rows of the procedure's axes."""

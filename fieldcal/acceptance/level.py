@@ -1,4 +1,4 @@
-"""How level the base is: what positions cannot see, somebody has to say.
+"""How level the base is: some sets of positions cannot determine it.
 
 A base tilted by t about a level axis moves a bias by up to g t, 0.17 m/s^2 for one
 degree. Five positions find the tilt. Two cannot tell it from a bias: there it is known
@@ -17,13 +17,13 @@ BLIND = 2
 
 
 def tilt_is_found(found: Calibration) -> bool:
-    """Whether the tilt is among the parameters, or plays no part."""
+    """Whether the tilt is a parameter of the result, or has no effect on it."""
     tilted = {"angle_offset", "base_tilt"} & set(found.groups)
     return bool(tilted) or found.method == "scalar"
 
 
 def level_missing(about: Description) -> str:
-    """What is wrong where nobody said how level the base is, and what to do."""
+    """Sentence for a base whose level was not stated, with the remedy."""
     bias = about.gravity * np.deg2rad(1.0)
     return (
         "these positions cannot see how level the base is, and 1° moves a bias by"

@@ -1,4 +1,4 @@
-"""Whether the calibration predicts a position that is held but not fitted.
+"""Whether the calibration predicts a position that was not fitted.
 
     r = U - U(x),  S = J C J^T + C_U + (s g)^2 (I - n n^T),  chi2 = r^T S^-1 r
 
@@ -28,7 +28,7 @@ from fieldcal.windows import Average
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """How far a position that was not fitted is off.
+    """Residual of a position that was not fitted.
 
     Attributes
     ----------

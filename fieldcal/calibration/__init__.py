@@ -1,4 +1,4 @@
-"""What a calibration is: parameters with their covariance, applied, compared, kept.
+"""Calibrations: parameters with their covariance, applied, compared and stored.
 
 The limits that a recalibration must reach are here too (`limits`). Nothing here
 estimates: estimators return a `Calibration`.

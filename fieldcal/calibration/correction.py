@@ -1,4 +1,4 @@
-"""Samples with bias, scale factor and cross-coupling taken out, and how well.
+"""Calibrated samples and their standard uncertainty.
 
     U = b + M f,  f = M^-1 (U - b)
     df = -M^-1 (db + dM f),  cov f = J C J^T
@@ -21,7 +21,7 @@ PIECE = 16384
 
 
 def corrected(raw: Array, bias: Array, matrix: Array) -> Array:
-    """True values of raw ones, (n, 3).
+    """Calibrated values of raw ones, (n, 3).
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def spread(
     covariance: Array,
     sensor: str,
 ) -> Array:
-    """Standard uncertainty of true values, (n, 3).
+    """Standard uncertainty of calibrated values, (n, 3).
 
     Parameters
     ----------

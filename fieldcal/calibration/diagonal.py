@@ -1,4 +1,4 @@
-"""A calibration as offsets and scale factors alone, and what that leaves out.
+"""A calibration reduced to bias and scale factor, and the error that this makes.
 
     U = b + M f,  D = diag M                                                       (1)
     D^-1 (U - b) - f = (D^-1 M - I) f                                              (2)

@@ -1,4 +1,4 @@
-"""Outputs in volts or counts: what they are worth, and a calibration in their unit.
+"""Scale of outputs in volts or counts, and a calibration in their unit.
 
 A device may put out volts or counts U = b + M f. All is calculated with outputs u that
 are m/s^2 and rad/s but for what a calibration corrects,
@@ -41,7 +41,7 @@ GROUPS = {
 
 @dataclass(frozen=True, slots=True)
 class Gauge:
-    """What one m/s^2 and one rad/s are in the outputs.
+    """Output units in one m/s^2 and in one rad/s.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a recalibration must reach to be GO: bounds by grade, from a file.
+"""Limits that a calibration must meet to be GO, by grade, from a file.
 
 ``limits.toml`` beside this module holds the defaults and says what each bound means; a
 file of the user's has the same tables and may leave out whatever it does not change.

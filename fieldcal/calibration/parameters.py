@@ -1,4 +1,4 @@
-"""What a calibration is: parameters with their covariance, and where they come from.
+"""A calibration: parameters with their covariance and provenance.
 
 Parameters are grouped under an id. ``acc_bias``, ``acc_scale``, ``gyr_bias``,
 ``gyr_scale`` have the components x, y, z of the device's axes; effects stand under

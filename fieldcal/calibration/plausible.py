@@ -1,4 +1,4 @@
-"""Numbers that no sensor can have, in the axes and units that were declared.
+"""Values that no sensor has in the declared axes and units.
 
 A scale factor far from nominal is another unit or full scale, a bias of half a g a
 device or a driver that takes its mean out, a scale factor of the other sign an axis
@@ -23,7 +23,7 @@ with; half a g; 30 deg/s."""
 def senseless(
     names: Sequence[str], values: Array, sigma: Array, nominal: Nominal
 ) -> list[str]:
-    """Numbers that no sensor in the declared axes and units can have."""
+    """Sentences about values that no sensor has in the declared axes and units."""
     said = []
     for name, value, s in zip(names, values, sigma, strict=True):
         group, _, axis = name.partition(".")

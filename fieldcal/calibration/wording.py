@@ -1,4 +1,4 @@
-"""Parameters as a person reads them: titles, digits, units."""
+"""Parameters as text: titles, digits, units."""
 
 from __future__ import annotations
 

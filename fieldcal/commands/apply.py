@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _with_units(table: pa.Table) -> pa.Table:
-    """Say the unit of each column, so that nobody has to guess it."""
+    """State the unit of each column."""
     import pyarrow as pa
 
     from fieldcal.core.samples import CHANNELS, UNITS

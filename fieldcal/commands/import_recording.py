@@ -150,12 +150,12 @@ def _bring(
     args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
 ) -> None:
     from fieldcal.importing.ingest import import_stream
-    from fieldcal.session.description import WORTHLESS
+    from fieldcal.session.description import UNSCALED
 
     name = recording.path.name.split(".")[0]
     about: dict[str, Any] = {"format": 1, **site_tables(args, name)}
     units = {"acceleration": args.acc_unit, "angular_rate": args.gyr_unit}
-    if kept := {k: u for k, u in units.items() if u in WORTHLESS}:
+    if kept := {k: u for k, u in units.items() if u in UNSCALED}:
         about["units"] = kept
     if args.rate:
         about["sampling"] = {"rate_hz": args.rate}

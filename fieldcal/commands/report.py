@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="earlier sessions or result.json of the same device, oldest first"
         " (default: what its history has)",
     )
-    add("--pdf", action="store_true", help="beside it a .pdf, by Chromium")
-    add("--png", action="store_true", help="beside it a .png, by Chromium")
+    add("--pdf", action="store_true", help="also write a .pdf, by Chromium")
+    add("--png", action="store_true", help="also write a .png, by Chromium")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""What a run prints at its end, of the first device and of those beside it."""
+"""What a run prints at its end, of the first device and of its companions."""
 
 from __future__ import annotations
 

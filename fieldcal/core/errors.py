@@ -1,4 +1,4 @@
-"""What can go wrong, and with which exit code the command line ends.
+"""Exceptions, and the exit code of the command line for each.
 
 FieldcalError                2
 +-- InputError               2  what the user gave cannot be used
@@ -56,7 +56,7 @@ class DeviceSilent(DeviceError):
 
 
 class MoverFailed(DeviceError):
-    """What turns the device did not do so."""
+    """The mover failed to turn the device."""
 
 
 class Moved(FieldcalError):
@@ -118,7 +118,7 @@ _DISK = {
 
 
 def disk_says(error: OSError) -> str:
-    """Why a disk takes nothing, and what to do now.
+    """Why a file cannot be written, and what to do.
 
     >>> disk_says(OSError(errno.ENOSPC, "No space left on device"))
     'the disk is full: make room on it, or name another'

@@ -45,7 +45,7 @@ def turn(alpha: ArrayLike, beta: ArrayLike) -> Array:
 
 
 def in_turned_axes(alpha: Array, beta: Array, vector: Array) -> Array:
-    """A vector (3,) in base axes as procedure axes see it after the turns, (..., 3).
+    """A vector (3,) of base axes in procedure axes after the turns, (..., 3).
 
     As `turn` times the vector, where only that is wanted.
 
@@ -77,10 +77,10 @@ def force(alpha: ArrayLike, beta: ArrayLike, gravity: float) -> Array:
 
 
 def mean_rotation(rates: Array) -> Array:
-    """What is left of another rate in the mean of whole turns, (n, 3, 3).
+    """Projection that averaging over whole turns makes of another rate, (n, 3, 3).
 
-    Of a device that turns at `rates` (n, 3), all that lies across goes round in it; one
-    at rest (0) keeps all of it.
+    Of a device that turns at `rates` (n, 3), components across the axis average to 0;
+    of a device at rest all components remain.
     """
     speed = np.linalg.norm(rates, axis=1, keepdims=True)
     axis = np.divide(rates, speed, out=np.zeros_like(rates), where=speed > 0)
@@ -95,7 +95,7 @@ def earth_rate_home(latitude: float) -> Array:
 
 
 def angles_of(direction: ArrayLike) -> tuple[float, float]:
-    """Turns alpha, beta in rad that bring about a specific force along `direction`.
+    """Angles alpha, beta in rad at which the specific force is along `direction`.
 
     `direction` is (3,) in procedure axes, of any length. The inverse of (4), beta in
     (-pi/2, pi/2]: f = g (-sin a, -cos a cos b, cos a sin b).

@@ -1,4 +1,4 @@
-"""What is added as one file: found by the file's name, known by its base class."""
+"""Plug-ins of one file each: found by the file's name and their base class."""
 
 from __future__ import annotations
 

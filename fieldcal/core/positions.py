@@ -17,7 +17,7 @@ class Position:
 
     Attributes
     ----------
-    name : what the operator is told
+    name : shown to the operator
     alpha, beta : turns (1), (2) from home, rad
     rate : constant rate about the procedure axes on a rate table, rad/s
 

@@ -1,4 +1,4 @@
-"""Raw samples in SI units, device axes: the one currency between drivers and core."""
+"""Raw samples in SI units and device axes, as drivers deliver them."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def _within(values: Array, step: float) -> float:
 
 
 def _nearer(recording: CheckedSamples, c: int, mended: Array) -> bool:
-    """Whether outputs come much nearer to what the nominal calibration foretells.
+    """Whether outputs come much nearer to what the nominal calibration predicts.
 
     Where a force is not known, it is no larger than gravity.
     """

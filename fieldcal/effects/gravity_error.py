@@ -32,7 +32,7 @@ class GravityError(Motion):
     like_calibration = True
 
     def chance(self, x: Experience) -> float:
-        """A latitude or a height that nobody said is no rare thing."""
+        """A site that was not stated is common."""
         return 0.05
 
     def change(self, x: Experience, values: Values) -> Experience:

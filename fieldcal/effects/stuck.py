@@ -26,10 +26,10 @@ from fieldcal.physics.shape import Shape
 
 ODDS = 1e-6
 MANY = 20
-"""Runs from which their usual length can be told."""
+"""Runs from which their usual length is known."""
 
 SHARE = 0.2
-"""Part of a window beside a run from which the window's own repeats can be told."""
+"""Part of a window next to a run from which the window's own repeats are known."""
 
 TURNED = 30.0
 """Standard deviations that other axes go through while the device is turned."""

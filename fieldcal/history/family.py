@@ -1,4 +1,4 @@
-"""Whether a value is what earlier calibrations of the device let expect.
+"""Whether a value agrees with earlier calibrations of the device.
 
 A parameter changes from run to run by b_i ~ N(0, tau^2) and is known to sigma_i:
 
@@ -10,10 +10,10 @@ A parameter changes from run to run by b_i ~ N(0, tau^2) and is known to sigma_i
     s^2 = tau^2 + sigma^2 + 1 / sum w                         of a new value        (4)
     z = (x - m) / s ~ t(nu_0 + n - 1)                                               (5)
 
-r is the spread usual for the grade, worth nu_0 runs, so that one earlier run is enough
-to compare with and many make r forgotten. Units are the parameter's. Source: (1) is the
-moment estimate of a random effect (DerSimonian and Laird 1986, unweighted); (2) the
-mean of a scaled inverse chi-squared prior's posterior.
+r is the spread usual for the grade; it counts as nu_0 runs, so that one earlier run is
+enough to compare with, and r loses its weight with many. Units are the parameter's.
+Source: (1) is the moment estimate of a random effect (DerSimonian and Laird 1986,
+unweighted); (2) the mean of a scaled inverse chi-squared prior's posterior.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 USUAL = 2.0
-"""nu_0: how many runs the spread that is usual for the grade is worth."""
+"""nu_0: number of runs that the usual spread of the grade counts as."""
 
 
 @dataclass(frozen=True, slots=True)
 class FamilySpread:
-    """What earlier runs let expect of the next one.
+    """Distribution of the next run, from earlier ones.
 
     Attributes
     ----------
@@ -61,15 +61,15 @@ class FamilySpread:
 
 
 def expected(values: Array, sigmas: Array, usual: float) -> FamilySpread:
-    """What runs (n,) with their uncertainties (n,) let expect, (1)-(3).
+    """Distribution of the next value, from runs (n,) and their uncertainties, (1)-(3).
 
     `usual` is r. There must be one run at least.
     """
     n = len(values)
-    told = 0.0
+    measured = 0.0
     if n > 1:
-        told = max(0.0, float(np.var(values, ddof=1) - np.mean(sigmas**2)))  # (1)
-    spread2 = (USUAL * usual**2 + (n - 1) * told) / (USUAL + n - 1)  # (2)
+        measured = max(0.0, float(np.var(values, ddof=1) - np.mean(sigmas**2)))  # (1)
+    spread2 = (USUAL * usual**2 + (n - 1) * measured) / (USUAL + n - 1)  # (2)
     w = 1 / (spread2 + sigmas**2)  # (3)
     return FamilySpread(
         float(w @ values / w.sum()),

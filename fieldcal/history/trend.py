@@ -88,8 +88,8 @@ def trend(
                 usually = expected(before[:, 0], before[:, 1], usual)
                 chance = usually.chance(value, sigma)
             known = _values(family(runs[: i + 1]), name)
-            told = known if len(known) else np.array([[value, sigma]])
-            spread = expected(told[:, 0], told[:, 1], usual).spread
+            shown = known if len(known) else np.array([[value, sigma]])
+            spread = expected(shown[:, 0], shown[:, 1], usual).spread
         odd = bool(chance < limits.family_chance / together)
         points.append(TrendPoint(run, value, sigma, unit, chance, odd, spread))
     return points

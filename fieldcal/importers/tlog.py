@@ -65,7 +65,7 @@ class TelemetryLog(Recording):
                 f"{self.path}: has no IMU message; have the autopilot send HIGHRES_IMU"
                 " or RAW_IMU, and record again"
             )
-        says = "calibrated, body's frame; unit told by gravity"
+        says = "calibrated, body's frame; unit found by gravity"
         return [ImuStream(name, says) for name in sorted(self._found)]
 
     def notes(self, stream: str) -> dict[str, Any]:

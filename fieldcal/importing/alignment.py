@@ -16,7 +16,7 @@ PATIENCE = 10.0
 
 
 class AlignedPair:
-    """Puts each sample of an accelerometer beside the gyroscope's nearest in time.
+    """Pairs each accelerometer sample with the gyroscope's nearest in time.
 
     Attributes
     ----------

@@ -12,7 +12,7 @@ from fieldcal.importing.recording import ReadOptions
 from fieldcal.session.sample_files import COLUMNS
 
 SKIP = "_"
-"""Stands for a column that is not wanted."""
+"""Name of a column to skip."""
 
 
 def check(wanted: ReadOptions) -> None:

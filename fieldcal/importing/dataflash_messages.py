@@ -56,7 +56,7 @@ class DataflashMessages:
 
     Parameters
     ----------
-    damaged : told of a damaged place and what is wrong with it; may refuse it
+    damaged : called with a damaged place and its fault; may raise
     pieces : gives its bytes from the beginning, each time anew
 
     Attributes

@@ -29,7 +29,7 @@ _AT_ONCE = 1 << 16
 """Packed bytes read together."""
 
 Cut = Callable[[str, str], None]
-"""Told where a file ends too early, and how; refuses it, or lets that be enough."""
+"""Called with the place where a file ends too early; may raise."""
 
 
 def refuse_truncated(path: Path) -> Cut:
@@ -47,7 +47,7 @@ def open_unpacked(path: Path, cut: Cut | None = None) -> IO[bytes]:
     Parameters
     ----------
     path : the file
-    cut : told if a packed file ends too early; refuses it if not given
+    cut : called if a packed file ends too early; without it that is an error
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Names of columns that say by themselves what is in them: channel and unit.
+"""Headings of columns that state channel and unit.
 
 ``ax [m/s^2]``, ``gyro_x (deg/s)``, ``time_us``: a name, and a unit in brackets or
 behind a sign that parts words. Taken is only what leaves no choice: each channel is
@@ -122,7 +122,7 @@ class HeadingMatch:
 
 
 def read(columns: Sequence[Column], skip: str = "") -> HeadingMatch | None:
-    """Understand the names of columns; None if they are not those of one IMU.
+    """Channels and units from headings; None if they are not those of one IMU.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def _channel(column: Column) -> tuple[str, str, str | None]:
 def resolve_headings(
     path: object, wanted: ReadOptions, found: HeadingMatch | None, else_say: str
 ) -> tuple[ReadOptions, str]:
-    """Take what the names say, and put it into words; or say what to write.
+    """Options from the headings, and a sentence about them.
 
     Raises
     ------

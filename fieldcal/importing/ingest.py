@@ -1,4 +1,4 @@
-"""A session folder made of a stream of a recording, whole or not at all."""
+"""Writes a session folder from one stream of a recording, atomically."""
 
 from __future__ import annotations
 

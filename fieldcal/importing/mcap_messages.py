@@ -57,8 +57,8 @@ def messages(path: Path, damaged: Cut, cut: Cut) -> Iterator[DecodedMessage]:
     Parameters
     ----------
     path : not packed
-    damaged : told of a chunk that is, which is left out
-    cut : told where the file ends too early
+    damaged : called with a damaged chunk, which is left out
+    cut : called with the place where the file ends too early
 
     """
     known, seen = _Dictionary(), 0

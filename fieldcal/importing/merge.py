@@ -1,4 +1,4 @@
-"""Several files that hold the channels of one IMU, row beside row."""
+"""Several files that hold the channels of one IMU, merged row by row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording from elsewhere is.
+"""A recording of another program.
 
 A recording holds the samples of one or several IMUs, each a stream with a name. They
 come piece by piece, so that a log may be as long as it likes.
@@ -29,7 +29,7 @@ TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """What the user says of a file that does not say it itself.
+    """Options of the user for what a file does not state.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Rows of numbers that are put aside on the disk once they are many."""
+"""Rows of numbers that are spooled to disk when they are many."""
 
 from __future__ import annotations
 

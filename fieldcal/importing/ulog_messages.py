@@ -55,7 +55,7 @@ class UlogMessages:
     Parameters
     ----------
     path : for errors
-    damaged : told of a damaged place and what is wrong with it; may refuse it
+    damaged : called with a damaged place and its fault; may raise
     bytes_of : gives its bytes from the beginning, each time anew
 
     Attributes

@@ -1,4 +1,4 @@
-"""Samples of a recording on their way into a session: judged, mended, written.
+"""Validation of imported samples: bad rows are left out, good ones written.
 
 A row is refused whose time is not later than that of the row before, whose numbers are
 infinite, or which holds nothing but zeros (a buffer that was never filled): a missing
@@ -19,13 +19,13 @@ from fieldcal.core.samples import CHANNELS, Array, Block, concat
 from fieldcal.importing.recording import MOST
 
 FEWEST, GROUP = 1 << 13, 1 << 15
-"""Rows that are worth a row group, and the most in one."""
+"""Fewest and most rows of a row group."""
 
 Rows = NDArray[np.bool_]
 
 
 class RowValidator:
-    """Looks at rows block by block.
+    """Validates rows block by block.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class RowValidator:
 
     @property
     def mended(self) -> list[str]:
-        """What was left out, run by run, a sentence each."""
+        """Rows left out, a sentence for each run."""
         says = [self._sentence(*run) for run in self._runs[:MOST]]
         if len(self._runs) > MOST:
             places, rows = self._more[0] + 1, self._more[1] + self._runs[MOST][3]

@@ -1,4 +1,4 @@
-"""What to install on an autopilot after a recalibration, and how much that changes.
+"""Parameters to install on an autopilot after a recalibration, old and new.
 
     o' = o + b / k,  k' = k / s                            see `mavlink_installed`  (1)
     var o' = var b / k^2,  var k' = k^2 var s / s^4                                 (2)
@@ -66,8 +66,8 @@ def installed_in(session: Session) -> Installed | None:
 
     """
     marks = [mark for mark in session.marks() if mark.get("event") == "device"]
-    told = [mark["installed"] for mark in marks if mark.get("installed")]
-    return Installed.from_table(told[-1]) if told else None
+    states = [mark["installed"] for mark in marks if mark.get("installed")]
+    return Installed.from_table(states[-1]) if states else None
 
 
 def changes(
@@ -103,7 +103,7 @@ def _sigma(found: Calibration, group: str) -> Any:
 
 
 def unsupported_parameters(found: Calibration) -> tuple[str, ...]:
-    """What the calibration has and the autopilot has no place for, a sentence each."""
+    """Parameters that the autopilot does not have, a sentence each."""
     return tuple(
         f"{group} stays out: the autopilot has no parameter for it"
         for group in LEFT_OUT
@@ -112,7 +112,7 @@ def unsupported_parameters(found: Calibration) -> tuple[str, ...]:
 
 
 def problems(wanted: tuple[Change, ...], installed: Installed) -> tuple[str, ...]:
-    """Values that no sound sensor has, a sentence each."""
+    """Implausible values, a sentence each."""
     known = names(installed.autopilot, installed.instance)
     said = []
     for change in wanted:

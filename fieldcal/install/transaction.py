@@ -1,4 +1,4 @@
-"""Writing a calibration onto an autopilot so that it can always be taken back.
+"""Writes parameters to an autopilot; the old ones are saved first.
 
 The old set is saved before the first parameter is touched. After writing everything is
 read back; if anything is not as wanted, the old set is written and read back as well.
@@ -33,7 +33,7 @@ def check_unchanged(
     since: str,
     other: Mapping[str, float] | None = None,
 ) -> None:
-    """Refuse if the autopilot does not keep what it is thought to.
+    """Refuse if the autopilot's parameters are not those of the proposal.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def note_done(path: Path, **what: Any) -> None:
 
 
 def save_removed(folder: Path) -> list[Path]:
-    """Save the set that a run set to no calibration; no file if it did not.
+    """Save parameters that a run had neutralised; no file if it had not.
 
     A run gives it back when it ends; one that was killed, or lost the link, did not.
     """

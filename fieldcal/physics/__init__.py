@@ -1,4 +1,4 @@
-"""What an effect is, and what it is a function of.
+"""Base classes of effects, and what they are functions of.
 
 `effect` holds the base classes, `shape` the parameters that outputs are not linear in,
 `experience` what the sensors experience, `recording` what checks of the signal chain

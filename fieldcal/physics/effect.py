@@ -1,4 +1,4 @@
-"""What an effect of the catalogue states: equation, parameters, sizes, what to do.
+"""Base classes of effects: equation, parameters, typical sizes, cure.
 
 The simulation everyone starts from is bias, scale factor and white noise,
 
@@ -94,7 +94,7 @@ class Effect(ABC):
     source: ClassVar[str]
 
     def applies(self, x: Experience) -> bool:
-        """Whether what it hangs on is known in some rows."""
+        """Whether its covariate is known in some rows."""
         return True
 
     def chance(self, x: Experience) -> float:

@@ -1,4 +1,4 @@
-"""What the device goes through, row by row, and how a fixture brings it about.
+"""Specific force, angular rate and other inputs of the device, row by row.
 
     f = P^T A(alpha, beta) f_base                        specific force, m/s^2
     w = P^T (A(alpha, beta) w_base + rate)               angular rate, rad/s
@@ -26,7 +26,7 @@ STEADY = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Experience:
-    """Rows (windows, block means or samples) and what the device goes through in each.
+    """Rows (windows, block means or samples) and the inputs of the device in each.
 
     Attributes
     ----------

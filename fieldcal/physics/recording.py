@@ -1,4 +1,4 @@
-"""What the checks of the signal chain look at, and what they report."""
+"""Input and output of the checks of the signal chain."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class CheckedSamples:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that happened to samples.
+    """A fault of samples.
 
     Attributes
     ----------

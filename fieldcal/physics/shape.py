@@ -1,4 +1,4 @@
-"""Parameters that the outputs are not linear in: their ranges, and values to try."""
+"""Shape parameters, in which the outputs are not linear: ranges and values to try."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WITHIN = (0.25, 0.08, 0.025, 0.008)
 """Parts of a row by which an instant is moved in it, closer and closer."""
 
 FINEST = 1.06
-"""Ratio of time constants that are told apart last."""
+"""Smallest ratio of neighbouring time constants."""
 
 
 @dataclass(frozen=True, slots=True)

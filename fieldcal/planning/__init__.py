@@ -1,4 +1,4 @@
-"""What a procedure may ask for, and which positions are worth taking.
+"""Steps of a procedure, and the choice of positions.
 
 `steps` are what plans yield and the engine carries out; `planner` and `aliasing` judge
 sets of positions before they are taken. Nothing here touches a device, a clock or a

@@ -31,7 +31,7 @@ NOTHING = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Aliases:
-    """What the positions cannot tell.
+    """Effects that the positions hide or confuse.
 
     Attributes
     ----------

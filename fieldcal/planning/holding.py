@@ -1,4 +1,4 @@
-"""What procedures share: holding positions one after the other, again if it moved."""
+"""Steps that procedures share: hold positions in turn, again after a disturbance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which positions to take, how well they will do, and what they cannot tell apart.
+"""Which positions to take, and the uncertainty that they give.
 
 The design of n positions, J (3n, p) about a perfect device, says what a joint estimate
 will reach before anything is measured:
@@ -74,7 +74,7 @@ GRADES = {
 
 @dataclass(frozen=True, slots=True)
 class Ladder:
-    """How far the joints can be turned, rad: |alpha| and |beta| at most."""
+    """Range of the joints, rad: largest |alpha| and |beta|."""
 
     alpha: float = float(np.deg2rad(45.0))
     beta: float = float(np.deg2rad(5.0))
@@ -87,7 +87,7 @@ class Ladder:
 
 
 def required_parameters(n: int) -> tuple[str, ...]:
-    """Parameters that n positions are asked for: the tilt from three on."""
+    """Parameters that n positions must determine: from three on the tilt as well."""
     return parameters(*(["angle_offset"] if n >= 3 else []))
 
 
@@ -223,5 +223,5 @@ def _shortest_way(positions: list[Position]) -> tuple[Position, ...]:
 def extra_position(
     positions: Sequence[Position], ladder: Ladder, gravity: float
 ) -> Position:
-    """The one further position worth most."""
+    """The further position that reduces the error most."""
     return best_positions(1, ladder, gravity, positions)[0]

@@ -1,4 +1,4 @@
-"""Procedures as plans: generators that say what should be done, and do nothing.
+"""Plans: generators that yield the steps of a procedure and do no I/O.
 
 A plan never touches a device, a clock or a screen. It yields steps; the engine carries
 each one out and sends the result back, or throws the error that a step ended in. So a

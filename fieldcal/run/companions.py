@@ -35,7 +35,7 @@ BATCHES = 1 << 17
 
 
 class Times:
-    """When the samples of a device were had, s of the host's clock."""
+    """Host arrival times of the samples."""
 
     def __init__(self) -> None:
         self._pairs: deque[tuple[float, float]] = deque(maxlen=BATCHES)
@@ -65,7 +65,7 @@ class Times:
 
 
 class Companion:
-    """A device that is recorded while another one is led through a procedure.
+    """A further device that is recorded while the first goes through a procedure.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class Companion:
 
 
 class LeadRecorder:
-    """The recording of the first device, whose windows hold for the others.
+    """Records the first device; its windows are those of the companions.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class LeadRecorder:
 
     Attributes
     ----------
-    tell : told, once, of each further device that fails meanwhile
+    tell : called once with a sentence for each companion that fails
 
     """
 

@@ -1,4 +1,4 @@
-"""Carries out plans: the one place where a procedure meets a device and a person.
+"""Carries out plans on a device, with an operator.
 
 Every sample that comes is recorded, whatever else happens; all waiting is counted in
 device time, so a virtual device may run faster than the wall clock and nothing changes.
@@ -166,7 +166,7 @@ class Engine:
             yield from pieces(block, PIECE)
 
     def _silent(self) -> None:
-        """Say that nothing comes, before anybody thinks that we are stuck."""
+        """Report that no samples arrive."""
         self._silence += 1
         reason = WaitReason(
             WaitState.NO_SAMPLES,

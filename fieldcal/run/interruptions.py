@@ -1,4 +1,4 @@
-"""What breaks a window off beside a movement: a gap, a restart, the operator."""
+"""What ends a window other than motion: a gap, a restart, the operator."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OFTEN = 3
 
 
 def restart_notice(moved: Moved, times: int) -> str:
-    """What an operator is told whose window was disturbed so many times."""
+    """Sentence about a window that was disturbed so many times."""
     said = f"{moved}; hold still, the window starts again"
     if times < OFTEN:
         return said

@@ -1,4 +1,4 @@
-"""What a run did, as JUnit XML, for whoever shows the results of a night.
+"""A run as JUnit XML, for continuous integration.
 
 A test case for each position, one for each check of GO or NO-GO, and one for the run
 itself, which is an error if it broke off.

@@ -1,4 +1,4 @@
-"""What the link did meanwhile, as marks beside the samples: gaps, restarts, the clock.
+"""Events of the link as marks: gaps, restarts, the clock.
 
 A link in trouble would make a mark for every sample lost, and each is forced to the
 disk. So marks are joined over `EVERY` seconds; what is at least `LONG` is said at once.

@@ -1,4 +1,4 @@
-"""Who turns the device: nobody we can tell, a command, or the virtual device itself."""
+"""Who turns the device: a person, a command, or the virtual device itself."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ class Mover(Protocol):
 
 
 class ManualMover:
-    """A person turns the device, or whatever else reads the instructions."""
+    """A person turns the device, as instructed."""
 
     def turn(self, position: Position, number: int = 0) -> None:
         """Leave it to the person."""
 
     def busy(self) -> bool:
-        """Nobody tells."""
+        """A person gives no signal."""
         return False
 
 
 class RunningDevice:
-    """A virtual device that is there already, turned through its control socket.
+    """A virtual device that runs already, turned through its control socket.
 
     Raises
     ------
@@ -65,11 +65,11 @@ class RunningDevice:
             self.ask(turn={"alpha_deg": alpha, "beta_deg": beta})
 
     def busy(self) -> bool:
-        """Its accelerometers tell when it is there."""
+        """False: its accelerometers show when it has arrived."""
         return False
 
     def close(self) -> None:
-        """Hang up; safe to call twice."""
+        """Close the connection; safe to call twice."""
         self._remote.close()
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""Plan files: what is to be held, how, and by whom it is turned.
+"""Plan files: positions, averaging, device and mover of a run.
 
 A plan is a session.toml with positions and a table ``[run]``; ``plan.schema.json`` says
 what may stand there, and the description of each key there is the remedy that an error
@@ -7,14 +7,12 @@ names. The session that a run records keeps the table, so that it can be gone on
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -23,8 +21,9 @@ from fieldcal import procedures
 from fieldcal.acceptance.verification import planned
 from fieldcal.core.errors import InputError, PlanError
 from fieldcal.core.positions import Position, forces
-from fieldcal.session import description
+from fieldcal.session import description, schemas
 from fieldcal.session.description import Description
+from fieldcal.session.schemas import refusal, validator_of
 
 SECONDS, WARM_UP, TURN = 30.0, 300.0, 120.0
 """Averaging time, longest wait for a device that warms up, longest turn, s."""
@@ -35,7 +34,7 @@ APART = math.radians(0.5)
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is to be done.
+    """Content of a plan.
 
     Attributes
     ----------
@@ -88,8 +87,7 @@ class Task:
 @cache
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a plan, with the procedures that there are."""
-    text = files("fieldcal").joinpath("schemas/plan.schema.json").read_text("utf-8")
-    found: dict[str, Any] = json.loads(text)
+    found = schemas.schema("plan")
     procedure = found["properties"]["run"]["properties"]["procedure"]
     procedure["enum"] = list(procedures.names())
     procedure["description"] = f"write one of {', '.join(procedures.names())}"
@@ -157,44 +155,12 @@ def task(tables: Mapping[str, Any], name: str) -> Task:
 
 
 def _check_schema(tables: Mapping[str, Any], name: str) -> None:
-    from jsonschema import Draft202012Validator
-    from jsonschema.exceptions import best_match
-
-    tables = {"run": {}, **tables}
-    error = best_match(Draft202012Validator(schema()).iter_errors(tables))
-    if error is None:
-        return
-    path = list(error.absolute_path)
-    remedy = str(error.schema.get("description", "mend it"))
-    if error.validator == "required":
-        path.append(next(k for k in error.validator_value if k not in error.instance))
-        what = "is missing"
-    elif error.validator == "additionalProperties":
-        known = error.schema.get("properties", {})
-        path.append(next(k for k in error.instance if k not in known))
-        what, remedy = "is not known", f"there are {', '.join(known)}"
-    elif error.validator == "not":
-        what = "does not belong there"
-    else:
-        what = f"= {json.dumps(error.instance, ensure_ascii=False, default=str)}"
-        what = (what if len(what) < 60 else what[:57] + "…") + " cannot be"
-    raise PlanError(f"{name}: {_key(path)} {what}: {remedy}")
-
-
-def _key(path: list[str | int]) -> str:
-    """A key as one finds it in the file."""
-    if path and path[0] == "position" and len(path) > 1:
-        number = int(path[1]) + 1
-        return " ".join([f"[[position]] number {number}", *map(str, path[2:])])
-    if path and path[0] in ("run", "verification") and len(path) > 1:
-        depth = 2 if path[1] == "mover" and len(path) > 2 else 1
-        table = ".".join(map(str, path[:depth]))
-        return " ".join([f"[{table}]", *map(str, path[depth:])])
-    return ".".join(map(str, path)) or "the file"
+    if wrong := refusal({"run": {}, **tables}, validator_of(schema())):
+        raise PlanError(f"{name}: {wrong}")
 
 
 def _check_positions(about: Description, name: str) -> None:
-    """Refuse positions that cannot end well."""
+    """Refuse positions that cannot give a calibration."""
     import numpy as np
 
     positions = about.positions

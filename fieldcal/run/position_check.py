@@ -1,9 +1,9 @@
-"""Is the device where it was asked to be? Judged from its accelerometers alone.
+"""Whether the device is in the position asked for, by its accelerometers.
 
 At rest the specific force shows where the device is, but through a calibration that is
 not known yet and on a base that may be tilted. Both move all positions alike, so once a
 position has been held the *change* since then is judged, and that is known much better:
-a step of 2.5 degrees is told from none.
+a step of 2.5 degrees is detected.
 
     |(f - f_held) - (f_wanted - f_held_wanted)| <= g (NEAR + TILT |change wanted| / g)
 

@@ -1,4 +1,4 @@
-"""A run from its first position to its last, across whatever breaks in between.
+"""A run from its first position to its last, across losses of the link.
 
 The link may break, the process may be killed, the operator may want a position once
 more: each time the plan starts again from its beginning, and what was taken is handed

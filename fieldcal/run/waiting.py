@@ -44,7 +44,7 @@ reads it, have had 1.1 s.
 
 
 class PositionWait:
-    """The way of the device to one position.
+    """Waits for the device to rest in one position.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class PositionWait:
     ----------
     meter : present motion as part of what is allowed; below 1 is rest
     arrival : where the device rests, None while it moves
-    where : where it is, as far as that can be told while it moves
+    where : where it is, as far as it is known while it moves
     f : (3,) specific force there, procedure axes, m/s^2; None likewise
     waited : s of samples since it was asked for, by the device's clock
     waited_host : the same by the host's, which may have gone on less

@@ -1,8 +1,8 @@
-"""session.toml: what was known and planned about a recording.
+"""session.toml: description of a recording: device, site, frame, positions.
 
-Parsing is strict where a slip would change numbers: a key of the wrong kind, an unknown
-unit or a mounting that is none is an error that names file, key and remedy. Keys this
-version does not know are left alone, so that others may add theirs.
+`schemas/session.schema.json` says what each key may be: a key of another kind is an
+error that names file, key and remedy. Keys that it does not have are left alone, so
+that others may add theirs.
 """
 
 from __future__ import annotations
@@ -22,13 +22,10 @@ from fieldcal.core.frames import mounting_matrix
 from fieldcal.core.gravity import G0, gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.session import fields
+from fieldcal.session.schemas import refusal, validator
 
 FORMAT = 1
-STEEPEST = 10.0
-"""Largest uncertainty of a base that one may call level, deg."""
-
-GRADES = ("tactical", "navigation")
+"""The format of session.toml."""
 
 ACC_UNITS = {"m/s^2": 1.0, "g": G0, "mg": 1e-3 * G0, "V": 1.0, "count": 1.0}
 GYR_UNITS = {
@@ -38,21 +35,20 @@ GYR_UNITS = {
     "V": 1.0,
     "count": 1.0,
 }
-"""SI units in one of each; what has no such relation is divided by the gauge."""
+"""SI units in one of each; outputs in V or counts are divided by the gauge."""
 
-WORTHLESS = ("V", "count")
-"""Units that only the nominal scale factors say the worth of."""
+UNSCALED = ("V", "count")
+"""Units whose scale only the nominal scale factors give."""
 
 _UNITS = {"acceleration": ACC_UNITS, "angular_rate": GYR_UNITS}
 
-TRIADS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
 NOMINAL_SCALES = ("acc_scale", "gyr_scale")
 NOMINAL = {"acc_bias": 0.0, "acc_scale": 1.0, "gyr_bias": 0.0, "gyr_scale": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What session.toml says, checked and in SI units.
+    """Content of session.toml, checked and in SI units.
 
     Attributes
     ----------
@@ -63,10 +59,10 @@ class Description:
     limits : full scale of the same two, in SI; absent where unknown
     latitude_deg, height_m, gravity : the site; gravity in m/s^2
     level_deg : how level the base was made, one sigma about each level axis; None where
-        nobody said
+        not stated
     angle_setting_deg : how well each position's angles are set, likewise
     axes : the mounting, procedure axis x, y, z is device axis ...
-    nominal : (3,) for each of `TRIADS`: the calibration a simulation starts from
+    nominal : (3,) for each key of `NOMINAL`: the calibration a simulation starts from
     gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
     model : parameters of the effects that the simulation includes, by id
     positions : as session.toml lists them
@@ -159,40 +155,33 @@ def parse(raw: Mapping[str, Any]) -> Description:
         Naming the key and the remedy.
 
     """
-    if raw.get("format", FORMAT) != FORMAT:
-        raise InputError(
-            f"format = {raw['format']!r} is not {FORMAT}; this version reads format"
-            f" {FORMAT} only"
-        )
-    device, site = fields.table(raw, "device"), fields.table(raw, "site")
-    units = {
-        kind: fields.choice(raw, "units", kind, known, next(iter(known)))
-        for kind, known in _UNITS.items()
-    }
-    latitude = fields.number(site, "site", "latitude_deg", 45.0)
-    height = fields.number(site, "site", "height_m", 0.0)
-    positions, windows = _positions(raw)
-    axes = fields.table(raw, "frame").get("mounting", ["+x", "+y", "+z"])
-    if not isinstance(axes, list) or not all(isinstance(a, str) for a in axes):
-        raise InputError('[frame] mounting must be like ["+x", "+y", "+z"]')
+    if wrong := refusal(raw, validator("session")):
+        raise InputError(wrong)
+    device, site = raw.get("device", {}), raw.get("site", {})
+    given = raw.get("units", {})
+    units = {k: given.get(k, next(iter(known))) for k, known in _UNITS.items()}
+    latitude = float(site.get("latitude_deg", 45.0))
+    height = float(site.get("height_m", 0.0))
+    positions, windows = _positions(raw.get("position", ()))
+    axes = raw.get("frame", {}).get("mounting", ("+x", "+y", "+z"))
     mounting_matrix(axes)
-    nominal = {name: _triad(fields.table(raw, "nominal"), name) for name in TRIADS}
+    nominal = _nominal(raw.get("nominal", {}))
     gauge = _gauge(units, nominal)
     return Description(
         device=device,
-        grade=fields.choice(raw, "device", "grade", GRADES, "tactical"),
-        rate_hz=fields.positive(fields.table(raw, "sampling"), "sampling", "rate_hz"),
+        grade=device.get("grade", "tactical"),
+        rate_hz=_known(raw.get("sampling", {}).get("rate_hz")),
         units=units,
-        limits=_limits(fields.table(raw, "range"), units, gauge),
+        limits=_limits(raw.get("range", {}), units, gauge),
         latitude_deg=latitude,
         height_m=height,
-        gravity=fields.positive(site, "site", "gravity") or gravity(latitude, height),
-        level_deg=_angle(site, "level_deg", "no level base"),
-        angle_setting_deg=_angle(site, "angle_setting_deg", "no setting of an angle"),
+        gravity=float(site.get("gravity") or gravity(latitude, height)),
+        level_deg=_known(site.get("level_deg")),
+        angle_setting_deg=_known(site.get("angle_setting_deg")),
         axes=tuple(axes),
         nominal={n: v / gauge.size[n.startswith("gyr")] for n, v in nominal.items()},
         gauge=gauge,
-        model=_model(fields.table(raw, "model")),
+        model=_model(raw.get("model", {})),
         positions=positions,
         windows=windows,
         numbers=tuple(range(len(positions))),
@@ -200,99 +189,72 @@ def parse(raw: Mapping[str, Any]) -> Description:
     )
 
 
-def _angle(site: Mapping[str, Any], key: str, what: str) -> float | None:
-    """How well an angle is known, deg; None where nobody said."""
-    sigma = fields.positive(site, "site", key)
-    if sigma is not None and sigma > STEEPEST:
-        raise InputError(
-            f"[site] {key} = {sigma:g} is {what}: give one sigma in degrees, up to"
-            f" {STEEPEST:g}"
-        )
-    return sigma
+def _known(value: float | None) -> float | None:
+    return None if value is None else float(value)
+
+
+def _nominal(table: Mapping[str, Any]) -> dict[str, Array]:
+    given = {name: table.get(name, [usual] * 3) for name, usual in NOMINAL.items()}
+    return {name: np.array(three, float) for name, three in given.items()}
 
 
 def _gauge(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
-    """By the nominal scale factors, where the unit itself is worth nothing known."""
+    """Output scale of channels in volts or counts, by the nominal scale factors."""
     size, named = [1.0, 1.0], list(SI)
     for i, (kind, scale) in enumerate(zip(_UNITS, NOMINAL_SCALES, strict=True)):
-        if units[kind] in WORTHLESS:
+        if units[kind] in UNSCALED:
             size[i], named[i] = float(np.abs(nominal[scale]).mean()), units[kind]
     if not all(size):
-        raise InputError("[nominal] a scale factor of 0 sees nothing: mend it")
+        raise InputError("[nominal] a scale factor is 0: give one that is not")
     return Gauge((size[0], size[1]), (named[0], named[1]))
 
 
 def _limits(
     table: Mapping[str, Any], units: Mapping[str, str], gauge: Gauge
 ) -> dict[str, float]:
-    limits = {kind: fields.positive(table, "range", kind) for kind in _UNITS}
-    worth = {
+    scale = {
         k: _UNITS[k][units[k]] / c for k, c in zip(_UNITS, gauge.size, strict=True)
     }
-    return {k: v * worth[k] for k, v in limits.items() if v is not None}
-
-
-def _triad(table: Mapping[str, Any], name: str) -> Array:
-    value = table.get(name, [NOMINAL[name]] * 3)
-    if not isinstance(value, list) or len(value) != 3:
-        raise InputError(f"[nominal] {name} = {value!r} must be three numbers, x y z")
-    return np.array([fields.number({name: v}, "nominal", name, 0.0) for v in value])
+    return {k: float(table[k]) * scale[k] for k in _UNITS if k in table}
 
 
 def _model(table: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    ids = table.get("effects", [])
-    if not isinstance(ids, list) or not all(isinstance(i, str) for i in ids):
-        raise InputError('[model] effects must be a list of ids, like ["base_tilt"]')
-    return {i: fields.table(table, i) for i in ids}
+    found = {name: table.get(name, {}) for name in table.get("effects", ())}
+    for name, parameters in found.items():
+        if not isinstance(parameters, Mapping):
+            raise InputError(f"[model] {name} cannot be: write a table [model.{name}]")
+    return found
 
 
 def _positions(
-    raw: Mapping[str, Any],
+    tables: Iterable[Mapping[str, Any]],
 ) -> tuple[tuple[Position, ...], tuple[tuple[float, float] | None, ...]]:
-    tables = raw.get("position", [])
-    if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
-        raise InputError("position must be tables: write [[position]] above each")
-    rows = [_position(i, table) for i, table in enumerate(tables)]
+    rows = [(_position(i, t), _window(i, t)) for i, t in enumerate(tables, 1)]
     return tuple(p for p, _ in rows), tuple(w for _, w in rows)
 
 
-def _position(
-    i: int, table: Mapping[str, Any]
-) -> tuple[Position, tuple[float, float] | None]:
-    name = f"position {i}"
-    given = [key for key in ("alpha_deg", "beta_deg") if key in table]
-    if len(given) == 1:
-        raise InputError(f"{name} has {given[0]} alone; give both angles or neither")
-    rate = table.get("rate_deg_s")
-    if rate is not None:
-        if not isinstance(rate, list) or len(rate) != 3:
-            raise InputError(f"{name}: rate_deg_s must be three numbers, deg/s")
-        rate = tuple(
-            np.deg2rad([fields.number({"r": r}, name, "r", 0.0) for r in rate])
-        )
+def _position(number: int, table: Mapping[str, Any]) -> Position:
     label = str(table.get("name", ""))
-    if given:
-        alpha, beta = (
-            fields.number(table, name, k, 0.0) for k in ("alpha_deg", "beta_deg")
-        )
-        position = Position.deg(alpha, beta, label)
+    if "alpha_deg" in table:
+        position = Position.deg(table["alpha_deg"], table["beta_deg"], label)
     else:
-        position = Position(label or name)
-    if rate is not None and any(rate) and not label:
-        turning = " ".join(f"{r:g}" for r in np.rad2deg(rate).round(6))
+        position = Position(label or f"position {number}")
+    rate = table.get("rate_deg_s")
+    if rate is None:
+        return position
+    if any(rate) and not label:
+        turning = " ".join(f"{r:g}" for r in rate)
         position = replace(position, name=f"{position.name}, {turning} °/s")
-    return replace(position, rate=rate), _window(name, table)
+    return replace(position, rate=tuple(np.deg2rad(rate)))
 
 
-def _window(name: str, table: Mapping[str, Any]) -> tuple[float, float] | None:
-    given = [key for key in ("start_s", "end_s") if key in table]
-    if not given:
+def _window(number: int, table: Mapping[str, Any]) -> tuple[float, float] | None:
+    if "start_s" not in table:
         return None
-    if len(given) == 1:
-        raise InputError(f"{name} has {given[0]} alone; give start_s and end_s")
-    start, end = (fields.number(table, name, key, 0.0) for key in ("start_s", "end_s"))
+    start, end = float(table["start_s"]), float(table["end_s"])
     if start >= end:
         raise InputError(
-            f"{name}: start_s = {start:g} must come before end_s = {end:g}"
+            f"[[position]] number {number} start_s = {start:g} cannot be: it must come"
+            f" before end_s = {end:g}"
         )
     return start, end

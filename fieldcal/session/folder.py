@@ -125,7 +125,7 @@ class Session:
         return raw
 
     def marks(self) -> Iterator[dict[str, Any]]:
-        """What happened, in order."""
+        """Marks in order."""
         return read_marks(self.folder / MARKS)
 
     def write_json(self, name: str, content: Mapping[str, Any]) -> Path:
@@ -157,7 +157,7 @@ def mark_line(mark: Mapping[str, Any]) -> str:
 
 
 def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:
-    """Marks of a file that are whole; no file gives none.
+    """Marks of a file with a correct checksum; none without a file.
 
     A line that was changed is left out, and so is a last one that was cut off.
 
@@ -205,7 +205,7 @@ def _mark(line: str) -> dict[str, Any] | None:
 
 
 def write_whole(path: Path, content: str | bytes) -> Path:
-    """Write a file so that a reader finds the old one or the new one, never half.
+    """Replace a file atomically: a reader finds the old content or the new one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Whether a session folder is whole: each file against its checksums and its schema.
+"""Integrity of a session folder: each file against its checksums and its schema.
 
 The JSON Schemas are in ``schemas/``, one for each kind of file, for other programs too;
 session.toml is judged as TOML reads it, marks.jsonl line by line.
@@ -7,10 +7,7 @@ session.toml is judged as TOML reads it, marks.jsonl line by line.
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterator
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,13 +15,12 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.session import description, sample_files
 from fieldcal.session.folder import DESCRIPTION, MARKS, RESULT, read_marks
+from fieldcal.session.schemas import validator
 
 DIAGNOSIS = "diagnosis.json"
 
-SCHEMAS = {
-    DESCRIPTION: "session", MARKS: "mark", RESULT: "result", DIAGNOSIS: "diagnosis"
-}  # fmt: skip
-"""Which schema a file is held to."""
+SCHEMAS = {MARKS: "mark", RESULT: "result", DIAGNOSIS: "diagnosis"}
+"""Which schema a file is held to; `description` reads session.toml by its own."""
 
 
 class FileFault(NamedTuple):
@@ -41,15 +37,8 @@ class FileFault(NamedTuple):
     text: str
 
 
-def schema(kind: str) -> dict[str, Any]:
-    """Return one of the schemas: session, mark, result or diagnosis."""
-    path = files("fieldcal").joinpath(f"schemas/{kind}.schema.json")
-    found: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    return found
-
-
 def findings(folder: Path) -> Iterator[FileFault]:
-    """What is wrong with a session, file by file; nothing if all of it is whole.
+    """Faults of a session, file by file; none if it is intact.
 
     Raises
     ------
@@ -77,8 +66,6 @@ def _description(folder: Path) -> Iterator[FileFault]:
         if not path.exists():
             raise
         yield FileFault(DESCRIPTION, _without(path, str(error)))
-        return
-    yield from _against(DESCRIPTION, tomllib.loads(path.read_text("utf-8")), "")
 
 
 def _samples(folder: Path) -> Iterator[FileFault]:
@@ -119,16 +106,9 @@ def _derived(path: Path) -> Iterator[FileFault]:
 
 
 def _against(name: str, document: Any, place: str) -> Iterator[FileFault]:
-    for error in _validator(SCHEMAS[name]).iter_errors(document):
+    for error in validator(SCHEMAS[name]).iter_errors(document):
         text = f"{place}{_path(error.absolute_path)}: {_short(error.message)}"
         yield FileFault(name, text)
-
-
-@cache
-def _validator(kind: str) -> Any:
-    import jsonschema
-
-    return jsonschema.Draft202012Validator(schema(kind))
 
 
 def _path(parts: Any) -> str:

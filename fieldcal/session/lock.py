@@ -1,4 +1,4 @@
-"""One writer a session: who records into a folder holds its lock until the end.
+"""One writer per session: the recorder holds a lock of the folder until the end.
 
 The lock is the operating system's, so that it ends with the process, however that ends.
 Who holds it, and since when, stands beside it for whoever comes second.
@@ -59,7 +59,7 @@ class SessionLock:
             raise
 
     def release(self) -> None:
-        """Let the next one in; safe to call twice."""
+        """Release the lock; safe to call twice."""
         if self._lock.is_locked:
             with suppress(OSError):
                 self._owner.unlink(missing_ok=True)
@@ -76,7 +76,7 @@ def _user() -> str:
 
 
 def _holder(owner: Path) -> str:
-    """Who holds a lock, as far as it can be told."""
+    """Who holds a lock, if it is known."""
     try:
         held = json.loads(owner.read_text("utf-8"))
         minutes = max(0.0, time() - float(held["host_s"])) / 60

@@ -1,4 +1,4 @@
-"""Writing a session while it happens, so that a killed process loses next to nothing.
+"""Records a session; a killed process loses less than a second of samples.
 
 Samples go into an Arrow IPC stream, each batch complete in itself, with its checksum,
 and handed to the operating system at least every `FLUSH` seconds, also while the device
@@ -158,7 +158,7 @@ class Recorder:
         self._encoder = ArrowEncoder(schema())
 
     def _resume(self) -> None:
-        """Cut off what is not whole, and go on behind it."""
+        """Cut off an incomplete batch and append after it."""
         from fieldcal.session.arrow_stream import ArrowEncoder, decode, whole
 
         path = self.folder / SAMPLES
@@ -207,7 +207,7 @@ class Recorder:
         return block
 
     def flush(self) -> None:
-        """Hand what waits to the operating system."""
+        """Hand waiting samples to the operating system."""
         with self._lock:
             self._written = monotonic()
             if not self._waiting and not self._unwritten:
@@ -260,7 +260,7 @@ class Recorder:
             self._held.release()
 
     def _keep_up(self) -> None:
-        """Flush and sync in the background; a fault is told at the next call."""
+        """Flush and sync in the background; a fault is raised by the next call."""
         synced = monotonic()
         while not self._stop.wait(FLUSH / 2):
             try:

@@ -33,7 +33,7 @@ _GUNZIP = 16 + zlib.MAX_WBITS
 
 
 def find(folder: Path, stem: str = "samples") -> Path:
-    """The one samples file of a session folder.
+    """Find the samples file of a session folder.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def find(folder: Path, stem: str = "samples") -> Path:
 
 
 def read(path: Path) -> tuple[Block, tuple[str, ...]]:
-    """Samples of a file as they stand there, and warnings about what was cut off.
+    """Samples of a file, unscaled, and warnings about what was cut off.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """The virtual twin of a device: everything that a diagnosis found, as a device file.
 
-    truth      bias and scale factor as they come out beside the effects
+    truth      bias and scale factor, fitted together with the effects
     noise      white noise of each axis, as it is in the windows
     effects    what the simulation had already, and what was found, as fitted
     climate    the temperature that was recorded

@@ -1,4 +1,4 @@
-"""What was fitted, as one device can have it.
+"""The fitted state as one that a device can have.
 
 In the model the rate of the base is three free numbers e. A device feels the Earth's at
 its latitude, turned about the vertical by its heading, or nothing; what else was fitted

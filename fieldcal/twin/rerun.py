@@ -1,4 +1,4 @@
-"""The session once more, on the virtual device with its own physics.
+"""Replays the session on the virtual device with its own physics.
 
 The device is held where the session's windows held it, at the session's own times, in
 the temperature that was recorded, without noise, and its outputs are compared with the

@@ -1,4 +1,4 @@
-"""What the virtual device is told, so that it goes through a session again.
+"""Commands that take the virtual device through a session again.
 
 It is held where the windows held it, as far as a fit knows that: at the angles of
 session.toml with the turns aside that were found, or, where none are known, at those

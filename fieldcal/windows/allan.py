@@ -1,4 +1,4 @@
-"""Allan deviation of a long recording at rest: what averaging can reach, and when.
+"""Allan deviation of a long recording at rest: what averaging can reach.
 
     sigma^2(tau) = <(y_k+1 - y_k)^2> / 2          y: means over tau, overlapping
 

@@ -1,4 +1,4 @@
-"""What cannot be a device at rest, whatever its noise."""
+"""Bounds beyond which a device is not at rest, whatever its noise."""
 
 from __future__ import annotations
 

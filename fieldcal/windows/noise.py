@@ -1,4 +1,4 @@
-"""White noise of samples, from what bends at short lags inside windows.
+"""White noise of samples, from differences at short lags inside windows.
 
 With means over m consecutive samples, the Hadamard variance times m,
 

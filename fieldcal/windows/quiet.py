@@ -1,4 +1,4 @@
-"""How much a device at rest wanders over 0.1 s to 12.8 s, robustly, by its own data.
+"""Noise of a device at rest over 0.1 s to 12.8 s, by robust estimates.
 
     y_i                                    means of cells, i = 1 .. m
     u_k,i = mean of 2^k cells from cell i  running mean of level k

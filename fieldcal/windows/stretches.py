@@ -1,4 +1,4 @@
-"""Still stretches of a recording that nobody marked.
+"""Finds still stretches of a recording without marks.
 
     r_i = max over channels of sd(y over 1 s about i) / quietest tenth of them     (1)
 

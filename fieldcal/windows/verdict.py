@@ -1,4 +1,4 @@
-"""The verdict on a window so far: still, or moved, when, on which axis and how."""
+"""Whether the device moved during a window: when, on which axis and how."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Departure:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What the samples so far say.
+    """Result for the samples so far.
 
     Attributes
     ----------

@@ -32,13 +32,13 @@ FEWEST = 10
 SETTLED = 15.0
 """Device time before which nothing is said of what more time would bring, s."""
 
-WORTH = 0.9
-"""Part to which twice the time must lower the error to be worth it (white: 0.71)."""
+GAIN_OF_DOUBLING = 0.9
+"""Factor to which twice the time must lower the error to go on (white noise: 0.71)."""
 
 
 @dataclass(frozen=True, slots=True)
 class LearnedNoise:
-    """What a window taught about the noise of the device, for the next one.
+    """Noise of the device learned in a window, for the next one.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ class Window:
             return None
         twice = np.sqrt(self._mean_error().doubled[:6] ** 2 + self._rounding())[:3]
         open_ = np.isfinite(sigma) & (sigma > (target or 0.0))
-        if (twice[open_] > WORTH * sigma[open_]).all():
+        if (twice[open_] > GAIN_OF_DOUBLING * sigma[open_]).all():
             return (
                 f"the bias wanders as much as is averaged out: {np.nanmax(sigma):.2g} "
                 f"m/s² is reached, and {2 * self.elapsed:.0f} s would give "

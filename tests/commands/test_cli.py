@@ -67,7 +67,11 @@ def one_sentence(text: str) -> bool:
 @pytest.mark.parametrize(
     ("toml", "csv", "says"),
     [
-        (ZERO_G, "t,ax,ay,az\n0,0,0,0\n", "gravity = 0 must be above 0"),
+        (
+            ZERO_G,
+            "t,ax,ay,az\n0,0,0,0\n",
+            "gravity = 0.0 cannot be: give the",
+        ),
         ("", "t,ax,ay,az\n0,0,0,0\n", "no [[position]]"),
         (
             "[[position]]\nalpha_deg = 0\nbeta_deg = 0\nstart_s = 0\nend_s = 9\n",

@@ -21,8 +21,8 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
 from fieldcal.exporters import ExportSource, ardupilot, exporter, formats, px4
 from fieldcal.session.folder import Session
-from fieldcal.session.integrity import schema
 from fieldcal.session.recorder import Recorder
+from fieldcal.session.schemas import schema
 
 PAIRS = [f"{i}{j}" for i in "123" for j in "123" if i != j]
 

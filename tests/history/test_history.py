@@ -85,15 +85,15 @@ def test_without_a_serial_number_nothing_is_kept(tmp_path: Path) -> None:
 
 def test_several_processes_may_add_at_once(tmp_path: Path) -> None:
     code = (
-        "import sys; sys.path.insert(0, sys.argv[3])\n"
+        "import sys; sys.path[:0] = sys.argv[3:]\n"
         "from pathlib import Path\nfrom test_history import calibration\n"
         "from fieldcal.history.store import History\n"
         "for i in range(8): History(Path(sys.argv[1])).add(\n"
         "    '2026', Path(f'/{sys.argv[2]}/{i}'), calibration())"
     )
     call = [sys.executable, "-c", code, str(tmp_path / "h")]
-    here = str(Path(__file__).parents[1])
-    both = [subprocess.Popen([*call, name, here]) for name in "ab"]
+    here = [str(folder) for folder in Path(__file__).parents[:2]]
+    both = [subprocess.Popen([*call, name, *here]) for name in "ab"]
     assert [p.wait() for p in both] == [0, 0]
     assert len(History(tmp_path / "h").runs("A1")) == 16
 

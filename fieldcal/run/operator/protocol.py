@@ -29,13 +29,13 @@ NOTHING, TAKEN_BEFORE = WaitReason(), WaitReason(WaitState.TAKEN_BEFORE)
 
 @dataclass(frozen=True, slots=True)
 class OperatorView:
-    """What there is to show now.
+    """State of the run for the display.
 
     Attributes
     ----------
     phase : what the engine waits for
     hold : the step being carried out
-    arrival : where the device is, None while it cannot be told
+    arrival : where the device is, None while it is not known
     stillness : present motion over the limit for rest; below 1 is still
     elapsed : s of device time averaged so far
     sigma : (6,) standard error reached so far, nan before there is one

@@ -38,7 +38,7 @@ def alert(view: OperatorView) -> str:
 
 
 def angles(view: OperatorView) -> list[tuple[str, Text]]:
-    """Name and inclinometer of both joints, where it can be told."""
+    """Name and inclinometer of both joints, where the angles are known."""
     wanted, now = view.hold.position.degrees, view.arrival
     if now is None or wanted is None:
         return []

@@ -112,12 +112,14 @@ def _windows(schedule: Schedule) -> list[HeldWindow]:
         raise InputError("no window to play again: the session has no positions")
     for i, w in enumerate(windows):
         if not np.isfinite([w.alpha, w.beta, w.start, w.end, *w.rate]).all():
-            raise InputError(f"position {i} cannot be played again: its angles or times"
-                             " are unknown")  # fmt: skip
+            raise InputError(
+                f"position {i + 1} cannot be played again: its angles or times are "
+                "unknown"
+            )
         if w.end <= w.start or (i and w.start < windows[i - 1].end):
             raise InputError(
-                f"position {i}: its window {w.start:g} to {w.end:g} s ends before it "
-                "starts, or overlaps the one before"
+                f"position {i + 1}: its window {w.start:g} to {w.end:g} s ends before "
+                "it starts, or overlaps the one before"
             )
     return windows
 

@@ -27,7 +27,7 @@ AXES = (("x", "#d9480f"), ("y", "#2b8a3e"), ("z", "#1971c2"))
 
 def drawings(positions: Sequence[Position]) -> str:
     """All positions side by side, as HTML."""
-    figures = "".join(_figure(i, p) for i, p in enumerate(positions))
+    figures = "".join(_figure(i, p) for i, p in enumerate(positions, 1))
     return f'<div style="display:flex;flex-wrap:wrap;gap:.5rem">{figures}</div>'
 
 

@@ -55,14 +55,14 @@ def pretty(unit: str) -> str:
     return "" if raised == "1" else raised.replace("degC", "°C")
 
 
-def ranges(numbers: Iterable[int]) -> str:
-    """Numbers with runs of them shortened.
+def position_numbers(indices: Iterable[int]) -> str:
+    """Numbers of positions, from 1, with runs of them shortened.
 
-    >>> ranges((0, 1, 2, 5, 7, 8))
-    '0–2, 5, 7–8'
+    >>> position_numbers((0, 1, 2, 5, 7, 8))
+    '1–3, 6, 8–9'
     """
     parts: list[list[int]] = []
-    for n in sorted(numbers):
+    for n in sorted(index + 1 for index in indices):
         if parts and n == parts[-1][1] + 1:
             parts[-1][1] = n
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import IO, TYPE_CHECKING
 
-from fieldcal.calibration.wording import ranges
+from fieldcal.calibration.wording import position_numbers
 from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.agreement import UNITS
@@ -71,7 +71,7 @@ def _mismatch(mismatch: tuple[Mismatch, ...]) -> object:
         table.add_row(
             " ".join(names),
             m.kind if m.covariate in (m.kind, "") else f"{m.kind}: {m.covariate}",
-            ranges(m.positions),
+            position_numbers(m.positions),
             "–".join(span),
             _rms(names, m.rms),
             f"{bar} {m.sigma:.0f}" if finite else bar,
@@ -182,7 +182,7 @@ def _replays(again: Rerun) -> object:
             f"{run.by_position[i, again.triad]:.2g} ({run.chi2_by_position[i]:.3g})"
             for run in runs
         ]
-        table.add_row(str(position), *cells)
+        table.add_row(str(position + 1), *cells)
     table.add_section()
     whole = [f"{r.rms[again.triad]:.2g} ({r.chi2_per_dof:.3g})" for r in runs]
     table.add_row("all", *whole)

@@ -126,9 +126,9 @@ def _refuse_overlap(about: Description) -> None:
     for (window, number), (then, following) in pairwise(held):
         if then[0] < window[1]:
             raise InputError(
-                f"position {following}: its window starts at {then[0]:g} s, before that"
-                f" of position {number} ends ({window[1]:g} s): the device cannot be in"
-                " both; mend start_s and end_s"
+                f"position {following + 1}: its window starts at {then[0]:g} s,"
+                f" before that of position {number + 1} ends ({window[1]:g} s): the"
+                " device cannot be in both; mend start_s and end_s"
             )
 
 

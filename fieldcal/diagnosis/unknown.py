@@ -58,11 +58,11 @@ def misset(
 
 
 def listed(positions: Sequence[int], most: int | None = None) -> str:
-    """Name positions, up to so many.
+    """Name positions by their numbers, which begin at 1, up to so many.
 
-    >>> listed([4]), listed([1, 2, 3], most=2)
+    >>> listed([3]), listed([0, 1, 2], most=2)
     ('position 4', 'positions 1, 2…')
     """
     word = "position" if len(positions) == 1 else "positions"
-    some = ", ".join(map(str, positions[:most]))
+    some = ", ".join(str(index + 1) for index in positions[:most])
     return f"{word} {some}" + "…" * (most is not None and len(positions) > most)

@@ -150,8 +150,8 @@ def rests(session: Session) -> Rests:
 
 
 def _named(session: Session, row: int) -> str:
-    """A position by its number, from 0, and by its name if it has one."""
-    number, name = f"position {row}", session.positions[row].name
+    """A position by its number, from 1, and by its name if it has one."""
+    number, name = f"position {row + 1}", session.positions[row].name
     return number if name == number else f"{number} ({name})"
 
 

@@ -74,7 +74,7 @@ def _by_position(
         Series(name, x + 0.16 * (i - middle), r, tone, low=r - s, high=r + s)
         for i, (name, r, s, tone) in enumerate(values)
     )
-    names = tuple(str(r) for r in found.rows)
+    names = tuple(str(r + 1) for r in found.rows)
     return Chart(
         f"residual-position-{what}",
         f"Residuals of the {what} by position",

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.calibration.wording import TITLES, number, pretty, ranges
+from fieldcal.calibration.wording import TITLES, number, position_numbers, pretty
 from fieldcal.core.samples import CHANNELS, common_unit
 from fieldcal.report import evidence
 from fieldcal.report.blocks import (
@@ -98,7 +98,9 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
             [
                 " ".join(names),
                 str(m.get("kind", "")),
-                ranges(p for p in list_at(m, "positions") if isinstance(p, int)),
+                position_numbers(
+                    p for p in list_at(m, "positions") if isinstance(p, int)
+                ),
                 " – ".join(span),
                 str(m.get("covariate", "")),
                 _rms(names, real(m.get("rms"))),

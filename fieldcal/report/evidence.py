@@ -29,7 +29,9 @@ def curves(found: Sequence[Json]) -> list[Block]:
     """Residual against what it follows, before and after."""
     blocks: list[Block] = []
     for i, curve in enumerate(found[:MOST_CURVES]):
+        channel, covariate = (str(curve.get(k, "")) for k in ("channel", "covariate"))
         x = np.array([real(v) for v in list_at(curve, "x")])
+        x += covariate == "position"  # which is counted from 0 in the file
         sigma = _column(curve, "sigma", len(x))
         series = tuple(
             Series(name, x, y, tone, low=y - sigma, high=y + sigma)
@@ -38,7 +40,6 @@ def curves(found: Sequence[Json]) -> list[Block]:
         )
         if not len(x) or not series:
             continue
-        channel, covariate = (str(curve.get(k, "")) for k in ("channel", "covariate"))
         sizes = [f"{s.name} {_rms(s):.2g}" for s in series]
         chart = Chart(
             f"curve-{i}",
@@ -74,7 +75,7 @@ def replay(twin: Json) -> list[Block]:
     )
     if not series:
         return []
-    names = tuple(str(p.get("position", "")) for p in places)
+    names = tuple(_number(p.get("position")) for p in places)
     worst = [f"{s.name} {np.nanmax(s.y):.3g}" for s in series]
     chart = Chart(
         "replay",
@@ -86,6 +87,11 @@ def replay(twin: Json) -> list[Block]:
         (Mark(1.0, "noise"),),
     )
     return [Figure(chart, "How far a simulation with its own physics is off.")]
+
+
+def _number(index: object) -> str:
+    """Number of a position that the file counts from 0."""
+    return str(index + 1) if isinstance(index, int) else ""
 
 
 def _agreement(places: Sequence[Json], name: str) -> Array:

@@ -77,7 +77,8 @@ class Material:
     def position_name(self, row: int) -> str:
         """Number of a position, and its name where it has one."""
         name = self.session.positions[row].name
-        return f"{row}" if name == f"position {row}" else f"{row} · {name}"
+        number = row + 1
+        return f"{number}" if name == f"position {number}" else f"{number} · {name}"
 
 
 def gather(folder: Path | str, earlier: Iterable[EarlierCalibration] = ()) -> Material:

@@ -69,7 +69,7 @@ def _misses(where: MeasuredAngles) -> Chart:
         "misses",
         "Shown less asked",
         f"The largest difference between an angle shown and asked for is {worst:.3f}°.",
-        Axis("position", names=tuple(str(r) for r in where.rows)),
+        Axis("position", names=tuple(str(r + 1) for r in where.rows)),
         Axis("shown less asked", "deg"),
         series,
     )

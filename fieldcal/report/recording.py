@@ -54,7 +54,9 @@ def windows(material: Material) -> tuple[LabelledSpan, ...]:
         return ()
     pairs = zip(material.still.rows, material.still.averages, strict=True)
     off = material.epoch
-    return tuple(LabelledSpan(a.start - off, a.end - off, str(row)) for row, a in pairs)
+    return tuple(
+        LabelledSpan(a.start - off, a.end - off, str(row + 1)) for row, a in pairs
+    )
 
 
 def _chart(material: Material) -> Record:

@@ -204,7 +204,7 @@ class Observations:
             found, axis = np.argwhere(bad)[0]
             row = int(rows[found])
             raise InputError(
-                f"position {row} ({self.positions[row].name}) has no mean of "
+                f"position {row + 1} ({self.positions[row].name}) has no mean of "
                 f"{CHANNELS[three][axis]}: take its window again or leave it out"
             )
         if not np.isfinite(cov).all() or (np.linalg.eigvalsh(cov) <= 0).any():

@@ -122,8 +122,8 @@ def test_vibration_can_be_set_for_each_window() -> None:
     ("windows", "says"),
     [
         ([], "no window"),
-        ([(0, 0, 5.0, 4.0)], "position 0: its window"),
-        ([(0, 0, 0.0, 4.0), (0, 0, 3.0, 6.0)], "position 1: its window"),
+        ([(0, 0, 5.0, 4.0)], "position 1: its window"),
+        ([(0, 0, 0.0, 4.0), (0, 0, 3.0, 6.0)], "position 2: its window"),
         ([(np.nan, 0, 0.0, 4.0)], "unknown"),
     ],
 )

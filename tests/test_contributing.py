@@ -16,11 +16,13 @@ from fieldcal.session.folder import Session
 from fieldcal.sim_device import Profile
 
 ROOT = Path(__file__).parent.parent
-TREE = ("fieldcal", "drivers", "procedures", "sim_device", "tests", "pyproject.toml")
+CODE = ("fieldcal", "drivers", "procedures", "sim_device", "benchmarks", "tests")
+TREE = (*CODE, "pyproject.toml")
 ADDED = {
     "tests/diagnosis/test_diagnosis_contract.py": "temperature_curve",
     "tests/effects/test_effects.py": "temperature_curve or TemperatureCurve",
     "tests/sim_device/test_sim_effects.py": "temperature_curve",
+    "tests/benchmarks_check/test_concealed_sessions.py": "temperature_curve or kind",
     "tests/drivers/test_wires_meet.py": "logger or writes",
 }
 """Tests that walk what there is, and what they are to find there."""

@@ -21,6 +21,7 @@ from benchmarks.concealed.judging import Outcome, judged
 from benchmarks.concealed.sessions import Session, plain
 from benchmarks.concealed.tables import printed
 from fieldcal.diagnosis import diagnose
+from fieldcal.effects import catalogue
 
 Draw = Callable[[np.random.Generator], Session]
 
@@ -58,6 +59,9 @@ def kinds() -> Mapping[str, tuple[Draw, int]]:
     for name in others.OUTSIDE:
         out[f"outside: {name}"] = (_outside(name), 3)
     out["three"] = (lambda rng: others.several(rng, _sigmas(rng), 3), 9)
+    for name in catalogue():
+        if name not in out:
+            out[name] = (lambda rng, n=name: others.example(n, rng), 3)  # type: ignore[misc]
     return out
 
 

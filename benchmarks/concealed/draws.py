@@ -15,43 +15,45 @@ import numpy as np
 
 from benchmarks.concealed.sessions import SIX, Session, plain
 from fieldcal.core.samples import Array, Block
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Line
 from fieldcal.sim_device import profile as device
+from fieldcal.sim_device.effects import ids, kind
 
 Values = dict[str, Any]
 
 
-def _matrix(letter: str, diagonal: bool) -> tuple[str, ...]:
-    pairs = [(i, j) for i in "123" for j in "123" if diagonal or i != j]
-    return tuple(f"{letter}{i}{j}" for i, j in pairs)
-
-
-VECTORS: Mapping[str, tuple[tuple[str, ...], float]] = {
-    "cross_coupling": (_matrix("k", False), 5e-3),
-    "gyro_cross_coupling": (_matrix("s", False), 5e-3),
-    "gyro_products": (_matrix("p", True), 5e-3),
-    "gyro_scale": (("s1", "s2", "s3"), 5e-3),
-    "quadratic": (("x", "y", "z"), 2e-4),
-    "cubic": (("x", "y", "z"), 5e-6),
-    "scale_asymmetry": (("x", "y", "z"), 2e-3),
-    "pendulous_products": (_matrix("l", True), 5e-5),
-    "g_sensitivity": (_matrix("g", True), 3e-5),
-    "g2_sensitivity": (("x", "y", "z"), 3e-7),
-    "base_tilt": (("about_x_deg", "about_z_deg"), 1.0),
-    "angle_offset": (("alpha0_deg", "beta0_deg"), 1.0),
-    "angle_scale": (("alpha", "beta"), 1e-2),
-    "temperature_scale": (("x", "y", "z"), 1e-4),
-    "lever_arm": (("x", "y", "z"), 0.1),
+USUAL: Mapping[str, float] = {
+    "cross_coupling": 5e-3,
+    "gyro_cross_coupling": 5e-3,
+    "gyro_products": 5e-3,
+    "gyro_scale": 5e-3,
+    "quadratic": 2e-4,
+    "cubic": 5e-6,
+    "scale_asymmetry": 2e-3,
+    "pendulous_products": 5e-5,
+    "g_sensitivity": 3e-5,
+    "g2_sensitivity": 3e-7,
+    "base_tilt": 1.0,
+    "angle_offset": 1.0,
+    "angle_scale": 1e-2,
+    "temperature_scale": 1e-4,
+    "lever_arm": 0.1,
 }
+"""What the components of a vector usually are; each is drawn by itself."""
+
 TIMED = (
     *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift", "bias_step"),
     *("settling", "hum"),
 )
-EQUATIONS = (*VECTORS, *TIMED, "sway", "time_delay", "heading_error")
+EQUATIONS = (*USUAL, *TIMED, "sway", "time_delay", "heading_error")
 """Effects with numbers that can be made larger and smaller."""
 
-LINES = ("hum", "sway")
+LINES = tuple(i for i, one in catalogue().items() if isinstance(one, Line))
 TURNING = ("gyro_cross_coupling", "gyro_scale", "lever_arm", "time_delay")
-HOT = ("temperature_bias", "temperature_scale", "thermal_hysteresis")
+HOT = tuple(i for i in ids() if "temperature" in kind(i).EXAMPLE.device)
+"""Effects that need a temperature that changes."""
+
 FIXED = ("tau_s", "at_s", "hz", "azimuth_deg", "phase_deg", "level")
 LARGEST = {
     **{"base_tilt": 5.0, "angle_offset": 5.0, "thermal_hysteresis": 2.0},
@@ -66,8 +68,8 @@ UNORIENTED = ("cross_coupling", "quadratic", "scale_asymmetry", "temperature_bia
 
 def drawn(name: str, rng: np.random.Generator, span: float) -> Values:
     """An effect's parameters at about their typical size, some of them zero."""
-    if name in VECTORS:
-        names, size = VECTORS[name]
+    if name in USUAL:
+        names, size = kind(name).VECTOR, USUAL[name]
         values = {n: float(size * rng.normal()) for n in names}
         if len(names) > 3:
             for n in rng.permutation(list(names))[: len(names) // 2]:
@@ -112,14 +114,14 @@ def single(name: str, rng: np.random.Generator, sigmas: float) -> Session:
 
 def suited(name: str, rng: np.random.Generator) -> Session:
     """A session in which an effect shows."""
-    if name == "gyro_products":
+    if kind(name).EXAMPLE.turntable:
         return plain(rng, ("table",))
     if name in ANYWHERE and rng.random() < 0.2:
         return _warmed(plain(rng, ("static",)), name, rng)
     if name in UNORIENTED and rng.random() < 0.2:
         return _warmed(replace(plain(rng, ("wide",)), angles=False), name, rng)
     session = plain(rng)
-    if name == "heading_error":
+    if kind(name).NEEDS_EARTH:
         one = session.profile
         noise = replace(
             one.noise,
@@ -160,7 +162,7 @@ def sized(session: Session, name: str, values: Values, sigmas: float) -> Values 
         factor = sigmas / there
         values = {n: v if n in FIXED else v * factor for n, v in values.items()}
     largest = max(abs(v) for n, v in values.items() if n not in FIXED)
-    usual = 4 * VECTORS[name][1] if name in VECTORS else 0.1
+    usual = 4 * USUAL.get(name, 0.025)
     return values if largest < LARGEST.get(name, usual) else None
 
 

@@ -11,7 +11,9 @@ import numpy as np
 from benchmarks.concealed.draws import EQUATIONS, HOT, drawn, size, sized, suited
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.core.samples import Array, Block
+from fieldcal.sim_device import effects
 from fieldcal.sim_device.profile import FullScale
+from fieldcal.sim_device.profile_file import from_tables
 
 CHANCE = ("angle_setting", "random_walk")
 CHAIN = (
@@ -125,13 +127,41 @@ def chain(name: str, rng: np.random.Generator) -> Session:
         "noise_level": {"channel": channel, "ratio": float(rng.uniform(2.5, 6))},
         "mounting": {"axes": str(rng.choice(axes))},
     }  # fmt: skip
-    host = name == "clock_skew"
+    host = effects.kind(name).EXAMPLE.host_clock
     session = replace(session, label=name, host_clock=host)
     if name == "saturation":
         session = replace(
             session, profile=replace(one, range=FullScale(acceleration=None))
         )
     return session.having({name: more[name]})
+
+
+def example(name: str, rng: np.random.Generator) -> Session:
+    """An effect without a draw of its own: its example, at some device and place."""
+    shown = effects.kind(name).EXAMPLE
+    session = plain(rng, ("table",) if shown.turntable else ("twelve", "wide"))
+    made = from_tables(shown.device)
+    parts = {part: getattr(made, part) for part in shown.device}
+    windows = session.windows
+    if shown.vibration is not None:
+        levels = [shown.vibration * (i % 3 == 1) for i in range(len(windows))]
+        windows = tuple(
+            replace(w, vibration=v) for w, v in zip(windows, levels, strict=True)
+        )
+    session = replace(
+        _calm(session),
+        label=name,
+        windows=windows,
+        thermometer=True,
+        host_clock=shown.host_clock,
+    )
+    session = replace(session, profile=replace(session.profile, **parts))
+    vector = effects.kind(name).VECTOR
+    given = {
+        n: v * float(rng.choice([-1, 1])) if n in vector else v
+        for n, v in shown.given.items()
+    }
+    return session.having({name: given})
 
 
 def _calm(session: Session) -> Session:

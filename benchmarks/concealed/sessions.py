@@ -98,15 +98,13 @@ class Session:
         unknown = np.full(len(block), np.nan)
         host = unknown
         if self.host_clock:
-            skew = self.profile.one("clock_skew")
-            pace = 1 + (skew["ppm"] * 1e-6 if skew else 0.0)
             late = np.random.default_rng(seed).exponential(2e-3, len(block))
-            host = 1e5 + block.t / pace + late
+            host = 1e5 + block.t / self.profile.pace + late
         warmth = block.temperature if self.thermometer else unknown
         block = replace(block, temperature=warmth, seq=unknown, t_host=host)
-        if (lost := self.profile.one("dropped")) is not None:
-            kept = np.random.default_rng(seed).random(len(block)) >= lost["fraction"]
-            block = _only(block, kept)
+        for one in self.profile.effects:
+            if arrival := one.arrival(np.random.default_rng(seed)):
+                block = _only(block, arrival(len(block)))
         return self.added(self, block) if self.added is not None else block
 
     @property

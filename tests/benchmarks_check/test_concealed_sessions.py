@@ -6,15 +6,31 @@ import pytest
 from benchmarks.concealed import kinds
 from benchmarks.concealed.draws import size
 from benchmarks.concealed.judging import judged
-from benchmarks.concealed.others import OUTSIDE
+from benchmarks.concealed.others import OUTSIDE, example
 from benchmarks.concealed.tables import GROUPS, groups
 from fieldcal.diagnosis import diagnose
 from fieldcal.effects import catalogue
+from fieldcal.sim_device.effects import ids, kind
+from fieldcal.sim_device.profile_file import from_tables
 
 
 def test_every_id_of_the_catalogue_is_concealed_in_some_kind() -> None:
     assert set(catalogue()) <= set(kinds())
     assert {f"outside: {name}" for name in OUTSIDE} <= set(kinds())
+
+
+@pytest.mark.parametrize("name", ids())
+def test_an_effect_without_a_draw_of_its_own_is_drawn_from_its_example(
+    name: str,
+) -> None:
+    session = example(name, np.random.default_rng(4))
+    assert session.label == name and set(session.concealed) == {name}
+    assert name in {one.id for one in session.profile.effects}
+    shown = kind(name).EXAMPLE
+    for part, table in shown.device.items():
+        there = getattr(session.profile, part)
+        made = getattr(from_tables(shown.device), part)
+        assert all(getattr(there, key) == getattr(made, key) for key in table)
 
 
 @pytest.mark.parametrize("name", ["quadratic", "gyro_scale", "hum"])

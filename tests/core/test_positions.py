@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from fieldcal.core import positions
 from fieldcal.core.positions import (
     FIVE,
     SETS,
@@ -75,6 +76,7 @@ def test_the_sets_are_those_of_the_paper_and_a_ladder() -> None:
     assert {p.degrees for p in WIDE} == {(0, 0), (45, 5), (45, -5), (-45, 5), (-45, -5)}
     assert SETS == {"two": TWO, "five": FIVE, "wide": WIDE, "six_faces": SIX_FACES}
     assert all(p.name for p in FIVE)
+    assert positions._set((0, 0), (45, 5)) == TWO
 
 
 def test_six_faces_are_each_axis_up_and_down() -> None:

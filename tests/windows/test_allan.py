@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Block
-from fieldcal.windows.allan import allan_deviation
+from fieldcal.core.samples import Array, Block
+from fieldcal.windows import allan
+from fieldcal.windows.allan import AllanDeviation, allan_deviation
+from fieldcal.windows.rounding import of_mean
 
 RATE = 50.0
 
@@ -78,3 +82,172 @@ def test_what_cannot_be_told_is_refused() -> None:
         allan_deviation(Block.of(block.t, np.full((len(block), 3), np.nan)))
     with pytest.raises(InputError, match="record 400 s at rest"):
         allan_deviation(block).sigma_of_mean(100.0)
+
+
+def deviation_of(x: Array, m: int) -> float:
+    """Root of half the mean square difference of neighbouring means of m, each one."""
+    means = [x[k : k + m].mean() for k in range(len(x) - m + 1)]
+    steps = [means[k + m] - means[k] for k in range(len(means) - m)]
+    return float(np.sqrt(np.mean(np.square(steps)) / 2))
+
+
+def test_deviations_are_those_of_overlapping_means() -> None:
+    block = still(61, walk=1e-3)
+    found = allan_deviation(block)
+    m = np.round(found.tau * RATE).astype(int)
+    np.testing.assert_allclose(found.tau, m / RATE, rtol=1e-9)
+    for i in (0, len(m) // 2, len(m) - 1):
+        for channel in (0, 5):
+            slow = deviation_of(block.six[:, channel], m[i])
+            assert found.deviation[i, channel] == pytest.approx(slow, rel=1e-6)
+    assert (found.low < found.deviation).all() and (found.deviation < found.high).all()
+    # of 30 000 differences more is known than of a few
+    width = (found.high - found.low) / found.deviation
+    assert (width[0] < 0.06).all() and (width[-1] > 0.5).all()
+
+
+@pytest.mark.parametrize(("rate", "first"), [(50.0, 5), (8.0, 1), (2.0, 1)])
+def test_durations_go_from_a_tenth_of_a_second_to_a_fourth_of_the_recording(
+    rate: float, first: int
+) -> None:
+    n = int(200 * rate)
+    acc = np.random.default_rng(0).standard_normal((n, 3))
+    found = allan_deviation(Block.of(7.0 + np.arange(n) / rate, acc))
+    assert found.tau[0] == pytest.approx(first / rate)
+    assert found.tau[-1] == pytest.approx(50.0, rel=0.02)
+    octaves = np.diff(np.log2(found.tau[-6:]))
+    assert octaves == pytest.approx(1 / 3, abs=0.06)
+    assert (np.diff(found.tau) > 0).all()
+
+
+@pytest.mark.statistical
+def test_the_interval_holds_as_often_as_it_says() -> None:
+    """White noise in two of three recordings, as chi-squared tells it."""
+    inside = []
+    for seed in range(12):
+        found = allan_deviation(still(100, seed=seed))
+        i = int(np.argmin(np.abs(found.tau - 5.0)))
+        truth = np.repeat([0.05, 0.002], 3) / np.sqrt(RATE * found.tau[i])
+        inside += list((found.low[i] < truth) & (truth < found.high[i]))
+    assert 0.5 < np.mean(inside) < 0.85
+
+
+def made(deviation: list[float], rounding: float = 0.0) -> AllanDeviation:
+    table = np.repeat(np.array(deviation)[:, None], 6, axis=1)
+    tau = np.array([1.0, 10.0, 100.0])
+    return AllanDeviation(tau, table, table, table, np.full(6, rounding))
+
+
+def test_between_two_durations_the_deviation_is_a_power_of_time() -> None:
+    found = made([1.0, 0.1, 0.1])
+    assert found.sigma_of_mean(np.sqrt(10.0)) == pytest.approx(np.sqrt(0.1))
+    assert found.sigma_of_mean(30.0) == pytest.approx(0.1)
+    assert found.sigma_of_mean(1.0) == pytest.approx(1.0)
+    assert found.sigma_of_mean(100.0) == pytest.approx(0.1)
+    # the error of rounding is another one, and adds
+    assert made([1.0, 0.3, 0.1], 0.4).sigma_of_mean(10.0) == pytest.approx(0.5)
+
+
+def test_a_deviation_of_nothing_is_known_by_its_rounding_or_not_at_all() -> None:
+    for none in (0.0, np.nan):
+        assert made([none] * 3, 0.4).sigma_of_mean(10.0) == pytest.approx(0.4)
+        assert np.isnan(made([none] * 3).sigma_of_mean(10.0)).all()
+
+
+@pytest.mark.parametrize("seconds", [0.9, 101.0])
+def test_a_duration_that_was_not_seen_is_refused(seconds: float) -> None:
+    with pytest.raises(InputError) as told:
+        made([1.0, 0.3, 0.1]).sigma_of_mean(seconds)
+    assert str(told.value) == (
+        f"the recording tells the error of means over 1 to 100 s, not {seconds:g} s: "
+        f"record {4 * seconds:.0f} s at rest"
+    )
+
+
+def test_the_best_time_is_the_one_of_the_least_deviation() -> None:
+    assert (made([1.0, 0.1, 0.3]).best == 10.0).all()
+    assert (made([1.0, np.nan, 0.3]).best == 100.0).all()
+    assert np.isnan(made([np.nan] * 3).best).all()
+
+
+def test_missing_values_are_laid_between_their_neighbours() -> None:
+    block = still(61)
+    gaps = block.acc.copy()
+    gaps[100:103, 0] = np.nan
+    gaps[7, 1] = np.inf
+    whole = block.acc.copy()
+    whole[100:103, 0] = np.linspace(whole[99, 0], whole[103, 0], 5)[1:-1]
+    whole[7, 1] = (whole[6, 1] + whole[8, 1]) / 2
+    bridged = allan_deviation(Block.of(block.t, gaps))
+    expected = allan_deviation(Block.of(block.t, whole))
+    np.testing.assert_allclose(bridged.deviation, expected.deviation)
+
+
+def test_a_channel_of_which_half_is_missing_is_not_judged() -> None:
+    block = still(61)
+    block.acc[::2, 0] = np.nan
+    block.acc[::3, 1] = np.nan
+    found = allan_deviation(block)
+    assert np.isnan(found.deviation[:, 0]).all()
+    assert np.isfinite(found.deviation[:, 1:]).all()
+
+
+def test_the_rounding_is_that_of_the_finest_step_of_the_sensor() -> None:
+    block = still(61)
+    block.acc[:] = np.round(block.acc / 0.1) * 0.1
+    block.gyr[:] = 0.25
+    found = allan_deviation(block)
+    noise = np.sqrt(np.mean(np.diff(block.acc, axis=0) ** 2, axis=0) / 2)
+    expected = np.sqrt(of_mean(np.full(3, 0.1), noise))
+    np.testing.assert_allclose(found.rounding[:3], expected)
+    assert (found.rounding[:3] > 0).all() and not found.rounding[3:].any()
+
+
+def test_a_step_that_shows_late_is_found() -> None:
+    t = np.arange(6000) / 50
+    acc = np.zeros((6000, 3))
+    acc[1000, 0] = 2.0
+    acc[5000, 0] = 0.5
+    found = allan_deviation(Block.of(t, acc))
+    assert found.rounding[1] == pytest.approx(0.5 / np.sqrt(12))
+
+
+def test_a_minute_is_enough_and_a_second_no_gap() -> None:
+    block = still(60.04)
+    assert allan_deviation(block).tau[-1] == pytest.approx(15.0, rel=0.02)
+    late = Block.of(block.t + np.where(block.t > 30, 0.98, 0.0), block.acc)
+    assert allan_deviation(late).tau[-1] == pytest.approx(15.0, rel=0.05)
+    with pytest.raises(InputError) as told:
+        allan_deviation(block[:-10])
+    assert str(told.value) == (
+        "a recording of 60 s is too short for an Allan deviation: "
+        "record 60 s or more at rest"
+    )
+    with pytest.raises(InputError, match="^a recording of 0 s is too short"):
+        allan_deviation(block[:0])
+
+
+def test_a_gap_is_told_with_its_place_and_what_to_do() -> None:
+    block = still(90)
+    late = np.where(block.t > 20, 2.0, 0.0) + np.where(block.t > 70, 7.0, 0.0)
+    with pytest.raises(InputError) as told:
+        allan_deviation(Block.of(block.t + late, block.acc))
+    assert str(told.value) == (
+        "no samples for 7.0 s from 72.00 s on: take the part of the recording before "
+        "or after"
+    )
+    with pytest.raises(InputError) as told:
+        allan_deviation(Block.of(block.t, np.full((len(block), 3), np.nan)))
+    assert str(told.value) == "none of ax, ay, az, gx, gy, gz was measured"
+
+
+def test_without_allantools_it_is_told_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "allantools", None)
+    with pytest.raises(InputError) as told:
+        allan_deviation(still(61))
+    assert str(told.value) == (
+        "Allan deviations need allantools: pip install 'fieldcal[allan]'"
+    )
+    assert allan.SHORTEST == 60.0

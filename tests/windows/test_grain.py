@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows import Average, average
+from fieldcal.windows.grain import AROUND, shows, variance
+from fieldcal.windows.rounding import of_few, of_mean
 
 STEP = np.repeat([9.80665e-3, 1e-3], 3)
 CUT = Grain(STEP[0], STEP[3], cut=True)
@@ -62,3 +65,80 @@ def test_a_device_that_says_nothing_is_judged_by_what_is_seen() -> None:
     values = rng.normal(0, 1e-3, (N, 6))
     one, other = window(values, None), window(values, Grain())
     np.testing.assert_array_equal(one.covariance, other.covariance)
+
+
+def off(v: float, noise: float) -> float:
+    """By how much the mean of what was cut toward zero and put in its middle is off."""
+    k = np.arange(0, 60)
+    # a value k + 1/2 for k < x < k + 1, except that of 0 < x < 1 nothing is left but 0
+    up = norm.cdf((k + 1 - v) / noise) - norm.cdf((k - v) / noise)
+    down = norm.cdf((-k - v) / noise) - norm.cdf((-k - 1 - v) / noise)
+    middle = np.where(k > 0, k + 0.5, 0.0)
+    return float(middle @ up - middle @ down - v)
+
+
+def stated(mean: float, noise: float, grain: Grain = CUT) -> Array:
+    """What is stated beside the rounding, in steps squared."""
+    sampled = np.sqrt(noise**2 + 1 / 12) * STEP
+    rounded = np.maximum(of_mean(STEP, sampled), of_few(STEP, sampled))
+    found = variance(grain, mean * STEP, sampled, STEP)
+    return np.asarray((found - rounded) / STEP**2)
+
+
+@pytest.mark.parametrize("noise", [0.6, 1.0])
+@pytest.mark.parametrize("mean", [-2.5, -0.7, 0.0, 0.3, 1.2, 3.0])
+def test_what_is_cut_is_off_around_zero_by_as_much_as_is_stated(
+    mean: float, noise: float
+) -> None:
+    """With this noise rounding itself leaves nothing: all that is off is the zero."""
+    expected = np.mean([off(mean + u, noise) ** 2 for u in AROUND])
+    np.testing.assert_allclose(stated(mean, noise), expected, rtol=0.02, atol=1e-6)
+
+
+def test_far_from_zero_and_of_what_is_rounded_nothing_is_added() -> None:
+    assert not stated(5.0, 0.3).any()
+    assert not stated(0.0, 0.3, ROUNDED).any()
+    # the reach of zero is two steps and three times the noise
+    assert stated(2.9, 1.0).all() and not stated(5.1, 1.0).any()
+
+
+def test_without_noise_the_variance_is_that_of_anywhere_within_two_steps() -> None:
+    found = variance(CUT, np.zeros(6), np.zeros(6), STEP) / STEP**2
+    # 1/3, of which the grid of 21 places tells 1/12 + 0.25 * 18/21
+    np.testing.assert_allclose(found, 1 / 3, rtol=0.13)
+
+
+def test_what_is_not_said_is_taken_as_it_is_seen() -> None:
+    grain = Grain(acc=STEP[0], cut=True)
+    seen = np.full(6, 0.5)
+    found = variance(grain, np.full(6, np.nan), np.zeros(6), seen)
+    np.testing.assert_allclose(found[3:], 0.25 / 12)
+    np.testing.assert_allclose(found[:3], found[0])
+    assert found[0] > STEP[0] ** 2 / 12
+    # a step that is seen but not said leaves the mean of two values out of account
+    sampled = np.full(6, 0.4 * 0.5)
+    noisy = variance(Grain(), np.zeros(6), sampled, seen)
+    np.testing.assert_allclose(noisy, of_mean(seen, sampled))
+    said = variance(Grain(0.5, 0.5), np.zeros(6), sampled, seen)
+    np.testing.assert_allclose(said, np.maximum(noisy, of_few(seen, sampled)))
+    assert (said > 1.1 * noisy).all()
+
+
+def test_steps_show_where_noise_does_not_hide_them_and_twice_as_wide_at_zero() -> None:
+    mean = np.array([0.0, 1.9, 2.1, 0.0, -1.9, np.nan]) * STEP
+    quiet, louder, loud = (s * STEP for s in (0.5, 1.4, 1.6))
+    for grain, sampled, expected in [
+        (ROUNDED, quiet, [1, 1, 1, 1, 1, 1]),
+        (ROUNDED, louder, [0, 0, 0, 0, 0, 0]),
+        (CUT, quiet, [2, 2, 1, 2, 2, 2]),
+        (CUT, louder, [2, 2, 0, 2, 2, 2]),
+        (CUT, loud, [0, 0, 0, 0, 0, 0]),
+        (Grain(), quiet, [0, 0, 0, 0, 0, 0]),
+        (Grain(cut=True), quiet, [0, 0, 0, 0, 0, 0]),
+    ]:
+        found = shows(grain, mean, sampled) / STEP
+        np.testing.assert_allclose(found, expected)
+    edge = shows(CUT, 2.0 * STEP, quiet) / STEP
+    np.testing.assert_allclose(edge, 1.0)
+    edge = shows(CUT, 0.0 * STEP, 1.5 * STEP) / STEP
+    np.testing.assert_allclose(edge, 0.0)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Stillness
+from fieldcal.windows.cells import Cells
 
 BIAS = np.array([0.01, -0.02, 0.005])
 
@@ -141,3 +142,88 @@ def test_channels_that_are_not_measured_do_not_matter() -> None:
     seen = watch(Block.of(block.t, block.acc, gyr))
     assert not any(still for t, still, _ in seen if 4.0 < t < 5.5)
     assert seen[-1][1]
+
+
+def slow(block: Block) -> list[tuple[float, float | None]]:
+    """(1) to (4) cell by cell: what is allowed of it, and since when it rests."""
+    cells = Cells()
+    cells.add(block)
+    table, noises, looks = cells.table, [], []
+    rest, since, even = None, None, 0
+    limit = np.repeat([0.5, 0.1], 3)
+    i = np.arange(8)
+    for last in range(7, len(table) - 1):
+        y = table.means[last - 7 : last + 1]
+        noises.append(np.sqrt(np.mean(np.diff(y, axis=0) ** 2, axis=0) / 2))
+        noise = 1.6 * np.quantile(noises[-200:], 0.1, axis=0)
+        slope, level = np.polyfit(i, y, 1)
+        d = np.sqrt(((y - level - np.outer(i, slope)) ** 2).sum(axis=0) / 6)
+        bound = limit if rest is not None else 0.2 * limit
+        ratios = [
+            d / np.minimum(3.5 * noise, bound),
+            8 * abs(slope) / np.minimum(6 * noise, bound),
+        ]
+        meter = float(np.max(ratios))
+        if rest is not None:
+            off = abs(y[:, 3:].mean(axis=0) - rest) / (0.006 + 3.5 * noise[3:])
+            calm = abs(np.diff(y[:, 3:], axis=0)).max(axis=0) <= 18 * noise[3:]
+            even = even + 1 if off.max() > 1 and calm.all() else 0
+            if even < 30:
+                meter = max(meter, float(off.max()))
+        time = table.times[last]
+        if meter > 1:
+            since = None
+        elif since is None:
+            since = time - 0.7
+        if since is not None and time - since > 1.6:
+            rest = y[:, 3:].mean(axis=0)
+        looks.append((meter, since))
+    return looks
+
+
+@pytest.mark.parametrize("what", ["turn", "bias", "hand", "loud"])
+def test_the_meter_is_the_slow_one_after_every_cell(what: str) -> None:
+    block = stream(3, [(5, 0), (3, 20), (8, 0)] if what == "turn" else [(16, 0)])
+    if what == "bias":
+        block.gyr[800:] += [0.0, 0.04, 0.0]
+    if what == "hand":
+        block.acc[:] += 0.3 * np.sin(np.arange(1600) / 40)[:, None]
+    if what == "loud":
+        # for 20 s it is remembered how quiet it was
+        block = stream(4, [(45, 0)])
+        block.acc[2000:] += 0.6 * np.random.default_rng(4).normal(size=(2500, 3))
+    block = block[:-1]
+    expected = slow(block)
+    stillness, seen = Stillness(), []
+    for first in range(0, len(block), 10):
+        stillness.add(block[first : first + 10])
+        seen.append((stillness.meter, stillness.since, stillness.still))
+    assert len(seen) == len(expected) + 8
+    assert seen[7] == (np.inf, None, False)
+    for (meter, since, still), (allowed, from_) in zip(seen[8:], expected, strict=True):
+        assert meter == pytest.approx(allowed, rel=1e-6)
+        assert since == from_ or since == pytest.approx(from_)
+        assert still == (from_ is not None)
+
+
+def test_steps_of_the_outputs_that_show_are_noise() -> None:
+    block = stream(5, [(10, 0)])
+    acc = np.zeros_like(block.acc) + [0.0, -9.75, 0.0]
+    acc[::70] += 0.25
+    acc[::110] -= 0.25
+    stillness = Stillness()
+    stillness.add(Block.of(block.t, acc, block.gyr))
+    assert stillness.still and stillness.meter < 1
+    coarse = acc + 2.0 * (block.t[:, None] > 9.5)
+    moved = Stillness()
+    moved.add(Block.of(block.t, coarse, block.gyr))
+    assert not moved.still
+
+
+def test_a_device_without_noise_is_not_judged_but_by_what_moves() -> None:
+    t = np.arange(1000) / 100
+    acc = np.zeros((1000, 3)) + [0.0, -9.81, 0.0]
+    stillness = Stillness()
+    stillness.add(Block.of(t, acc))
+    assert (stillness.meter, stillness.still) == (0.0, True)
+    assert stillness.since == pytest.approx(0.0)

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import Block, concat
 from fieldcal.session.folder import Session
-from fieldcal.windows import average, still_stretches
+from fieldcal.windows import average, still_stretches, stretches
+from fieldcal.windows.cells import Cells
 
 
 def recording(
@@ -147,3 +148,115 @@ def test_a_real_device_at_rest_is_never_rejected_and_its_means_repeat(
     variance = np.array([window.sigma**2 for window in windows])
     pulls = change / np.sqrt(variance[1:] + variance[:-1])
     assert 0.8 < pulls.std() < 1.3
+
+
+@pytest.fixture(scope="module")
+def long() -> Block:
+    """Two recordings, one after the other, with values and samples missing."""
+    first, second = recording(11)[0], recording(12, 0.001)[0]
+    late = Block.of(second.t + first.t[-1] + 0.01, second.acc, second.gyr)
+    block = concat([first, late])
+    block.acc[300:340, 1] = np.nan
+    block.gyr[2400:2500] = np.nan
+    kept = np.ones(len(block), dtype=bool)
+    kept[1500:1520] = False
+    return concat([block[:1500], block[1520:]])
+
+
+@pytest.mark.parametrize(("part", "sample"), [(40, 1 << 15), (64, 200), (4096, 100)])
+def test_a_recording_that_is_looked_at_in_parts_gives_the_same(
+    monkeypatch: pytest.MonkeyPatch, long: Block, part: int, sample: int
+) -> None:
+    expected = still_stretches(long, 3.0)
+    assert len(expected) == 10
+    monkeypatch.setattr(stretches, "_PART", part)
+    assert still_stretches(long, 3.0) == expected
+    monkeypatch.setattr(stretches, "_SAMPLE", sample)
+    found = still_stretches(long, 3.0)
+    # what is usual is judged by some of the spans then
+    np.testing.assert_allclose(found, expected, atol=0.35)
+
+
+def test_samples_are_asked_for_where_sums_do_not_do(long: Block) -> None:
+    cells = Cells()
+    cells.add(long)
+    rows = stretches.summary(cells.table)
+    assert rows.shape == (len(cells.table), 35)
+    np.testing.assert_array_equal(rows[:, 0], cells.table.times)
+    asked = []
+
+    def between(start: float, end: float) -> list[Block]:
+        asked.append((start, end))
+        # in pieces, some of them empty
+        block = long.between(start, end)
+        return [block[:0], block[:7], block[7:7], block[7:], block[:0]]
+
+    found = stretches.still_in(rows, cells.table.origin, between, 3.0)
+    assert found == still_stretches(long, 3.0)
+    assert all(start < end for start, end in asked)
+
+
+def test_every_stretch_passes_as_a_window_and_is_as_long_as_asked(long: Block) -> None:
+    for shortest in (0.0, 1.0, 3.0, 5.5):
+        for start, end in still_stretches(long, shortest):
+            assert end - start >= max(1.0, shortest)
+            assert average(long.between(start, end)).n > 80
+    assert not still_stretches(long, 7.0)
+    assert still_stretches(long, -5.0) == still_stretches(long, 1.0)
+
+
+def test_a_push_cuts_a_rest_in_two() -> None:
+    rng = np.random.default_rng(3)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (6000, 3))
+    acc[3000:3030, 0] += 0.12
+    block = Block.of(np.arange(6000) / 100, acc)
+    (_, first), (second, _) = still_stretches(block)
+    assert first == pytest.approx(30.0, abs=0.8)
+    assert second == pytest.approx(30.3, abs=0.8)
+
+
+def test_even_rotations_are_not_rests() -> None:
+    """A rate table that turns evenly is as quiet as one that rests."""
+    rng = np.random.default_rng(4)
+    n = 6000
+    rate = np.where(np.arange(n) % 2000 >= 1200, 0.5, 0.0)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (n, 3))
+    gyr = rng.normal(0, 0.002, (n, 3)) + 0.3
+    gyr[:, 2] -= rate
+    found = still_stretches(Block.of(np.arange(n) / 100, acc, gyr))
+    assert len(found) == 3
+    for k, (start, end) in enumerate(found):
+        assert start == pytest.approx(20 * k, abs=0.8)
+        assert end == pytest.approx(20 * k + 12, abs=0.8)
+
+
+def test_a_rest_of_hours_is_several_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stretches, "_LONGEST", 100)
+    monkeypatch.setattr(stretches, "_PART", 64)
+    rng = np.random.default_rng(5)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (4000, 3))
+    found = still_stretches(Block.of(np.arange(4000) / 100, acc))
+    assert 4 <= len(found) <= 8
+    assert max(end - start for start, end in found) <= 10.1
+    assert sum(end - start for start, end in found) > 34
+
+
+def test_stretches_begin_at_a_sample_and_end_behind_one(long: Block) -> None:
+    for start, end in still_stretches(long, 3.0):
+        inside = long.between(start, end)
+        assert inside.t[0] == start and inside.t[-1] == np.nextafter(end, 0.0)
+
+
+def test_fewer_than_two_seconds_are_no_recording() -> None:
+    rng = np.random.default_rng(6)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (300, 3))
+    block = Block.of(np.arange(300) / 100, acc)
+    assert still_stretches(block[:190], 1.0) == []
+    ((start, end),) = still_stretches(block[:250], 1.0)
+    assert start < 0.6 and end > 1.8
+
+
+def test_a_device_of_which_nothing_ever_varies_is_at_rest_or_stuck() -> None:
+    block = Block.of(np.arange(2000) / 100, np.zeros((2000, 3)) + [0, 0, 9.81])
+    for start, end in still_stretches(block):
+        assert end - start > 15

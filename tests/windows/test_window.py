@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fieldcal.core.errors import InputError, Moved
-from fieldcal.core.samples import CHANNELS, Block, concat
+from fieldcal.core.samples import CHANNELS, Array, Block, Grain, concat
 from fieldcal.windows import Average, StillnessLimits, Window, average
-from windows.signals import UNIT, block_of, flicker, low_passed, markov, white
+from fieldcal.windows.cells import Cells
+from fieldcal.windows.grain import variance
+from fieldcal.windows.longrun import error_of_mean
+from windows.signals import HOME, UNIT, block_of, flicker, low_passed, markov, white
 
 
 def rejection(block: Block) -> Moved | None:
@@ -279,3 +283,201 @@ def test_a_device_that_turns_a_little_in_the_hand_is_known_along_gravity() -> No
         across.append(aside[0] @ covariance @ aside[0] / (along @ covariance @ along))
     assert 0.8 < np.std(pulls) < 1.15
     assert np.median(across) > 4
+
+
+def filled(block: Block, **known: Any) -> Window:
+    window = Window(**known)
+    window.add(block)
+    return window
+
+
+def parts_of(block: Block) -> tuple[Array, Array, Array]:
+    """Covariance by axes, along the force, and the direction of it."""
+    cells = Cells()
+    cells.add(block)
+    n = np.nan_to_num(cells.table.mean) * [1, 1, 1, 0, 0, 0]
+    n /= np.linalg.norm(n)
+    steady = cells.table.steady
+    plain = error_of_mean(steady, cells.table.spacing).covariance
+    along = error_of_mean((steady @ n)[:, None], cells.table.spacing).covariance
+    return plain, along, n
+
+
+def test_the_mean_along_the_force_has_the_error_of_its_own_spectrum() -> None:
+    """And what has nothing in common with it keeps its own, (1)."""
+    rng = np.random.default_rng(11)
+    x = white(rng, 3000)
+    x[:, [0, 2, 3]] += np.cumsum(0.1 * white(rng, 3000, 3), axis=0)
+    block = block_of(x)
+    block.acc[:, 2] += 3.0
+    plain, along, n = parts_of(block)
+    found = filled(block).covariance
+    assert n @ found @ n == pytest.approx(along[0, 0], rel=1e-6)
+    for row in np.linalg.svd((plain @ n)[None])[2][1:]:
+        assert row @ found @ row == pytest.approx(row @ plain @ row, rel=1e-6)
+    np.testing.assert_allclose(found, found.T)
+
+
+def test_a_device_without_a_force_has_the_covariance_of_its_axes() -> None:
+    block = block_of(white(np.random.default_rng(12), 3000))
+    gyr = Block.of(block.t, np.full_like(block.acc, np.nan), block.gyr)
+    cells = Cells()
+    cells.add(gyr)
+    plain = error_of_mean(cells.table.steady, cells.table.spacing).covariance
+    window = filled(gyr)
+    np.testing.assert_allclose(window.covariance[3:, 3:], plain[3:, 3:], rtol=1e-6)
+    assert np.isnan(window.sigma[:3]).all() and window.moved is None
+    assert np.isnan(window.mean[:3]).all()
+
+
+def test_samples_that_are_missing_widen_the_error_by_their_share() -> None:
+    block = block_of(white(np.random.default_rng(13), 3000))
+    block.gyr[block.t % 0.4 > 0.195, 1] = np.nan
+    cells = Cells()
+    cells.add(block)
+    share = np.isfinite(cells.table.means[:, 4]).mean()
+    assert 0.4 < share < 0.6
+    plain, _, _ = parts_of(block)
+    found = filled(block).covariance
+    assert found[4, 4] == pytest.approx(plain[4, 4] / share**2, rel=1e-6)
+    assert found[4, 3] == pytest.approx(plain[4, 3] / share, rel=1e-6)
+    assert found[3, 3] == pytest.approx(plain[3, 3], rel=1e-6)
+
+
+def test_rounding_is_added_to_the_variance_of_each_axis() -> None:
+    rng = np.random.default_rng(14)
+    step = np.array([0.02, 0.02, 0.02, 0.004, 0.004, 0.004])
+    six = np.round((HOME + 0.1 * step * white(rng, 3000)) / step) * step
+    block = Block.of(np.arange(3000) / 100, six[:, :3], six[:, 3:])
+    cells = Cells()
+    cells.add(block)
+    noise = np.nan_to_num(cells.table.noise)
+    for grain in (None, Grain(0.02, 0.004), Grain(0.02, 0.004, cut=True)):
+        added = variance(grain or Grain(), cells.table.mean, noise, step)
+        window = filled(block, grain=grain)
+        plain, _, _ = parts_of(block)
+        found = np.diag(window.covariance) - added
+        np.testing.assert_allclose(found[3:], np.diag(plain)[3:], atol=1e-12)
+        assert (added > 0).all() and (window.sigma > 0.999 * np.sqrt(added)).all()
+
+
+def test_jumps_that_the_device_announces_are_no_motion() -> None:
+    x = white(np.random.default_rng(15), 3000)
+    block = block_of(0.001 * x)
+    block.acc[1500:1530, 0] += 0.05
+    assert filled(block).moved
+    assert filled(block, grain=Grain(0.1, 0.1)).moved is None
+    assert average(block, grain=Grain(0.1, 0.1)).n == 3000
+
+
+def test_what_a_window_taught_is_the_noise_and_its_shape() -> None:
+    rng = np.random.default_rng(16)
+    first = filled(block_of(flicker(2.0)(rng, 6000)))
+    learned = first.noise
+    assert learned and learned.quiet and learned.quiet.cells == 600
+    assert learned.spectrum.quiet is None
+    np.testing.assert_array_equal(learned.spectrum.seen, learned.seen)
+    assert learned.seen.shape[1] == 7 and learned.seen.max() == 0
+    # the shape is learnt on: it makes the error of a short window a longer one's
+    block = block_of(flicker(2.0)(rng, 1000))
+    alone, after = filled(block), filled(block, noise=learned.spectrum)
+    assert (np.abs(after.sigma / alone.sigma - 1) > 0.02).sum() >= 4
+    assert after.motion == pytest.approx(alone.motion)
+    assert after.noise and after.noise.quiet and after.noise.quiet.cells == 100
+    both = filled(block, noise=learned)
+    assert both.noise and both.noise.quiet and both.noise.quiet.cells == 700
+    np.testing.assert_allclose(both.sigma, after.sigma)
+    assert average(block, noise=learned).sigma == pytest.approx(both.sigma)
+
+
+def test_a_window_too_short_to_teach_hands_on_what_was_known() -> None:
+    rng = np.random.default_rng(17)
+    learned = filled(block_of(white(rng, 3000))).noise
+    short = block_of(white(rng, 150))
+    assert filled(short).noise is None
+    handed = filled(short, noise=learned).noise
+    assert handed and learned and handed.quiet is learned.quiet
+
+
+def test_limits_are_those_that_are_given() -> None:
+    block = block_of(white(np.random.default_rng(18), 3000))
+    assert filled(block, limits=StillnessLimits(gyr=1e-4)).moved
+    with pytest.raises(Moved, match="no device at rest"):
+        average(block, StillnessLimits(gyr=1e-4))
+
+
+def test_it_is_told_why_averaging_can_stop() -> None:
+    window = filled(block_of(white(np.random.default_rng(9), 3000)))
+    reached = window.sigma[:3].max()
+    assert window.done(reached) == (
+        f"each accelerometer mean is known to {reached:.2g} m/s², "
+        f"{reached:.2g} m/s² was wanted"
+    )
+    assert window.done(0.999 * reached) is None and window.done() is None
+    wandering = filled(block_of(flicker(20.0)(np.random.default_rng(9), 3000)))
+    told = wandering.done()
+    assert told == wandering.done(1e-9)
+    largest = wandering.sigma[:3].max()
+    found = re.fullmatch(
+        r"the bias wanders as much as is averaged out: (\S+) m/s² is reached, and "
+        r"60 s would give (\S+) m/s²",
+        told or "",
+    )
+    assert found and found[1] == f"{largest:.2g}"
+    assert 0.9 * largest < float(found[2]) < 1.5 * largest
+
+
+def test_nothing_is_said_of_more_time_before_it_has_settled() -> None:
+    x = flicker(20.0)(np.random.default_rng(9), 3000)
+    assert filled(block_of(x[:1490])).done() is None
+    assert filled(block_of(x[:1501])).done() is not None
+
+
+def test_more_time_is_worth_it_as_long_as_one_axis_gains() -> None:
+    rng = np.random.default_rng(19)
+    x = flicker(20.0)(rng, 3000)
+    x[:, 0] = 100 * white(rng, 3000, 1)[:, 0]
+    window = filled(block_of(x))
+    assert window.done() is None
+    # unless that axis is known well enough
+    sigma = window.sigma
+    assert sigma[0] > sigma[1]
+    x[:, 0] /= 1000
+    window = filled(block_of(x))
+    assert window.done() is None
+    assert "wanders" in (window.done(1.5 * window.sigma[0]) or "")
+
+
+def test_an_axis_that_is_not_measured_has_no_say() -> None:
+    block = block_of(flicker(20.0)(np.random.default_rng(20), 3000))
+    block.acc[:, 2] = np.nan
+    window = filled(block)
+    assert window.done(1.0) is None or "wanders" in str(window.done(1.0))
+    assert f"{np.nanmax(window.sigma[:3]):.2g} m/s² is reached" in str(window.done())
+    none = Block.of(block.t, np.full_like(block.acc, np.nan), block.gyr)
+    assert filled(none).done() is None
+
+
+def test_averages_say_when_they_were_taken() -> None:
+    found = average(block_of(white(np.random.default_rng(21), 100), start=7.0))
+    assert (found.start, found.n) == (7.0, 100) and found.temperature == 25.0
+    assert found.end == pytest.approx(7.99)
+    assert np.isfinite(found.sigma).all()
+
+
+def test_a_window_one_cell_short_is_told_what_it_needs() -> None:
+    with pytest.raises(InputError) as told:
+        average(block_of(white(np.random.default_rng(0), 90)))
+    assert str(told.value) == (
+        "a window of 90 samples over 0.89 s is too short for its mean to have an "
+        "error: take 1 s or more"
+    )
+    short = filled(block_of(white(np.random.default_rng(0), 90)))
+    assert short.covariance.shape == (6, 6) and np.isnan(short.covariance).all()
+
+
+def test_motion_that_is_just_allowed_is_rest() -> None:
+    block = block_of(white(np.random.default_rng(22), 3000))
+    ratio = filled(block).motion
+    assert 0.3 < ratio < 1
+    assert filled(block).moved is None and average(block).n == 3000

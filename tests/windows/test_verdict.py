@@ -1,0 +1,249 @@
+"""The verdict on a window: what, when, how long, on which axis, and in which words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.windows import StillnessLimits
+from fieldcal.windows.cells import Cells, CellTable
+from fieldcal.windows.disturbance import pushes, shakes, steps
+from fieldcal.windows.quiet import Quiet, quiet
+from fieldcal.windows.trend import line
+from fieldcal.windows.verdict import Departure, Verdict, judge
+from windows.signals import HOME, UNIT, block_of, white
+
+LIMITS = StillnessLimits()
+
+
+def table(block: Block) -> CellTable:
+    cells = Cells()
+    cells.add(block)
+    return cells.table
+
+
+def rest(n: int = 3000, seed: int = 0) -> Array:
+    return white(np.random.default_rng(seed), n)
+
+
+def verdict(noise: Array, rate: float = 100.0) -> Verdict:
+    return judge(table(block_of(noise, rate, start=100.0)), LIMITS)
+
+
+def test_rest_is_below_what_is_allowed_and_hands_on_its_noise() -> None:
+    found = verdict(rest())
+    assert 0 < found.worst.ratio < 1 and 0 < found.present < 1
+    assert found.quiet is not None and found.quiet.cells == 300
+    cells = table(block_of(rest(), start=100.0))
+    np.testing.assert_allclose(found.quiet.allan, quiet(cells.means).allan)
+
+
+@pytest.mark.parametrize("channel", [0, 4])
+def test_a_push_is_told_with_its_size_place_and_duration(channel: int) -> None:
+    x = rest()
+    x[1500:1580, channel] += 6.0
+    worst = verdict(x).worst
+    assert (worst.kind, worst.channel) == ("push", channel)
+    assert worst.ratio > 2 and worst.seconds == pytest.approx(0.8)
+    assert worst.at == pytest.approx(115.0, abs=0.11)
+    assert worst.size == pytest.approx(6.0 * UNIT[channel], rel=0.1)
+    assert worst.noise == pytest.approx(UNIT[channel] / np.sqrt(80), rel=0.5)
+
+
+def test_a_step_is_told_where_it_lies() -> None:
+    x = rest()
+    x[1500:, 2] -= 3.0
+    worst = verdict(x).worst
+    assert (worst.kind, worst.channel) == ("step", 2) and worst.ratio > 2
+    assert worst.at == pytest.approx(115.0, abs=0.11)
+    assert worst.size == pytest.approx(-3.0 * UNIT[2], rel=0.1)
+
+
+def test_a_shake_is_told_by_its_size_from_sample_to_sample() -> None:
+    x = rest()
+    x[1500:1540, 5] += 8 * (-1.0) ** np.arange(40)
+    worst = verdict(x).worst
+    assert (worst.kind, worst.channel) == ("shake", 5)
+    assert worst.at == pytest.approx(115.0, abs=0.11)
+    assert worst.seconds == pytest.approx(0.4)
+    # changes of +-16 have a short-lag noise of 16 / sqrt(2)
+    assert worst.size == pytest.approx(16 / np.sqrt(2) * UNIT[5], rel=0.15)
+    assert worst.noise == pytest.approx(UNIT[5], rel=0.1)
+
+
+def test_a_drift_is_told_by_its_change_over_the_window() -> None:
+    x = rest()
+    x[:, 1] += np.linspace(0, 10.0, 3000)
+    worst = verdict(x).worst
+    assert (worst.kind, worst.channel, worst.at) == ("drift", 1, 100.0)
+    assert worst.size == pytest.approx(10.0 * UNIT[1], rel=0.1)
+    assert worst.seconds == pytest.approx(30.0)
+    # a change is allowed for by the limit and by what the noise can pretend
+    cells = table(block_of(x, start=100.0))
+    longest = quiet(cells.means).allan[-1, 1]
+    assert worst.noise == pytest.approx(longest)
+    assert worst.ratio == pytest.approx(worst.size / (0.1 + 5.8 * longest))
+
+
+def test_what_no_device_at_rest_does_is_told_by_the_limit() -> None:
+    t = np.arange(3000)[:, None] / 100
+    x = rest() + 40 * np.sin(2 * np.pi * 0.7 * t) * (np.arange(6) == 0)
+    worst = verdict(x).worst
+    assert (worst.kind, worst.channel, worst.seconds) == ("noise", 0, 0.1)
+    assert worst.noise == LIMITS.acc and worst.size > 2.0 / np.sqrt(2)
+    assert worst.ratio == pytest.approx(worst.size / LIMITS.acc)
+    cells = table(block_of(x, start=100.0))
+    assert worst.size == pytest.approx(quiet(cells.means).spread[0, 0])
+    assert worst.at == cells.times[np.argmax(abs(cells.means[:, 0]))]
+
+
+def test_a_stuck_channel_is_told_with_its_run() -> None:
+    block = block_of(rest(), start=100.0)
+    block.acc[1800:2600, 0] = block.acc[1800, 0]
+    found = judge(table(block), LIMITS)
+    worst = found.worst
+    assert (worst.kind, worst.channel, worst.size) == ("stuck", 0, 0.0)
+    assert worst.ratio == np.inf and worst.noise == pytest.approx(UNIT[0], rel=0.2)
+    assert worst.at == pytest.approx(118.1) and worst.seconds == pytest.approx(7.9)
+
+
+def test_a_channel_that_is_dead_beside_noisy_ones_is_stuck() -> None:
+    block = block_of(rest(), start=100.0)
+    block.gyr[:, 1] = 0.25
+    worst = judge(table(block), LIMITS).worst
+    assert (worst.kind, worst.channel) == ("stuck", 4)
+
+
+def test_a_device_coarser_than_its_noise_is_not_stuck() -> None:
+    block = block_of(rest(), start=100.0)
+    block.acc[:] = np.round(block.acc)
+    block.gyr[:] = 0.0
+    assert judge(table(block), LIMITS).worst.ratio < 1
+
+
+def allowed(cells: float) -> float:
+    """Twice as much in a window of 8 s as in a long one."""
+    return 5.8 * (1 + (8.0 / (0.1 * cells)) ** 2)
+
+
+@pytest.mark.parametrize("n", [300, 800, 3000])
+def test_the_ratio_is_the_largest_departure_over_what_is_allowed(n: int) -> None:
+    cells = table(block_of(rest(n, seed=n), start=100.0))
+    found = judge(cells, LIMITS)
+    noise, means = quiet(cells.means), cells.means
+    tests = [
+        *pushes(means - line(means), noise, np.zeros(6)),
+        *steps(means, noise, np.zeros(6)),
+        *shakes(cells.short, cells.steps, np.zeros(6)),
+    ]
+    bound = allowed(len(cells))
+    largest = max(test.z.max() for test in tests) / bound
+    recent = max(test.z[-10:].max() for test in tests if test.cells < 10) / bound
+    assert found.worst.ratio == pytest.approx(largest)
+    assert found.present == pytest.approx(recent)
+
+
+def test_windows_before_sharpen_the_judgement() -> None:
+    first = verdict(rest(6000, seed=1))
+    x = rest(400, seed=2)
+    x[200:250, 1] += 4.0
+    cells = table(block_of(x))
+    alone, after = judge(cells, LIMITS), judge(cells, LIMITS, first.quiet)
+    assert alone.worst.ratio < 1 < after.worst.ratio
+    assert after.quiet is not None and after.quiet.cells == 640
+
+
+def test_the_last_cell_does_not_count_while_it_fills() -> None:
+    x = rest(3003)
+    x[3000:] += 50.0
+    found = verdict(x)
+    assert found.worst.ratio < 1 and found.present < 1
+    assert found.quiet is not None and found.quiet.cells == 300
+
+
+@pytest.mark.parametrize(("n", "judged"), [(290, False), (300, True)])
+def test_three_seconds_are_judged_by_their_own_noise(n: int, judged: bool) -> None:
+    before = Quiet(np.ones((3, 6)), 30)
+    cells = table(block_of(rest(n), start=100.0))
+    found = judge(cells, LIMITS, before)
+    assert (found.present > 0) == judged
+    assert (found.quiet is not before) == judged
+    if not judged:
+        scatter = cells.means.std(axis=0) / LIMITS.noise
+        assert found.worst.kind == "noise" and found.present == 0.0
+        assert found.worst.ratio == pytest.approx(scatter.max())
+        assert found.worst.channel == np.argmax(scatter)
+
+
+def test_of_nothing_nothing_is_said() -> None:
+    found = judge(Cells().table, LIMITS)
+    assert (found.worst.ratio, found.present, found.quiet) == (0.0, 0.0, None)
+    assert np.isnan(found.worst.at)
+
+
+def test_jumps_that_come_of_rounding_are_no_disturbance() -> None:
+    block = block_of(0.001 * rest(), start=100.0)
+    block.acc[1500:1520, 1] += 0.02
+    block.acc[2000:2001, 1] += 1e-4
+    told = np.repeat([0.03, 0.0], 3)
+    cells = table(block)
+    alone, with_steps = judge(cells, LIMITS), judge(cells, LIMITS, None, told)
+    assert alone.worst.ratio > 1 > with_steps.worst.ratio
+    # jumps that the values show themselves are allowed for without being told
+    coarse = block_of(rest(), start=100.0)
+    coarse.acc[:] = HOME[:3]
+    coarse.acc[1500:1530, 1] += 0.3
+    for told_or_not in (None, np.zeros(6)):
+        assert judge(table(coarse), LIMITS, None, told_or_not).worst.ratio <= 1.01
+
+
+def said(departure: Departure) -> str:
+    moved = departure.error(100.0)
+    assert moved.at == departure.at
+    assert moved.axis == ["ax", "ay", "az", "gx", "gy", "gz"][departure.channel]
+    return str(moved)
+
+
+@pytest.mark.parametrize(
+    ("departure", "text"),
+    [
+        (
+            Departure(2.0, "push", 1, 112.5, 0.8, 0.3, 0.02),
+            "disturbed 12.5 s into the window on ay: a 0.8 s push of "
+            "+0.3 ± 0.02 m/s², 15 times the noise",
+        ),
+        (
+            Departure(2.0, "step", 3, 112.5, 0.8, -0.004, 0.0005),
+            "disturbed 12.5 s into the window on gx: a lasting change of "
+            "-0.004 ± 0.0005 rad/s, 8 times the noise",
+        ),
+        (
+            Departure(2.0, "shake", 2, 112.5, 0.4, 0.25, 0.05),
+            "disturbed 12.5 s into the window on az: shaken for 0.4 s by "
+            "0.25 m/s², 5 times the noise",
+        ),
+        (
+            Departure(2.0, "push", 0, 112.5, 0.8, 0.3, 0.0),
+            "disturbed 12.5 s into the window on ax: a 0.8 s push of "
+            "+0.3 ± 0 m/s², where the noise is 0 m/s²",
+        ),
+        (
+            Departure(2.0, "drift", 2, 100.0, 30.0, 0.4, 0.01),
+            "creeping on az: +0.4 ± 0.01 m/s² over the window",
+        ),
+        (
+            Departure(2.0, "noise", 5, 100.0, 0.1, 0.3, 0.1),
+            "moving on gz by 0.3 rad/s, which no device at rest does",
+        ),
+        (
+            Departure(np.inf, "stuck", 0, 118.0, 7.9, 0.0, 0.05),
+            "ax repeats one value for 7.9 s from 18.0 s into the window: "
+            "its sensor is stuck",
+        ),
+    ],
+)
+def test_the_operator_is_told_what_when_where_and_by_how_much(
+    departure: Departure, text: str
+) -> None:
+    assert said(departure) == text

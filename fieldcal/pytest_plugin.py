@@ -138,6 +138,7 @@ class VirtualImu:
         """
         __tracebackhide__ = True
         from fieldcal.calibration import Calibration
+        from fieldcal.calibration.names import group_of
         from fieldcal.commands.table import concealed_values
 
         if not isinstance(found, Calibration):
@@ -147,7 +148,7 @@ class VirtualImu:
         for name, value, sigma in zip(
             found.names, found.values, found.sigma, strict=True
         ):
-            limit = (within or {}).get(name.partition(".")[0], float("inf"))
+            limit = (within or {}).get(group_of(name), float("inf"))
             if sigma > limit:
                 wrong.append(f"{name} is known to ± {sigma:.3g}, wanted {limit:.3g}")
             if name in truth:

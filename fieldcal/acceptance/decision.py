@@ -18,6 +18,7 @@ from fieldcal.acceptance.level import level_missing, tilt_is_found
 from fieldcal.acceptance.verification import Verification
 from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import ParameterName, group_of, sensor_of
 from fieldcal.core.chances import chi2_tail
 from fieldcal.history.family import expected
 from fieldcal.session.description import Description
@@ -159,7 +160,8 @@ def _uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
     checks = []
     for group in COMPONENTS:
         limit = limits.sigma(group)
-        sensor_read = any(name.startswith(group[:4]) for name in found.names)
+        read = {sensor_of(group_of(name)) for name in found.names}
+        sensor_read = sensor_of(group) in read
         if limit is None or not sensor_read:
             continue
         unit = COMPONENTS[group][1]
@@ -175,7 +177,7 @@ def _uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
                 f"{group} {'xyz'[worst]} is known to ± {sigma[worst]:.2g}"
                 f"{_of(unit)}, {'within' if ok else 'more than'} {limit:.2g}{_of(unit)}"
             )
-            if not ok and group.startswith("acc"):
+            if not ok and sensor_of(group) == "acc":
                 says += _by_angles(found, limits)
             value = float(sigma[worst])
             checks.append(Check(f"{group} uncertainty", ok, says, value, limit, unit))
@@ -211,10 +213,10 @@ def _change(
         return [Check("change", None, "no serial number, so no history to compare")]
     if not family:
         return [Check("change", None, "first calibration of this device")]
-    known = [n for n in found.names if limits.repeat(n.partition(".")[0]) is not None]
+    known = [n for n in found.names if limits.repeat(group_of(n)) is not None]
     checks = []
-    for group in dict.fromkeys(n.partition(".")[0] for n in known):
-        names = [n for n in known if n.startswith(f"{group}.")]
+    for group in dict.fromkeys(group_of(n) for n in known):
+        names = [n for n in known if group_of(n) == group]
         made = [_compared(found, n, limits, family, len(known)) for n in names]
         checks += sorted(filter(None, made), key=lambda c: c.value or 0.0)[:1]
     return checks
@@ -229,8 +231,8 @@ def _compared(
 ) -> Check | None:
     """One parameter against earlier runs; all parameters share the probability."""
     earlier = [c for c in family if name in c.names]
-    group, _, axis = name.partition(".")
-    repeat = limits.repeat(group)
+    parameter = ParameterName.of(name)
+    repeat = limits.repeat(parameter.group)
     if not earlier or repeat is None:
         return None
     value, sigma = found.value(name), found.uncertainty(name)
@@ -243,12 +245,12 @@ def _compared(
     ok = chance >= limit
     unit = _of(found.units[found.names.index(name)])
     says = (
-        f"{group} {axis} differs from {usual.runs} earlier calibration"
-        f"{'s' if usual.runs > 1 else ''} by {value - usual.mean:+.2g}"
+        f"{parameter.group} {parameter.component} differs from {usual.runs} earlier"
+        f" calibration{'s' if usual.runs > 1 else ''} by {value - usual.mean:+.2g}"
         f" ± {usual.sigma(sigma):.2g}{unit}"
         f"{'' if ok else ': out of family; inspect the device before you use it'}"
     )
-    return Check(f"{group} change", ok, says, chance, limit, "1")
+    return Check(f"{parameter.group} change", ok, says, chance, limit, "1")
 
 
 def _verification(seen: Verification | None, limits: GradeLimits) -> Check:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldcal.calibration.names import ParameterName
 from fieldcal.core.samples import Array
 
 PIECE = 16384
@@ -81,12 +82,13 @@ def spread(
 
 def _place(name: str, sensor: str) -> tuple[int, int] | None:
     """Row of a parameter, and 0 for the bias or 1 + column of the matrix."""
-    group, _, part = name.partition(".")
+    parameter = ParameterName.of(name)
     cross = "cross_coupling" if sensor == "acc" else "gyro_cross_coupling"
-    if group == f"{sensor}_bias":
-        return "xyz".index(part), 0
-    if group == f"{sensor}_scale":
-        return "xyz".index(part), 1 + "xyz".index(part)
-    if group == cross:
-        return int(part[1]) - 1, int(part[2])
+    if parameter.group == f"{sensor}_bias":
+        return parameter.axis, 0
+    if parameter.group == f"{sensor}_scale":
+        return parameter.axis, 1 + parameter.axis
+    if parameter.group == cross:
+        row, column = parameter.entry
+        return row, 1 + column
     return None

@@ -15,6 +15,7 @@ from typing import Any, get_args
 import numpy as np
 
 from fieldcal.calibration.gauge import in_sample_units, in_si_units
+from fieldcal.calibration.names import group_of
 from fieldcal.calibration.parameters import COMPONENTS, Calibration, Method
 from fieldcal.core.errors import InputError
 
@@ -94,7 +95,7 @@ def _group(calibration: Calibration, group: str) -> dict[str, Any]:
     values, sigmas = calibration.vector(group)
     units = [
         u for n, u in zip(calibration.names, calibration.units, strict=True)
-        if n.partition(".")[0] == group
+        if group_of(n) == group
     ]  # fmt: skip
     out: dict[str, Any] = {
         "value": [_number(v) for v in values],

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.calibration.names import group_of
 from fieldcal.calibration.parameters import Calibration
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
@@ -112,7 +113,7 @@ def _changed(calibration: Calibration, power: int) -> Calibration:
     factors: Array = np.ones(len(calibration.names))
     units = list(calibration.units)
     for i, name in enumerate(calibration.names):
-        group = name.partition(".")[0]
+        group = group_of(name)
         if (found := gauge.of(group)) is not None:
             factors[i] = found[0] ** power
             units[i] = found[1] if power > 0 else GROUPS[group][2]

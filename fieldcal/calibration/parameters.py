@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fieldcal.calibration.correction import corrected, spread
+from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 
@@ -50,7 +51,7 @@ class Nominal:
             three = getattr(self, name)
             if len(three) != 3 or not np.isfinite(three).all():
                 raise InputError(f"nominal {name} is {three}: give three numbers")
-            if name.endswith("scale") and not np.all(three):
+            if name in ("acc_scale", "gyr_scale") and not np.all(three):
                 raise InputError(
                     f"nominal {name} is {three}: a scale of 0 sees nothing"
                 )
@@ -100,12 +101,12 @@ class Calibration:
     @property
     def groups(self) -> tuple[str, ...]:
         """The ids present, in order."""
-        return tuple(dict.fromkeys(n.partition(".")[0] for n in self.names))
+        return tuple(dict.fromkeys(group_of(n) for n in self.names))
 
     def components(self, group: str) -> tuple[str, ...]:
         """Component names of a group that were determined."""
-        parts = [n.partition(".") for n in self.names]
-        return tuple(c for g, _, c in parts if g == group)
+        parsed = map(ParameterName.of, self.names)
+        return tuple(name.component for name in parsed if name.group == group)
 
     def value(self, name: str) -> float:
         """One value by its full name; nan where it was not determined."""
@@ -158,7 +159,8 @@ class Calibration:
         bias = np.where(np.isfinite(bias), bias, nominal_bias)
         matrix = np.diag(np.where(np.isfinite(scale), scale, nominal_scale))
         for part in self.components(cross):
-            matrix[int(part[1]) - 1, int(part[2]) - 1] = self.value(f"{cross}.{part}")
+            name = ParameterName(cross, part)
+            matrix[name.entry] = self.value(str(name))
         return bias, matrix
 
     def apply(self, block: Block, nominal: Nominal | None = None) -> Block:

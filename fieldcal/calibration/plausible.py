@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fieldcal.calibration.names import ParameterName, group_of, sensor_of
 from fieldcal.calibration.parameters import Nominal
 from fieldcal.core.samples import Array
 
@@ -26,11 +27,11 @@ def senseless(
     """Sentences about values that no sensor has in the declared axes and units."""
     said = []
     for name, value, s in zip(names, values, sigma, strict=True):
-        group, _, axis = name.partition(".")
-        if group not in UNREAL:
+        parameter = ParameterName.of(name)
+        if parameter.group not in UNREAL:
             continue
-        usual = getattr(nominal, group)["xyz".index(axis)]
-        if group.endswith("scale"):
+        usual = getattr(nominal, parameter.group)[parameter.axis]
+        if parameter.group in ("acc_scale", "gyr_scale"):
             said += _scale(name, float(value), float(s), usual)
         else:
             said += _bias(name, float(value), float(s), usual, nominal)
@@ -49,7 +50,7 @@ def _scale(name: str, value: float, sigma: float, usual: float) -> list[str]:
             " the other way; mend [frame] mounting, or the signs of the angles or"
             " rates"
         ]
-    group = name.partition(".")[0]
+    group = group_of(name)
     if abs(value / usual - 1) - UNSEEN * sigma / abs(usual) > UNREAL[group]:
         return [
             f"{name} is {value:.3g} ± {sigma:.2g}, nominal {usual:.3g}: no sensor is"
@@ -63,12 +64,13 @@ def _scale(name: str, value: float, sigma: float, usual: float) -> list[str]:
 def _bias(
     name: str, value: float, sigma: float, usual: float, nominal: Nominal
 ) -> list[str]:
-    group = name.partition(".")[0]
-    unit = abs(getattr(nominal, group.replace("bias", "scale"))["xyz".index(name[-1])])
+    parameter = ParameterName.of(name)
+    sensor = sensor_of(parameter.group)
+    unit = abs(getattr(nominal, f"{sensor}_scale")[parameter.axis])
     off = abs(value - usual) - UNSEEN * sigma
-    if off <= UNREAL[group] * unit:
+    if off <= UNREAL[parameter.group] * unit:
         return []
-    si = "m/s^2" if group.startswith("acc") else "rad/s"
+    si = "m/s^2" if sensor == "acc" else "rad/s"
     return [
         f"{name} is {(value - usual) / unit:+.3g} {si} from nominal: no sensor is that"
         " far off; either the device or its driver takes its mean out, or the offset"

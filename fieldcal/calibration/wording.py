@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from fieldcal.calibration.names import ParameterName
+
 TITLES = {
     "acc_bias": "acc bias",
     "acc_scale": "acc scale factor",
@@ -40,8 +42,9 @@ def title(name: str) -> str:
     >>> title("acc_bias.x"), title("base_tilt.about_x_deg")
     ('acc bias x', 'base tilt about x')
     """
-    group, _, component = name.partition(".")
-    label = component.replace("_deg", "").replace("_", " ")
+    parameter = ParameterName.of(name)
+    group = parameter.group
+    label = parameter.component.replace("_deg", "").replace("_", " ")
     return f"{TITLES.get(group, group.replace('_', ' '))} {label}".strip()
 
 

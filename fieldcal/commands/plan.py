@@ -170,8 +170,10 @@ def _cell(sigma: float | None) -> str:
 
 
 def _unit(name: str) -> str:
+    from fieldcal.calibration.names import group_of
+
     units = {"acc_bias": "m/s²", "acc_scale": "1", "gyr_bias": "rad/s"}
-    return units.get(name.partition(".")[0], "°")
+    return units.get(group_of(name), "°")
 
 
 def _tell(confused: Aliases, further: Position) -> None:

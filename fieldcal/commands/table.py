@@ -8,6 +8,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
+from fieldcal.calibration.names import group_of
 from fieldcal.calibration.wording import number, title
 from fieldcal.commands.installing import lines
 
@@ -44,7 +45,7 @@ def show(
     before = ""
     rows = zip(calibration.names, calibration.values, calibration.sigma, strict=True)
     for (name, value, sigma), unit in zip(rows, calibration.units, strict=True):
-        group = name.partition(".")[0]
+        group = group_of(name)
         if before and group != before:
             table.add_section()
         cells = [title(name), *number(value, sigma), unit]

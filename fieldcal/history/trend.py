@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import group_of
 from fieldcal.history.family import expected
 from fieldcal.history.store import HistoryRun, family
 
@@ -71,7 +72,7 @@ def trend(
     limits : of its grade
 
     """
-    usual = limits.repeat(name.partition(".")[0])
+    usual = limits.repeat(group_of(name))
     points = []
     for i, run in enumerate(runs):
         found = run.calibration
@@ -81,7 +82,7 @@ def trend(
         unit = found.units[found.names.index(name)]
         chance, spread = np.nan, np.nan
         before = _values(family(runs[:i]), name)
-        together = max(1, sum(limits.repeat(n.partition(".")[0]) is not None
+        together = max(1, sum(limits.repeat(group_of(n)) is not None
                               for n in found.names))  # fmt: skip
         if usual is not None:
             if len(before):

@@ -9,6 +9,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
+from fieldcal.calibration.names import ParameterName
 from fieldcal.calibration.wording import number, pretty, title
 from fieldcal.core.samples import Array
 from fieldcal.report.blocks import (
@@ -146,10 +147,11 @@ def _parameters(found: Calibration, nominal: Mapping[str, Array]) -> Table:
     for i, (name, value, sigma, unit) in enumerate(
         zip(shown.names, shown.values, shown.sigma, shown.units, strict=True)
     ):
-        group, _, axis = name.partition(".")
+        parameter = ParameterName.of(name)
+        group = parameter.group
         change: str | Cell = ""
         if group in nominal and sigma > 0:
-            z = (found.values[i] - nominal[group]["xyz".index(axis)]) / found.sigma[i]
+            z = (found.values[i] - nominal[group][parameter.axis]) / found.sigma[i]
             change = Cell(f"{z:+.1f} σ", bar=float(min(1.0, abs(z) / WIDEST)))
         rows.append([title(name), *number(value, sigma), pretty(unit), change])
     columns: tuple[str, ...] = ("parameter", ">value", ">± 1σ", "unit")

@@ -1,0 +1,67 @@
+"""Names of parameters: a group and a component, written ``group.component``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+AXES = "xyz"
+
+SENSORS = {
+    "acc_bias": "acc",
+    "acc_scale": "acc",
+    "gyr_bias": "gyr",
+    "gyr_scale": "gyr",
+}
+"""The sensor of each group that is always reported in device axes."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterName:
+    """Name of one parameter.
+
+    Attributes
+    ----------
+    group : ``acc_bias``, ``gyr_scale``, or the id of an effect
+    component : an axis, or a parameter of the effect; empty where there is one only
+
+    """
+
+    group: str
+    component: str = ""
+
+    @classmethod
+    def of(cls, name: str) -> ParameterName:
+        """Read a name as files have it.
+
+        >>> ParameterName.of("cross_coupling.k12").entry
+        (0, 1)
+        """
+        group, _, component = name.partition(".")
+        return cls(group, component)
+
+    def __str__(self) -> str:
+        return f"{self.group}.{self.component}" if self.component else self.group
+
+    @property
+    def axis(self) -> int:
+        """Index of the axis of a bias or a scale factor."""
+        return AXES.index(self.component)
+
+    @property
+    def entry(self) -> tuple[int, int]:
+        """Row and column, from 0, of a cross-coupling such as ``k12``."""
+        return int(self.component[1]) - 1, int(self.component[2]) - 1
+
+
+def sensor_of(group: str) -> str:
+    """``acc`` or ``gyr`` for a bias or a scale factor; empty for an effect."""
+    return SENSORS.get(group, "")
+
+
+def group_of(name: str) -> str:
+    """Group of a parameter.
+
+    >>> group_of("acc_bias.x")
+    'acc_bias'
+    """
+    return ParameterName.of(name).group

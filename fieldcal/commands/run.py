@@ -15,6 +15,7 @@ from fieldcal.commands.run_task import make_task
 from fieldcal.commands.several import StoreSeveral
 from fieldcal.commands.site import add_site
 from fieldcal.core.errors import FieldcalError
+from fieldcal.core.plugins import names
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -41,12 +42,14 @@ PATIENCE, PATIENCE_HEADLESS = 120.0, 20.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
+    # their names alone: what they import is not loaded for a line of help
+    procedures = names([str(Path(__file__).parents[1] / "procedures")])
     add(
         "procedure",
         nargs=argparse.OPTIONAL,
         metavar="PROCEDURE",
-        help="two_position, five_position, positions, or a plan file (a session.toml"
-        " with positions, and a table [run])",
+        help=f"{', '.join(procedures)}, or a plan file (a session.toml with"
+        " positions, and a table [run])",
     )
     add("--resume", type=Path, metavar="SESSION", help="go on with a run broken off")
     _add_device(parser)

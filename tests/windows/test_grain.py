@@ -7,7 +7,7 @@ from scipy.stats import norm
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows import Average, average
-from fieldcal.windows.grain import AROUND, shows, variance
+from fieldcal.windows.grain import AROUND, variance, visible_step
 from fieldcal.windows.rounding import of_few, of_mean
 
 STEP = np.repeat([9.80665e-3, 1e-3], 3)
@@ -136,9 +136,9 @@ def test_steps_show_where_noise_does_not_hide_them_and_twice_as_wide_at_zero() -
         (Grain(), quiet, [0, 0, 0, 0, 0, 0]),
         (Grain(cut=True), quiet, [0, 0, 0, 0, 0, 0]),
     ]:
-        found = shows(grain, mean, sampled) / STEP
+        found = visible_step(grain, mean, sampled) / STEP
         np.testing.assert_allclose(found, expected)
-    edge = shows(CUT, 2.0 * STEP, quiet) / STEP
+    edge = visible_step(CUT, 2.0 * STEP, quiet) / STEP
     np.testing.assert_allclose(edge, 1.0)
-    edge = shows(CUT, 0.0 * STEP, 1.5 * STEP) / STEP
+    edge = visible_step(CUT, 0.0 * STEP, 1.5 * STEP) / STEP
     np.testing.assert_allclose(edge, 0.0)

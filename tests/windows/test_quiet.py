@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.quiet import Quiet, quiet, running
+from fieldcal.windows.quiet import QuietNoise, quiet, running
 
 
 def test_white_noise_falls_with_the_root_of_the_duration_and_spreads_so() -> None:
     """For white noise s_k = a_k."""
     allan = np.sqrt(0.5 ** np.arange(8))[:, None] * [1.0, 3.0]
-    np.testing.assert_allclose(Quiet(allan, 300).spread, allan)
+    np.testing.assert_allclose(QuietNoise(allan, 300).spread, allan)
 
 
 def test_the_spread_sums_what_changes_at_all_longer_durations() -> None:
     allan = np.array([[2.0], [1.0], [3.0]])
     half = [2.0, 0.5, 4.5]
     expected = [sum(half[k:]) + half[-1] for k in range(3)]
-    np.testing.assert_allclose(Quiet(allan, 30).spread[:, 0], np.sqrt(expected))
+    np.testing.assert_allclose(QuietNoise(allan, 30).spread[:, 0], np.sqrt(expected))
 
 
 @pytest.mark.parametrize(("m", "levels"), [(1, 1), (3, 1), (4, 2), (9, 3), (600, 8)])
@@ -101,7 +101,7 @@ def test_what_never_varies_has_no_noise() -> None:
 def test_windows_before_are_pooled_by_their_cells() -> None:
     x = np.random.default_rng(2).standard_normal((40, 1))
     own = quiet(x).allan
-    before = Quiet(0.9 * own, 120)
+    before = QuietNoise(0.9 * own, 120)
     found = quiet(x, before)
     assert found.cells == 160
     expected = np.sqrt((40 * own**2 + 120 * (0.9 * own) ** 2) / 160)
@@ -112,7 +112,7 @@ def test_the_noise_may_double_from_one_window_to_the_next_and_no_more() -> None:
     x = np.random.default_rng(3).standard_normal((40, 2))
     own = quiet(x).allan
     known = np.column_stack([own[:, 0] / 10, 0 * own[:, 1]])
-    found = quiet(x, Quiet(known, 40)).allan
+    found = quiet(x, QuietNoise(known, 40)).allan
     bounded = np.sqrt(((2 * known[:, 0]) ** 2 + known[:, 0] ** 2) / 2)
     np.testing.assert_allclose(found[:, 0], bounded)
     # of what never varied before nothing is known
@@ -124,7 +124,7 @@ def test_levels_that_only_one_of_the_windows_has_are_taken_over(levels: int) -> 
     x = np.random.default_rng(4).standard_normal((40, 1))
     own = quiet(x).allan
     assert len(own) == 5
-    before = Quiet(np.full((levels, 1), 0.5), 40)
+    before = QuietNoise(np.full((levels, 1), 0.5), 40)
     found = quiet(x, before).allan
     assert len(found) == max(5, levels)
     expected = own[2:] if levels == 2 else np.full((3, 1), 0.5)

@@ -37,7 +37,7 @@ def test_what_does_not_vary_is_off_by_anything_within_a_step() -> None:
     np.testing.assert_allclose(rounding.of_mean(steps, still), [0.25 / 12, 0.0])
     np.testing.assert_allclose(rounding.of_few(steps, still), [0.25 / 12, 0.0])
     np.testing.assert_allclose(rounding.least(steps), [0.5 / np.sqrt(12), 0.0])
-    np.testing.assert_array_equal(rounding.before(still, steps), still)
+    np.testing.assert_array_equal(rounding.noise_before_rounding(still, steps), still)
 
 
 def test_many_windows_of_many_channels_at_once() -> None:
@@ -52,10 +52,10 @@ def test_many_windows_of_many_channels_at_once() -> None:
 def test_the_steps_leave_the_noise_that_was_there_before() -> None:
     noise = np.array([0.7, 2.0])
     sampled = [exact(float(s), 0.1)[1] for s in noise]
-    found = rounding.before(np.array(sampled), np.ones(2))
+    found = rounding.noise_before_rounding(np.array(sampled), np.ones(2))
     np.testing.assert_allclose(found, noise, rtol=2e-3)
     # nothing is below 0, whatever the step
-    assert rounding.before(np.array([0.1]), np.ones(1)) == 0
+    assert rounding.noise_before_rounding(np.array([0.1]), np.ones(1)) == 0
 
 
 @pytest.mark.parametrize("step", [0.5, 1.0, 2.0])
@@ -84,8 +84,10 @@ def test_two_values_that_take_turns_tell_where_between_them_the_mean_is(
 def test_single_steps_show_where_the_noise_is_lower() -> None:
     step = np.full(5, 2.0)
     sampled = np.array([0.0, 1.1, 1.2, 5.0, np.nan])
-    np.testing.assert_array_equal(rounding.shown(step, sampled), [2, 2, 0, 0, 2])
-    assert rounding.shown(np.zeros(1), np.zeros(1)) == 0
+    np.testing.assert_array_equal(
+        rounding.visible_steps(step, sampled), [2, 2, 0, 0, 2]
+    )
+    assert rounding.visible_steps(np.zeros(1), np.zeros(1)) == 0
 
 
 def test_examples() -> None:

@@ -191,7 +191,7 @@ def test_samples_are_asked_for_where_sums_do_not_do(long: Block) -> None:
         block = long.between(start, end)
         return [block[:0], block[:7], block[7:7], block[7:], block[:0]]
 
-    found = stretches.still_in(rows, cells.table.origin, between, 3.0)
+    found = stretches.still_stretches_of_file(rows, cells.table.origin, between, 3.0)
     assert found == still_stretches(long, 3.0)
     assert all(start < end for start, end in asked)
 

@@ -9,7 +9,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.windows import StillnessLimits
 from fieldcal.windows.cells import Cells, CellTable
 from fieldcal.windows.disturbance import pushes, shakes, steps
-from fieldcal.windows.quiet import Quiet, quiet
+from fieldcal.windows.quiet import QuietNoise, quiet
 from fieldcal.windows.trend import line
 from fieldcal.windows.verdict import Departure, Verdict, judge
 from windows.signals import HOME, UNIT, block_of, white
@@ -164,7 +164,7 @@ def test_the_last_cell_does_not_count_while_it_fills() -> None:
 
 @pytest.mark.parametrize(("n", "judged"), [(290, False), (300, True)])
 def test_three_seconds_are_judged_by_their_own_noise(n: int, judged: bool) -> None:
-    before = Quiet(np.ones((3, 6)), 30)
+    before = QuietNoise(np.ones((3, 6)), 30)
     cells = table(block_of(rest(n), start=100.0))
     found = judge(cells, LIMITS, before)
     assert (found.present > 0) == judged

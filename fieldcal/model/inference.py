@@ -100,13 +100,13 @@ class Inference:
         for _ in range(PASSES):
             seen.add(search.key(found.members))
             if found.members != members:
-                state, values, members = self.settled(
+                state, values, _ = self.settled(
                     state, values, found.members, found.sizes
                 )
-                members = self.shaped(state, values, members, found.sizes)
-                state, values, members = self.settled(
-                    state, values, members, found.sizes
-                )
+                members = self.shaped(state, values, found.members, found.sizes)
+                # with the columns that are in the state now: those of the grid's
+                # points, estimated beside, would be taken off the way a second time
+                state, values, found = self.settled(state, values, members, found.sizes)
             search = Search(self.dictionary, self.gram(state, values, found))
             found = search.run(members)
             if found.keys == frozenset(c.key for c, _ in members):
@@ -135,7 +135,8 @@ class Inference:
             there = whole(one.state, self.dictionary)[group.columns]
             if np.abs(there).max() < AFAR:
                 return None
-            state, values, members = self.settled(state, values, one.members, one.sizes)
+            members = one.members
+            state, values, _ = self.settled(state, values, members, one.sizes)
             about = Search(self.dictionary, self.gram(state, values, None))
             return state, values, about.run(members)
         return None
@@ -277,8 +278,8 @@ class Inference:
         values: Array,
         members: tuple[Member, ...],
         sizes: Sizes | None = None,
-    ) -> tuple[State, Array, tuple[Member, ...]]:
-        """The state at the estimate of a set, by Gauss and Newton."""
+    ) -> tuple[State, Array, Set]:
+        """The state at the estimate of a set, by Gauss and Newton, and that set."""
         values = self._padded(values)
         for _ in range(NEWTON):
             wanted = self.wanted(members) | (values != 0)
@@ -294,7 +295,7 @@ class Inference:
             counted = np.isin(found.state.columns, self._nonlinear(members))
             if step[counted].max(initial=0.0) < CONVERGED:
                 break
-        return state, values, members
+        return state, values, found
 
     def _nonlinear(self, members: tuple[Member, ...]) -> Array:
         """Columns whose values are in the state: all that are no course in time."""

@@ -1,12 +1,13 @@
 """What a set may be given: every other cause, with what it is worth.
 
 A cause is offered at its best variant and size, beside the set's instability as it is
-and smaller, since what it explains is instability no longer.
+and smaller in one triad, since what it explains there is instability no longer; the
+other triad's stays, which nothing has explained.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +19,14 @@ from fieldcal.model.sets import Set, Sets
 from fieldcal.model.sizing import DENSITY, EVEN, Member, Sizes
 from fieldcal.samples import Array
 
-LEVELS = (0, 3, 6, 9, 40)
+LEVELS = (3, 6, 9, 40)
 """Steps in size by which instability may fall when something is explained."""
+
+FALLING = ((0, 1, 2), (3, 4, 5, 6))
+"""Instabilities that fall together: of a triad, and of turns with the gyroscopes."""
+
+Less = tuple[int, ...]
+"""Indices of instabilities in `priors.SIZES`, (7,)."""
 
 LEAST = 0.5
 """Gain of ln L below which an offer is none."""
@@ -37,14 +44,14 @@ class Offer:
     member : cause and variant
     score : of the set with it, foretold
     size : index of its likeliest size
-    level : by how much the instability is less beside it
+    less : instability beside it
 
     """
 
     member: Member
     score: float
     size: int
-    level: int
+    less: Less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,13 +60,13 @@ class Table:
 
     Attributes
     ----------
-    down : by how much its instability is less
+    less : its instability
     state, score : of the set
     offers : the best first
 
     """
 
-    down: int
+    less: Less
     state: Eliminated
     score: float
     offers: list[Offer]
@@ -87,13 +94,13 @@ class Offers(Sets):
         key = self.key(there.members)
         if key not in self._tables:
             self._tables[key] = [
-                Table(down, state, score, self._at_level(there, state, score, down))
-                for down, state, score in self._levels(there)
+                Table(less, state, score, self._at_level(there, state, score, less))
+                for less, state, score in self._levels(there)
             ]
         return self._tables[key]
 
     def _at_level(
-        self, there: Set, state: Eliminated, score: float, down: int
+        self, there: Set, state: Eliminated, score: float, less: Less
     ) -> list[Offer]:
         """Every cause that a set has not, beside one instability, the best first."""
         d, chances = self.dictionary, self._chances(there)
@@ -109,7 +116,7 @@ class Offers(Sets):
                 if int(at[m]) not in best or worth[m] > best[int(at[m])][0]:
                     best[int(at[m])] = float(worth[m]), int(variant[m]), int(size[m])
         offers = [
-            Offer((c, c.variants[v]), score + worth, size, down)
+            Offer((c, c.variants[v]), score + worth, size, less)
             for c, (worth, v, size) in ((d.causes[i], b) for i, b in best.items())
             if c.key not in there.keys
         ]
@@ -124,30 +131,40 @@ class Offers(Sets):
                 out[i] += np.log(priors.AGAIN / cause.chance)
         return out
 
-    def _levels(self, there: Set) -> Iterator[tuple[int, Eliminated, float]]:
+    def _levels(self, there: Set) -> Iterator[tuple[Less, Eliminated, float]]:
         """The set with its instability as it is and smaller, and its score then."""
         sizes = there.sizes
         base = there.score - there.state.score
         base -= self.alike(sizes.instability)
         columns, wide = there.state.columns, there.state.sizes
         ways = [(wide, 0.0), self.opened(there)]
-        for down in LEVELS if self.unstable.any() else LEVELS[:1]:
-            less = tuple(max(i - down, 0) for i in sizes.instability)
+        for less in self._less(sizes.instability):
+            fallen = less != sizes.instability
             rows = self.weighed(less)
-            for before, cost in ways if down and ways[1][1] else ways[:1]:
+            for before, cost in ways if fallen and ways[1][1] else ways[:1]:
                 state = Eliminated.of(rows, columns, before)
-                yield down, state, base + cost + state.score + self.alike(less)
+                yield less, state, base + cost + state.score + self.alike(less)
         first, rows = 0, self.weighed(sizes.instability)
         for group, size in zip(
             self.dictionary.always, sizes.calibration, strict=True
-        ):  # what a device has anyway, with next to no change from nominal
+        ):  # what a device has anyway, with next to no change from nominal: what one
+            # cause does to all axes, or in time, looks like it
             some = slice(first, first := first + len(group.columns))
-            if group.in_step:
+            if group.in_step or not group.in_state:
                 small = wide.copy()
                 small[some] = group.sizes(float(priors.SIZES[0]))
                 state = Eliminated.of(rows, columns, small)
                 lost = DENSITY[0] - DENSITY[size]
-                yield 0, state, there.score - there.state.score + state.score + lost
+                score = there.score - there.state.score + state.score
+                yield sizes.instability, state, score + lost
+
+    def _less(self, instability: Less) -> list[Less]:
+        """Instabilities as they are, and smaller in one triad; each once."""
+        found = [instability]
+        for some in FALLING if self.unstable.any() else ():
+            for down in LEVELS:
+                found.append(fallen(instability, some, down))
+        return list(dict.fromkeys(found))
 
     def opened(self, there: Set) -> tuple[Array, float]:
         """Sizes with no calibration below what is typical, and what that costs, ln.
@@ -184,8 +201,15 @@ class Offers(Sets):
 
     def taken(self, there: Set, *offers: Offer) -> Set:
         """The set with what was offered."""
-        sizes, down = there.sizes, max(o.level for o in offers)
-        less = tuple(max(i - down, 0) for i in sizes.instability)
+        sizes = there.sizes
+        less = tuple(map(min, *(o.less for o in offers), sizes.instability))
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluated((*there.members, *(o.member for o in offers)), start)
+
+
+def fallen(instability: Less, some: Sequence[int], down: int) -> Less:
+    """Instabilities of which some are smaller by so many steps."""
+    return tuple(
+        max(size - down, 0) if i in some else size for i, size in enumerate(instability)
+    )

@@ -83,7 +83,7 @@ class Search(Offers):
         """
         tried: dict[tuple[str, str], tuple[float, Offer, Offer]] = {}
         for table in self.tables(there):
-            if not table.down:
+            if table.less == there.sizes.instability:
                 continue
             for one, two, gain in _pairs(table):
                 key = (one.member[0].key, two.member[0].key)

@@ -72,6 +72,11 @@ def smooth(span: float) -> Array:
     return even
 
 
+def along(axis: int) -> Array:
+    """Which columns of `Span.fading` are of the force along one axis, (SLOW,)."""
+    return axis * SLOW + np.arange(SLOW)
+
+
 def alpha(x: Experience) -> Array:
     """Harmonics of the first joint."""
     return _angle(x.alpha)

@@ -11,6 +11,9 @@ from fieldcal.model.causes import FEW, TRIADS, Cause, Group
 from fieldcal.model.table import Table
 from fieldcal.samples import CHANNELS, Array
 
+FORCES = 3
+"""Channels that feel a force, those of the accelerometers."""
+
 
 def of_no_effect(table: Table) -> Iterator[Cause]:
     """Functions that no effect makes, on each channel."""
@@ -70,8 +73,12 @@ def _of_covariates(table: Table, sizes: Array) -> Iterator[Cause]:
         first = table.course(covariate, of, width, False)
         for c in table.seen.tolist():
             at = first + c * width + np.arange(width)
-            group = Group(covariate, CHANNELS[c], at, np.full(width, sizes[c]))
-            yield _cause(covariate, CHANNELS[c], [group])
+            parts = [at]
+            if covariate == "force and time" and c < FORCES:
+                parts.append(at[unknown.along(c)])  # a scale factor that changes
+            groups = [Group(covariate, CHANNELS[c], some, np.full(len(some), sizes[c]))
+                      for some in parts]  # fmt: skip
+            yield _cause(covariate, CHANNELS[c], groups)
 
 
 def _cause(name: str, part: str, groups: Sequence[Group]) -> Cause:

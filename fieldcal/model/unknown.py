@@ -72,9 +72,9 @@ def smooth(span: float) -> Array:
     return even
 
 
-def along(axis: int) -> Array:
-    """Which columns of `Span.fading` are of the force along one axis, (SLOW,)."""
-    return axis * SLOW + np.arange(SLOW)
+def along(axis: int) -> slice:
+    """Which columns of `Span.fading` are of the force along one axis."""
+    return slice(axis * SLOW, (axis + 1) * SLOW)
 
 
 def alpha(x: Experience) -> Array:

@@ -5,13 +5,17 @@ READY := .venv/.ready
 DEV := .venv/.dev
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench docs setup clean
+.PHONY: demo test test-all lint bench docs setup clean
 
 demo: $(READY)
 	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
 
 test: $(DEV)
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n 2 --dist loadgroup
+
+# the whole catalogue and every seed, before a release or where diagnosis was changed
+test-all: $(DEV)
+	$(BIN)/python -m pytest -q -n 2 --dist loadgroup --all
 
 lint: $(DEV)
 	$(BIN)/ruff check .

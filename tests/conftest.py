@@ -26,7 +26,6 @@ WAITING = frozenset(
     [
         "test_beside",
         "test_can_imu",
-        "test_codecs",
         "test_console_run",
         "test_crash_safety",
         "test_end_to_end",
@@ -35,32 +34,52 @@ WAITING = frozenset(
         "test_link_contract",
         "test_link_faults",
         "test_mavlink_imu",
-        "test_mavlink_log",
         "test_operator_errors",
         "test_plan_file",
         "test_ports",
         "test_pulled_stick",
         "test_pytest_plugin",
-        "test_reader",
         "test_replay",
         "test_resume",
         "test_serial_imu",
+        "test_sim_keys",
+        "test_sim_serial",
         "test_wires_meet",
         "test_write",
     ]
 )
-"""Modules whose tests wait for devices in processes of their own, or for the clock."""
+"""Modules whose tests wait for devices in processes of their own."""
+
+SPREAD = frozenset(["test_any_recording", "test_diagnosis_contract"])
+"""Long modules whose tests have nothing in common that takes time to make."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Two groups, for two processors: one waits for devices, the other calculates.
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that `make test-all` gives."""
+    parser.addoption(
+        "--all",
+        action="store_true",
+        help="run the tests marked thorough too: the whole catalogue, every seed",
+    )
 
-    Tests that wait run one at a time, as on a machine with a single processor: a device
-    that gets no time runs late.
+
+def pytest_collection_modifyitems(
+    config: pytest.Config, items: list[pytest.Item]
+) -> None:
+    """Leave out what is thorough, unless all is wanted; share the rest out.
+
+    What waits is one group: it leaves a processor free. Of the others each module is
+    one, for what its tests have in common.
     """
+    if not config.getoption("--all"):
+        left_out = [item for item in items if item.get_closest_marker("thorough")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [i for i in items if not i.get_closest_marker("thorough")]
     for item in items:
-        waits = item.path.stem in WAITING or item.path.parent.name == "sim_device"
-        item.add_marker(pytest.mark.xdist_group("waiting" if waits else "calculating"))
+        name = item.path.stem
+        if name not in SPREAD:
+            group = "waiting" if name in WAITING else name
+            item.add_marker(pytest.mark.xdist_group(group))
 
 
 collect_ignore = ["example_project"]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from closed_circle import every_effect
 
 from fieldcal import description
 from fieldcal.description import Description
@@ -109,7 +110,7 @@ def test_every_id_has_a_case() -> None:
     assert set(CASES) == set(catalogue())
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", every_effect())
 def test_put_in_and_named(name: str) -> None:
     case = CASES[name]
     profile, windows = _device(name, case), _windows(case)

@@ -1,0 +1,39 @@
+"""Which effects of the catalogue go round the closed circle in every run.
+
+Round the circle an effect is put into the virtual device, and named from the recording.
+That takes seconds each, so every run takes one in three, the same ones each time: a
+test that turns red has been turned red by the change, and not by the day it is run on.
+They are every third in the order of their kinds, so that each kind is among them.
+`--all` takes the whole catalogue.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from fieldcal.effects import Chain, Effect, Line, Motion, Scatter, catalogue
+
+KINDS: tuple[type[Effect], ...] = (Chain, Line, Motion, Scatter, Effect)
+"""The last is what all are, and here those that are none of the others."""
+
+ONE_IN = 3
+
+
+def _kind(effect: Effect) -> int:
+    return next(i for i, kind in enumerate(KINDS) if isinstance(effect, kind))
+
+
+def ordered() -> list[str]:
+    """Ids of the catalogue by kind, then by what they are seen in."""
+    of = catalogue()
+    return sorted(of, key=lambda id_: (_kind(of[id_]), of[id_].seen_in, id_))
+
+
+def every_effect() -> list[Any]:
+    """Parameters of a test: all ids, of which some are for `--all` alone."""
+    return [
+        id_ if i % ONE_IN == 0 else pytest.param(id_, marks=pytest.mark.thorough)
+        for i, id_ in enumerate(ordered())
+    ]

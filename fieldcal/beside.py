@@ -6,9 +6,10 @@ all of them: its ends go over the host's clock into each one's own time,
 
     t_n = f_n^-1(f_1(t_1)),  f_k(t) = host time at which device k's sample t was had
 
-piecewise straight between the batches that came. The first device rests for a while
+piecewise straight between the batches that came. The host time is that at which they
+were read, so whoever records them may be late. The first device rests for a while
 before its window begins, and nobody turns it before the window is marked, so the few
-hundredths of a second by which batches are late do not matter.
+hundredths of a second by which batches are read late do not matter.
 """
 
 from __future__ import annotations
@@ -18,12 +19,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Lock, Thread
-from time import monotonic
 from typing import Any
 
 import numpy as np
 
-from fieldcal.driver import Driver, open_driver
+from fieldcal.driver import Driver, host_clock, open_driver
 from fieldcal.errors import FieldcalError
 from fieldcal.link_marks import LinkMarks
 from fieldcal.recorder import Recorder
@@ -41,8 +41,10 @@ class Times:
         self._pairs: deque[tuple[float, float]] = deque(maxlen=BATCHES)
 
     def add(self, block: Block) -> None:
-        """Take samples that have come just now."""
-        self._pairs.append((float(block.t[-1]), monotonic()))
+        """Take samples that follow; those whose arrival is not known came just now."""
+        arrived = float(block.t_host[-1])
+        host = arrived if np.isfinite(arrived) else host_clock()
+        self._pairs.append((float(block.t[-1]), host))
 
     @property
     def known(self) -> bool:

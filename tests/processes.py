@@ -6,12 +6,15 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fieldcal.movers import Controlled
 
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
 RUN, SIM = [*FIELDCAL, "run"], [*FIELDCAL, "sim"]
@@ -39,6 +42,19 @@ def wait_for_samples(
     while not (file.exists() and file.stat().st_size > size):
         assert monotonic() < deadline and (run is None or run.poll() is None)
         sleep(0.02)
+
+
+def turned(devices: Sequence[Controlled], alpha: float, beta: float) -> None:
+    """Turn devices on one table; the first one last, when the others are there.
+
+    Whoever waits for the first to rest finds all of them at rest, however late each of
+    their processes runs.
+    """
+    angles = {"alpha_deg": alpha, "beta_deg": beta}
+    for device in reversed(devices):
+        until = device.ask(turn=angles)["until_s"]
+        while device is not devices[0] and device.ask(status={})["time_s"] < until:
+            sleep(0.01)
 
 
 @dataclass(frozen=True)

@@ -221,7 +221,7 @@ def test_what_settles_shows_whatever_the_orientations(
 @pytest.mark.parametrize(
     ("effect", "parameters"),
     [
-        ("base_tilt", {"about_x_deg": 0.5}),
+        pytest.param("base_tilt", {"about_x_deg": 0.5}, marks=pytest.mark.thorough),
         ("cross_coupling", {"k12": 0.004, "k31": -0.003}),
         ("gyro_scale", {"s1": 0.02}),
     ],
@@ -248,7 +248,9 @@ def test_positions_without_angles_among_those_that_have_them(
     assert fit["after"]["held_out_rms"] < 0.3 * fit["before"]["held_out_rms"]
 
 
-@pytest.mark.parametrize("seed", [11, 12, 13])
+@pytest.mark.parametrize(
+    "seed", [11, *(pytest.param(s, marks=pytest.mark.thorough) for s in (12, 13))]
+)
 def test_a_walk_foretells_what_comes_soon(
     seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

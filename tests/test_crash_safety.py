@@ -157,8 +157,11 @@ def test_a_doubled_batch_counts_once(
     assert len(found) == BATCHES * ROWS and "twice" in says
 
 
-def test_a_killed_recording_keeps_every_batch_it_had_written(tmp_path: Path) -> None:
-    for i, moment in enumerate(moments(10, seed=1)):
+@pytest.mark.parametrize("times", [4, pytest.param(20, marks=pytest.mark.thorough)])
+def test_a_killed_recording_keeps_every_batch_it_had_written(
+    tmp_path: Path, times: int
+) -> None:
+    for i, moment in enumerate(moments(times, seed=1)):
         written = killed(tmp_path / str(i), moment)
         assert not faults(tmp_path / str(i), written)
 

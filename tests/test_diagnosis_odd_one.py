@@ -12,7 +12,7 @@ from ladder_sessions import agrees, diagnosed, named
 
 from fieldcal.diagnosis.result import Diagnosis
 
-AMID = (1, 5)
+AMID = (1, pytest.param(5, marks=pytest.mark.thorough))
 """Positions amid the session; at its ends a step of the bias would do as well."""
 
 
@@ -64,7 +64,11 @@ def test_one_axis_in_one_position(window: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("window", "alpha", "beta"),
-    [(0, 1.0, 0.0), (4, 0.0, -1.5), (8, 22.5, 1.0)],
+    [
+        (0, 1.0, 0.0),
+        pytest.param(4, 0.0, -1.5, marks=pytest.mark.thorough),
+        (8, 22.5, 1.0),
+    ],
 )
 def test_angles_that_were_set_otherwise_are_said(
     window: int,

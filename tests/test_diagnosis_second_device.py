@@ -82,7 +82,9 @@ def test_a_line_that_shakes_three_windows(tmp_path: Path) -> None:
     agrees(said, "vibration_rectification", {"x": 5e-3, "y": -4e-3, "z": 3e-3})
 
 
-@pytest.mark.parametrize("fault", [play, course])
+@pytest.mark.parametrize(
+    "fault", [play, pytest.param(course, marks=pytest.mark.thorough)]
+)
 def test_axes_that_go_together_do_not_wander(tmp_path: Path, fault: Fault) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, fault)
     assert said.verdict == "unexplained" and "random_walk" not in named(said)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,16 +53,22 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return out
 
 
+@pytest.fixture(scope="module")
+def solved(folders: dict[str, Path]) -> dict[str, dict[str, Any]]:
+    """The result of each session, which is in its folder as well."""
+    out = {}
+    for unit, folder in folders.items():
+        assert main(["solve", str(folder), "--cross"]) == 0
+        out[unit] = json.loads((folder / "result.json").read_text())
+        Draft202012Validator(schema()).validate(out[unit])
+    return out
+
+
 @pytest.mark.parametrize(("unit", "acc", "gyr"), [("count", ACC, GYR), ("V", 0.2, 3.0)])
 def test_what_is_solved_is_the_same_in_another_unit(
-    folders: dict[str, Path], unit: str, acc: float, gyr: float
+    solved: dict[str, dict[str, Any]], unit: str, acc: float, gyr: float
 ) -> None:
-    documents = []
-    for name in ("SI", unit):
-        assert main(["solve", str(folders[name]), "--cross"]) == 0
-        documents.append(json.loads((folders[name] / "result.json").read_text()))
-        Draft202012Validator(schema()).validate(documents[-1])
-    plain, scaled = (d["parameters"] for d in documents)
+    plain, scaled = (solved[name]["parameters"] for name in ("SI", unit))
     assert plain.keys() == scaled.keys()
     for group, entry in plain.items():
         kind = {"acc": acc, "cro": acc, "gyr": gyr}
@@ -91,13 +98,13 @@ def test_effects_are_relative_and_the_calibration_is_in_counts(
     assert bias[1]["value"] == pytest.approx(mine, rel=1e-4)
 
 
+@pytest.mark.usefixtures("solved")
 def test_it_is_applied_exported_and_shown(
     folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = {}
     for name in ("SI", "count"):
         folder = str(folders[name])
-        assert main(["solve", folder, "--cross"]) == 0
         assert main(["apply", folder, str(tmp_path / f"{name}.csv")]) == 0
         out[name] = np.genfromtxt(tmp_path / f"{name}.csv", delimiter=",", names=True)
         assert main(["report", folder, "-o", str(tmp_path / f"{name}.html")]) == 0

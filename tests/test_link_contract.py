@@ -141,7 +141,18 @@ def test_every_driver_and_every_wire_format_has_its_line() -> None:
     assert set(codec.formats()) <= set(LINES)
 
 
-@pytest.mark.parametrize("name", LINES)
+def one_a_link() -> list[Any]:
+    """Parameters of a test: every line, those of formats that share a link at length.
+
+    What each format puts into bytes is held against what it was in test_wires_meet.
+    """
+    few = ("witmotion", "can", "mavlink", "mavlink on a serial port")
+    few += ("mavlink over datagrams",)
+    more = (name for name in LINES if name not in few)
+    return [*few, *(pytest.param(m, marks=pytest.mark.thorough) for m in more)]
+
+
+@pytest.mark.parametrize("name", one_a_link())
 def test_a_minute_at_1_khz_without_a_loss_and_the_truth_in_it(
     name: str, tmp_path: Path, reference: Calibration
 ) -> None:

@@ -26,7 +26,15 @@ LINKS = {
     "can": "--can slcan --port-link {0}/port",
     "mavlink": "--mavlink tcpin:127.0.0.1:0",
 }
-every_link = pytest.mark.parametrize("link", LINKS)
+every_link = pytest.mark.parametrize(
+    "link",
+    [
+        "serial",
+        "can",
+        "mavlink",
+        pytest.param("text", marks=pytest.mark.thorough),
+    ],
+)
 
 SURVIVED: tuple[dict[str, float], ...] = (
     {"flip_bits": 5},

@@ -51,6 +51,7 @@ def test_a_bump_is_judged_by_name_and_by_number() -> None:
         ("outside: fading scale", 91_047_002),  # of one axis alone
         ("pair", 93_100_030),  # two on accelerometers, one on gyroscopes as well
         ("pair", 93_100_037),
+        ("pair", 93_200_005),  # six of nine parameters made up for the other
     ],
 )
 def test_what_is_concealed_is_named(label: str, seed: int) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.model.causes import Cause, Group
 from fieldcal.model.offers import Offer, Offers, Table
 from fieldcal.model.pairs import pairs
 from fieldcal.model.sets import Set
@@ -52,7 +53,25 @@ class Search(Offers):
         for i in range(len(best.members)):
             less = self.without(best, i)
             best = max([best, less, self._followed(less, best.score)], key=_score)
-        return self._instead(best) if best is there else best
+        if best is not there:
+            return best
+        return max(self._instead(best), self._wider(best), key=_score)
+
+    def _wider(self, there: Set) -> Set:
+        """The best set with all the parameters of one of its causes and one more.
+
+        Alone a cause is given those that are worth it, which make up for others; beside
+        another one it may need all, and before it has them the other is worth nothing.
+        """
+        found = [there]
+        for i, (cause, group) in enumerate(there.members):
+            whole = _whole(cause, group)
+            if whole is not group:
+                members = list(there.members)
+                members[i] = (cause, whole)
+                wide = self.evaluated(tuple(members), there.sizes)
+                found.append(self._followed(wide, there.score))
+        return max(found, key=_score)
 
     def _instead(self, there: Set) -> Set:
         """The best set with two or three causes in the place of one without physics.
@@ -118,10 +137,15 @@ def _pairs(table: Table) -> Iterator[tuple[Offer, Offer, float]]:
 def _widened(offer: Offer) -> Offer:
     """An offer with all the parameters that its cause has."""
     cause, group = offer.member
+    whole = _whole(cause, group)
+    return offer if whole is group else replace(offer, member=(cause, whole))
+
+
+def _whole(cause: Cause, group: Group) -> Group:
+    """The variant of a cause with all its parameters, the group itself if it has."""
     whole = cause.variants[0]
-    if group.shape or group.params == whole.params:
-        return offer
-    return replace(offer, member=(cause, whole))
+    part = not group.shape and set(group.params) < set(whole.params)
+    return whole if part else group
 
 
 def _score(one: Set) -> float:

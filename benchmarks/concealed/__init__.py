@@ -54,9 +54,10 @@ def kinds() -> Mapping[str, tuple[Draw, int]]:
         out[name] = (lambda rng, n=name: others.special(n, rng), 3)  # type: ignore[misc]
     for name in others.CHAIN:
         out[name] = (lambda rng, n=name: others.chain(n, rng), 3)  # type: ignore[misc]
-    out["pair"] = (lambda rng: others.pair(rng, _sigmas(rng)), 18)
+    out["pair"] = (lambda rng: others.several(rng, _sigmas(rng)), 18)
     for name in others.OUTSIDE:
         out[f"outside: {name}"] = (_outside(name), 3)
+    out["three"] = (lambda rng: others.several(rng, _sigmas(rng), 3), 9)
     return out
 
 

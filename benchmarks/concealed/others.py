@@ -1,4 +1,4 @@
-"""Sessions with two effects, with chance, a broken chain, or what no catalogue has."""
+"""Sessions with several effects, with chance, a broken chain, or what no catalogue has."""
 
 from __future__ import annotations
 
@@ -28,25 +28,28 @@ APART = (
     {"lever_arm", "time_delay", "sway", "hum"},
     {"heading_error", "g_sensitivity", "g2_sensitivity", "base_tilt", "angle_offset"},
 )
-"""Effects that are much alike: pairs are drawn from different sets."""
+"""Effects that are much alike: those at once are drawn from different sets."""
+
+LABELS = {2: "pair", 3: "three"}
 
 
-def pair(rng: np.random.Generator, sigmas: float) -> Session:
-    """Two effects that are not alike, each of that size."""
+def several(rng: np.random.Generator, sigmas: float, count: int = 2) -> Session:
+    """Effects of which no two are alike, each of that size."""
     names = [n for n in EQUATIONS if n not in ("gyro_products", "heading_error")]
     while True:
-        one, two = (str(n) for n in rng.choice(names, 2, replace=False))
-        if any({one, two} <= alike for alike in APART):
+        some = [str(n) for n in rng.choice(names, count, replace=False)]
+        if any(len(alike & set(some)) > 1 for alike in APART):
             continue
-        session = suited(one if one in HOT else two, rng)
+        session = suited(next((n for n in some[:-1] if n in HOT), some[-1]), rng)
         if session.place == "static" or not session.angles:
             continue
         span, concealed = session.windows[-1].end, {}
-        for name in (one, two):
+        for name in some:
             if values := sized(session, name, drawn(name, rng, span), sigmas):
                 concealed[name] = values
-        if len(concealed) == 2:
-            return replace(session.having(concealed), label="pair", sigmas=sigmas)
+        if len(concealed) == count:
+            label = LABELS[count]
+            return replace(session.having(concealed), label=label, sigmas=sigmas)
 
 
 def chance(name: str, rng: np.random.Generator) -> Session:

@@ -9,16 +9,18 @@ import numpy as np
 
 from benchmarks.concealed.draws import EQUATIONS
 from benchmarks.concealed.judging import Outcome
+from benchmarks.concealed.others import LABELS
 
 GROUPS: dict[str, Callable[[Outcome], bool]] = {
     "nothing left out": lambda o: o.label.startswith("nothing"),
     "one effect with an equation": lambda o: o.label in EQUATIONS,
     "a broken chain, chance, others": lambda o: (
         o.label not in EQUATIONS
-        and o.label != "pair"
+        and o.label not in LABELS.values()
         and not o.label.startswith(("nothing", "outside"))
     ),
-    "two effects": lambda o: o.label == "pair",
+    "two effects": lambda o: o.label == LABELS[2],
+    "three effects": lambda o: o.label == LABELS[3],
     "outside the catalogue": lambda o: o.label.startswith("outside"),
 }
 SIZES = (0.0, 10.0, 14.0, 20.0, 30.0, np.inf)

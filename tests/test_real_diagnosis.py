@@ -6,6 +6,10 @@ import csv
 import gzip
 import json
 import tomllib
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from functools import cache
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +35,16 @@ FACES = {
 """The specific force in six faces, by the names that their recordings use."""
 
 
-def diagnosed(folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+def diagnosed(folder: Path) -> dict[str, Any]:
     """What diagnosis.json says, with the replay on the twin; no warning reached us."""
-    code = main(
-        ["diagnose", str(folder), "--json", "--twin", str(folder / "twin.toml")]
-    )
-    out, err = capsys.readouterr()
-    said: dict[str, Any] = json.loads(out)
+    out, err = StringIO(), StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = main(
+            ["diagnose", str(folder), "--json", "--twin", str(folder / "twin.toml")]
+        )
+    said: dict[str, Any] = json.loads(out.getvalue())
     assert code == (said["verdict"] != "consistent")
-    assert "RuntimeWarning" not in err
+    assert "RuntimeWarning" not in err.getvalue()
     return said
 
 
@@ -99,24 +104,38 @@ def faces_by_rows(shared: Path, folder: Path) -> Path:
     return write_session(folder, Block.of(t, number[:, 4:], gyr), places)
 
 
+Write = Callable[[Path, Path], Path]
+
+
+@pytest.fixture(scope="module")
+def faces(
+    shared: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[Write], dict[str, Any]]:
+    """Diagnose a session of six faces; each once, however often it is asked for."""
+
+    @cache
+    def said_of(session: Write) -> dict[str, Any]:
+        return diagnosed(session(shared, tmp_path_factory.mktemp("faces") / "s"))
+
+    return said_of
+
+
 @pytest.mark.parametrize(
     ("session", "before", "after"),
     [(labelled_faces, 0.129, 0.035), (faces_by_rows, 0.078, 0.013)],
 )
 def test_six_faces_are_not_square(
-    session: Any,
+    session: Write,
     before: float,
     after: float,
-    shared: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    faces: Callable[[Write], dict[str, Any]],
 ) -> None:
     """The published residuals with known axes, without and with cross-coupling.
 
     How well a hand sets faces is estimated along: what is left of the residual is not
     that of least squares, but much less than without.
     """
-    said = diagnosed(session(shared, tmp_path / "s"), capsys)
+    said = faces(session)
     assert said["verdict"] in ("left_out", "ambiguous")
     assert "cross_coupling" in named(said)
     assert "gyro_scale" not in named(said)  # nobody held the heading
@@ -130,9 +149,9 @@ def test_six_faces_are_not_square(
 
 
 def test_the_bias_of_six_faces_is_the_peer_s(
-    shared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    shared: Path, faces: Callable[[Write], dict[str, Any]]
 ) -> None:
-    said = diagnosed(labelled_faces(shared, tmp_path / "s"), capsys)
+    said = faces(labelled_faces)
     path = shared / "real" / "imucal_ferraris" / "peer_example_cal.json"
     peer = json.loads(path.read_text())
     ours = said["calibration"]["acc_bias"]
@@ -161,7 +180,7 @@ def test_whole_milligravities_are_coarse_steps_and_no_bumps(
     monkeypatch.chdir(tmp_path)
     assert main(["import", str(path)]) == 0
     capsys.readouterr()
-    said = diagnosed(tmp_path / "autopilot_12_positions" / message, capsys)
+    said = diagnosed(tmp_path / "autopilot_12_positions" / message)
     assert list(named(said)) == left_out
     steps = {"acc": 1e-3 * G0, "gyr": 1e-3}  # mg, mrad/s
     for effect in said["effects"]:
@@ -169,9 +188,7 @@ def test_whole_milligravities_are_coarse_steps_and_no_bumps(
             assert abs(found["value"] - steps[name]) < 3 * found["sigma"]
 
 
-def test_an_autopilot_on_the_bench_warms_up(
-    shared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_autopilot_on_the_bench_warms_up(shared: Path, tmp_path: Path) -> None:
     """In a minute nobody tells an exponential of many minutes from a drift: both."""
     pyulog = pytest.importorskip("pyulog", reason="pyulog reads PX4 logs")
     path = shared / "real" / "pyulog_samples" / "sample.ulg.gz"
@@ -188,9 +205,7 @@ def test_an_autopilot_on_the_bench_warms_up(
     )
     t = t[new]
     window = {"start_s": float(t[0]) + 9.0, "end_s": float(t[-1])}
-    said = diagnosed(
-        write_session(tmp_path / "s", Block.of(t, acc, gyr), [window]), capsys
-    )
+    said = diagnosed(write_session(tmp_path / "s", Block.of(t, acc, gyr), [window]))
     found = named(said)
     there = {*found, *(a for effect in found.values() for a in effect["aliases"])}
     assert "warm_up" in there
@@ -229,10 +244,10 @@ def at_rest_for(shared: Path, folder: Path, name: str) -> Path:
 
 
 def test_ten_minutes_on_a_table_follow_a_quarter_of_a_kelvin(
-    shared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    shared: Path, tmp_path: Path
 ) -> None:
     name = "set-2__unmoved-with-x-pointing-forward-10min"
-    said = diagnosed(at_rest_for(shared, tmp_path / "s", name), capsys)
+    said = diagnosed(at_rest_for(shared, tmp_path / "s", name))
     found = named(said)
     assert "temperature_bias" in found
     assert found["temperature_bias"]["evidence"]["held_out_gain"] > 0.5
@@ -247,17 +262,15 @@ def test_ten_minutes_on_a_table_follow_a_quarter_of_a_kelvin(
 
 
 def test_a_minute_with_broken_stamps_shows_nothing_more(
-    shared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    shared: Path, tmp_path: Path
 ) -> None:
     name = "set-1__unmoved-z-pointing-left"
-    said = diagnosed(at_rest_for(shared, tmp_path / "s", name), capsys)
+    said = diagnosed(at_rest_for(shared, tmp_path / "s", name))
     assert said["verdict"] == "consistent"
     assert "degrees of freedom" in " ".join(said["warnings"])
 
 
-def test_ten_short_intervals_are_not_fitted_with_more(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ten_short_intervals_are_not_fitted_with_more(tmp_path: Path) -> None:
     """Nine parameters would "fit" them; none of the accelerometers' is believed."""
     counts, intervals = hand_held()
     t = np.arange(len(counts)) / 100
@@ -267,7 +280,7 @@ def test_ten_short_intervals_are_not_fitted_with_more(
         for a, b in intervals.T
     ]
     folder = write_session(tmp_path / "s", block, windows)
-    said = diagnosed(folder, capsys)
+    said = diagnosed(folder)
     shapes = {"cross_coupling", "quadratic", "cubic", "scale_asymmetry"}
     assert not shapes & set(named(said))
     why = {c["id"]: c["why"] for c in said["candidates"]}

@@ -1,4 +1,4 @@
-"""Sessions with several effects, with chance, a broken chain, or what no catalogue has."""
+"""Sessions with several effects, with chance, a broken chain, or no known effect."""
 
 from __future__ import annotations
 

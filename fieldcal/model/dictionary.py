@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +28,35 @@ from fieldcal.model.table import Table
 from fieldcal.model.unknown_causes import of_no_effect
 from fieldcal.model.wander import Wander
 from fieldcal.samples import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Alike:
+    """Groups of causes that are alike in width.
+
+    Attributes
+    ----------
+    blocks : (b, k) columns, each block once, as several groups may be made of it
+    block : (m,) the block of each group
+    typical : (m, k) sizes
+    cause, variant : (m,) their numbers
+
+    """
+
+    blocks: Index
+    block: Index
+    typical: Array
+    cause: Index
+    variant: Index
+
+    @classmethod
+    def of(cls, some: Sequence[tuple[int, int, Group]]) -> Alike:
+        """Of groups with the numbers of their causes and variants."""
+        columns = np.array([g.columns for _, _, g in some])
+        blocks, block = np.unique(columns, axis=0, return_inverse=True)
+        typical = np.array([g.typical for _, _, g in some])
+        cause, variant = np.array([(i, j) for i, j, _ in some]).T
+        return cls(blocks, block.ravel(), typical, cause, variant)
 
 
 class Dictionary(Table):
@@ -83,24 +112,13 @@ class Dictionary(Table):
         return out
 
     @cached_property
-    def by_width(self) -> list[tuple[Index, Array, Index, Index]]:
-        """Groups of causes, those alike in width together.
-
-        Columns (m, k), typical sizes (m, k), number of the cause and of the variant.
-        """
+    def by_width(self) -> list[Alike]:
+        """Groups of causes, those alike in width together."""
         found: dict[int, list[tuple[int, int, Group]]] = {}
         for i, cause in enumerate(self.causes):
             for j, group in enumerate(cause.variants):
                 found.setdefault(len(group.columns), []).append((i, j, group))
-        return [
-            (
-                np.array([g.columns for _, _, g in some]),
-                np.array([g.typical for _, _, g in some]),
-                np.array([i for i, _, _ in some]),
-                np.array([j for _, j, _ in some]),
-            )
-            for some in found.values()
-        ]
+        return [Alike.of(some) for some in found.values()]
 
     @cached_property
     def chances(self) -> Array:

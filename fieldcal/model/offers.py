@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.model import priors
 from fieldcal.model.dictionary import Dictionary
-from fieldcal.model.evidence import Eliminated, Gram, gains
+from fieldcal.model.evidence import Eliminated, Gram, Weighed, gains
 from fieldcal.model.sets import Set, Sets
 from fieldcal.model.sizing import DENSITY, EVEN, Member, Sizes
 from fieldcal.samples import Array
@@ -27,6 +27,9 @@ FALLING = ((0, 1, 2), (3, 4, 5, 6))
 
 Less = tuple[int, ...]
 """Indices of instabilities in `priors.SIZES`, (7,)."""
+
+WIDE = 30
+"""Columns of a group from which its eigenvalues cost more than to look them up."""
 
 LEAST = 0.5
 """Gain of ln L below which an offer is none."""
@@ -72,12 +75,31 @@ class Table:
     offers: list[Offer]
 
 
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What rows at one instability say of every column, whatever the set.
+
+    Attributes
+    ----------
+    rows : so weighed
+    pull : (k,) of all columns
+    blocks : Phi^T R^-1 Phi of the blocks of each width
+
+    """
+
+    rows: Weighed
+    pull: Array
+    blocks: list[Array]
+
+
 class Offers(Sets):
     """What sets may be given."""
 
     def __init__(self, dictionary: Dictionary, gram: Gram) -> None:
         super().__init__(dictionary, gram)
         self._tables: dict[tuple[tuple[str, int], ...], list[Table]] = {}
+        self._at: dict[Less, Seen] = {}
+        self._known: dict[int, Array] = {}
 
     def offers(self, there: Set) -> list[Offer]:
         """Every cause that a set has not, at its best variant, the best one first."""
@@ -105,9 +127,8 @@ class Offers(Sets):
         """Every cause that a set has not, beside one instability, the best first."""
         d, chances = self.dictionary, self._chances(there)
         best: dict[int, tuple[float, int, int]] = {}
-        for (_, _, at, variant), gain in zip(
-            d.by_width, self._screen(state), strict=True
-        ):
+        for alike, gain in zip(d.by_width, self._screen(state, less), strict=True):
+            at, variant = alike.cause, alike.variant
             profile = gain + DENSITY
             size = profile.argmax(axis=1)
             worth = np.logaddexp.reduce(profile, axis=1) + chances[at]
@@ -140,11 +161,11 @@ class Offers(Sets):
         ways = [(wide, 0.0), self.opened(there)]
         for less in self._less(sizes.instability):
             fallen = less != sizes.instability
-            rows = self.weighed(less)
+            rows = self._seen(less).rows
             for before, cost in ways if fallen and ways[1][1] else ways[:1]:
                 state = Eliminated.of(rows, columns, before)
                 yield less, state, base + cost + state.score + self.alike(less)
-        first, rows = 0, self.weighed(sizes.instability)
+        first, rows = 0, self._seen(sizes.instability).rows
         for group, size in zip(
             self.dictionary.always, sizes.calibration, strict=True
         ):  # what a device has anyway, with next to no change from nominal: what one
@@ -181,23 +202,45 @@ class Offers(Sets):
                 cost += float(DENSITY[EVEN] - DENSITY[size])
         return wide, cost
 
-    def _screen(self, state: Eliminated) -> Iterator[Array]:
+    def _seen(self, less: Less) -> Seen:
+        """What the rows say of every column at one instability."""
+        if less not in self._at:
+            rows = self.weighed(less)
+            blocks = rows.diagonals(
+                [alike.blocks for alike in self.dictionary.by_width]
+            )
+            self._at[less] = Seen(rows, rows.pull(None), blocks)
+        return self._at[less]
+
+    def _screen(self, state: Eliminated, less: Less) -> Iterator[Array]:
         """Gains over sizes of every variant of every cause, (m, sizes) by width."""
-        rows = state.rows
-        shared, own = (
-            rows.matrix(state.columns, None),
-            rows.diagonals([at for at, *_ in self.dictionary.by_width]),
-        )
+        there = self._seen(less)
+        shared = there.rows.matrix(state.columns, None)
         half = np.linalg.cholesky(state.inverse).T @ shared
-        pull = rows.pull(None) - shared.T @ state.estimate
-        for (at, typical, _, _), block in zip(
-            self.dictionary.by_width, own, strict=True
-        ):
-            part = np.moveaxis(half[:, at], 0, 1)  # (m, a, k)
-            inner = block - np.swapaxes(part, 1, 2) @ part
+        rest = there.pull - shared.T @ state.estimate
+        for alike, own in zip(self.dictionary.by_width, there.blocks, strict=True):
+            part = np.moveaxis(half[:, alike.blocks], 0, 1)  # (b, a, k)
+            typical, block = alike.typical, alike.block
+            inner = (own - np.swapaxes(part, 1, 2) @ part)[block]
             inner *= typical[:, :, None] * typical[:, None, :]
-            top = (np.diagonal(block, 0, 1, 2) * typical**2).max(axis=-1)
-            yield gains(inner, pull[at] * typical, top)
+            top = (np.diagonal(own, 0, 1, 2)[block] * typical**2).max(axis=-1)
+            yield self._gains(inner, rest[alike.blocks[block]] * typical, top)
+
+    def _gains(self, inner: Array, pull: Array, own: Array) -> Array:
+        """Gains of groups; of wide ones only where no other instability gave the same.
+
+        What no turn and no orientation connects with a triad does not see its
+        instability.
+        """
+        if inner.shape[-1] < WIDE:
+            return gains(inner, pull, own)
+        keys = [
+            hash(m.tobytes() + q.tobytes()) for m, q in zip(inner, pull, strict=True)
+        ]
+        new = [i for i, key in enumerate(keys) if key not in self._known]
+        found = gains(inner[new], pull[new], own[new])
+        self._known.update(zip((keys[i] for i in new), found, strict=True))
+        return np.array([self._known[key] for key in keys])
 
     def taken(self, there: Set, *offers: Offer) -> Set:
         """The set with what was offered."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -126,12 +127,16 @@ def _pairs(table: Table) -> Iterator[tuple[Offer, Offer, float]]:
     Each with all its parameters as well: beside the other it may need them.
     """
     known = [o for o in table.offers if o.member[0].kind != "unknown"][:PROMISING]
-    wide = [_widened(o) for o in known]
-    for some in (known, wide) if wide != known else (known,):
-        groups, sizes = [o.member[1] for o in some], [o.size for o in some]
-        for gain, (i, j), (u, v) in pairs(table.state, groups, sizes):
-            if some is known or some[i] != known[i] or some[j] != known[j]:
-                yield replace(some[i], size=u), replace(some[j], size=v), gain
+    every = [*known, *(_widened(o) for o in known)]
+    new = [a is not b for a, b in zip(known, every[len(known) :], strict=True)]
+    wanted = []
+    for i, j in combinations(range(len(known)), 2):
+        wanted.append((i, j))
+        if new[i] or new[j]:
+            wanted.append((i + new[i] * len(known), j + new[j] * len(known)))
+    groups, sizes = [o.member[1] for o in every], [o.size for o in every]
+    for gain, (i, j), (u, v) in pairs(table.state, groups, sizes, wanted):
+        yield replace(every[i], size=u), replace(every[j], size=v), gain
 
 
 def _widened(offer: Offer) -> Offer:

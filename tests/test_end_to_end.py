@@ -7,7 +7,6 @@ import signal
 import subprocess
 import threading
 from pathlib import Path
-from time import monotonic, sleep, time
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ import pytest
 from processes import RUN, Recalibrated, wait_for_samples
 from talking import talking
 
+from fieldcal import sample_files
 from fieldcal.cli import main
 from fieldcal.movers import VirtualDevice
 from fieldcal.session import Session
@@ -115,42 +115,27 @@ def solved(
     return found
 
 
-def test_killed_at_any_moment_the_session_holds_all_but_the_last_moment(
+def test_killed_at_any_moment_the_session_holds_all_that_was_in_the_file(
     tmp_path: Path,
 ) -> None:
     rng = np.random.default_rng(2)
-    for attempt in range(4):
+    for attempt in range(3):
         folder = tmp_path / str(attempt)
         process = subprocess.Popen(
             [*RUN, "five_position", "--headless", TILTED, "--speed", "20"]
             + ["-o", str(folder)],
             stderr=subprocess.DEVNULL,
         )
-        wait_for_samples(folder, process, 5000)
-        late = _slept(rng.uniform(0.3, 1.8), folder / "samples.arrows")
-        killed = time()
+        wait_for_samples(folder, process, int(rng.uniform(5_000, 200_000)))
+        there = len(sample_files.read(folder / "samples.arrows")[0])
         process.send_signal(signal.SIGKILL)
         process.wait()
         session = Session.open(folder)
         block = session.block
         assert "cut off" in session.warnings[0]
         assert (np.diff(block.t) > 0).all()
-        # what waited in the reader at the kill had not reached the recorder yet, and
-        # on a busy machine each of device, reader and recorder waits for its turn
-        assert killed - block.t_host[-1] < 1.0 + 4 * late, "more than is usual is lost"
+        assert len(block) >= there > 50
         assert main(["solve", str(folder)]) in (1, 2), "two windows are never GO"
-
-
-def _slept(seconds: float, file: Path) -> float:
-    """Sleep; the longest that this process or the file had to wait for its turn, s."""
-    end, late = monotonic() + seconds, 0.0
-    size, grew = file.stat().st_size, monotonic()
-    while (now := monotonic()) < end:
-        sleep(0.02)
-        if file.stat().st_size > size:
-            size, grew = file.stat().st_size, monotonic()
-        late = max(late, monotonic() - now - 0.02, monotonic() - grew)
-    return late
 
 
 def test_an_interrupted_run_ends_with_130_and_keeps_what_was_recorded(

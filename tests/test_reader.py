@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from fieldcal.driver import host_clock
 from fieldcal.drivers.reader import Chunk, Reader
 from fieldcal.errors import DeviceError
 
@@ -36,14 +37,13 @@ def numbers(chunks: list[Chunk]) -> list[int]:
 def test_a_reader_that_nobody_empties_stops_at_its_limit_and_loses_nothing() -> None:
     source = Counting(5000)
     reader = Reader("x", lambda: source, 0.0, limit=400)
-    deadline = time.monotonic() + 5
-    while source.next < 100 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    time.sleep(0.05)
-    assert 100 <= source.next <= 102
+    while source.next <= 100:
+        time.sleep(0.001)
     got: list[int] = []
-    while len(got) < 5000 and time.monotonic() < deadline:
-        got += numbers(reader.take(0.1))
+    while len(got) < 5000:
+        some = numbers(reader.take(0.1))
+        assert len(some) <= 100
+        got += some
     assert got == list(range(1, 5001))
     reader.close()
     assert source.closed == 1
@@ -76,27 +76,23 @@ def test_a_fault_that_is_none_of_the_links_is_not_retried() -> None:
 
 def test_a_broken_link_is_opened_again_and_the_break_is_marked() -> None:
     sources = [Counting(3, OSError()), Counting(3)]
-    left = iter(sources)
-    reader = Reader("x", lambda: next(left), 5.0)
+    left, before = iter(sources), host_clock()
+    reader = Reader("x", lambda: next(left), 600.0)
     chunks: list[Chunk] = []
-    deadline = time.monotonic() + 5
-    while len(chunks) < 6 and time.monotonic() < deadline:
+    while len(chunks) < 6:
         chunks += reader.take(0.1)
     assert [chunk.broken for chunk in chunks] == [False] * 3 + [True, False, False]
-    hosts = [chunk.t_host for chunk in chunks]
+    hosts = [before, *(chunk.t_host for chunk in chunks), host_clock()]
     assert hosts == sorted(hosts)
-    assert abs(hosts[0] - time.time()) < 10
     reader.close()
     assert [source.closed for source in sources] == [1, 1]
 
 
 def test_closing_does_not_wait_for_patience() -> None:
-    reader = Reader("x", lambda: Counting(0, OSError()), 600.0)
-    deadline = time.monotonic() + 5
-    while not reader.reconnecting and time.monotonic() < deadline:
+    # a patience longer than a test may take
+    reader = Reader("x", lambda: Counting(0, OSError()), 1e4)
+    while not reader.reconnecting:
         time.sleep(0.001)
     before = threading.active_count()
-    began = time.monotonic()
     reader.close()
-    assert time.monotonic() - began < 2
     assert threading.active_count() == before - 1

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from wires import wit_acc, wit_cycles, wit_gyr
 
-from fieldcal.driver import Driver, open_driver
-from fieldcal.drivers.serial_imu import reason
+from fieldcal.driver import Driver, host_clock, open_driver
+from fieldcal.drivers.serial_imu import Imu, reason
 from fieldcal.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.samples import Array, Block, concat
 
@@ -34,10 +34,17 @@ def pty() -> Iterator[tuple[int, str]]:
         pass  # a test hung up
 
 
+def read(imu: Driver, size: int) -> None:
+    """Wait until the driver's thread has read so many bytes that nobody has taken."""
+    assert isinstance(imu, Imu)
+    while imu._reader._held < size:
+        time.sleep(0.001)
+
+
 def collect(imu: Driver, n: int) -> Array:
     """First accelerations in counts, of the next n samples."""
     parts: list[Block] = []
-    for block in imu.blocks(5.0):
+    for block in imu.blocks(60.0):
         parts.append(block)
         if sum(len(part) for part in parts) >= n:
             break
@@ -48,7 +55,7 @@ def test_samples_in_any_pieces(pty: tuple[int, str]) -> None:
     ours, path = pty
     stream = b"".join(CYCLES[:200])
     with open_driver(f"serial:{path}?format=witmotion&baud=115200") as imu:
-        before = time.time()
+        before = host_clock()
         for i in range(0, len(stream), 37):
             os.write(ours, stream[i : i + 37])
         got = collect(imu, 200)
@@ -56,7 +63,7 @@ def test_samples_in_any_pieces(pty: tuple[int, str]) -> None:
         assert imu.health.samples == 200
         os.write(ours, CYCLES[200])
         block = next(imu.blocks())
-        assert before - 1 < block.t_host[0] < time.time() + 1
+        assert before < block.t_host[0] < host_clock()
 
 
 SENDER = """
@@ -84,7 +91,8 @@ def test_nothing_is_lost_between_two_processes_and_a_hang_up_is_said() -> None:
         with open_driver(f"serial:{path}?reconnect=0") as imu:
             sender.stdin.write("\n")
             sender.stdin.flush()
-            time.sleep(0.3)  # a recorder that is busy: nothing must get lost
+            # a recorder that is busy: nothing must get lost
+            read(imu, len(CYCLES) * len(CYCLES[0]))
             assert collect(imu, len(CYCLES)).tolist() == list(range(len(CYCLES)))
             assert imu.health.bad == imu.health.skipped == imu.health.gaps == 0
             sender.stdin.write("\n")
@@ -98,9 +106,8 @@ def test_what_came_before_a_hang_up_is_delivered(pty: tuple[int, str]) -> None:
     ours, path = pty
     with open_driver(f"serial:{path}?reconnect=0") as imu:
         os.write(ours, b"".join(CYCLES[:50]) + ACC[:5])
-        time.sleep(0.1)
+        read(imu, 50 * len(CYCLES[0]) + len(ACC[:5]))
         os.close(ours)
-        time.sleep(0.3)
         assert len(collect(imu, 50)) == 50
         with pytest.raises(DeviceError, match="hung up"):
             collect(imu, 1)
@@ -125,17 +132,16 @@ def test_unplugged_and_back_resumes_with_a_gap(tmp_path: Path) -> None:
     link = tmp_path / "imu"
     first, second = os.openpty(), os.openpty()
     link.symlink_to(os.ttyname(first[1]))
-    with open_driver(f"serial:{link}?reconnect=5") as imu:
+    with open_driver(f"serial:{link}?reconnect=600") as imu:
         os.write(first[0], b"".join(CYCLES[:50]) + CYCLES[50][:20])
         assert len(collect(imu, 50)) == 50
         os.close(first[0])
         os.close(first[1])
-        deadline = time.monotonic() + 5
-        while not imu.reconnecting and time.monotonic() < deadline:
+        while not imu.reconnecting:
             imu.receive(0.01)
         link.unlink()
         link.symlink_to(os.ttyname(second[1]))
-        while imu.reconnecting and time.monotonic() < deadline:
+        while imu.reconnecting:
             imu.receive(0.01)
         os.write(second[0], b"".join(CYCLES[80:120]))
         assert collect(imu, 40).tolist() == list(range(80, 120))
@@ -157,7 +163,7 @@ def test_silence(pty: tuple[int, str]) -> None:
         with pytest.raises(DeviceSilent, match="no sample for 0.1 s: not a byte"):
             next(imu.blocks(0.1))
         os.write(pty[0], ACC + GYR + CYCLES[0])
-        assert len(next(imu.blocks(1.0))) == 1
+        assert len(next(imu.blocks(60.0))) == 1
         with pytest.raises(DeviceSilent, match="went silent for 0.1 s: not a byte"):
             next(imu.blocks(0.1))
 
@@ -166,6 +172,7 @@ def test_silence(pty: tuple[int, str]) -> None:
 def test_garbage(pty: tuple[int, str], garbage: bytes) -> None:
     with open_driver(f"serial:{pty[1]}") as imu:
         os.write(pty[0], garbage)
+        read(imu, len(garbage))
         with pytest.raises(
             DeviceSilent, match="no format that is known; check the baud"
         ):
@@ -175,6 +182,7 @@ def test_garbage(pty: tuple[int, str], garbage: bytes) -> None:
 def test_frames_without_a_sample(pty: tuple[int, str]) -> None:
     with open_driver(f"serial:{pty[1]}") as imu:
         os.write(pty[0], GYR * 20)
+        read(imu, len(GYR) * 20)
         with pytest.raises(DeviceSilent, match="check what the device is to send"):
             next(imu.blocks(0.2))
 
@@ -183,7 +191,7 @@ def test_drain_takes_what_is_there_and_no_more(pty: tuple[int, str]) -> None:
     ours, path = pty
     with open_driver(f"serial:{path}") as imu:
         os.write(ours, b"".join(CYCLES[:30]))
-        time.sleep(0.2)
+        read(imu, 30 * len(CYCLES[0]))
         assert len(imu.drain()) == 30
         assert len(imu.drain()) == 0
         os.write(ours, CYCLES[30])

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import COMPONENTS, Calibration
+from fieldcal.chances import chi2_tail
 from fieldcal.description import Description
 from fieldcal.error_growth import TIMES, Growth, growth
 from fieldcal.family import expected
@@ -127,13 +128,11 @@ def _document(check: Check) -> dict[str, Any]:
 
 
 def _fit(found: Calibration, limits: Limits) -> Check:
-    from scipy.special import gammaincc
-
     if not found.good:
         return Check("fit", False, "the estimate itself is bad: " + _first(found))
     if found.dof <= 0 or not np.isfinite(found.chi2):
         return Check("fit", None, "the positions leave nothing over to check the fit")
-    chance = float(gammaincc(found.dof / 2, found.chi2 / 2))
+    chance = chi2_tail(found.chi2, found.dof)
     ok = chance >= limits.fit_chance
     word = "agree" if ok else "do not agree"
     says = (

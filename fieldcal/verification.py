@@ -18,6 +18,7 @@ from itertools import product
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.chances import chi2_tail
 from fieldcal.description import Description
 from fieldcal.model.planned import parameters, predicted
 from fieldcal.positions import Position, forces
@@ -67,8 +68,6 @@ def verify(
     angle_sigma : how well its angles are set, rad
 
     """
-    from scipy.special import gammaincc
-
     names, x, covariance = _parameters(calibration, about)
     u, j = predicted(names, x, [position], about.gravity, about.mounting)
     residual = average.mean[ACC] - u[0]
@@ -76,7 +75,7 @@ def verify(
     setting = (angle_sigma * about.gravity) ** 2 * (np.eye(3) - np.outer(n, n))
     s = j[0] @ covariance @ j[0].T + average.covariance[ACC, ACC] + setting
     chi2 = float(residual @ np.linalg.solve(s, residual))
-    chance = float(gammaincc(1.5, chi2 / 2))
+    chance = chi2_tail(chi2, 3)
     return Verification(position, residual, np.sqrt(np.diag(s)), chance)
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fieldcal.chances import chi2_tail
 from fieldcal.errors import InputError
 from fieldcal.samples import Array
 
@@ -68,8 +69,6 @@ def compare(first: Calibration, second: Calibration) -> Comparison:
         If they have no parameter in common, or one in different units.
 
     """
-    from scipy.special import gammaincc
-
     common = [n for n in first.names if n in second.names]
     if not common:
         raise InputError("the two calibrations have no parameter in common")
@@ -92,7 +91,7 @@ def compare(first: Calibration, second: Calibration) -> Comparison:
         sigma,
         chi2,
         len(common),
-        float(gammaincc(len(common) / 2, chi2 / 2)),
+        chi2_tail(chi2, len(common)),
         tuple(n for n in first.names if n not in common),
         tuple(n for n in second.names if n not in common),
     )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldcal.chances import chi2_tail
 from fieldcal.gravity import G0
 from fieldcal.samples import Array
 from fieldcal.solve.observations import Observations
@@ -41,9 +42,7 @@ def not_determined(missing: Sequence[str], remedy: Sequence[str], what: str) -> 
 
 def chance(chi2: float, dof: int) -> float:
     """Probability of a chi2 at least as large when only the stated noise acts."""
-    from scipy.special import gammaincc
-
-    return float(gammaincc(dof / 2, chi2 / 2)) if dof > 0 else 1.0
+    return chi2_tail(chi2, dof) if dof > 0 else 1.0
 
 
 def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:

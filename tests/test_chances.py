@@ -1,0 +1,21 @@
+"""Chances of sums of squares, beside a library's for any degrees of freedom."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import gammaincc
+
+from fieldcal.chances import chi2_tail
+
+
+@pytest.mark.parametrize("dof", [1, 2, 3, 4, 5, 10, 33, 100, 1001, 20000])
+def test_the_tail_is_that_of_the_incomplete_gamma_function(dof: int) -> None:
+    for chi2 in (0.0, 1e-6, 0.1, 3.84, 0.5 * dof, dof, 1.2 * dof, 2.0 * dof + 5, 5e3):
+        expected = float(gammaincc(dof / 2, chi2 / 2))
+        assert chi2_tail(chi2, dof) == pytest.approx(expected, rel=1e-9, abs=1e-290)
+
+
+def test_what_has_no_end_has_no_chance() -> None:
+    assert chi2_tail(np.inf, 3) == 0.0
+    assert np.isnan(chi2_tail(np.nan, 4))

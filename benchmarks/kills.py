@@ -2,8 +2,10 @@
 
 A run against a virtual device in another process, which goes on meanwhile, is killed at
 random instants (SIGKILL) and gone on with by ``--resume``, again and again until it is
-done; or the link hangs up at random instants. A finished position must be kept as it
-was, never be asked for again, and the result must agree with what the device conceals.
+done; or the link hangs up at random instants. Instants are counted in bytes recorded,
+so that a busy machine has them at the same places of a session. A finished position
+must be kept as it was, never be asked for again, and the result must agree with what
+the device conceals.
 """
 
 import json
@@ -13,7 +15,7 @@ import sys
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from time import monotonic, sleep
+from time import sleep
 from typing import Any
 
 import numpy as np
@@ -121,16 +123,25 @@ def windows(session: Path) -> dict[int, tuple[float, float]]:
     }
 
 
+def recorded(session: Path) -> int:
+    """Bytes of samples that a session has."""
+    file = session / "samples.arrows"
+    return file.stat().st_size if file.exists() else 0
+
+
 def killed(
-    bench: Bench, name: str, rng: np.random.Generator, lasts: float, most: int = MOST
+    bench: Bench, name: str, rng: np.random.Generator, whole: float, most: int = MOST
 ) -> Outcome:
-    """One run that is killed, so many times at most, until it gets through."""
+    """One run that is killed, so many times at most, until it gets through.
+
+    `whole` is what a run records that nobody breaks, in bytes of samples.
+    """
     session, outcome = bench.folder / name, Outcome()
     before: dict[int, tuple[float, float]] = {}
     for attempt in range(most + 1):
         process = bench.start(session)
-        deadline = monotonic() + rng.uniform(0.0, lasts)
-        while attempt < most and process.poll() is None and monotonic() < deadline:
+        instant = rng.uniform(0.0, whole)
+        while attempt < most and process.poll() is None and recorded(session) < instant:
             sleep(0.005)
         if attempt < most and process.poll() is None:
             process.kill()
@@ -147,17 +158,15 @@ def killed(
 
 
 def pulled(
-    bench: Bench, name: str, rng: np.random.Generator, lasts: float, most: int = 3
+    bench: Bench, name: str, rng: np.random.Generator, whole: float, most: int = 3
 ) -> Outcome:
     """One run whose cable is pulled at random instants, so many times at most."""
     session, outcome = bench.folder / name, Outcome()
     process = bench.start(session)
-    instants = np.sort(rng.uniform(0.0, lasts, rng.integers(1, most + 1)))
-    while process.poll() is None and not (session / "samples.arrows").exists():
-        sleep(0.005)  # a cable that is not there at the start is another error
-    began, before = monotonic(), {}
-    for instant in instants:
-        while process.poll() is None and monotonic() - began < instant:
+    before: dict[int, tuple[float, float]] = {}
+    # a cable that is not there at the start is another error
+    for instant in 1 + np.sort(rng.uniform(0.0, whole, rng.integers(1, most + 1))):
+        while process.poll() is None and recorded(session) < instant:
             sleep(0.005)
         if process.poll() is None:
             before = windows(session)
@@ -199,11 +208,10 @@ def series(
     try:
         for first in range(0, runs, DEVICES):
             bench = Bench(folder, seed + first)
-            began = monotonic()
             bench.start(folder / f"whole-{first}").communicate()
-            lasts = monotonic() - began
+            whole = recorded(folder / f"whole-{first}")
             for number in range(first, min(runs, first + DEVICES)):
-                outcomes.append(one(bench, f"run-{number}", rng, 1.1 * lasts, **times))
+                outcomes.append(one(bench, f"run-{number}", rng, 1.1 * whole, **times))
                 shutil.rmtree(folder / f"run-{number}", ignore_errors=True)
             bench.device.close()
     finally:

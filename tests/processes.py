@@ -83,6 +83,6 @@ def recalibrate(folder: Path) -> Recalibrated:
     """Five positions of a virtual device on a tilted base."""
     call = [*RUN, "five_position", "--headless", "--virtual=--base-tilt=1,-1"]
     call += ["--speed", "max", "--seed", "5", "--json", "-o", str(folder)]
-    done = subprocess.run(call, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(call, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return Recalibrated(folder, json.loads(done.stdout), done.stderr)

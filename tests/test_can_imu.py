@@ -47,7 +47,7 @@ def sims() -> Iterator[list[subprocess.Popen[str]]]:
     yield started
     for sim in started:
         sim.terminate()
-        sim.communicate(timeout=10)
+        sim.communicate()
 
 
 def start(

@@ -197,7 +197,7 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     marks = [m["event"] for m in read_marks(folder / "marks.jsonl")]
     assert marks.count("repeated") == 2 and marks.count("skipped") == 1
     call = ["-m", "fieldcal", "run", "--resume", str(folder), "--plain"]
-    child = pexpect.spawn(sys.executable, call, encoding="utf-8", timeout=60)
+    child = pexpect.spawn(sys.executable, call, encoding="utf-8")
     for number, angles in ((3, (22.5, 2.5)), (4, (45.0, 2.5)), (5, (45.0, 5.0))):
         child.expect(f"position {number}: turn to")
         device.ask(turn=dict(zip(("alpha_deg", "beta_deg"), angles, strict=True)))

@@ -77,7 +77,7 @@ class Run:
 
     def end(self) -> tuple[int, Any, str]:
         """Exit code, the result, and the last line of standard error."""
-        out, said = self._process.communicate(timeout=60)
+        out, said = self._process.communicate()
         lines = said.strip().splitlines()
         return self._process.returncode, json.loads(out or "null"), lines[-1]
 
@@ -172,7 +172,7 @@ def failed(
     wait_for_samples(folder, run)
     for fault in faults:
         device.ask(fault=fault)
-    _, said = run.communicate(timeout=60)
+    _, said = run.communicate()
     return run.returncode, said.strip().splitlines()[-1]
 
 

@@ -42,7 +42,7 @@ class Sim:
         return os.open(self.port, os.O_RDWR | os.O_NOCTTY)
 
     def ended(self) -> tuple[int, str]:
-        _, said = self.process.communicate(timeout=20)
+        _, said = self.process.communicate()
         return self.process.returncode, said
 
 

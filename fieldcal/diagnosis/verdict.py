@@ -170,7 +170,7 @@ def _is_open(explanation: Explanation, one: Standing) -> bool:
     """Whether something else may as well be there in the place of a cause."""
     if one.name in catalogue() and catalogue()[one.name].like_calibration:
         return True
-    others = explanation.posterior.probability(one.aliases)
+    others = explanation.posterior.probability(one.aliases, one.triads)
     return others > priors.OPEN
 
 

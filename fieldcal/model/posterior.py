@@ -9,18 +9,26 @@ counts the sets with an alias of it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from fieldcal.model import priors
-from fieldcal.model.causes import Group
+from fieldcal.model.causes import Cause, Group
 from fieldcal.model.offers import Offer
 from fieldcal.model.search import Search
 from fieldcal.model.sets import Set
 from fieldcal.model.sizing import Member
 from fieldcal.samples import Array
+
+BOTH = frozenset("ag")
+"""Accelerometers and gyroscopes, by the first letter of their channels."""
+
+
+def triads_of(cause: Cause) -> frozenset[str]:
+    """Those that a cause is on."""
+    return frozenset(cause.part[:1]) or BOTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +48,11 @@ class Standing:
     members: tuple[Member, ...]
     probability: float
     aliases: tuple[str, ...]
+
+    @property
+    def triads(self) -> frozenset[str]:
+        """Those that it is on."""
+        return frozenset[str]().union(*(triads_of(c) for c, _ in self.members))
 
     @property
     def kind(self) -> str:
@@ -144,10 +157,17 @@ class Posterior:
         share = np.exp(score - np.logaddexp.reduce(score))
         return list(zip(sets, share.tolist(), strict=True))
 
-    def probability(self, names: Iterable[str]) -> float:
-        """That one of some causes is there."""
+    def probability(self, names: Iterable[str], triads: frozenset[str] = BOTH) -> float:
+        """That one of some causes is there, on one of some triads ("a", "g").
+
+        What stands on the gyroscopes does not stand for what is on accelerometers.
+        """
         wanted = set(names)
-        return sum(w for s, w in self.weights if wanted & set(self.names(s)))
+        return sum(
+            w
+            for s, w in self.weights
+            if any(c.name in wanted and triads_of(c) & triads for c, _ in s.members)
+        )
 
     def standing(self) -> list[Standing]:
         """Causes of the best set, as far as they are likelier there than not."""
@@ -157,10 +177,11 @@ class Posterior:
             names = [n for n, _ in others]
             strange = self._kind(name) == "unknown"
             alike = [n for n in names if not strange or self._kind(n) == "unknown"]
-            probability = self.probability([name, *alike])
+            members = tuple(m for m in self.best.members if m[0].name == name)
+            one = Standing(name, members, np.nan, tuple(names))
+            probability = self.probability([name, *alike], one.triads)
             if probability >= priors.NAMED:
-                members = tuple(m for m in self.best.members if m[0].name == name)
-                out.append(Standing(name, members, probability, tuple(names)))
+                out.append(replace(one, probability=probability))
         return out
 
 

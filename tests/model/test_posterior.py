@@ -195,3 +195,16 @@ def test_probabilities_are_shares_of_the_sets_that_were_visited() -> None:
         assert np.log(part / share) == pytest.approx(other.score - best.score, abs=1e-6)
     with_one = [w for s, w in posterior.weights if KEYS[0] in posterior.names(s)]
     assert posterior.probability([KEYS[0]]) == pytest.approx(sum(with_one))
+
+
+def test_what_accelerometers_show_stands_for_nothing_on_gyroscopes() -> None:
+    d = SESSION.dictionary
+    drift = next(c for c in d.causes if c.key == "bias_drift:acc").variants[0]
+    there = SESSION.design[:, :, drift.columns] @ drift.sizes(1.0)
+    rng = np.random.default_rng(4)
+    search = SESSION.search(SESSION.noise(rng, np.zeros(7)) + there)
+    posterior = Posterior(search, search.run())
+    (one,) = posterior.standing()
+    assert (one.name, one.triads) == ("bias_drift", frozenset("a"))
+    assert posterior.probability(["bias_drift"], frozenset("a")) > 0.99
+    assert posterior.probability(["bias_drift"], frozenset("g")) < 0.05

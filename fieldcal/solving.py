@@ -23,6 +23,7 @@ from fieldcal.session import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.rows import variances, widened
+from fieldcal.solve.shown import Shown
 from fieldcal.uncarried import angles_set, misread, told, uncarried
 
 Turns = Literal["auto", "yes", "no"]
@@ -75,8 +76,13 @@ class Laid:
         except InputError:
             return None
 
-    def recorded(self, turns: bool) -> Recorded | None:
-        """Rows of the windows, and the samples between them if they are to be used."""
+    def recorded(
+        self, turns: bool, shown: Explanation | None = None
+    ) -> Recorded | None:
+        """Rows of the windows, and the samples between them if they are to be used.
+
+        `shown` is what the recording shows to be there.
+        """
         if self.prepared is None:
             return None
         source, rows = self.prepared.source, self.prepared.rows
@@ -86,7 +92,10 @@ class Laid:
             sd[:, 3 * c : 3 * c + 3] = rows.sd[:, 3 * c : 3 * c + 3]
         rows = replace(rows, sd=sd)
         rows = widened(rows, variances(self.seen))
-        return Recorded(rows, origins(source, rows), source if turns else None)
+        if shown is None:
+            return Recorded(rows, origins(source, rows), source if turns else None)
+        likely = tuple(Shown(s.members, p) for s, p in shown.posterior.weights)
+        return Recorded(rows, origins(source, rows), source if turns else None, likely)
 
 
 def solved(
@@ -116,7 +125,7 @@ def solved(
     printed = bool(asked.get("as_printed"))
     shown = None if printed or laid.prepared is None else explain(laid.prepared)
     asked, said = _as_shown(asked, shown)
-    recorded = None if printed else laid.recorded(turns != "no")
+    recorded = None if printed else laid.recorded(turns != "no", shown)
     found = solve(laid.seen, recorded=recorded, **asked)
     if turns == "yes":
         _insist(found, session, still)

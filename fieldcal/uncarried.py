@@ -112,7 +112,8 @@ def _carries(calibration: Calibration, standing: Standing) -> bool:
     if effect is None or isinstance(effect, Scatter):
         return True
     carrying = {standing.name, *standing.aliases, effect.carried_by}
-    return bool(carrying & set(calibration.groups))
+    with_it = calibration.info.get("carried", {}).get("causes", {})
+    return bool(carrying & {*calibration.groups, *with_it})
 
 
 def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float]:

@@ -20,7 +20,7 @@ def of_effects(table: Table) -> Iterator[Cause]:
     for effect in catalogue().values():
         if not isinstance(effect, Motion | Sensor) or not effect.params:
             continue
-        if effect.applies(table.x) and (grid := list(_grid(table, effect))):
+        if effect.applies(table.x) and (grid := list(points(table, effect))):
             yield from _of_effect(table, effect, grid)
 
 
@@ -29,7 +29,7 @@ def _of_effect(
 ) -> Iterator[Cause]:
     """The causes that an effect is: one, or one a triad."""
     places = effect_columns(table, effect, grid)
-    for part, at in _parts(table, effect):
+    for part, at in parts(table, effect):
         variants = tuple(
             _group(table, effect, part, some, point, columns)
             for some in _axes(table, effect, at)
@@ -83,7 +83,7 @@ def effect_columns(
     ]
 
 
-def _parts(table: Table, effect: Effect) -> list[tuple[str, tuple[int, ...]]]:
+def parts(table: Table, effect: Effect) -> list[tuple[str, tuple[int, ...]]]:
     """Parameters that go together: those of a triad, where they are by channel."""
     names = [p.name for p in effect.params]
     if not set(names) <= set(CHANNELS):
@@ -118,7 +118,7 @@ def unit_of(table: Table, effect: Effect) -> float:
     return float(np.abs(table.unit[3 if gyro else 0]))
 
 
-def _grid(table: Table, effect: Effect) -> Iterator[Point]:
+def points(table: Table, effect: Effect) -> Iterator[Point]:
     """Values of the shape parameters to try, with the origin of times."""
     if not effect.shapes:
         yield {}, 0

@@ -69,6 +69,7 @@ class Mixture:
     ----------
     columns : (k,) of the dictionary
     mean, covariance : (k,), (k, k)
+    sizes : (k,) standard deviation of each before the rows are seen
     bad : (p,) probability that a window is bad
     scatter : (7,) rms of what each channel wanders from window to window
     score : ln of the evidence of the set
@@ -78,6 +79,7 @@ class Mixture:
     columns: Index
     mean: Array
     covariance: Array
+    sizes: Array
     bad: Array
     scatter: Array
     score: float
@@ -93,6 +95,7 @@ class Mixing:
     unstable : (7,) typical instability, 0 where there is none
     given : whether nobody looked for causes: then windows may be bad, or scattered by
         more than the device
+    doubt : whether a window may be bad; not to be asked again where none is
 
     """
 
@@ -103,12 +106,13 @@ class Mixing:
         there: Set,
         unstable: Array,
         given: bool = True,
+        doubt: bool = True,
     ) -> None:
         self.dictionary, self.there, self.unstable = dictionary, there, unstable
         self.density = UNSTEADY if given else DEVICES
         sizing = Sizing(dictionary, gram, unstable, there.members, there.sizes)
         self.columns, self.wide = sizing.every, there.state.sizes
-        self.doubted = self._doubted() if given else []
+        self.doubted = self._doubted() if given and doubt else []
         more = [at for _, at in self.doubted]
         self.gram = gram.only(np.concatenate([self.columns, *more]))
         self.bad = np.zeros(len(dictionary.held))
@@ -136,7 +140,9 @@ class Mixing:
         covariance += (weight[:, None] * off).T @ off
         tau = np.array([t for _, _, t in every])
         scatter = np.sqrt(weight @ tau**2)
-        return Mixture(self.columns, mean, covariance, self.bad, scatter, total)
+        return Mixture(
+            self.columns, mean, covariance, self.wide, self.bad, scatter, total
+        )
 
     def _doubted(self) -> list[tuple[int, Index]]:
         """Windows that may be bad by the accelerometers, with their columns."""

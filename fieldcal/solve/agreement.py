@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.effects import Motion, Sensor
 from fieldcal.model import priors
 from fieldcal.model.evidence import Gram, Index
 from fieldcal.model.mixture import Mixture
@@ -26,6 +27,9 @@ from fieldcal.solve.words import CERTAIN
 
 ROUNDED = 1e-9
 """Share of the longest column below which rounding alone is left of one."""
+
+CERTAINLY = (Motion, Sensor)
+"""Effects that have an equation."""
 
 UNIT = 1e-6
 """Largest share of what is estimated in a direction that windows do not show."""
@@ -67,10 +71,10 @@ def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -
     index = gram.index[found.columns]
     means = gram.means[:p, list(channels)][:, :, index].reshape(-1, len(index))[used]
     y = off.ravel()[used]
-    random = _random(d, found)
+    random = _random(d)
     noise = (1 / info.ravel()[used]) + gram.shared[at].ravel()[used] ** 2
     loose = _loose(gram, p, channels)[used]
-    wide = means[:, random] * _sizes(d, found)[random]
+    wide = means[:, random] * found.sizes[random]
     plain = np.diag(noise) + wide @ wide.T
     stated = plain + loose @ loose.T
     free = means[:, ~random]
@@ -82,22 +86,23 @@ def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -
     chi2, rank = _least(plain[np.ix_(good, good)], columns, y[good])
     residual = seen.along(y - free @ found.mean[~random])
     wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
-    sizes = free * _sizes(d, found)[~random]
+    sizes = free * found.sizes[~random]
     alone = seen.along(*_left_out(stated + wander, sizes, y, seen))
     return Fit(
         chi2, int(good.sum()) - rank, seen.rms(residual), seen.rms(alone), residual
     )
 
 
-def _random(d: Given, found: Mixture) -> Mask:
-    """Which columns of the estimate are of a known size, (k,)."""
-    fixed = [np.full(len(g.columns), g.fixed != priors.FREE) for g in d.groups]
-    return np.concatenate(fixed)
-
-
-def _sizes(d: Given, found: Mixture) -> Array:
-    """Sizes of the columns before the rows are seen, (k,)."""
-    return np.concatenate([g.sizes(g.fixed or 1.0) for g in d.groups])
+def _random(d: Given) -> Mask:
+    """Which columns of the estimate are random, or known but for their size, (k,)."""
+    equations = [
+        g for _, g in d.explanations[0].members if isinstance(g.effect, CERTAINLY)
+    ]
+    every = [
+        np.full(len(g.columns), g.fixed != priors.FREE and g not in equations)
+        for g in d.groups
+    ]
+    return np.concatenate(every)
 
 
 def _loose(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:

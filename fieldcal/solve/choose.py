@@ -146,7 +146,7 @@ class _Session:
     def _with(
         self, tilt: Tilt, level: float | None = None, follow: bool = True
     ) -> Estimated:
-        """A set with a model of the tilt, turns followed or windows alone."""
+        """A set with a model of the tilt; windows alone are to choose one by."""
         turning = self.turning if follow else None
         seen, turned = self.seen, turning is not None
         table = bool(seen.rotating.any())
@@ -161,7 +161,7 @@ class _Session:
             earth=self.unknown,
             turned=turned,
         )
-        return estimated(self.recorded, turning, self.nominal, wanted)
+        return estimated(self.recorded, turning, self.nominal, wanted, follow)
 
     def _by_tilt(self) -> tuple[Estimated, list[str]]:
         """The model of the tilt that fits better, the other one being weighed in.
@@ -190,7 +190,7 @@ class _Session:
                 " both; more positions with both angles turned would tell"
             )
         weight = 1 / (1 + float(np.exp(min(ahead, 50.0))))
-        found = usable[best] if self.turning is None else self._with(best)
+        found = self._with(best)
         return found.mixed_with(usable[best], usable[other], weight), [note]
 
     def _level_taken(self) -> str:

@@ -6,6 +6,7 @@ are followed about it, and the answer is taken there (`mixture`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from fieldcal.model.inference import Inference
 from fieldcal.model.mixture import Mixing, Mixture
 from fieldcal.model.reduce import Rows, Source
 from fieldcal.model.search import Search
+from fieldcal.model.sizing import Member
 from fieldcal.model.state import State
 from fieldcal.model.system import System
 from fieldcal.model.turn import Turning
@@ -24,11 +26,15 @@ from fieldcal.samples import Array
 from fieldcal.solve.agreement import Fit, agreement
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask
+from fieldcal.solve.shown import Shown
+from fieldcal.solve.variants import variants
 from fieldcal.solve.words import CERTAIN, SUSPECT
 
 OPEN = 0.25
 """Part of a variance before the rows from which they determined nothing."""
 
+DOUBTED = 0.02
+"""Probability that a window is bad below which it moves no interval."""
 
 NO_WEIGHT = 1e5
 """Times its noise that a bad window is given where it must not bend the state."""
@@ -43,12 +49,14 @@ class Recorded:
     rows : of the windows
     since : (o, n) s since the turn
     source : the samples of turns that are to be followed
+    shown : explanations of the recording
 
     """
 
     rows: Rows
     since: Array
     source: Source | None = None
+    shown: tuple[Shown, ...] = ()
 
     def turning(self) -> Turning | None:
         """Whoever follows the turns, if there are any."""
@@ -68,7 +76,8 @@ class Estimated:
     names : (k,) parameters that the rows determine
     values, covariance : (k,), (k, k)
     missing : parameters that they do not determine
-    found : the mixture
+    found : the mixture of the likeliest explanation
+    moved : by how many sigmas what is carried moves each parameter, (k,)
     acc, gyr : how well the windows agree
     turns : rows of the turns
 
@@ -80,6 +89,7 @@ class Estimated:
     covariance: Array
     missing: tuple[str, ...]
     found: Mixture
+    moved: Array
     acc: Fit
     gyr: Fit
     turns: tuple[TurnRows, ...]
@@ -103,6 +113,28 @@ class Estimated:
         )
 
     @property
+    def causes(self) -> dict[str, float]:
+        """What the set has that was not asked for, with its probability."""
+        out: dict[str, float] = {}
+        for one in self.given.explanations:
+            for name in dict.fromkeys(cause.name for cause, _ in one.members):
+                out[name] = out.get(name, 0.0) + one.probability
+        return dict(sorted(out.items(), key=lambda item: -item[1]))
+
+    @property
+    def sure(self) -> float:
+        """Probability that something is there that was not asked for."""
+        return sum(one.probability for one in self.given.explanations if one.members)
+
+    @property
+    def ended_s(self) -> float | None:
+        """When biases that change are as stated, s since the start."""
+        if not self.given.ending.any():
+            return None
+        x = self.given.x
+        return float((x.since_start + x.lasts / 2).max())
+
+    @property
     def bad(self) -> Array:
         """Probability that each window is bad, (n,) in the order of the positions."""
         out = np.zeros(int(self.given.held.max()) + 1)
@@ -122,7 +154,11 @@ class Estimated:
 
 
 def estimated(
-    recorded: Recorded, turning: Turning | None, nominal: State, wanted: Wanted
+    recorded: Recorded,
+    turning: Turning | None,
+    nominal: State,
+    wanted: Wanted,
+    averaged: bool = True,
 ) -> Estimated:
     """Fit a set.
 
@@ -132,32 +168,36 @@ def estimated(
     turning : of the same, if turns are to be used
     nominal : the state that is started from
     wanted : what the set is made of
+    averaged : whether over all explanations, or the likeliest is enough
 
     """
     rows, since = recorded.rows, recorded.since
-    given = Given(rows, np.abs(nominal.scale), since, turning is not None, wanted)
+    given = Given(
+        rows, np.abs(nominal.scale), since, turning is not None, wanted, recorded.shown
+    )
     turns = None if turning is None else Turns(turning, given, False)
-    bad = np.zeros(len(given.held), dtype=bool)
+    likely, bad = given.explanations[0], np.zeros(len(given.held), dtype=bool)
     # one bad window of six can be told from scatter, two of six cannot
     for _ in range(1 + max(1, len(bad) // 6)):
         inference = Inference(System(_without(rows, given, bad), given), nominal, turns)
         gram = inference.gram(*_settled(inference, given), None)
-        found = _mixed(given, gram)
+        found = _mixed(given, Search(given, gram), likely.members)
         worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
         if worst.any() and (found.bad[worst] > SUSPECT).all():
             # a gross error bends the state so far that nothing is linear about it
             others = System(_without(rows, given, bad | worst), given)
             beside = Inference(others, nominal, turns)
             gram = inference.gram(*_settled(beside, given), None)
-            found = _mixed(given, gram)
+            found = _mixed(given, Search(given, gram), likely.members)
         worst &= (found.bad > CERTAIN) & ~bad
         if not worst.any() or bad.sum() >= max(1, len(bad) // 6):
             break
         bad |= worst
     found = replace(found, bad=np.where(bad, 1.0, found.bad))
-    names, values, covariance, missing = _named(given, found, nominal)
+    parameters = _parameters(given, gram, found, nominal, averaged)
+    names, values, covariance, moved, missing = _determined(given, parameters)
     return Estimated(
-        given, names, values, covariance, missing, found,
+        given, names, values, covariance, missing, found, moved,
         agreement(gram, given, found, (0, 1, 2)),
         agreement(gram, given, found, (3, 4, 5)),
         tuple(inference.turned),
@@ -180,36 +220,92 @@ def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
     return state, values
 
 
-def _mixed(given: Given, gram: Gram) -> Mixture:
-    """The set at all its sizes, with each window perhaps being bad."""
+def _mixed(
+    given: Given, search: Search, carried: Sequence[Member], doubt: bool = True
+) -> Mixture:
+    """A set with some causes beside what is asked for, at all its sizes.
+
+    Each window may be bad as well, unless there is no `doubt`.
+    """
+    there = search.evaluated((*given.asked, *carried))
+    return Mixing(given, search.gram, there, search.unstable, doubt=doubt).run()
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """All parameters that a set has, determined or not.
+
+    Attributes
+    ----------
+    values, covariance : (k,), (k, k), at the end of the recording
+    moved : by how many sigmas what is carried moves each, (k,)
+
+    """
+
+    values: Array
+    covariance: Array
+    moved: Array
+
+
+def _parameters(
+    given: Given, gram: Gram, likeliest: Mixture, nominal: State, averaged: bool
+) -> Parameters:
+    """The mean over all explanations, (1) of `shown`."""
+    if not averaged or not any(one.members for one in given.explanations):
+        only = _ended(given, likeliest, nominal)
+        return Parameters(*only, np.zeros(len(only[0])))
     search = Search(given, gram)
-    there = search.evaluated(given.members)
-    return Mixing(given, gram, there, search.unstable).run()
+    found, doubt = [], bool(likeliest.bad.max(initial=0.0) > DOUBTED)
+    for one in given.explanations:
+        for same in variants(search, given.asked, one):
+            mixed = likeliest
+            if (*given.asked, *same.members) != given.members:
+                mixed = _mixed(given, search, same.members, doubt)
+            chance = one.probability * same.probability
+            found.append((chance, _ended(given, mixed, nominal)))
+    weight = np.array([p for p, _ in found])
+    means = np.array([value for _, (value, _) in found])
+    values: Array = weight @ means
+    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, (_, c) in found]))
+    covariance += (weight[:, None] * (means - values)).T @ (means - values)
+    plain, own = _ended(given, _mixed(given, search, (), doubt), nominal)
+    return Parameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
 
 
-def _named(
-    given: Given, found: Mixture, nominal: State
-) -> tuple[tuple[str, ...], Array, Array, tuple[str, ...]]:
+def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
+    """Parameters of one explanation at the end of the recording, (2) of `shown`."""
+    picked = np.zeros((len(given.names), len(found.columns)))
+    before = np.zeros(len(given.names))
+    for i, name in enumerate(given.names):
+        picked[i, np.flatnonzero(found.columns == given.place(name)[0])[0]] = 1.0
+        group, _, axis = name.partition(".")
+        sensor, _, kind = group.partition("_")
+        if sensor in ("acc", "gyr") and kind in ("bias", "scale"):
+            c = "xyz".index(axis) + 3 * (sensor == "gyr")
+            picked[i] += given.ending[int(kind == "scale")][c, found.columns]
+            before[i] = (nominal.bias if kind == "bias" else nominal.scale)[c]
+    return before + picked @ found.mean, picked @ found.covariance @ picked.T
+
+
+def _determined(
+    given: Given, found: Parameters
+) -> tuple[tuple[str, ...], Array, Array, Array, tuple[str, ...]]:
     """Parameters that are determined, and the names of those that are not."""
-    base = {}
-    for c in range(6):
-        sensor, axis = ("acc", "gyr")[c // 3], "xyz"[c % 3]
-        base[f"{sensor}_bias.{axis}"] = float(nominal.bias[c])
-        base[f"{sensor}_scale.{axis}"] = float(nominal.scale[c])
-    before = np.concatenate([g.sizes(g.fixed or 1.0) for g in given.groups])
-    at = [np.flatnonzero(found.columns == given.place(n)[0])[0] for n in given.names]
+    before = np.zeros(given.width)
+    for group in given.groups:
+        before[group.columns] = group.sizes(group.fixed or 1.0)
     told = np.sqrt(np.diag(found.covariance))
     limits = USEFUL | ({"gyr_scale": TURNED} if given.wanted.turned else {})
-    useful = [limits.get(n.partition(".")[0], np.inf) for n in given.names]
     known = [
-        i for i, (k, worst) in enumerate(zip(at, useful, strict=True))
-        if told[k] ** 2 < OPEN * before[k] ** 2 and told[k] < worst
-    ]  # fmt: skip
-    rows = [at[i] for i in known]
+        i
+        for i, name in enumerate(given.names)
+        if told[i] ** 2 < OPEN * before[given.place(name)[0]] ** 2
+        and told[i] < limits.get(name.partition(".")[0], np.inf)
+    ]
     names = tuple(given.names[i] for i in known)
-    values = found.mean[rows] + [base.get(n, 0.0) for n in names]
     missing = tuple(n for i, n in enumerate(given.names) if i not in known)
-    return names, values, found.covariance[np.ix_(rows, rows)], missing
+    square = found.covariance[np.ix_(known, known)]
+    return names, found.values[known], square, found.moved[known], missing
 
 
 USEFUL = {

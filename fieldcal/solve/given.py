@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -28,8 +29,12 @@ from fieldcal.model.reduce import Rows
 from fieldcal.model.sizing import Member
 from fieldcal.model.wander import Wander
 from fieldcal.samples import CHANNELS, Array
+from fieldcal.solve.shown import Shown, at_end, carried
 
 Tilt = Literal["none", "angle_offset", "base_tilt"]
+
+TILTS = ("angle_offset", "base_tilt")
+"""Models of one tilt: a set has one of them."""
 
 NOT_SHOWN = ("k21", "k31", "k32")
 """Couplings that a common rotation makes of the others: where no orientation is known,
@@ -73,22 +78,47 @@ class Given(Dictionary):
     since : (o, n) s since the turn, by origin
     turns : whether the way between positions is seen
     wanted : what the set is made of
+    shown : explanations of the recording, of which the set takes what it lacks
+
+    Attributes
+    ----------
+    explanations : the same by its own columns, the likeliest first
 
     """
 
     def __init__(
-        self, rows: Rows, unit: Array, since: Array, turns: bool, wanted: Wanted
+        self,
+        rows: Rows,
+        unit: Array,
+        since: Array,
+        turns: bool,
+        wanted: Wanted,
+        shown: Sequence[Shown] = (),
     ) -> None:
         self.wanted = wanted
         held = np.unique(rows.x.position)
         common = np.array([rows.common[rows.x.position == p][0] for p in held])
         wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
         super().__init__(rows.x, rows.used, since, common, unit, turns, wander)
+        has = {n.partition(".")[0] for n in self.names}
+        if has & set(TILTS):
+            has |= set(TILTS)
+        self.explanations = carried(self, shown, has) or (Shown((), 1.0),)
+
+    @property
+    def asked(self) -> tuple[Member, ...]:
+        """What was asked for, and what is known of it."""
+        return tuple((c, c.variants[0]) for c in self.causes)
 
     @property
     def members(self) -> tuple[Member, ...]:
-        """The set."""
-        return tuple((c, c.variants[0]) for c in self.causes)
+        """The set, with what the likeliest explanation of the recording has."""
+        return (*self.asked, *self.explanations[0].members)
+
+    @cached_property
+    def ending(self) -> Array:
+        """What columns make of biases and scale factors at the end, (2, 6, k)."""
+        return at_end(self, self.explanations)
 
     @property
     def groups(self) -> list[Group]:
@@ -182,7 +212,7 @@ class Given(Dictionary):
             every = [c for g in self.always if g.cause == kind for c in g.columns]
             at = (self.bias if kind == "bias" else self.scale) + channel
             return np.array([at] if at in every else [], dtype=np.intp)
-        for cause, one in self.members:
+        for cause, one in self.asked:
             if cause.name == group and isinstance(one.effect, Effect):
                 names = [one.effect.params[j].name for j in one.params]
                 if part in names:
@@ -207,7 +237,7 @@ class Given(Dictionary):
     def _of(self, name: str) -> list[str]:
         return [
             f"{name}.{one.effect.params[j].name}"
-            for cause, one in self.members
+            for cause, one in self.asked
             if cause.name == name and isinstance(one.effect, Effect)
             for j in one.params
         ]

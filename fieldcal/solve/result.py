@@ -46,9 +46,14 @@ def calibration(
 
     """
     names, values, covariance = found.names, found.values, found.covariance
-    said = [*_open(method, seen, found), *notes, *_level(method, asked, seen)]
+    there = words.carried(
+        found.sure, found.causes, found.names, found.moved, found.ended_s
+    )
+    said = [there, *_open(method, seen, found), *notes, *_level(method, asked, seen)]
     if not names or _blind(found, seen):
-        raise NotObservable("these positions determine nothing: " + "; ".join(said))
+        raise NotObservable(
+            "these positions determine nothing: " + "; ".join(filter(None, said))
+        )
     sigma = np.sqrt(np.diag(covariance))
     odd = senseless(names, values, sigma, seen.nominal)
     acc = found.acc if any(n.startswith("acc") for n in names) else found.gyr
@@ -203,6 +208,17 @@ def _turns(found: Estimated) -> tuple[float, int]:
     return chi2, max(0, count - spent)
 
 
+def _carried(seen: Observations, found: Estimated) -> dict[str, Any]:
+    """What the set has that was not asked for, and what that does."""
+    moved = dict(zip(found.names, found.moved.tolist(), strict=True))
+    out: dict[str, Any] = {"causes": found.causes, "moved_sigmas": moved}
+    if found.ended_s is not None:
+        last = float(seen.temperature[-1]) if len(seen.temperature) else np.nan
+        warm = last if np.isfinite(last) else None
+        out["as_of"] = {"since_start_s": found.ended_s, "temperature_degc": warm}
+    return out
+
+
 def _info(
     method: Method, seen: Observations, asked: Asked, found: Estimated
 ) -> dict[str, Any]:
@@ -230,6 +246,8 @@ def _info(
             "chi2": gyr.chi2, "dof": gyr.dof, "rms": gyr.rms, "unit": "rad/s",
             "extra_scatter": scatter_of(found.found, (3, 4, 5)),
         }  # fmt: skip
+    if found.causes:
+        out["carried"] = _carried(seen, found)
     if found.turns:
         chi2, dof = _turns(found)
         out["turns"] = {"chi2": chi2, "dof": dof}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fieldcal.chances import chi2_tail
 from fieldcal.gravity import G0
+from fieldcal.model.priors import NAMED
 from fieldcal.samples import Array
 from fieldcal.solve.observations import Observations
 
@@ -17,6 +18,9 @@ UNLIKELY = 0.01
 SUSPECT, CERTAIN = 0.1, 0.99
 """Probability of a window to be bad from which it is said, and from which it has no
 weight left."""
+
+MENTIONED = 0.1
+"""Probability from which a cause is named in a sentence."""
 
 NO_DOF = "no degree of freedom: the residual says nothing; add a verification position"
 
@@ -61,6 +65,42 @@ def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
         f"the {what} disagree with the model beyond their windows' noise "
         f"(chi2 {chi2:.0f} with dof {dof}): an extra scatter of {spread:.2g} {unit} is "
         f"in the uncertainties{few}, and {cause}"
+    )
+
+
+def carried(
+    sure: float,
+    causes: Mapping[str, float],
+    names: Sequence[str],
+    moved: Array,
+    ended_s: float | None,
+) -> str:
+    """Tell what is in a result that was not asked for; nothing where it may not be.
+
+    Parameters
+    ----------
+    sure : probability that something is there
+    causes : probability by id of the effect
+    names, moved : parameters, and by how many sigmas each moves with it
+    ended_s : when biases are as stated, s since the start; None if they stay
+
+    """
+    if sure < NAMED:
+        return ""
+    listed = join(
+        [f"{i} (probability {p:.2f})" for i, p in causes.items() if p >= MENTIONED]
+    )
+    worst = int(np.abs(moved).argmax())
+    when = ""
+    if ended_s is not None:
+        when = (
+            " biases and scale factors are those at the end of the recording,"
+            f" {ended_s:.0f} s after its start, and"
+        )
+    return (
+        f"the recording shows {listed}, which the result carries:{when} the"
+        f" uncertainties are with it; without it {names[worst]} would be"
+        f" {abs(moved[worst]):.1f} σ off; fieldcal diagnose says what to do"
     )
 
 

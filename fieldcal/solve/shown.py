@@ -1,0 +1,235 @@
+"""What a recording shows to be there beside what is asked for, in a given set.
+
+Causes come from the search of the diagnosis, each explanation E of the recording with
+its probability, and each is a given set of its own: what was asked for, and its causes.
+What is said is the mean over the explanations,
+
+    mean = sum_E P(E) mean_E,   cov = sum_E P(E) [cov_E + off_E off_E^T]           (1)
+
+so an interval contains what nobody knows about the cause. Biases and scale factors that
+change are those at the end of the recording, at the temperature of its last window and
+with the device at rest: what it starts a flight with. With outputs U(f, w) of what
+is carried at that instant,
+
+    bias = U(0, 0),   scale_c = [U_c(+d e_c) - U_c(-d e_c)] / 2 d,   d -> 0        (2)
+
+Source: Hoeting, Madigan, Raftery and Volinsky 1999 for (1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from fieldcal.effects import Motion, Scatter, Sensor
+from fieldcal.model.causes import Cause, Group
+from fieldcal.model.columns import Course, View
+from fieldcal.model.dictionary import Dictionary
+from fieldcal.model.effect_causes import at_points, parts, points
+from fieldcal.model.random_causes import of_chance
+from fieldcal.model.sizing import Member
+from fieldcal.model.state import State
+from fieldcal.model.turn import only
+from fieldcal.model.unknown_causes import of_no_effect
+from fieldcal.samples import CHANNELS, Array
+
+AXES = 3
+"""Parameters from which on an effect is not taken on some of them alone."""
+
+LEAST = 0.01
+"""Probability below which an explanation is not looked at: it moves no interval."""
+
+BY_WINDOW = ("misset", "window", "position")
+"""Causes by which windows are off each for itself: a given set has those already, as
+windows that scatter or are bad."""
+
+CHANGING = ("time", "temperature", "force and time")
+"""Functions without physics whose value at the end is part of what the device has come
+to; those of angles and forces have no zero."""
+
+SMALL = 1e-3
+"""d of (2), m/s^2 and rad/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """An explanation of a recording.
+
+    Attributes
+    ----------
+    members : its causes, of any dictionary
+    probability : that it is the right one
+    maybe : the same causes on triads that do not show them, and may have them
+
+    """
+
+    members: tuple[Member, ...]
+    probability: float
+    maybe: tuple[Member, ...] = ()
+
+
+def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown, ...]:
+    """Explanations by the columns of another dictionary, the likeliest first.
+
+    Parameters
+    ----------
+    d : the dictionary; columns that it lacks are appended
+    shown : explanations; those that differ in nothing that is carried become one
+    has : names of what the set has already
+
+    """
+    total: dict[frozenset[Group], float] = {}
+    own: dict[Group, Cause] = {}
+    for one in shown:
+        kept = [m for m in one.members if _adds(m, has)]
+        own |= {group: cause for cause, group in kept}
+        key = frozenset(group for _, group in kept)
+        total[key] = total.get(key, 0.0) + one.probability
+    likely = {k: p for k, p in total.items() if p >= LEAST * sum(total.values())}
+    wanted = {g: own[g] for key in likely for g in key}
+    here = {g: m for g, m in _moved(d, wanted)}
+    also = list(_elsewhere(d, [c for c, _ in here.values()]))
+    out: dict[frozenset[Group], Shown] = {}
+    for key, p in likely.items():
+        members = tuple(here[g] for g in key if g in here)
+        same = frozenset(g for _, g in members)
+        before = out[same].probability if same in out else 0.0
+        maybe = tuple(m for m in also if m[0].name in {c.name for c, _ in members})
+        out[same] = Shown(members, before + p / sum(likely.values()), maybe)
+    return tuple(sorted(out.values(), key=lambda s: -s.probability))
+
+
+def _adds(member: Member, has: set[str]) -> bool:
+    """Whether a given set lacks a cause."""
+    cause, group = member
+    if cause.name in BY_WINDOW:
+        return False
+    effect = group.effect
+    if isinstance(effect, Scatter) and not {p.name for p in effect.params} <= set(
+        CHANNELS
+    ):
+        return False  # how well angles are set is always in
+    if effect is not None and effect.like_calibration:
+        return False  # nothing tells it from what is estimated
+    carrying = {cause.name, *([effect.carried_by] if effect else [])}
+    return not carrying & has
+
+
+def _moved(
+    d: Dictionary, wanted: Mapping[Group, Cause]
+) -> Iterator[tuple[Group, Member]]:
+    """Groups of another dictionary, each with the member that it is in this one."""
+    every: dict[str, Cause] = {}
+    if not all(has_equation(g) for g in wanted):
+        every = {c.key: c for c in [*of_chance(d), *of_no_effect(d)]}
+    new: dict[str, list[tuple[Group, list[Group]]]] = {}
+    for group, cause in wanted.items():
+        if has_equation(group):
+            if group.effect is not None and group.effect.applies(d.x):
+                new.setdefault(cause.key, []).append((group, _variants(d, group)))
+        elif cause.key in every:
+            same = every[cause.key]
+            yield group, (same, same.variants[cause.variants.index(group)])
+    for cause in {c.key: c for c in wanted.values()}.values():
+        pairs = new.get(cause.key, [])
+        variants = tuple(one for _, some in pairs for one in some)
+        same = replace(cause, variants=variants)
+        for group, some in pairs:
+            yield group, (same, some[0])
+
+
+def _variants(d: Dictionary, group: Group) -> list[Group]:
+    """A group of an effect by columns of `d`, and its effect elsewhere."""
+    effect = group.effect
+    if not isinstance(effect, Motion | Sensor):
+        raise TypeError(f"{group.cause} has no equation")
+    whole = next(at for part, at in parts(d, effect) if part == group.part)
+    if isinstance(effect, Motion) or len(whole) > AXES:
+        return at_points(d, group, [(group.shape, group.origin)])
+    own = (group.shape, group.origin)
+    grid = [own, *(point for point in points(d, effect) if point != own)]
+    out = [
+        one if len(some) == len(whole) else _some(one, some)
+        for one in at_points(d, replace(group, params=whole), grid)
+        for n in range(1, len(whole) + 1)
+        for some in combinations(whole, n)
+    ]
+    return sorted(out, key=lambda g: (g.params, g.shape) != (group.params, group.shape))
+
+
+def _elsewhere(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
+    """Effects of one triad on the other one: what a device has is often in both."""
+    known = {c.key for c in causes}
+    for name in dict.fromkeys(c.name for c in causes if c.kind == "effect"):
+        first = next(c for c in causes if c.name == name)
+        group = first.variants[0]
+        if not isinstance(group.effect, Sensor):
+            continue
+        for part, some in parts(d, group.effect):
+            other = replace(first, part=part)
+            if part != first.part and some and other.key not in known:
+                every = _variants(d, replace(group, part=part, params=some))
+                yield replace(other, variants=tuple(every)), every[0]
+
+
+def _some(whole: Group, params: tuple[int, ...]) -> Group:
+    """A group with some of its parameters."""
+    at = [whole.params.index(j) for j in params]
+    return replace(
+        whole, params=params, columns=whole.columns[at], typical=whole.typical[at]
+    )
+
+
+def has_equation(group: Group) -> bool:
+    """Whether an effect makes it, and no chance; else it is told by its place."""
+    return isinstance(group.effect, Motion | Sensor)
+
+
+def at_end(d: Dictionary, shown: Sequence[Shown]) -> Array:
+    """What columns of what is carried have made of biases and scale factors, (2).
+
+    Back come (2, 6, k): biases and scale factors by output and column of `d`.
+    """
+    out = np.zeros((2, 6, d.width))
+    there = np.zeros(d.width, dtype=bool)
+    for one in shown:
+        for cause, group in (*one.members, *one.maybe):
+            if not isinstance(group.effect, Motion) and (
+                group.effect is not None or cause.name in CHANGING
+            ):
+                for each in cause.variants if has_equation(group) else (group,):
+                    there[each.columns] = True
+    if not there.any():
+        return out
+    out[0] = _outputs(d, there, np.zeros(6))
+    for c in range(6):
+        step = SMALL * np.eye(6)[c]
+        up, down = (_outputs(d, there, s * step)[c] for s in (1.0, -1.0))
+        out[1, c] = (up - down) / (2 * SMALL)
+    return out
+
+
+def _outputs(d: Dictionary, there: Array, felt: Array) -> Array:
+    """Outputs by column, (6, k), at the end where f and w are given, (6,)."""
+    x = only(d.x, [int(np.argmax(d.x.t))])
+    nothing, rest = np.zeros((1, 3)), float(d.x.lasts[int(np.argmax(d.x.t))]) / 2
+    x = replace(
+        x, t=x.t + rest, since_start=x.since_start + rest, lasts=np.zeros(1),
+        f=felt[None, :3], w=felt[None, 3:], w_dot=nothing, variance=nothing,
+        heating=np.zeros(1), since_turn=np.full(1, np.inf),
+    )  # fmt: skip
+    nowhere = State(np.zeros(6), np.ones(6), np.zeros((d.places, 2)), np.zeros(3))
+    view = View(x, x, np.full((len(d.since), 1), np.inf), nowhere)
+    out = np.zeros((6, d.width))
+    ends = [*(first for first, _ in d.bases[1:]), d.width]
+    for (first, basis), end in zip(d.bases, ends, strict=True):
+        if not there[first:end].any():
+            continue
+        row = basis.of(view)[0]
+        out[:, first:end] = (
+            np.kron(np.eye(6), row) if isinstance(basis, Course) else row
+        )
+    return np.where(there, out, 0.0)

@@ -1,0 +1,116 @@
+"""An explanation on all axes and in all shapes that its causes may have.
+
+The search names the axes that show a cause beyond doubt and the shape that fits best;
+what other axes have of it, and where in time, is as uncertain as anything. So an
+explanation is the mean over its variants, each weighed by its evidence over all sizes,
+the other causes as they are ((3) of `model.evidence`). There are hundreds, and of two
+causes the product: points that are spread evenly over the probabilities of each stand
+for all. Source: Niederreiter 1992 for the points.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.model.evidence import Eliminated, Index, gains
+from fieldcal.model.search import Search
+from fieldcal.model.sizing import DENSITY, Member
+from fieldcal.samples import Array
+from fieldcal.solve.shown import Shown, has_equation
+
+POINTS = 24
+"""Variants of one explanation that stand for all of them."""
+
+PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
+"""Their square roots spread points evenly over the causes beyond the first."""
+
+
+def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Shown]:
+    """Variants of an explanation, with their probabilities if it is the right one.
+
+    Parameters
+    ----------
+    search : over the rows
+    known : what the set has beside
+    one : the explanation
+
+    """
+    each = [_choices(search, (*known, *one.members), m) for m in one.members]
+    each += [_perhaps(search, (*known, *one.members), m) for m in one.maybe]
+    share: dict[tuple[Member, ...], float] = {}
+    points = spread(len(each))
+    for at in points:
+        picked = [
+            choices[int(np.searchsorted(np.cumsum(weight)[:-1], u))]
+            for u, (choices, weight) in zip(at, each, strict=True)
+        ]
+        members = tuple(m for some in picked for m in some)
+        share[members] = share.get(members, 0.0) + 1 / len(points)
+    return [Shown(members, p) for members, p in share.items()]
+
+
+def spread(count: int) -> Array:
+    """Points spread evenly over a cube, (POINTS, count); in the middle of one line."""
+    if not count:
+        return np.full((1, 0), 0.5)
+    step = np.array([1 / POINTS, *np.sqrt(PRIMES[: count - 1])])
+    out: Array = (np.arange(POINTS)[:, None] * step + 0.5 / POINTS) % 1.0
+    return out
+
+
+def _choices(
+    search: Search, members: tuple[Member, ...], member: Member
+) -> tuple[list[tuple[Member, ...]], Array]:
+    """Variants of a cause of a set, and how likely each is."""
+    cause, group = member
+    if not (has_equation(group) and cause.variants[1:]):
+        return [(member,)], np.ones(1)
+    score = _scores(search, members, member)
+    weight: Array = np.exp(score - np.logaddexp.reduce(score))
+    return [((cause, other),) for other in cause.variants], weight
+
+
+def _perhaps(
+    search: Search, members: tuple[Member, ...], member: Member
+) -> tuple[list[tuple[Member, ...]], Array]:
+    """A set as it is or with one variant of a further cause, and how likely each is.
+
+    The best variant's evidence is that with windows as unstable as they are beside it.
+    """
+    cause = member[0]
+    score = _scores(search, members, member)
+    best = (cause, cause.variants[int(np.argmax(score))])
+    gain = search.evaluated((*members, best)).score - search.evaluated(members).score
+    score = np.append(0.0, score - score.max() + gain)
+    choices: list[tuple[Member, ...]] = [(), *(((cause, v),) for v in cause.variants)]
+    out: Array = np.exp(score - np.logaddexp.reduce(score))
+    return choices, out
+
+
+def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Array:
+    """Evidence of every variant of a cause beside the other members, over all sizes."""
+    others, own = member[0].variants, member[1]
+    every = np.unique(np.concatenate([g.columns for g in others]))
+    rest = _without(search, members, own.columns)
+    inner, pull = rest.rest(every, np.ones(len(every)))
+    alone = np.diag(rest.rows.matrix(every, every))
+    score = np.zeros(len(others))
+    width = np.array([len(g.columns) for g in others])
+    for k in np.unique(width).tolist():
+        some = np.flatnonzero(width == k)
+        at = np.searchsorted(every, [others[j].columns for j in some])
+        size = np.array([others[j].typical for j in some])
+        square = inner[at[:, :, None], at[:, None, :]]
+        square *= size[:, :, None] * size[:, None, :]
+        top = (alone[at] * size**2).max(axis=1)
+        gain = gains(square, pull[at] * size, top)
+        score[some] = np.logaddexp.reduce(gain + DENSITY, axis=1)
+    return score
+
+
+def _without(search: Search, members: tuple[Member, ...], own: Index) -> Eliminated:
+    """A set without some columns, windows being as unstable as with them."""
+    full = search.evaluated(members)
+    kept = ~np.isin(full.state.columns, own)
+    rows = search.weighed(full.sizes.instability)
+    return Eliminated.of(rows, full.state.columns[kept], full.state.sizes[kept])

@@ -1,0 +1,171 @@
+"""What a recording shows, in a given set: the mean over explanations, at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from observed import BIAS, SCALE, observe, outputs
+
+from fieldcal.model.effect_causes import of_effects
+from fieldcal.model.inference import Inference
+from fieldcal.model.random_causes import of_chance
+from fieldcal.model.search import Search
+from fieldcal.model.sizing import Member
+from fieldcal.model.state import State
+from fieldcal.model.system import System
+from fieldcal.positions import SIX_FACES, Position
+from fieldcal.solve import Observations
+from fieldcal.solve.estimation import Estimated, Recorded, estimated
+from fieldcal.solve.given import Given, Wanted
+from fieldcal.solve.rows import of_means
+from fieldcal.solve.shown import Shown
+from fieldcal.solve.variants import spread, variants
+
+PLACES = (
+    *SIX_FACES,
+    *(Position.deg(a, b) for a, b in [(45, 0), (-45, 0), (0, 45), (45, 35), (0, 0)]),
+)
+TIMES = 40.0 * np.arange(len(PLACES))
+DRIFT = 2e-5
+NOMINAL = State(
+    np.zeros(6), np.ones(6), np.zeros((len(PLACES), 2)), np.zeros(3)
+)  # fmt: skip
+
+
+def seen(drift: float = DRIFT, noise: int | None = None) -> Observations:
+    """Windows of a device whose bias of x drifts."""
+    acc = outputs(PLACES)
+    acc[:, 0] += drift * TIMES
+    if noise is not None:
+        acc += np.random.default_rng(noise).normal(0.0, 1e-3, acc.shape)
+    return replace(observe(PLACES, acc), time=TIMES)
+
+
+def recording(drift: float = DRIFT, noise: int | None = None) -> Recorded:
+    """Its rows, with the time since the start."""
+    rows = of_means(seen(drift, noise))
+    x = replace(rows.rows.x, since_start=TIMES)
+    return replace(rows, rows=replace(rows.rows, x=x))
+
+
+def given(shown: Sequence[Shown] = ()) -> Given:
+    recorded = recording()
+    return Given(recorded.rows, np.ones(6), recorded.since, False, Wanted(), shown)
+
+
+def member(name: str, params: tuple[int, ...] | None = None) -> Member:
+    """A cause of the accelerometers, by the columns of a dictionary of its own."""
+    d = given()
+    (cause,) = [
+        c for c in (*of_effects(d), *of_chance(d)) if (c.name, c.part) == (name, "acc")
+    ]
+    return next((cause, g) for g in cause.variants if params in (None, g.params))
+
+
+def fitted(shown: Sequence[Shown], noise: int | None = None) -> Estimated:
+    recorded = replace(recording(noise=noise), shown=tuple(shown))
+    return estimated(recorded, None, NOMINAL, Wanted())
+
+
+def test_explanations_that_differ_in_nothing_that_is_carried_are_one() -> None:
+    drift = member("bias_drift")
+    d = given([Shown((drift,), 0.5), Shown((), 0.2), Shown((drift,), 0.3)])
+    assert [len(s.members) for s in d.explanations] == [1, 0]
+    assert [s.probability for s in d.explanations] == pytest.approx([0.8, 0.2])
+
+
+def test_one_that_hardly_can_be_is_left_out_and_so_is_what_the_set_has() -> None:
+    drift = member("bias_drift")
+    unlikely = given([Shown((drift,), 0.002), Shown((), 0.998)])
+    assert [s.probability for s in unlikely.explanations] == [1.0]
+    d = given()
+    (cause,) = [c for c in of_effects(d) if c.name == "base_tilt"]
+    shown = [Shown(((cause, cause.variants[0]),), 1.0)]
+    rows = recording()
+    same = Given(
+        rows.rows, np.ones(6), rows.since, False, Wanted("angle_offset"), shown
+    )
+    assert not same.explanations[0].members
+
+
+def test_the_bias_is_that_at_the_end() -> None:
+    """Of a drift, what it has come to; of its scale factor nothing."""
+    d = given([Shown((member("bias_drift"),), 1.0)])
+    ((_, group),) = d.explanations[0].members
+    bias, scale = d.ending
+    for j, column in zip(group.params, group.columns, strict=True):
+        assert bias[j, column] == pytest.approx(TIMES[-1])
+    assert np.count_nonzero(bias) == len(group.params) and not scale.any()
+
+
+def test_a_walk_ends_where_its_cosines_do() -> None:
+    """At the end cosine k is (-1)^k."""
+    d = given([Shown((member("random_walk"),), 1.0)])
+    ((_, group),) = d.explanations[0].members
+    channel = group.params[0]
+    ends = d.ending[0][channel, group.columns]
+    own = ends[ends != 0.0]
+    assert own[:4] == pytest.approx([-1.0, 1.0, -1.0, 1.0])
+
+
+def test_the_drift_is_found_and_the_bias_is_right_at_the_end() -> None:
+    found = fitted([Shown((member("bias_drift", (0,)),), 1.0)])
+    value = dict(zip(found.names, found.values, strict=True))
+    sigma = dict(zip(found.names, np.sqrt(np.diag(found.covariance)), strict=True))
+    assert value["acc_bias.x"] == pytest.approx(
+        BIAS[0] + DRIFT * TIMES[-1], abs=0.3 * sigma["acc_bias.x"]
+    )
+    assert value["acc_scale.x"] == pytest.approx(
+        SCALE[0], abs=0.3 * sigma["acc_scale.x"]
+    )
+    # the end of a line is known half as well as its middle
+    assert sigma["acc_bias.x"] > 1.5 * 1e-3 / np.sqrt(len(PLACES))
+
+
+def test_the_answer_is_the_mean_over_explanations() -> None:
+    """Equation (1) of the module, of each explanation alone."""
+    drift = member("bias_drift")
+    one, none = fitted([Shown((drift,), 1.0)], 3), fitted((), 3)
+    both = fitted([Shown((drift,), 0.7), Shown((), 0.3)], 3)
+    assert one.names == none.names == both.names
+    mean = 0.7 * one.values + 0.3 * none.values
+    np.testing.assert_allclose(both.values, mean, rtol=0, atol=1e-7)
+    spread = np.zeros_like(both.covariance)
+    for share, each in ((0.7, one), (0.3, none)):
+        off = each.values - mean
+        spread += share * (each.covariance + np.outer(off, off))
+    np.testing.assert_allclose(np.diag(both.covariance), np.diag(spread), rtol=2e-3)
+    assert both.causes == {"bias_drift": pytest.approx(0.7)}
+    assert both.sure == pytest.approx(0.7)
+
+
+def test_a_cause_is_on_every_axis_that_it_may_be_on() -> None:
+    """The one that shows it beyond doubt is in nearly all of them."""
+    recorded = recording(1e-4)
+    shown = [Shown((member("bias_drift", (0,)),), 1.0)]
+    d = Given(recorded.rows, np.ones(6), recorded.since, False, Wanted(), shown)
+    gram = Inference(System(recorded.rows, d), NOMINAL).gram(
+        NOMINAL, np.zeros(d.width), None
+    )
+    found = variants(Search(d, gram), d.asked, d.explanations[0])
+    assert sum(s.probability for s in found) == pytest.approx(1.0)
+    sets = {s.members[0][1].params: s.probability for s in found}
+    assert sum(p for axes, p in sets.items() if 0 in axes) > 0.99
+    assert max(sets, key=lambda axes: sets[axes]) == (0,) and len(sets) > 1
+
+
+def test_points_stand_evenly_for_the_variants_of_every_cause() -> None:
+    """Of each cause by itself, and of two together."""
+    for count in (1, 2, 3):
+        at = spread(count)
+        assert ((at >= 0) & (at < 1)).all()
+        for column in at.T:
+            inside = np.histogram(column, 6, (0.0, 1.0))[0] / len(at)
+            assert np.abs(inside - 1 / 6).max() <= 0.5 / 6
+    one, two = spread(2).T > 0.5
+    for quarter in (one & two, one & ~two, ~one & two, ~one & ~two):
+        assert 4 <= quarter.sum() <= 8
+    assert len(spread(0)) == 1

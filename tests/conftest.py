@@ -50,7 +50,7 @@ WAITING = frozenset(
 )
 """Modules whose tests wait for devices in processes of their own."""
 
-SPREAD = frozenset(["test_any_recording", "test_diagnosis_contract"])
+SPREAD = frozenset(["test_any_recording", "test_diagnosis_contract", "test_twin"])
 """Long modules whose tests have nothing in common that takes time to make."""
 
 

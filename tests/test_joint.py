@@ -97,7 +97,7 @@ def whitened(found: Sequence[Calibration], error: Array) -> Array:
 CASES = [
     (Model(), TWO, 100),
     (Model("angle_offset"), FIVE, 60),
-    (Model("angle_offset"), WIDE, 60),
+    pytest.param(Model("angle_offset"), WIDE, 60, marks=pytest.mark.thorough),
     (Model("base_tilt"), WIDE, 60),
     (Model("base_tilt"), NINE, 40),
     (Model(cross=True), SIX_FACES, 50),
@@ -138,7 +138,16 @@ def bumped(size: float) -> Disturb:
 
 
 @pytest.mark.parametrize("places", [SIX, NINE])
-@pytest.mark.parametrize("size", [3.0, 5.0, 10.0, 100.0, 3000.0])
+@pytest.mark.parametrize(
+    "size",
+    [
+        3.0,
+        pytest.param(5.0, marks=pytest.mark.thorough),
+        10.0,
+        pytest.param(100.0, marks=pytest.mark.thorough),
+        3000.0,
+    ],
+)
 def test_one_bad_position_is_doubted_and_never_spoils_the_interval(
     places: tuple[Position, ...], size: float
 ) -> None:

@@ -68,7 +68,9 @@ def practice(folder: Path) -> Path:
     return session
 
 
-@pytest.fixture(scope="module", params=[own, practice])
+@pytest.fixture(
+    scope="module", params=[own, pytest.param(practice, marks=pytest.mark.thorough)]
+)
 def page(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Page:

@@ -62,7 +62,9 @@ def test_a_common_rotation_does_not_show() -> None:
     np.testing.assert_allclose(a.values, b.values, atol=1e-5)
 
 
-@pytest.mark.parametrize("cross", [False, True])
+@pytest.mark.parametrize(
+    "cross", [pytest.param(False, marks=pytest.mark.thorough), True]
+)
 def test_pulls_and_chi2_with_unequal_windows(cross: bool) -> None:
     rng = np.random.default_rng(6)
     f = spread_over_the_sphere(15, 4)
@@ -83,7 +85,7 @@ def test_pulls_and_chi2_with_unequal_windows(cross: bool) -> None:
     assert 0.92 < (np.abs(pulls) < 1.96).mean() < 0.98
 
 
-@pytest.mark.parametrize("n", [8, 14])
+@pytest.mark.parametrize("n", [8, pytest.param(14, marks=pytest.mark.thorough)])
 def test_scatter_beyond_the_windows_widens_the_intervals(n: int) -> None:
     rng = np.random.default_rng(n)
     inside = []

@@ -54,9 +54,11 @@ def later(block: Block, seconds: float) -> Block:
     "concealed",
     [
         "base_tilt:about_x_deg=1,about_z_deg=-0.7",
-        "cross_coupling:k12=0.01,k31=-0.008,k32=0.02",
+        pytest.param(
+            "cross_coupling:k12=0.01,k31=-0.008,k32=0.02", marks=pytest.mark.thorough
+        ),
         "settling:ax=0.05,az=-0.04,tau_s=5",
-        "settling:ax=0.05,gx=0.003,tau_s=5",
+        pytest.param("settling:ax=0.05,gx=0.003,tau_s=5", marks=pytest.mark.thorough),
         "mounting:axes=+y-x+z",
         "stuck:channel=gy,from_s=40,to_s=43",
     ],
@@ -207,9 +209,19 @@ def test_of_a_line_the_replay_leaves_little(
 @pytest.mark.parametrize(
     ("concealed", "figure", "part"),
     [
-        ("gyro_scale:s1=0.01,s3=-0.012", "rms_turns_rad", 0.2),
+        pytest.param(
+            "gyro_scale:s1=0.01,s3=-0.012",
+            "rms_turns_rad",
+            0.2,
+            marks=pytest.mark.thorough,
+        ),
         ("gyro_cross_coupling:s12=0.02", "rms_turns_rad", 0.6),
-        ("lever_arm:x=0.05,z=-0.03", "rms_turns_acceleration", 0.6),
+        pytest.param(
+            "lever_arm:x=0.05,z=-0.03",
+            "rms_turns_acceleration",
+            0.6,
+            marks=pytest.mark.thorough,
+        ),
         ("time_delay:seconds=0.02", "rms_turns_acceleration", 0.2),
     ],
 )

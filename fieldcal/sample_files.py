@@ -214,7 +214,9 @@ def _numbers(path: Path, table: pa.Table, name: str) -> Array:
         return np.empty(0)
     if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
         raise SessionError(f"{path}: column {name} holds {column.type}, not numbers")
-    return numbers(column.cast(pa.float64()))
+    if column.type != pa.float64():  # casting loads all that Arrow computes with
+        column = column.cast(pa.float64())
+    return numbers(column)
 
 
 def _check_columns(path: Path, columns: dict[str, Array]) -> None:

@@ -12,7 +12,7 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 
@@ -35,14 +35,28 @@ COMMANDS = {
 }  # fmt: skip
 
 
-def record(folder: Path, rate_hz: float, seconds: float) -> int:
-    """Record a session of nine positions; returns how many samples it has."""
+Parameters = Mapping[str, Mapping[str, float]]
+
+COUPLED: Parameters = {"cross_coupling": {"k12": 0.003}}
+
+
+def record(
+    folder: Path,
+    rate_hz: float,
+    seconds: float,
+    angles: Sequence[tuple[float, float]] = ANGLES,
+    there: Parameters = COUPLED,
+) -> int:
+    """Record a session, of nine positions; returns how many samples it has.
+
+    `there` are the effects in it with their parameters.
+    """
     import pyarrow as pa
 
-    starts = [3.0 + i * (seconds + GAP_S) for i in range(len(ANGLES))]
-    held = [(*a, s, s + seconds) for a, s in zip(ANGLES, starts, strict=True)]
-    coupled = effect("cross_coupling", {"k12": 0.003})
-    device = Profile(sampling=Sampling(rate_hz), effects=(coupled,))
+    starts = [3.0 + i * (seconds + GAP_S) for i in range(len(angles))]
+    held = [(*a, s, s + seconds) for a, s in zip(angles, starts, strict=True)]
+    effects = tuple(effect(name, values) for name, values in there.items())
+    device = Profile(sampling=Sampling(rate_hz), effects=effects)
     block = simulate(device, [(*np.deg2rad(w[:2]), *w[2:]) for w in held], seed=1)
     rows = "".join(
         f"[[position]]\nalpha_deg = {a}\nbeta_deg = {b}\nstart_s = {s}\nend_s = {e}\n"

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.model.reduce import Rows
 from fieldcal.samples import Array
 
-FEW = 3
-"""Windows below which stretches of them are left out instead of windows."""
-
-LONG, SHORT = 5, 24
-"""How many: what is random foretells for a short time only, causes for long."""
-
 PARTS = (0.0, 0.1, 0.25, 0.5, 1.0)
 """Ends of the parts of a window over which residuals are averaged."""
 
 
-def averages(
-    rows: Rows, residual: Array, parts: Sequence[float] = PARTS
-) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Means over parts of the windows, the parts being given by their ends.
+def averages(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Means over parts of the windows.
 
     Returns
     -------
@@ -35,7 +25,7 @@ def averages(
     means, sds, position = [], [], []
     for p in np.unique(rows.x.position):
         at = np.flatnonzero(rows.x.position == p)
-        cuts = np.unique(np.round(np.array(parts) * len(at)).astype(int))
+        cuts = np.unique(np.round(np.array(PARTS) * len(at)).astype(int))
         for a, b in zip(cuts[:-1], cuts[1:], strict=True):
             part = at[a:b]
             use = np.isfinite(residual[part]) & rows.used[part]
@@ -48,14 +38,9 @@ def averages(
     return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
 
 
-def rms(rows: Rows, residual: Array, stretches: int = LONG) -> Array:
-    """Root mean square over the parts of windows, (6,); nan where there is none.
-
-    The parts of a few long windows are as short as the stretches left out.
-    """
-    few = len(np.unique(rows.x.position)) < FEW and stretches == SHORT
-    even = np.linspace(0.0, 1.0, stretches + 1).tolist()
-    mean, _, _ = averages(rows, residual, even if few else PARTS)
+def rms(rows: Rows, residual: Array) -> Array:
+    """Root mean square over the parts of windows, (6,); nan where there is none."""
+    mean, _, _ = averages(rows, residual)
     count = np.isfinite(mean).sum(axis=0)
     squares = np.nansum(mean**2, axis=0)
     return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))

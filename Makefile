@@ -11,11 +11,11 @@ demo: $(READY)
 	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
 
 test: $(DEV)
-	$(BIN)/python -m pytest -q -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -q -n 2
 
 # the whole catalogue and every seed, before a release or where diagnosis was changed
 test-all: $(DEV)
-	$(BIN)/python -m pytest -q -n 2 --dist loadgroup --all
+	$(BIN)/python -m pytest -q -n 2 --all
 
 lint: $(DEV)
 	$(BIN)/ruff check .

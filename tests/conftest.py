@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -66,20 +67,30 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(
     config: pytest.Config, items: list[pytest.Item]
 ) -> None:
-    """Leave out what is thorough, unless all is wanted; share the rest out.
-
-    What waits is one group: it leaves a processor free. Of the others each module is
-    one, for what its tests have in common.
-    """
+    """Leave out what is thorough, unless all is wanted."""
     if not config.getoption("--all"):
         left_out = [item for item in items if item.get_closest_marker("thorough")]
         config.hook.pytest_deselected(items=left_out)
         items[:] = [i for i in items if not i.get_closest_marker("thorough")]
-    for item in items:
-        name = item.path.stem
-        if name not in SPREAD:
-            group = "waiting" if name in WAITING else name
-            item.add_marker(pytest.mark.xdist_group(group))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Share the tests out among processes, if there are several.
+
+    What waits is one group: it leaves a processor free. Of the others each module is
+    one, for what its tests have in common. The largest come first.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByModule(LoadScopeScheduling):  # type: ignore[misc]
+        def _split_scope(self, nodeid: str) -> str:
+            module = nodeid.partition("::")[0]
+            if Path(module).stem in SPREAD:
+                return nodeid
+            return "waiting" if Path(module).stem in WAITING else module
+
+    return ByModule(config, log)
 
 
 collect_ignore = ["example_project"]

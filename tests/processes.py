@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
 RUN, SIM = [*FIELDCAL, "run"], [*FIELDCAL, "sim"]
-TWO_POSITION = [*RUN, "two_position", "--headless", "--level=0.001"]
-"""Two positions on a base that is level, and no operator."""
+TWO_POSITION = [*RUN, "two_position", "--headless", "--level=0.001", "--angles=0.001"]
+"""Two positions on a base that is level, set exactly, and no operator."""
 
 
 @contextmanager

@@ -70,7 +70,7 @@ def test_solving_the_recorded_session_gives_the_same_numbers(
 def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
     done = run(
         *("two_position", "--headless", "--virtual", "--speed", "60", "--json"),
-        *("--no-report", "-o", str(tmp_path / "s"), "--level=0.01"),
+        *("--no-report", "-o", str(tmp_path / "s"), "--level=0.001", "--angles=0.001"),
     )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -86,7 +86,7 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     """Unsaid it is NO-GO, and said it is in the uncertainty, without a second turn."""
     done = run(
         *("two_position", "--headless", "--virtual=--base-tilt=0.5,-0.3", "--json"),
-        *("--speed", "60", "--no-report", "-o", str(tmp_path / "s")),
+        *("--speed", "60", "--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"),
     )
     assert done.returncode == 1, done.stderr
     told = [json.loads(line) for line in done.stderr.splitlines()]

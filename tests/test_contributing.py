@@ -27,8 +27,6 @@ ADDED = {
 }
 """Tests that walk what there is, and what they are to find there."""
 
-pytestmark = pytest.mark.xdist_group("additions")
-
 
 def diffs() -> list[str]:
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

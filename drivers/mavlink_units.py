@@ -45,7 +45,7 @@ def untruncated_mean(k: Array) -> Array:
 def recognised_unit(acc: Array, whole: bool) -> str | None:
     """Name the unit of accelerations (n, 3), (3); None if none fits.
 
-    >>> told(np.array([[0.0, 3.0, -1001.0]]), whole=True)
+    >>> recognised_unit(np.array([[0.0, 3.0, -1001.0]]), whole=True)
     'mg'
     """
     size = float(np.median(np.linalg.norm(acc, axis=1)))

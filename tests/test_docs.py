@@ -41,6 +41,21 @@ def test_examples_of_the_documentation(page: Path) -> None:
     assert tried or ">>>" not in page.read_text()
 
 
+def test_examples_of_every_module() -> None:
+    folders = ("fieldcal", "drivers", "procedures", "sim_device")
+    paths = [p for f in folders for p in (DOCS.parent / f).rglob("*.py")]
+    names = {str(p.relative_to(DOCS.parent).with_suffix("")) for p in paths}
+    failed: dict[str, doctest.TestResults] = {}
+    for name in sorted(names):
+        dotted = name.replace("/", ".").removesuffix(".__init__")
+        if not dotted.startswith("fieldcal"):
+            dotted = f"fieldcal.{dotted}"
+        if not dotted.endswith("__main__"):
+            result = doctest.testmod(import_module(dotted))
+            failed |= {dotted: result} if result.failed else {}
+    assert not failed
+
+
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the site's drawings are made."""

@@ -98,7 +98,7 @@ def _rms(names: list[str], rms: float) -> str:
 def format_probability(probability: float) -> str:
     """A probability, without more digits than are worth saying.
 
-    >>> sure(0.873), sure(0.9996)
+    >>> format_probability(0.873), format_probability(0.9996)
     ('0.87', 'above 0.99')
     """
     return "above 0.99" if probability > 0.99 else f"{probability:.2f}"

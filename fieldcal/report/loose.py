@@ -30,7 +30,8 @@ def objects_at(document: Json, key: str) -> list[Json]:
 def group_alike(rows: Sequence[Json], but: str) -> list[tuple[list[str], Json]]:
     """Objects that differ in one key only, together: all its values, and the first.
 
-    >>> alike([{"at": 1, "of": "x"}, {"at": 1, "of": "y"}, {"at": 2, "of": "x"}], "of")
+    >>> rows = [{"at": 1, "of": "x"}, {"at": 1, "of": "y"}, {"at": 2, "of": "x"}]
+    >>> group_alike(rows, "of")
     [(['x', 'y'], {'at': 1, 'of': 'x'}), (['x'], {'at': 2, 'of': 'x'})]
     """
     found: dict[str, tuple[list[str], Json]] = {}
@@ -55,7 +56,7 @@ def real(value: object) -> float:
 def format_number(value: object, form: str) -> str:
     """A number as a text; a dash where there is none.
 
-    >>> shown(0.5, "{:.2f}"), shown(None, "{:.2f}")
+    >>> format_number(0.5, "{:.2f}"), format_number(None, "{:.2f}")
     ('0.50', '–')
     """
     number = real(value)

@@ -150,7 +150,7 @@ def mark_line(mark: Mapping[str, Any]) -> str:
     r"""Return a mark as a line of marks.jsonl, with its checksum.
 
     >>> mark_line({"event": "told"})
-    '{"event": "told", "crc32": "1a049d94"}\\n'
+    '{"event": "told", "crc32": "1a049d94"}\n'
     """
     text = json.dumps(mark)
     return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'

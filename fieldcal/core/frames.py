@@ -49,7 +49,8 @@ def in_turned_axes(alpha: Array, beta: Array, vector: Array) -> Array:
 
     As `turn` times the vector, where only that is wanted.
 
-    >>> np.round(seen_after(np.zeros(1), np.array([np.pi / 2]), [0, -1, 0]), 12) + 0.0
+    >>> beta = np.array([np.pi / 2])
+    >>> np.round(in_turned_axes(np.zeros(1), beta, [0, -1, 0]), 12) + 0.0
     array([[0., 0., 1.]])
     """
     x, y, z = vector

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from threading import Condition, Thread
 from typing import NamedTuple, Protocol
 
-from fieldcal.core.errors import DeviceError
+from fieldcal.core.errors import DeviceError, LinkLost
 from fieldcal.drivers.driver import host_clock
 
 BATCH = 0.02
@@ -95,7 +95,7 @@ class Reader:
             if not chunks and self._closing:
                 raise DeviceError(f"{self._name} was closed: open it again")
             if not chunks and self._fault:
-                raise DeviceError(self._gone()) from self._fault
+                raise LinkLost(self._gone()) from self._fault
         return chunks
 
     def close(self) -> None:
@@ -119,7 +119,7 @@ class Reader:
 
     def _gone(self) -> str:
         back = f" and was not back in {self._patience:g} s" if self._patience else ""
-        return f"{self._name} hung up{back}: check cable and power, then start again"
+        return f"{self._name} hung up{back}: check cable and power"
 
     def _run(self) -> None:
         broken = False

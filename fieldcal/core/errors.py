@@ -55,6 +55,20 @@ class DeviceSilent(DeviceError):
     """No sample came in time."""
 
 
+class LinkLost(DeviceError):
+    """The link was there and is gone.
+
+    Attributes
+    ----------
+    fault : what happened and what to check, without what a caller may do next
+
+    """
+
+    def __init__(self, fault: str) -> None:
+        super().__init__(f"{fault}, then start again")
+        self.fault = fault
+
+
 class MoverFailed(DeviceError):
     """The mover failed to turn the device."""
 

@@ -19,6 +19,7 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import (
     DeviceError,
     FieldcalError,
+    LinkLost,
     MoverFailed,
     SessionError,
     Skipped,
@@ -140,7 +141,7 @@ class SessionRun:
         self._recorder.mark("lost", text=str(lost))
         left = deadline - monotonic()
         if left > 0:
-            said = str(lost).removesuffix(", then start again")
+            said = lost.fault if isinstance(lost, LinkLost) else str(lost)
             self._operator.tell(
                 f"{said}; goes on by itself once it is back, within {left:.0f} s"
             )

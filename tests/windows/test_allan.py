@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
@@ -130,6 +131,17 @@ def test_the_interval_holds_as_often_as_it_says() -> None:
         truth = np.repeat([0.05, 0.002], 3) / np.sqrt(RATE * found.tau[i])
         inside += list((found.low[i] < truth) & (truth < found.high[i]))
     assert 0.5 < np.mean(inside) < 0.85
+
+
+def test_the_interval_is_that_of_chi_squared_with_as_many_degrees_of_freedom() -> None:
+    """White noise: Riley 2008, NIST SP 1065, table 5."""
+    found = allan_deviation(still(100))
+    n, m = 100 * RATE, np.round(found.tau * RATE)
+    freedom = (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)
+    for bound, share in ((found.low, 0.8413), (found.high, 0.1587)):
+        expected = np.sqrt(freedom / chi2.ppf(share, freedom))
+        ratio = bound[:, 0] / found.deviation[:, 0]
+        np.testing.assert_allclose(ratio[:-3] - 1, expected[:-3] - 1, rtol=0.12)
 
 
 def made(deviation: list[float], rounding: float = 0.0) -> AllanDeviation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import itertools
 import json
 from pathlib import Path
 
@@ -215,6 +216,60 @@ def test_a_push_cuts_a_rest_in_two() -> None:
     assert second == pytest.approx(30.3, abs=0.8)
 
 
+def asking(block: Block, shortest: float) -> tuple[list[tuple[float, float]], int]:
+    """Stretches, and how often the samples themselves were asked for."""
+    cells, asked = Cells(), []
+    cells.add(block)
+
+    def between(start: float, end: float) -> list[Block]:
+        asked.append((start, end))
+        part = block.between(start, end)
+        return [part[:0], part[:7], part[7:7], part[7:], part[:0]]
+
+    rows = stretches.summary(cells.table)
+    found = stretches.still_stretches_of_file(
+        rows, cells.table.origin, between, shortest
+    )
+    assert all(start <= end for start, end in asked)
+    return found, len(asked)
+
+
+def test_where_sums_are_clear_no_samples_are_asked_for() -> None:
+    rng = np.random.default_rng(7)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (2000, 3))
+    block = Block.of(np.arange(2000) / 100, acc)
+    ((start, end),), asked = asking(block, 2.0)
+    assert asked == 0 and end - start > 18
+    assert start in block.t and np.nextafter(end, 0.0) in block.t
+    # of samples that do not lie on the edges of cells it is
+    shifted = np.concatenate([[0.0], 0.004 + np.arange(1, 2000) / 100])
+    ((first, last),), asked = asking(Block.of(shifted, acc), 2.0)
+    assert asked == 1 and last - first == pytest.approx(end - start, abs=0.11)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pushes_that_a_second_does_not_show_cut_a_rest(seed: int) -> None:
+    """Each is three times the noise of a cell, for three seconds."""
+    rng = np.random.default_rng(seed)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (6000, 3))
+    for at in (1500, 4000):
+        acc[at : at + 300, 1] += 0.035
+    block = Block.of(np.arange(6000) / 100, acc)
+    found, asked = asking(block, 2.0)
+    assert asked >= 5
+    for start, end in found:
+        inside = block.between(start, end)
+        assert average(inside).n == len(inside)
+        assert inside.t[0] == start and inside.t[-1] == np.nextafter(end, 0.0)
+    rests = [(0.0, 15.0), (18.0, 40.0), (43.0, 60.0)]
+    for start, end in rests:
+        covered = sum(max(0.0, min(b, end) - max(a, start)) for a, b in found)
+        assert covered > 0.7 * (end - start)
+    assert all(a < b for (_, a), (b, _) in itertools.pairwise(found))
+    # parts that are shorter than what is asked for are left out
+    assert asking(block, 16.0)[0] == [s for s in found if s[1] - s[0] >= 16.0]
+
+
 def test_even_rotations_are_not_rests() -> None:
     """A rate table that turns evenly is as quiet as one that rests."""
     rng = np.random.default_rng(4)
@@ -249,11 +304,13 @@ def test_stretches_begin_at_a_sample_and_end_behind_one(long: Block) -> None:
 
 def test_fewer_than_two_seconds_are_no_recording() -> None:
     rng = np.random.default_rng(6)
-    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (300, 3))
-    block = Block.of(np.arange(300) / 100, acc)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (360, 3))
+    block = Block.of(np.arange(360) / 100, acc)
     assert still_stretches(block[:190], 1.0) == []
     ((start, end),) = still_stretches(block[:250], 1.0)
     assert start < 0.6 and end > 1.8
+    # two seconds unless something else is asked for; half a second is lost at the ends
+    assert len(still_stretches(block)) == len(still_stretches(block, 3.0)) + 1
 
 
 def test_a_device_of_which_nothing_ever_varies_is_at_rest_or_stuck() -> None:

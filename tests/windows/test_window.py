@@ -368,6 +368,12 @@ def test_jumps_that_the_device_announces_are_no_motion() -> None:
     assert filled(block).moved
     assert filled(block, grain=Grain(0.1, 0.1)).moved is None
     assert average(block, grain=Grain(0.1, 0.1)).n == 3000
+    # of what is cut toward zero, a jump across zero is twice as wide
+    block.acc[1500:1530, 0] += 0.1
+    assert filled(block, grain=Grain(0.1, 0.1)).moved
+    assert filled(block, grain=Grain(0.1, 0.1, cut=True)).moved is None
+    block.acc[:, 0] += 5.0
+    assert filled(block, grain=Grain(0.1, 0.1, cut=True)).moved
 
 
 def test_what_a_window_taught_is_the_noise_and_its_shape() -> None:

@@ -226,6 +226,15 @@ def test_a_step_that_shows_late_is_found() -> None:
 
 def test_a_minute_is_enough_and_a_second_no_gap() -> None:
     block = still(60.04)
+    assert block[:3001].t[-1] == 60.0
+    assert allan_deviation(block[:3001]).tau[-1] == pytest.approx(15.0, rel=0.02)
+    for shift in (-100.0, 100.0):
+        later = Block.of(block.t[:-2] + shift, block.acc[:-2])
+        with pytest.raises(InputError, match="too short"):
+            allan_deviation(later[:-1])
+        assert allan_deviation(Block.of(block.t + shift, block.acc)).tau[
+            0
+        ] == pytest.approx(0.1)
     assert allan_deviation(block).tau[-1] == pytest.approx(15.0, rel=0.02)
     late = Block.of(block.t + np.where(block.t > 30, 0.98, 0.0), block.acc)
     assert allan_deviation(late).tau[-1] == pytest.approx(15.0, rel=0.05)

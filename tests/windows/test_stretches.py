@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldcal.core.samples import Block, concat
+from fieldcal.core.samples import Array, Block, concat
 from fieldcal.session.folder import Session
 from fieldcal.windows import average, still_stretches, stretches
 from fieldcal.windows.cells import Cells
@@ -270,19 +270,151 @@ def test_pushes_that_a_second_does_not_show_cut_a_rest(seed: int) -> None:
     assert asking(block, 16.0)[0] == [s for s in found if s[1] - s[0] >= 16.0]
 
 
-def test_even_rotations_are_not_rests() -> None:
+@pytest.mark.parametrize("axis", range(3))
+def test_even_rotations_are_not_rests(axis: int) -> None:
     """A rate table that turns evenly is as quiet as one that rests."""
     rng = np.random.default_rng(4)
     n = 6000
-    rate = np.where(np.arange(n) % 2000 >= 1200, 0.5, 0.0)
+    rate = np.where(np.arange(n) % 2000 < 800, 0.5, 0.0)
     acc = [0, 0, 9.81] + rng.normal(0, 0.03, (n, 3))
     gyr = rng.normal(0, 0.002, (n, 3)) + 0.3
-    gyr[:, 2] -= rate
+    gyr[:, axis] -= rate
     found = still_stretches(Block.of(np.arange(n) / 100, acc, gyr))
     assert len(found) == 3
     for k, (start, end) in enumerate(found):
-        assert start == pytest.approx(20 * k, abs=0.8)
-        assert end == pytest.approx(20 * k + 12, abs=0.8)
+        assert start == pytest.approx(20 * k + 8, abs=0.8)
+        assert end == pytest.approx(20 * k + 20, abs=0.8)
+
+
+def test_what_only_the_gyroscopes_tell_is_no_rest() -> None:
+    rng = np.random.default_rng(8)
+    n = 6000
+    acc = [0, 0, 9.81] + rng.normal(0, 0.3, (n, 3))
+    gyr = rng.normal(0, 1e-4, (n, 3))
+    turning = np.arange(n) % 2000 < 800
+    gyr[:, 2] += np.where(turning, 0.01 * np.sin(np.arange(n) / 30), 0.0)
+    found = still_stretches(Block.of(np.arange(n) / 100, acc, gyr))
+    assert len(found) == 3
+    for k, (start, end) in enumerate(found):
+        assert start == pytest.approx(20 * k + 8, abs=0.8)
+        assert end == pytest.approx(20 * k + 20, abs=0.8)
+
+
+def test_half_a_second_is_left_at_each_end() -> None:
+    rng = np.random.default_rng(7)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (2000, 3))
+    block = Block.of(np.arange(2000) / 100, acc)
+    assert still_stretches(block) == [(0.5, np.nextafter(19.49, 20.0))]
+    shifted = np.concatenate([[0.0], 0.004 + np.arange(1, 2000) / 100])
+    ((start, end),) = still_stretches(Block.of(shifted, acc))
+    assert (start, end) == (shifted[50], np.nextafter(shifted[1949], 20.0))
+
+
+def test_rests_whose_samples_are_asked_for_are_all_found() -> None:
+    block, rests = recording(9)
+    shifted = np.concatenate([[0.0], 0.004 + block.t[1:]])
+    late = Block.of(shifted, block.acc, block.gyr)
+    found = still_stretches(late, 3.0)
+    assert len(found) == len(rests) == 5
+    np.testing.assert_allclose(found, still_stretches(block, 3.0), atol=0.15)
+
+
+def rows_of(seed: int, m: int = 150) -> Array:
+    """Rows of `summary`, in some of which values are few or missing."""
+    rng = np.random.default_rng(seed)
+    rows = np.zeros((m, 35))
+    rows[:, 0] = np.arange(m) / 10
+    counts = rng.choice([10.0, 10.0, 10.0, 5.0, 4.0, 0.0], (m, 6)) * np.arange(1, 7)
+    rows[:, 1:7], rows[:, 7:13] = counts, counts * rng.normal(size=(m, 6))
+    return rows
+
+
+@pytest.mark.parametrize("m", [10, 11, 25, 26, 150])
+def test_spans_are_spreads_and_means_of_a_second(
+    monkeypatch: pytest.MonkeyPatch, m: int
+) -> None:
+    monkeypatch.setattr(stretches, "_PART", 16)
+    rows, usual = rows_of(m, m), 10.0 * np.arange(1, 7)
+    last, means = np.zeros(6), []
+    for row in rows:
+        mean = row[7:13] / np.maximum(row[1:7], 1.0)
+        last = np.where(row[1:7] >= usual / 2, mean, last)
+        means.append(last)
+    parts = list(stretches._spans(rows, usual))
+    assert [first for first, _, _ in parts] == list(range(0, m - 9, 16))
+    spread, level = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    assert len(spread) == len(level) == m - 9
+    for i in range(m - 9):
+        np.testing.assert_allclose(spread[i], np.std(means[i : i + 10], axis=0))
+        np.testing.assert_allclose(level[i], np.mean(means[i : i + 10], axis=0))
+
+
+@pytest.mark.parametrize("sample", [40, 1 << 15])
+def test_what_is_usual_is_the_median_of_evenly_spread_cells(
+    monkeypatch: pytest.MonkeyPatch, sample: int
+) -> None:
+    monkeypatch.setattr(stretches, "_PART", 17)
+    monkeypatch.setattr(stretches, "_SAMPLE", sample)
+    rows = rows_of(3)
+    rows[:, 1:7] = np.arange(150)[:, None] ** 2 * np.arange(1, 7)
+    every = 4 if sample == 40 else 1
+    expected = np.median(rows[::every, 1:7], axis=0)
+    np.testing.assert_array_equal(stretches._usual(rows), expected)
+
+
+def test_the_valley_leaves_the_least_variance_on_both_sides() -> None:
+    """Otsu 1979: by trying all thresholds."""
+    rng = np.random.default_rng(10)
+    for few, apart in ((30, 3.0), (200, 1.5), (400, 2.0)):
+        logs = np.sort(np.r_[rng.normal(0, 0.4, 300), rng.normal(apart, 0.3, few)])
+        within = [
+            k * logs[:k].var() + (len(logs) - k) * logs[k:].var()
+            for k in range(1, len(logs))
+        ]
+        k = 1 + int(np.argmin(within))
+        expected = np.exp((logs[:k].mean() + logs[k:].mean()) / 2)
+        shuffled = np.exp(rng.permutation(logs))
+        assert stretches._valley(shuffled) == pytest.approx(expected)
+    assert np.isfinite(stretches._valley(np.array([0.0, 1.0, 1.0, 2.0])))
+
+
+def test_a_weighted_median_counts_each_value_so_many_times() -> None:
+    rng = np.random.default_rng(11)
+    for n in (1, 2, 9, 10):
+        values, weights = rng.normal(size=(n, 3)), rng.integers(1, 30, n)
+        every = np.sort(np.repeat(values, weights, axis=0), axis=0)
+        lower = every[(len(every) - 1) // 2]
+        found = stretches._weighted_median(values, weights)
+        np.testing.assert_array_equal(found, lower)
+
+
+@pytest.mark.parametrize("longest", [7, 36_000])
+def test_calm_runs_go_on_from_part_to_part_up_to_the_longest(
+    monkeypatch: pytest.MonkeyPatch, longest: int
+) -> None:
+    monkeypatch.setattr(stretches, "_LONGEST", longest)
+    rng = np.random.default_rng(12)
+    spread, level = rng.random((400, 6)) ** 8, rng.random((400, 6))
+    bound = np.full(6, 0.6)
+    parts = [(k, spread[k : k + 5], level[k : k + 5]) for k in range(0, 400, 5)]
+    calm = (spread < bound).all(axis=1)
+    found = list(stretches._calm(parts, bound))
+    covered = np.zeros(400, dtype=bool)
+    for first, s, x in found:
+        rows = slice(first, first + len(s))
+        assert len(s) <= longest and not covered[rows].any()
+        covered[rows] = True
+        np.testing.assert_array_equal(s, spread[rows])
+        np.testing.assert_array_equal(x, level[rows])
+    np.testing.assert_array_equal(covered, calm)
+    ends = np.flatnonzero(np.diff(calm.astype(int), prepend=0, append=0))
+    if longest > 400:
+        assert [first for first, _, _ in found] == ends[::2].tolist()
+    else:
+        # what a part adds is taken whole or begins a run of its own
+        for (first, s, _), (then, t, _) in itertools.pairwise(found):
+            if first + len(s) == then:
+                assert len(s) + min(len(t), 5 - then % 5) > longest
 
 
 def test_a_rest_of_hours_is_several_stretches(monkeypatch: pytest.MonkeyPatch) -> None:

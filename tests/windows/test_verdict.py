@@ -82,6 +82,8 @@ def test_a_drift_is_told_by_its_change_over_the_window() -> None:
     # a change is allowed for by the limit and by what the noise can pretend
     cells = table(block_of(x, start=100.0))
     longest = quiet(cells.means).allan[-1, 1]
+    laid = line(cells.means)[:, 1]
+    assert worst.size == pytest.approx(laid[-1] - laid[0], rel=1e-9)
     assert worst.noise == pytest.approx(longest)
     assert worst.ratio == pytest.approx(worst.size / (0.1 + 5.8 * longest))
 

@@ -81,6 +81,8 @@ def test_the_whole_of_a_table_is_that_of_its_samples() -> None:
         samples.t[-1],
     )
     np.testing.assert_allclose(table.mean, np.nanmean(six, axis=0))
+    first = np.isfinite(six).argmax(axis=0)
+    np.testing.assert_array_equal(table.origin, six[first, np.arange(6)])
     noise = np.sqrt(np.nanmean(np.diff(six, axis=0) ** 2, axis=0) / 2)
     np.testing.assert_allclose(table.noise, noise)
     assert table.temperature == pytest.approx(np.nanmean(samples.temperature))

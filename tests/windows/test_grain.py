@@ -81,7 +81,7 @@ def stated(mean: float, noise: float, grain: Grain = CUT) -> Array:
     """What is stated beside the rounding, in steps squared."""
     sampled = np.sqrt(noise**2 + 1 / 12) * STEP
     rounded = np.maximum(of_mean(STEP, sampled), of_few(STEP, sampled))
-    found = variance(grain, mean * STEP, sampled, STEP)
+    found = variance(grain, mean * STEP, sampled, 3 * STEP)
     return np.asarray((found - rounded) / STEP**2)
 
 

@@ -7,6 +7,7 @@ FieldcalError                2
 |    +-- NotObservable       2  the positions cannot determine what was asked for
 +-- DeviceError              3  the link to the device failed
 |    +-- DeviceSilent        3  no sample came in time
+|    +-- LinkLost            3  the link broke during a run
 |    +-- MoverFailed         3  what turns the device did not do so
 +-- Moved                    1  the device was not still during a window
 +-- WrongPosition            1  the device is not where the procedure needs it

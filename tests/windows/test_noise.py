@@ -116,9 +116,10 @@ def test_the_line_under_a_walk_goes_through_the_two_longest_levels() -> None:
     expected = np.sqrt(short - slope * 25**2)
     assert noise_of([x], RATE).white[0] == pytest.approx(expected, rel=1e-9)
     # three levels are the fewest that show whether they obey it
-    (long, _), (short, _) = (slow([x[:, 0]], m) for m in (60, 15))
-    expected = np.sqrt(short - (long - short) / (60**2 - 15**2) * 15**2)
-    assert noise_of([x], 60.0).white[0] == pytest.approx(expected, rel=1e-9)
+    x += 0.3 * walk(80_000, 1, 10)
+    (long, _), (short, _) = (slow([x[:, 0]], m) for m in (16, 4))
+    expected = np.sqrt(short - (long - short) / (16**2 - 4**2) * 4**2)
+    assert noise_of([x], 16.0).white[0] == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize(

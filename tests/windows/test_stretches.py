@@ -286,6 +286,15 @@ def test_even_rotations_are_not_rests(axis: int) -> None:
         assert end == pytest.approx(20 * k + 20, abs=0.8)
 
 
+def test_the_longer_of_rest_and_rotation_is_rest_whichever_comes_last() -> None:
+    rng = np.random.default_rng(4)
+    acc = [0, 0, 9.81] + rng.normal(0, 0.03, (5000, 3))
+    gyr = rng.normal(0, 0.002, (5000, 3))
+    gyr[3000:, 2] += 0.5
+    ((start, end),) = still_stretches(Block.of(np.arange(5000) / 100, acc, gyr))
+    assert start < 1.0 and end == pytest.approx(30.0, abs=0.8)
+
+
 def test_what_only_the_gyroscopes_tell_is_no_rest() -> None:
     rng = np.random.default_rng(8)
     n = 6000

@@ -1,14 +1,16 @@
 """The command line: one command a module in `commands`, loaded when it is called.
 
 Exit codes: 0 good, 1 the calibration or the verdict is bad, 2 wrong usage or input,
-3 the device failed, 130 interrupted. What a command has to say goes to standard output,
-with --json exactly one JSON object; messages go to standard error.
+3 the device failed, 70 fieldcal itself broke, 130 interrupted. What a command has to
+say goes to standard output, with --json exactly one JSON object; messages go to
+standard error.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -25,10 +27,13 @@ exit codes:
   1    the calibration or the verdict is bad
   2    wrong usage or input
   3    the device failed
+  70   fieldcal itself broke; a file to send in is named
   130  interrupted
 """
 
 INTERRUPTED = 130
+BROKEN = 70
+"""What sysexits.h calls EX_SOFTWARE: no verdict and no wrong input ends with it."""
 
 
 class CommandModule(Protocol):
@@ -98,3 +103,29 @@ def _guarded(name: str, arguments: list[str]) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
+    except Exception as error:  # the operator gets a sentence whatever it is
+        sys.stderr.write(f"fieldcal {name}: {_broken(name, arguments, error)}\n")
+        return BROKEN
+
+
+def _broken(name: str, arguments: list[str], error: Exception) -> str:
+    """Write down an error that nobody foresaw, and say where."""
+    import platform
+    import tempfile
+    import traceback
+
+    from fieldcal.core.version import __version__
+
+    text = (
+        f"fieldcal {__version__}, Python {platform.python_version()},"
+        f" {platform.platform()}\nfieldcal {shlex.join([name, *arguments])}\n\n"
+        + "".join(traceback.format_exception(error))
+    )
+    said = f"broke on {type(error).__name__}, a fault of its own and no verdict"
+    try:
+        handle, path = tempfile.mkstemp(prefix="fieldcal-broke-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+    except OSError:
+        return f"{said}: send in what follows\n{text.rstrip()}"
+    return f"{said}: send in {path}, which says where, and the recording if you may"

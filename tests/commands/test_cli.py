@@ -127,3 +127,33 @@ def test_a_wrong_plan_is_refused_before_anything_moves(
     said = capsys.readouterr().err
     assert says in said and one_sentence(said)
     assert not folder.exists()
+
+
+@pytest.mark.parametrize("error", [MemoryError(), ValueError("odd"), KeyError("x")])
+def test_what_nobody_foresaw_is_no_verdict(
+    error: Exception,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def breaks(_: object) -> int:
+        raise error
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("fieldcal.commands.verify.run", breaks)
+    assert main(["verify", "some folder"]) == 70
+    said = capsys.readouterr()
+    (kept,) = tmp_path.glob("*.txt")
+    assert not said.out and said.err.count("\n") == 1
+    assert str(kept) in said.err and type(error).__name__ in said.err
+    text = kept.read_text()
+    assert "verify 'some folder'" in text and "in breaks" in text
+
+
+def test_where_no_file_can_be_written_the_place_is_said_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "nowhere"))
+    monkeypatch.setattr("fieldcal.commands.verify.run", lambda _: 1 // 0)
+    assert main(["verify", "x"]) == 70
+    assert "Traceback" in capsys.readouterr().err

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import time
@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import Array, Block
+from fieldcal.importing.clock import ClockStep, SteadyClock
 from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.spool import SpooledRows
@@ -26,6 +27,26 @@ from fieldcal.windows.stretches import still_stretches_of_file, summary
 LONG = 5.0
 """Mean periods without a sample that are a gap."""
 
+PAUSE = 1.0
+"""Shortest gap that is a pause of the recording, s: in others samples came late."""
+
+
+def mean_period(t: Array) -> float:
+    """Mean distance of times (n,) between pauses, s; nan of one.
+
+    What a pause is depends on the period, so the longest are left out until none is.
+
+    >>> mean_period(np.array([0.0, 0.02, 0.04, 300.0, 300.02, 300.04])).__round__(9)
+    0.02
+    """
+    steps = np.diff(t)
+    while len(steps):
+        period = float(steps.mean())
+        if not (long := steps > max(LONG * period, PAUSE)).any():
+            return period
+        steps = steps[~long]
+    return float("nan")
+
 
 @dataclass(slots=True)
 class StreamFacts:
@@ -36,6 +57,7 @@ class StreamFacts:
     rows : samples that were taken
     start_s, end_s : first and last time
     gaps, longest_gap_s : times that no sample came for `LONG` mean periods
+    pauses, paused_s : those of them that last `PAUSE`, and the duration of all these
     coldest, warmest : deg C, None where there is no temperature
     left_out : rows that were left out, where that was asked for
 
@@ -46,6 +68,8 @@ class StreamFacts:
     end_s: float = float("nan")
     gaps: int = 0
     longest_gap_s: float = 0.0
+    pauses: int = 0
+    paused_s: float = 0.0
     coldest: float | None = None
     warmest: float | None = None
     left_out: int = 0
@@ -55,14 +79,16 @@ class StreamFacts:
         """Take in the block that follows."""
         if not self.rows:
             self.start_s = float(block.t[0])
-            if len(block) > 1:
-                self._period = float((block.t[-1] - block.t[0]) / (len(block) - 1))
+            self._period = mean_period(block.t)
         pause = float(block.t[0]) - self.end_s if self.rows else 0.0
         steps = block.t[1:] - block.t[:-1]
         for gaps in (np.array([pause]), steps):
-            many = np.count_nonzero(gaps > LONG * self._period)
-            self.gaps += int(many)
-            if many:
+            long = gaps[gaps > LONG * self._period]
+            self.gaps += len(long)
+            paused = long[long >= PAUSE]
+            self.pauses += len(paused)
+            self.paused_s += float(paused.sum())
+            if len(long):
                 self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
         self.rows += len(block)
         self.end_s = float(block.t[-1])
@@ -74,9 +100,10 @@ class StreamFacts:
 
     @property
     def rate_hz(self) -> float:
-        """Mean rate, Hz; nan of one sample."""
-        span = self.end_s - self.start_s
-        return (self.rows - 1) / span if span > 0 else float("nan")
+        """Mean rate between the pauses, Hz; nan where no sample follows another."""
+        steps = self.rows - 1 - self.pauses
+        span = self.end_s - self.start_s - self.paused_s
+        return steps / span if steps > 0 and span > 0 else float("nan")
 
     def sentence(self) -> str:
         """Say it in a line."""
@@ -181,9 +208,9 @@ def _fill(
     import tomlkit
 
     judge = RowValidator(str(recording.path), recording.place, recording.repair)
-    facts, cells = StreamFacts(), Cells()
+    facts, cells, clock = StreamFacts(), Cells(), SteadyClock()
     with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
-        for block in recording.blocks(stream):
+        for block in _steadied(clock, recording.blocks(stream)):
             good = judge.good(block)
             if len(good):
                 facts.add(good)
@@ -199,14 +226,29 @@ def _fill(
         stretches = still_stretches_of_file(rows, rest.origin, written.between, still)
     repairs = [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
-    text = tomlkit.dumps({**about, "position": positions})
+    # an empty list would be in the way of the tables that the user adds
+    tables = {"position": positions} if positions else {}
+    text = tomlkit.dumps({**about, **tables})
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
-    (part / MARKS).write_text(_marks(recording, stream, facts, repairs), "utf-8")
+    recording.says += [step.sentence() for step in clock.steps]
+    marks = _marks(recording, stream, facts, repairs, clock.steps)
+    (part / MARKS).write_text(marks, "utf-8")
     return facts, stretches, [*repairs, *recording.says]
 
 
+def _steadied(clock: SteadyClock, blocks: Iterable[Block]) -> Iterator[Block]:
+    """Blocks without the steps of the device's clock."""
+    for block in blocks:
+        yield clock.add(block)
+    yield clock.rest()
+
+
 def _marks(
-    recording: Recording, stream: str, facts: StreamFacts, repairs: list[str]
+    recording: Recording,
+    stream: str,
+    facts: StreamFacts,
+    repairs: list[str],
+    steps: list[ClockStep],
 ) -> str:
     """What is kept of where the samples come from."""
     parts = recording.parts if isinstance(recording, MergedFiles) else [recording]
@@ -226,4 +268,5 @@ def _marks(
     marks = [imported, {"event": "device", **notes, "host_s": now}]
     if grain is not None:
         marks.append({"event": "grain", **grain, "host_s": now})
+    marks += [{"event": "clock_step", **s._asdict(), "host_s": now} for s in steps]
     return "".join(mark_line(mark) for mark in marks)

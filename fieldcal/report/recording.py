@@ -28,6 +28,7 @@ EVENTS = {
     "wrong": "wrong place",
     "failed": "failed",
     "interrupted": "interrupted",
+    "clock_step": "clock set",
 }
 
 

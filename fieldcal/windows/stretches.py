@@ -5,7 +5,8 @@
 y are cell means. Rest and turns make two heaps of log r; the valley between them (Otsu
 1979) tells one from the other, be the rest on a table or in a hand. Each stretch is
 then held to its own noise, to the level of the gyroscopes at rest, and to the test that
-a window must pass, so that no sample of a turn gets in.
+a window must pass, so that no sample of a turn gets in. What happens during a pause
+of the recording nobody knows: a stretch ends there.
 """
 
 from __future__ import annotations
@@ -40,6 +41,9 @@ _PART = 4096
 
 _SAMPLE = 1 << 15
 """Spans by which the usual is judged: of a longer recording, evenly spread ones."""
+
+_PAUSE = 5.0
+"""Usual distances from one cell to the next that are a pause, if they make a span."""
 
 _RATE = 0.02
 """Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
@@ -143,34 +147,45 @@ def _clear(cells: CellTable, shortest: float) -> tuple[float, float] | None:
     return first, float(np.nextafter(last, np.inf))
 
 
-def _spans(rows: CellRows, usual: Array) -> Iterator[Spans]:
+class _Usual(NamedTuple):
+    """Number of values in a cell, (6,), and the shortest time that is a pause, s."""
+
+    counts: Array
+    pause: float
+
+
+def _spans(rows: CellRows, usual: _Usual) -> Iterator[Spans]:
     """First span of a part, the spread and the mean of each of them, (k, 6).
 
-    `usual` (6,) is the number of values in a cell. The mean of one with few is that of
-    the cell before: unlike `CellTable.steady`, that is true of a device that was turned
-    meanwhile, for no line goes through all of its positions.
+    The mean of a cell with few values is that of the cell before: unlike
+    `CellTable.steady`, that is true of a device that was turned meanwhile, for no line
+    goes through all of its positions. The spread over a pause is infinite.
     """
     before: Array = np.zeros((1, 6))
     for first in range(0, len(rows) - _SPAN + 1, _PART):
         part = rows[first : first + _PART + _SPAN - 1]
         cells = _table(part, np.zeros(6))
         means = hold_last(
-            np.where(cells.counts < usual / 2, np.nan, cells.means), before
+            np.where(cells.counts < usual.counts / 2, np.nan, cells.means), before
         )
         before = means[_PART - 1 : _PART]
         view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
-        yield first, view.std(axis=-1), view.mean(axis=-1)
+        spread = view.std(axis=-1)
+        paused = np.concatenate([[0], np.cumsum(np.diff(cells.times) > usual.pause)])
+        spread[paused[_SPAN - 1 :] > paused[: len(spread)]] = np.inf
+        yield first, spread, view.mean(axis=-1)
 
 
-def _usual(rows: CellRows) -> Array:
-    """Median number of values in a cell, (6,)."""
+def _usual(rows: CellRows) -> _Usual:
+    """What is usual of the cells, by their medians."""
     every = -(-len(rows) // _SAMPLE)
-    counts = [
-        rows[first : first + _PART][-first % every :: every, 1:7].copy()
-        for first in range(0, len(rows), _PART)
-    ]
-    usual: Array = np.median(np.concatenate(counts), axis=0)
-    return usual
+    counts, steps = [], []
+    for first in range(0, len(rows), _PART):
+        part = rows[first : first + _PART]
+        counts.append(part[-first % every :: every, 1:7].copy())
+        steps.append(np.diff(part[:, 0])[-first % every :: every])
+    pause = _PAUSE * max(float(np.median(np.concatenate(steps))), _SPAN * CELL / _PAUSE)
+    return _Usual(np.median(np.concatenate(counts), axis=0), pause)
 
 
 def _at_rest(rows: CellRows, bound: Array) -> list[_Run]:
@@ -188,6 +203,9 @@ def _at_rest(rows: CellRows, bound: Array) -> list[_Run]:
             for first, spread, _ in short or _spans(rows, usual)
         ]
     )
+    some = some[np.isfinite(some).all(axis=1)]
+    if not len(some):
+        return []
     quiet = np.quantile(some, 0.1, axis=0)
     scale = np.where(quiet > 0, quiet, np.inf)
     valley = np.clip(_valley((some / scale).max(axis=1)), _LEAST, _MOST)

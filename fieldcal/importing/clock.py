@@ -88,7 +88,7 @@ class SteadyClock:
     def rest(self) -> Block:
         """Return the rows that were held back: the last, of which nothing follows."""
         held, self._held = self._held, concat([])
-        if len(held) and np.isfinite(self._period):
+        if len(held) and abs(held.t[0] - self._last) > STEP:
             self._step_to(float(held.t[0]))
         return replace(held, t=held.t + self._offset)
 

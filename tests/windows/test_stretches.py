@@ -349,7 +349,7 @@ def test_spans_are_spreads_and_means_of_a_second(
         mean = row[7:13] / np.maximum(row[1:7], 1.0)
         last = np.where(row[1:7] >= usual / 2, mean, last)
         means.append(last)
-    parts = list(stretches._spans(rows, usual))
+    parts = list(stretches._spans(rows, stretches._Usual(usual, np.inf)))
     assert [first for first, _, _ in parts] == list(range(0, m - 9, 16))
     spread, level = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     assert len(spread) == len(level) == m - 9
@@ -368,7 +368,24 @@ def test_what_is_usual_is_the_median_of_evenly_spread_cells(
     rows[:, 1:7] = np.arange(150)[:, None] ** 2 * np.arange(1, 7)
     every = 4 if sample == 40 else 1
     expected = np.median(rows[::every, 1:7], axis=0)
-    np.testing.assert_array_equal(stretches._usual(rows), expected)
+    rows[:, 0] = 0.1 * np.arange(150) + 7.0 * (np.arange(150) >= 75)
+    usual = stretches._usual(rows)
+    np.testing.assert_array_equal(usual.counts, expected)
+    assert usual.pause == pytest.approx(1.0)
+    rows[:, 0] *= 10
+    assert stretches._usual(rows).pause == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("at", [1, 15, 16, 17, 140, 149])
+def test_no_span_goes_over_a_pause(monkeypatch: pytest.MonkeyPatch, at: int) -> None:
+    monkeypatch.setattr(stretches, "_PART", 16)
+    rows = rows_of(4)
+    rows[:, 0] = 0.1 * np.arange(150) + 1.5 * (np.arange(150) >= at)
+    parts = stretches._spans(rows, stretches._usual(rows))
+    spread = np.concatenate([spread for _, spread, _ in parts])
+    over = [i < at <= i + 9 for i in range(141)]
+    np.testing.assert_array_equal(np.isinf(spread).all(axis=1), over)
+    np.testing.assert_array_equal(np.isinf(spread).any(axis=1), over)
 
 
 def test_the_valley_leaves_the_least_variance_on_both_sides() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.core.positions import FIVE, TWO, WIDE, Position
 from fieldcal.core.samples import Array
-from fieldcal.model.planned import parameters, predicted
+from fieldcal.model.causes.planned import parameters, predicted
 from fieldcal.planning.planner import Ladder, best_positions
 from fieldcal.solve import Observations
 from fieldcal.solve import solve as estimate

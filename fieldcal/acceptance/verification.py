@@ -21,7 +21,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.positions import Position, forces
 from fieldcal.core.samples import ACC, Array
-from fieldcal.model.planned import parameters, predicted
+from fieldcal.model.causes.planned import parameters, predicted
 from fieldcal.session.description import Description
 from fieldcal.windows import Average
 

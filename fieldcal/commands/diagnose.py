@@ -82,7 +82,7 @@ def _replayed(
     path: Path, session: Session, explanation: Explanation, found: Diagnosis
 ) -> Rerun:
     """Replay the session on its twin, and write the twin's device file."""
-    from fieldcal.diagnosis.quality import raw
+    from fieldcal.diagnosis.findings.quality import raw
     from fieldcal.session.folder import write_whole
     from fieldcal.sim_device.profile_file import to_toml
     from fieldcal.twin import rerun

@@ -7,9 +7,9 @@ from typing import IO, TYPE_CHECKING
 from fieldcal.calibration.wording import position_numbers
 from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
-from fieldcal.diagnosis.agreement import UNITS
+from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.words import said
+from fieldcal.diagnosis.wording.paragraph import said
 
 if TYPE_CHECKING:
     from fieldcal.twin import Rerun

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating[Any]]
 
+Index = NDArray[np.intp]
+
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 UNITS = ("m/s^2",) * 3 + ("rad/s",) * 3
 ACC, GYR = slice(0, 3), slice(3, 6)

@@ -1,8 +1,9 @@
 """What physics a simulation leaves out of a recording.
 
-Samples are checked (`chain`), cleaned of lines (`spectrum`) and reduced to block means
-(`reduce`); windows and the turns between them are laid to causes of the catalogue by
-one model (`fieldcal.model`, `explain`), and `verdict` puts it together.
+Samples are checked and cleaned of lines (`signal`) and reduced to block means
+(`prepare`); causes of the catalogue explain windows and the turns between them by one
+model (`fieldcal.model`, `explain`). `findings` makes the parts of a diagnosis,
+`wording` the sentences, and `verdict` puts it together.
 """
 
 from fieldcal.diagnosis.result import Diagnosis

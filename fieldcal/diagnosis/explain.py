@@ -10,22 +10,22 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.prepare import Prepared
-from fieldcal.model.dictionary import Dictionary
-from fieldcal.model.dwell import beginnings
-from fieldcal.model.fitted import Fitted
-from fieldcal.model.held_out import HeldOut, in_question
-from fieldcal.model.inference import Inference, Inferred
-from fieldcal.model.noise import grain_of
-from fieldcal.model.posterior import Posterior, Standing
-from fieldcal.model.reduce import Rows, RowSource, rate_of, spans
-from fieldcal.model.reported import reported
-from fieldcal.model.search import Search
-from fieldcal.model.sets import Set
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.wander import Wander
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.held_out import HeldOut, in_question
+from fieldcal.model.posterior.probabilities import Posterior, Standing
+from fieldcal.model.posterior.reported import reported
+from fieldcal.model.rows.noise import grain_of
+from fieldcal.model.rows.reduce import Rows, RowSource, rate_of, spans
+from fieldcal.model.rows.rest_onset import beginnings
+from fieldcal.model.search.inference import Inference, Inferred
+from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system import System
-from fieldcal.model.turn import Turning
-from fieldcal.model.turn_rows import Turns
-from fieldcal.model.wander import Wander
+from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.system.linear_system import System
+from fieldcal.model.system.turn_rows import Turns
+from fieldcal.model.turns.turn import Turning
 from fieldcal.session.description import Description
 
 ROUGH = 0.7

@@ -11,15 +11,15 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, GYR, Block
-from fieldcal.diagnosis.chain import Checked, check, checked_again
-from fieldcal.diagnosis.line import Remains, Tone
-from fieldcal.diagnosis.spectrum import tones, without
+from fieldcal.diagnosis.signal.chain import Checked, check, checked_again
+from fieldcal.diagnosis.signal.line import Remains, Tone
+from fieldcal.diagnosis.signal.spectrum import tones, without
 from fieldcal.effects import catalogue
-from fieldcal.model.dwell import arrivals
-from fieldcal.model.hand import rows_of
-from fieldcal.model.reduce import Rows, RowSource, spans
+from fieldcal.model.rows.hand_tremor import rows_of
+from fieldcal.model.rows.reduce import Rows, RowSource, spans
+from fieldcal.model.rows.rest_onset import arrivals
+from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import Term
-from fieldcal.model.thermometer import Thermometer
 from fieldcal.physics.effect import Chain, Line, Scatter
 from fieldcal.session.description import Description
 

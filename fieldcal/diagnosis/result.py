@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from fieldcal.diagnosis.candidates import Candidate
-    from fieldcal.diagnosis.curves import Curve
+from fieldcal.core.samples import Array
 
 Verdict = Literal["consistent", "left_out", "ambiguous", "unexplained"]
 
@@ -166,6 +165,79 @@ class CalibrationGroup:
                 for c, s in zip(self.change, self.sigma, strict=True)
             ],
             "unit": self.unit,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One explanation that was tried.
+
+    Attributes
+    ----------
+    id : of the effect
+    delta_chi2 : by how much the squares fall with it alone
+    delta_bic : the same less ln(rows) for every parameter
+    held_out_gain : part of the held-out rms that goes with it, where it was chosen
+    probability : that it is there
+    chosen : whether it is among the effects found
+    why : why it lost, in words; empty if it did not
+
+    """
+
+    id: str
+    delta_chi2: float
+    delta_bic: float
+    held_out_gain: float
+    probability: float
+    chosen: bool
+    why: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        return {
+            "id": self.id,
+            "delta_chi2": number(self.delta_chi2),
+            "delta_bic": number(self.delta_bic),
+            "held_out_gain": number(self.held_out_gain),
+            "probability": number(self.probability),
+            "chosen": self.chosen,
+            "why": self.why,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A channel's residual over a covariate.
+
+    Attributes
+    ----------
+    channel : name in `samples.CHANNELS`
+    covariate, unit : what it is drawn over
+    x : (m,) the covariate
+    position : (m,) of session.toml
+    before, after : (m,) residuals, m/s^2 or rad/s
+    sigma : (m,) their standard deviation from white noise
+
+    """
+
+    channel: str
+    covariate: str
+    unit: str
+    x: Array
+    position: NDArray[np.intp]
+    before: Array
+    after: Array
+    sigma: Array
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        columns = ("x", "before", "after", "sigma")
+        return {
+            "channel": self.channel,
+            "covariate": self.covariate,
+            "unit": self.unit,
+            "position": [int(p) for p in self.position],
+            **{n: [number(v) for v in getattr(self, n)] for n in columns},
         }
 
 

@@ -10,15 +10,21 @@ import numpy as np
 from fieldcal.calibration.parameters import Nominal
 from fieldcal.calibration.plausible import senseless
 from fieldcal.core.samples import Block
-from fieldcal.diagnosis import locate, naming
-from fieldcal.diagnosis.advice import advice
-from fieldcal.diagnosis.agreement import UNITS, Agreement
-from fieldcal.diagnosis.candidates import candidates
-from fieldcal.diagnosis.curves import curves
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.naming import Removed
+from fieldcal.diagnosis.findings import found_effects, mismatches
+from fieldcal.diagnosis.findings.agreement import UNITS, Agreement
+from fieldcal.diagnosis.findings.candidates import candidates
+from fieldcal.diagnosis.findings.curves import curves
+from fieldcal.diagnosis.findings.found_effects import Removed
+from fieldcal.diagnosis.findings.quality import (
+    OF_TURNS,
+    after,
+    before,
+    in_turns,
+    parted,
+)
+from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, unknown
 from fieldcal.diagnosis.prepare import prepare
-from fieldcal.diagnosis.quality import OF_TURNS, after, before, in_turns, parted
 from fieldcal.diagnosis.result import (
     CalibrationGroup,
     Diagnosis,
@@ -27,14 +33,14 @@ from fieldcal.diagnosis.result import (
     Quality,
     Verdict,
 )
-from fieldcal.diagnosis.unknown import Unknown, unknown
-from fieldcal.diagnosis.words import notes, paragraph
+from fieldcal.diagnosis.wording.advice import advice
+from fieldcal.diagnosis.wording.paragraph import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.posterior import Standing
-from fieldcal.model.reduce import spans
-from fieldcal.model.reported import reported
-from fieldcal.model.sets import Set
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.probabilities import Standing
+from fieldcal.model.posterior.reported import reported
+from fieldcal.model.rows.reduce import spans
 from fieldcal.session.description import Description
 
 GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}
@@ -63,7 +69,7 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
 def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     """What follows from an explanation of the samples of a block."""
     standing = explanation.standing
-    lost = {s.name: naming.removed(explanation, s) for s in standing}
+    lost = {s.name: found_effects.removed(explanation, s) for s in standing}
     first, then = before(block, explanation), after(explanation)
     effects = _effects(explanation, lost, then)
     strange = _strange(explanation, lost)
@@ -108,7 +114,7 @@ def _quality(
     """Before, after and the unit: of the windows, or of the turns if only they part."""
     prepared = explanation.prepared
     of_samples = prepared.tones or prepared.checked.ids
-    if lost and not of_samples and all(map(naming.in_turns, lost.values())):
+    if lost and not of_samples and all(map(found_effects.in_turns, lost.values())):
         if explanation.inferred.turned:
             return *in_turns(explanation), OF_TURNS
     triad = parted(first, then)
@@ -119,12 +125,12 @@ def _effects(
     explanation: Explanation, lost: Mapping[str, Removed], then: Agreement
 ) -> list[FoundEffect]:
     prepared = explanation.prepared
-    found = list(naming.of_samples(prepared.checked.faults))
+    found = list(found_effects.of_samples(prepared.checked.faults))
     for tone, left in zip(prepared.tones, prepared.remains, strict=True):
-        found.append(naming.of_tone(tone, left.gain(tone.clear)))
+        found.append(found_effects.of_tone(tone, left.gain(tone.clear)))
     for one in explanation.standing:
         if one.name in catalogue():
-            found.append(naming.of_rows(explanation, one, lost[one.name], then))
+            found.append(found_effects.of_rows(explanation, one, lost[one.name], then))
     if explanation.sees_earth:
         evidence = {"delta_chi2": 2 * explanation.earth}
         found.append(FoundEffect("earth_rate", {}, evidence=evidence))
@@ -136,7 +142,7 @@ def _strange(explanation: Explanation, lost: Mapping[str, Removed]) -> list[Unkn
     out = []
     for one in explanation.standing:
         if one.name not in catalogue():
-            places = list(locate.of_unknown(explanation, one, lost[one.name]))
+            places = list(mismatches.of_unknown(explanation, one, lost[one.name]))
             out += unknown(explanation, one, places)
     return out
 
@@ -195,11 +201,11 @@ def _mismatch(
 ) -> list[Mismatch]:
     prepared = explanation.prepared
     windows = spans(block, prepared.source.about)
-    out = list(locate.of_faults(block.t, windows, prepared.checked.faults))
-    out += locate.of_tones(explanation)
+    out = list(mismatches.of_faults(block.t, windows, prepared.checked.faults))
+    out += mismatches.of_tones(explanation)
     for one in explanation.standing:
         if one.name in catalogue():
-            out += locate.of_cause(explanation, one, lost[one.name])
+            out += mismatches.of_cause(explanation, one, lost[one.name])
     out += [u.mismatch for u in strange]
     return sorted(out, key=lambda m: -m.sigma)
 
@@ -256,7 +262,7 @@ def _open(explanation: Explanation) -> list[str]:
         effect = catalogue().get(one.name)
         if effect is None:
             continue
-        told = naming.parameters(explanation, one)
+        told = found_effects.parameters(explanation, one)
         for _, group in one.members:
             names = [effect.params[j].name for j in group.params]
             out += [f"{one.name}.{n}" for n in names if n not in told]
@@ -298,5 +304,5 @@ def _spare(explanation: Explanation, first: int) -> int:
     for one in explanation.best.linear:
         if first <= one.channel < first + 3:
             reach[one.columns] |= np.abs(one.design).max(axis=0) > 0
-    narrowed = np.diag(found.inverse) < naming.DETERMINED * found.sizes**2
+    narrowed = np.diag(found.inverse) < found_effects.DETERMINED * found.sizes**2
     return int(sum(held) - turns - (reach[found.columns] & narrowed).sum())

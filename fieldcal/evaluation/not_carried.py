@@ -19,14 +19,14 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import CHANNELS
-from fieldcal.diagnosis.chain import check
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.naming import sizes
+from fieldcal.diagnosis.findings.found_effects import sizes
 from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.diagnosis.signal.chain import check
 from fieldcal.diagnosis.verdict import calibrated
 from fieldcal.effects import catalogue
-from fieldcal.model.posterior import Standing
-from fieldcal.model.sets import Set
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.physics.effect import Chain, Scatter
 from fieldcal.session.folder import Session
 

@@ -9,4 +9,8 @@ value of the shape psi_k, with typical sizes T_k and one free size v_k. What dec
 between causes is the evidence of the rows, exact for every group (`evidence`), and the
 chance that a session has a cause at all (`priors`). No effect is known by name here: to
 add one, write its file in `effects/`.
+
+From below: `rows` and `turns` reduce samples, `causes` have columns, `evidence` weighs
+a set of causes, `system` linearises a session, `search` finds the best set, and
+`posterior` states probabilities and numbers. `priors` and `state` serve all of them.
 """

@@ -16,8 +16,8 @@ import numpy as np
 from fieldcal.core.positions import Position, angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
-from fieldcal.model import columns
-from fieldcal.model.columns import RowView
+from fieldcal.model.causes import columns
+from fieldcal.model.causes.columns import RowView
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience

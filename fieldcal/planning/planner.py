@@ -27,7 +27,7 @@ import numpy as np
 from fieldcal.core.errors import PlanError
 from fieldcal.core.positions import Position, forces
 from fieldcal.core.samples import Array
-from fieldcal.model.planned import design, parameters
+from fieldcal.model.causes.planned import design, parameters
 
 STARTS = 12
 """Random sets the exchange begins from; the best ends agree long before."""

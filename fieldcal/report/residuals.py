@@ -25,7 +25,7 @@ from fieldcal.core.frames import (
 from fieldcal.core.positions import rates
 from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import observations
-from fieldcal.model.planned import state_of
+from fieldcal.model.causes.planned import state_of
 from fieldcal.physics.experience import Experience
 from fieldcal.report.gather import Material
 from fieldcal.solve.observations import Observations

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
-from fieldcal.model.evidence import Gram, Index
-from fieldcal.model.mixture import Mixture
+from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.solve.given import Given
 from fieldcal.solve.observations import Mask

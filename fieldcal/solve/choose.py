@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.calibration import Calibration, Method
-from fieldcal.model.planned import parameters
+from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
 from fieldcal.solve import printed
 from fieldcal.solve.assumed import Asked

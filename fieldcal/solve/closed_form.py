@@ -22,7 +22,7 @@ import numpy as np
 
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import ACC, Array
-from fieldcal.model.planned import PLAIN
+from fieldcal.model.causes.planned import PLAIN
 from fieldcal.solve.closed import Closed
 from fieldcal.solve.observations import Observations
 

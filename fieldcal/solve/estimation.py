@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes import CLOSURE
-from fieldcal.model.evidence import Gram
-from fieldcal.model.inference import Inference
-from fieldcal.model.mixture import Mixing, Mixture
-from fieldcal.model.reduce import Rows, RowSource
-from fieldcal.model.search import Search
-from fieldcal.model.sizing import Member
+from fieldcal.model.causes.cause import CLOSURE
+from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.posterior.mixture import Mixing, Mixture
+from fieldcal.model.rows.reduce import Rows, RowSource
+from fieldcal.model.search.inference import Inference
+from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system import System
-from fieldcal.model.turn import Turning
-from fieldcal.model.turn_rows import TurnRows, Turns
+from fieldcal.model.system.linear_system import System
+from fieldcal.model.system.turn_rows import TurnRows, Turns
+from fieldcal.model.turns.turn import Turning
 from fieldcal.solve.agreement import Fit, agreement
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask

@@ -18,17 +18,17 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
-from fieldcal.model import columns, priors
-from fieldcal.model.causes import TRIADS, Cause, Group
-from fieldcal.model.columns import General
-from fieldcal.model.dictionary import Dictionary
-from fieldcal.model.effect_causes import effect_columns, unit_of
-from fieldcal.model.evidence import Index
-from fieldcal.model.reduce import Rows
-from fieldcal.model.sizing import Member
-from fieldcal.model.wander import Wander
+from fieldcal.model import priors
+from fieldcal.model.causes import columns
+from fieldcal.model.causes.cause import TRIADS, Cause, Group
+from fieldcal.model.causes.columns import General
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.effect_causes import effect_columns, unit_of
+from fieldcal.model.causes.wander import Wander
+from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
 from fieldcal.solve.shown import Shown, at_end, carried

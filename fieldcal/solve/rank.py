@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.model.planned import design
+from fieldcal.model.causes.planned import design
 from fieldcal.solve.observations import Observations
 
 Mask = NDArray[np.bool_]

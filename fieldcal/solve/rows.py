@@ -13,7 +13,7 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE, force_home
 from fieldcal.core.positions import rates
 from fieldcal.core.samples import ACC, Array
-from fieldcal.model.reduce import Rows, free_force
+from fieldcal.model.rows.reduce import Rows, free_force
 from fieldcal.physics.experience import Experience
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.observations import Observations

@@ -25,15 +25,15 @@ from itertools import combinations
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.model.causes import Cause, Group
-from fieldcal.model.columns import Course, RowView
-from fieldcal.model.dictionary import Dictionary
-from fieldcal.model.effect_causes import at_points, parts, points
-from fieldcal.model.random_causes import of_chance
-from fieldcal.model.sizing import Member
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.causes.columns import Course, RowView
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.effect_causes import at_points, parts, points
+from fieldcal.model.causes.random_causes import of_chance
+from fieldcal.model.causes.unknown_causes import of_no_effect
+from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
-from fieldcal.model.turn import only
-from fieldcal.model.unknown_causes import of_no_effect
+from fieldcal.model.turns.turn import only
 from fieldcal.physics.effect import Motion, Scatter, Sensor
 
 AXES = 3

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.samples import Array
-from fieldcal.model.evidence import Eliminated, Index, gains
-from fieldcal.model.search import Search
-from fieldcal.model.sizing import DENSITY, Member
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.evidence.gram import Eliminated, gains
+from fieldcal.model.evidence.sizing import DENSITY, Member
+from fieldcal.model.search.selection import Search
 from fieldcal.solve.shown import Shown, has_equation
 
 POINTS = 24

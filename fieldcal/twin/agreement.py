@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.agreement import UNITS
+from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import number
 from fieldcal.sim_device.profile import Profile
 from fieldcal.twin.ways import WayDifference

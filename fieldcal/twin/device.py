@@ -20,12 +20,12 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.line import Tone
 from fieldcal.diagnosis.result import FoundEffect
+from fieldcal.diagnosis.signal.line import Tone
 from fieldcal.effects import catalogue
-from fieldcal.model.reduce import rate_of
+from fieldcal.model.rows.reduce import rate_of
+from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import State, Term
-from fieldcal.model.thermometer import Thermometer
 from fieldcal.physics.effect import Chain, Effect, Scatter
 from fieldcal.physics.recording import lsb_of
 from fieldcal.session.description import Description

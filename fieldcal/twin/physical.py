@@ -22,13 +22,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.frames import earth_rate_home
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.model.evidence import Index
-from fieldcal.model.fitted import Fitted
-from fieldcal.model.inference import Inference
+from fieldcal.model.search.inference import Inference
 from fieldcal.model.state import State
-from fieldcal.model.system import System
+from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.system.linear_system import System
 from fieldcal.physics.experience import Experience
 
 STANDS = 3.0

@@ -27,11 +27,11 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.parts import rms
-from fieldcal.model.fitted import Fitted
-from fieldcal.model.reduce import Rows
+from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
-from fieldcal.model.turn import Turn, Turning
+from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.turns.turn import Turn, Turning
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.twin import device as twin

@@ -15,10 +15,10 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.model.fitted import Fitted
-from fieldcal.model.reduce import spans
+from fieldcal.model.rows.reduce import spans
 from fieldcal.model.state import State
-from fieldcal.model.turn import Turn, only
+from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.turns.turn import Turn, only
 from fieldcal.physics.experience import Experience
 from fieldcal.sim_device.replay import HeldWindow
 from fieldcal.twin.ways import way_of

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.attitude import vee
-from fieldcal.model.turn import Turn
+from fieldcal.model.turns.attitude import vee
+from fieldcal.model.turns.turn import Turn
 from fieldcal.sim_device.way import Manoeuvre
 
 

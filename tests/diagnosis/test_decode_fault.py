@@ -11,7 +11,7 @@ from ladder_sessions import tables
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Block
-from fieldcal.diagnosis.chain import check
+from fieldcal.diagnosis.signal.chain import check
 from fieldcal.effects.decode_fault import undone
 from fieldcal.session import description
 

@@ -10,7 +10,7 @@ import pytest
 from fieldcal.core.frames import earth_rate_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
-from fieldcal.model.columns import RowView, of_effect
+from fieldcal.model.causes.columns import RowView, of_effect
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Line, Motion, Sensor
 from fieldcal.physics.experience import Experience

@@ -8,7 +8,7 @@ from observed import BIAS, SCALE, G, observe, outputs
 
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.core.samples import Array
-from fieldcal.model.planned import design, parameters
+from fieldcal.model.causes.planned import design, parameters
 from fieldcal.solve import solve
 from fieldcal.solve.rank import LADDER, MOST, determined, ladder_remedy, remedy
 

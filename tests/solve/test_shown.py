@@ -10,13 +10,13 @@ import pytest
 from observed import BIAS, SCALE, observe, outputs
 
 from fieldcal.core.positions import SIX_FACES, Position
-from fieldcal.model.effect_causes import of_effects
-from fieldcal.model.inference import Inference
-from fieldcal.model.random_causes import of_chance
-from fieldcal.model.search import Search
-from fieldcal.model.sizing import Member
+from fieldcal.model.causes.effect_causes import of_effects
+from fieldcal.model.causes.random_causes import of_chance
+from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.search.inference import Inference
+from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system import System
+from fieldcal.model.system.linear_system import System
 from fieldcal.solve import Observations
 from fieldcal.solve.estimation import Estimated, Recorded, estimated
 from fieldcal.solve.given import Given, Wanted

@@ -25,8 +25,8 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.evaluation.observations import rests
 from fieldcal.evaluation.solution import Laid
 from fieldcal.evaluation.solution import solved as solve_session
-from fieldcal.model import rotation
-from fieldcal.model.rotation import carry, exponential, small_turns
+from fieldcal.model.turns import rotation
+from fieldcal.model.turns.rotation import carry, exponential, small_turns
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 from fieldcal.windows import Average

@@ -1,0 +1,74 @@
+"""Residuals over what they follow, before and after: the pictures of a diagnosis.
+
+For each mismatch in the windows, the residual of the simulation alone and that of the
+simulation with the effects found, averaged over parts of windows, with its standard
+deviation from white noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.findings.agreement import Agreement
+from fieldcal.diagnosis.findings.stretch_means import averages
+from fieldcal.diagnosis.result import Curve, Mismatch
+from fieldcal.model.rows.reduce import Rows
+
+
+def curves(
+    explanation: Explanation,
+    mismatch: Sequence[Mismatch],
+    first: Agreement,
+    then: Agreement,
+) -> Iterator[Curve]:
+    """One curve for each channel and covariate in which the windows part."""
+    source = explanation.prepared.source
+    start = source.warmth.start_c
+    done = set()
+    for m in mismatch:
+        name, unit = NAMES.get(m.kind, ("", ""))
+        if not name or m.channel not in CHANNELS or (m.channel, name) in done:
+            continue
+        done.add((m.channel, name))
+        c = CHANNELS.index(m.channel)
+        rows = first.rows
+        before, sd, position = averages(rows, first.residual)
+        after = averages(then.rows, then.residual)[0]
+        position = np.array(source.about.numbered(position))
+        x = _mean(rows, COVARIATES[name](rows)) + (start if unit == "°C" else 0.0)
+        if name == "position":
+            x = position.astype(float)
+        yield Curve(
+            m.channel, name, unit, x, position, before[:, c], after[:, c], sd[:, c]
+        )
+
+
+NAMES: Mapping[str, tuple[str, str]] = {
+    "position": ("position", ""),
+    "samples": ("time", "s"),
+    "time": ("time", "s"),
+    "temperature": ("temperature", "°C"),
+    "transient": ("time since the turn", "s"),
+}
+"""What the residual of a kind of mismatch is drawn over, and its unit."""
+
+COVARIATES: Mapping[str, Callable[[Rows], Array]] = {
+    "position": lambda rows: rows.x.position.astype(float),
+    "time": lambda rows: rows.x.t,
+    "temperature": lambda rows: rows.x.warming,
+    "time since the turn": lambda rows: rows.x.since_turn,
+}
+
+
+def _mean(rows: Rows, values: Array) -> Array:
+    """Means of something known in each row over the same parts of windows."""
+    six = np.broadcast_to(values[:, None], rows.y.shape)
+    mean = averages(rows, six)[0]
+    known = np.isfinite(mean)
+    weight = np.where(known, mean, 0.0).sum(axis=1)
+    out: Array = weight / np.maximum(known.sum(axis=1), 1)
+    return out

@@ -1,0 +1,245 @@
+"""Where recording and simulation part: channel, positions, stretch of time, covariate.
+
+For a cause the residual without it, all else fitted, is looked at: the channels whose
+squares it accounts for, the positions in which it stands out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.findings.correlates import courses
+from fieldcal.diagnosis.findings.found_effects import Removed, in_turns
+from fieldcal.diagnosis.findings.stretch_means import averages
+from fieldcal.diagnosis.result import Kind, Mismatch
+from fieldcal.effects import catalogue
+from fieldcal.model.posterior.probabilities import Standing
+from fieldcal.model.rows.reduce import spans
+from fieldcal.physics.recording import Fault
+
+CLEAR = 25.0
+"""Squares that a channel has to lose for the mismatch to be in it."""
+
+PART = 0.03
+"""And at least this part of the most that any channel loses."""
+
+STANDS = 3.5
+"""Standard deviations from which a position stands out."""
+
+
+def of_cause(
+    explanation: Explanation, standing: Standing, lost: Removed
+) -> Iterator[Mismatch]:
+    """Mismatches that an effect of the catalogue accounts for."""
+    effect = catalogue()[standing.name]
+    if in_turns(lost):
+        yield from _of_turns(explanation, standing, lost)
+        return
+    yield from _of_residual(explanation, lost, effect.seen_in, effect.covariate)
+
+
+def _of_residual(
+    explanation: Explanation, lost: Removed, kind: Kind, covariate: str
+) -> Iterator[Mismatch]:
+    squares = lost.squares
+    mean, sd, position = averages(explanation.rows, lost.residual)
+    most = float(np.nanmax(squares))
+    for c in np.flatnonzero(squares >= min(max(CLEAR, PART * most), most)):
+        at = standing_out(mean[:, c] / sd[:, c], position)
+        inside = np.isin(position, at)
+        start, end = stretch(explanation, at)
+        yield Mismatch(
+            channel=CHANNELS[c],
+            kind=kind,
+            positions=at,
+            from_s=start,
+            to_s=end,
+            covariate=covariate,
+            rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
+            sigma=float(np.sqrt(max(squares[c], 0.0))),
+        )
+
+
+def standing_out(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
+    """Positions whose residuals stand out; the largest, if none does."""
+    size = np.nan_to_num(np.abs(z))
+    out = np.unique(position[size > STANDS])
+    if not len(out):
+        out = position[[int(np.argmax(size))]]
+    return tuple(int(p) for p in out)
+
+
+def stretch(explanation: Explanation, positions: Sequence[int]) -> tuple[float, float]:
+    """Device time from the first to the last sample of some positions, s."""
+    source = explanation.prepared.source
+    windows = spans(source.block, source.about)[list(positions)]
+    t = source.block.t
+    return float(t[windows[:, 0].min()]), float(t[windows[:, 1].max() - 1])
+
+
+def _of_turns(
+    explanation: Explanation, standing: Standing, lost: Removed
+) -> Iterator[Mismatch]:
+    """What a cause does while the device is turned, channel by channel."""
+    turned = explanation.inferred.turned
+    if not turned:
+        return
+    columns = np.concatenate([g.columns for _, g in standing.members])
+    values = explanation.best.estimate
+    squares = np.zeros(len(turned))
+    for i, turn in enumerate(turned):
+        at = np.isin(turn.columns, columns)
+        off = turn.design[:, at] @ values[turn.columns[at]]
+        way = turn.way_design[:, at] @ values[turn.columns[at]]
+        squares[i] = float(turn.info @ off**2) + float(way @ way)
+    out = squares > max(STANDS**2, 0.05 * squares.max())
+    some = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
+    places = tuple(sorted({p for t in some for p in t.positions}))
+    source = explanation.prepared.source
+    windows = spans(source.block, source.about)
+    t = source.block.t
+    gaps = [(windows[p, 1], windows[q, 0]) for p, q in (s.positions for s in some)]
+    effect = catalogue()[standing.name]
+    delta = 2 * (explanation.posterior.best.state.score - lost.set.state.score)
+    for channel, size in shown(explanation, standing).items():
+        yield Mismatch(
+            channel=channel,
+            kind="turn",
+            positions=places,
+            from_s=float(t[min(a for a, _ in gaps)]),
+            to_s=float(t[max(b for _, b in gaps) - 1]),
+            covariate=effect.covariate,
+            rms=size,
+            sigma=float(np.sqrt(max(delta, 0.0))),
+        )
+
+
+def shown(explanation: Explanation, standing: Standing) -> dict[str, float]:
+    """Largest output that a cause makes in turns, by channel, rms of the worst turn."""
+    inference = explanation.inferred.inference
+    out: dict[str, float] = {}
+    for course in inference.on_turns(explanation.state, standing.members):
+        for c, name in enumerate(CHANNELS):
+            size = float(np.sqrt(np.mean(course[:, c] ** 2)))
+            out[name] = max(out.get(name, 0.0), size)
+    for triad in (CHANNELS[:3], CHANNELS[3:]):
+        largest = max((out.get(n, 0.0) for n in triad), default=0.0)
+        for name in triad:
+            if out.get(name, 0.0) <= 0.1 * largest or largest <= 0.0:
+                out.pop(name, None)
+    return out
+
+
+def of_unknown(
+    explanation: Explanation, standing: Standing, lost: Removed
+) -> Iterator[Mismatch]:
+    """Mismatches that no effect in the catalogue accounts for."""
+    for cause, group in standing.members:
+        positions = (group.position,) if group.position >= 0 else None
+        triad = np.arange(3, 6) if group.part == "gyr" else np.arange(3)
+        squares = np.nan_to_num(lost.squares[triad])
+        channels = (
+            [CHANNELS.index(group.part)]
+            if group.part in CHANNELS
+            else triad[squares > CLEAR].tolist() or [int(triad[squares.argmax()])]
+        )
+        for c in channels:
+            mean, sd, position = averages(explanation.rows, lost.residual)
+            at = positions or standing_out(mean[:, c] / sd[:, c], position)
+            start, end = stretch(explanation, at)
+            inside = np.isin(position, at)
+            covariate, correlation, share = followed(
+                explanation, cause.name, c, lost.residual
+            )
+            yield Mismatch(
+                channel=CHANNELS[c],
+                kind=KINDS.get(cause.name, "position"),
+                positions=tuple(at),
+                from_s=start,
+                to_s=end,
+                covariate=covariate,
+                rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
+                sigma=float(np.sqrt(max(lost.squares[c], 0.0))),
+                correlation=correlation,
+                share=share,
+            )
+
+
+KINDS: dict[str, Kind] = {
+    "time": "time",
+    "force and time": "time",
+    "temperature": "temperature",
+    "since turn": "transient",
+}
+"""Kind of mismatch of functions that no effect makes; the others go by position."""
+
+
+def followed(
+    explanation: Explanation, name: str, channel: int, residual: Array
+) -> tuple[str, float, float]:
+    """What an unexplained residual follows best, the correlation, and its share."""
+    if name in ("window", "position", "misset"):
+        return "the position itself", np.nan, np.nan
+    x, off = explanation.rows.x, residual[:, channel]
+    known = np.isfinite(off)
+    best, correlation = name, np.nan
+    for label, course in courses(name, x, channel).items():
+        spread = course[known].std()
+        if spread > 1e-9:
+            one = float(np.corrcoef(course[known], off[known])[0, 1])
+            if not np.isfinite(correlation) or abs(one) > abs(correlation):
+                best, correlation = label, one
+    after = explanation.best.residual()[:, channel]
+    sd = explanation.rows.sd[:, channel]
+    noise = float(known.sum())
+    total = float(((off / sd)[known] ** 2).sum()) - noise
+    left = float(((after / sd)[known] ** 2).sum()) - noise
+    return best, correlation, float(np.clip(1 - left / max(total, 1e-9), 0.0, 1.0))
+
+
+def of_faults(
+    t: Array, windows: NDArray[np.intp], faults: Sequence[tuple[str, Fault]]
+) -> Iterator[Mismatch]:
+    """What happened to samples."""
+    for name, fault in faults:
+        inside = [
+            p
+            for p, (a, b) in enumerate(windows)
+            if b > a and t[a] <= fault.to_s and t[b - 1] >= fault.from_s
+        ]
+        effect = catalogue()[name]
+        for channel in fault.channels or (fault.channel,):
+            yield Mismatch(
+                channel=str(channel),
+                kind=effect.seen_in,
+                positions=tuple(inside),
+                from_s=fault.from_s,
+                to_s=fault.to_s,
+                covariate=effect.covariate,
+                rms=fault.size,
+                sigma=fault.sigma,
+            )
+
+
+def of_tones(explanation: Explanation) -> Iterator[Mismatch]:
+    """Lines in the spectrum."""
+    positions = tuple(int(p) for p in explanation.dictionary.held)
+    start, end = stretch(explanation, positions)
+    for tone in explanation.prepared.tones:
+        for name in tone.channels:
+            size = float(tone.amplitude[CHANNELS.index(name)])
+            yield Mismatch(
+                channel=name,
+                kind="spectrum",
+                positions=positions,
+                from_s=start,
+                to_s=end,
+                covariate=f"{tone.hz:.4g} Hz",
+                rms=size / np.sqrt(2),
+                sigma=float(np.sqrt(tone.chi2)),
+            )

@@ -1,0 +1,46 @@
+"""Residuals averaged over parts of the windows: the mismatch counts, not the noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array
+from fieldcal.model.rows.reduce import Rows
+
+PARTS = (0.0, 0.1, 0.25, 0.5, 1.0)
+"""Ends of the parts of a window over which residuals are averaged."""
+
+
+def averages(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Means over parts of the windows.
+
+    Returns
+    -------
+    mean : (m, 6) weighted mean residuals; nan where there is none
+    sd : (m, 6) their standard deviation from white noise
+    position : (m,)
+
+    """
+    means, sds, position = [], [], []
+    for p in np.unique(rows.x.position):
+        at = np.flatnonzero(rows.x.position == p)
+        cuts = np.unique(np.round(np.array(PARTS) * len(at)).astype(int))
+        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+            part = at[a:b]
+            use = np.isfinite(residual[part]) & rows.used[part]
+            weight = np.where(use, 1 / np.where(use, rows.sd[part], 1.0) ** 2, 0.0)
+            total = weight.sum(axis=0)
+            some = np.where(total > 0, total, np.nan)
+            means.append((weight * np.nan_to_num(residual[part])).sum(axis=0) / some)
+            sds.append(np.hypot(1 / np.sqrt(some), rows.common[part[0]]))
+            position.append(p)
+    return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
+
+
+def rms(rows: Rows, residual: Array) -> Array:
+    """Root mean square over the parts of windows, (6,); nan where there is none."""
+    mean, _, _ = averages(rows, residual)
+    count = np.isfinite(mean).sum(axis=0)
+    squares = np.nansum(mean**2, axis=0)
+    return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))

@@ -1,0 +1,205 @@
+"""The signal chain first: physics fitted to a broken chain is nonsense.
+
+What can be put right is put right (axes, units, bytes), what cannot is left out (stuck,
+clipped, bumped), and the rest is remembered (lost samples, the clock, coarse steps).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.frames import earth_rate_home, force_home
+from fieldcal.core.positions import angles
+from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.effects import catalogue
+from fieldcal.model.rows.reduce import masked, rate_of, spans, table_rate
+from fieldcal.model.rows.vibration import usual_noise
+from fieldcal.physics.effect import Chain
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.recording import CheckedSamples, Fault, lsb_of
+from fieldcal.session.description import Description
+from fieldcal.windows.noise import ChannelNoise
+
+MENDING = ("decode_fault", "mounting")
+"""In this order: a channel with wrong bytes looks like one of another axis."""
+
+MASKING = ("saturation", "stuck", "bump")
+NOTING = ("quantisation", "dropped", "clock_skew", "noise_level")
+
+CLIPPED = 1e-3
+"""Part of a window at the rail that makes its mean useless."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A recording after the checks of its chain.
+
+    Attributes
+    ----------
+    block : samples put right
+    usable : (n, 6) samples that can be used
+    faults : what was found, by the effect's id
+    noise : (6,) standard deviation of one usable sample in the windows
+
+    """
+
+    block: Block
+    usable: NDArray[np.bool_]
+    faults: tuple[tuple[str, Fault], ...]
+    noise: Array
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """What was found and has a name in the catalogue, each once."""
+        return tuple(dict.fromkeys(i for i, fault in self.faults if fault.values))
+
+    @property
+    def pace(self) -> float:
+        """Seconds of the device's clock in a true second."""
+        found = [f.values["ppm"] for i, f in self.faults if i == "clock_skew"]
+        return 1 + 1e-6 * float(found[0]) if found else 1.0
+
+
+def check(block: Block, about: Description) -> Checked:
+    """Look for every fault of the chain, and act on what is found."""
+    usable = np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)])
+    faults: list[tuple[str, Fault]] = []
+    seen = recording(block, usable, about)
+    for name in MENDING:
+        for fault in _find(name, seen):
+            faults.append((name, fault))
+            if fault.mended is not None:
+                six = _mended(block, fault)
+                block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
+                seen = recording(block, usable, about)
+    for name in MASKING:
+        before = len(faults)
+        found = _find(name, seen)
+        for fault in _off_rails(found, seen) if name == "stuck" else found:
+            if name == "saturation" and _is_stuck(fault, faults):
+                continue
+            faults.append((name, fault))
+            _mask(name, fault, usable, seen.windows)
+        if len(faults) > before:
+            seen = recording(block, usable, about)
+    for name in NOTING:
+        faults += [(name, fault) for fault in _find(name, seen)]
+    return Checked(block, usable, tuple(_once(faults)), seen.noise)
+
+
+def checked_again(checked: Checked, block: Block, about: Description) -> Checked:
+    """The same with what lines in the spectrum can feign looked at without them."""
+    faults = [(n, f) for n, f in checked.faults if n != "noise_level"]
+    seen = recording(block, checked.usable, about)
+    faults += [("noise_level", f) for f in _find("noise_level", seen)]
+    return replace(checked, faults=tuple(faults))
+
+
+def _find(name: str, seen: CheckedSamples) -> list[Fault]:
+    effect = catalogue()[name]
+    if not isinstance(effect, Chain):
+        raise TypeError(f"{name} is no effect on samples")
+    return effect.find(seen)
+
+
+def _mended(block: Block, fault: Fault) -> Array:
+    if fault.mended is None:
+        return block.six
+    if "channel" not in fault.values:
+        return fault.mended
+    six, c = block.six, CHANNELS.index(fault.channel)
+    six[:, c] = fault.mended[:, c]
+    return six
+
+
+def _mask(
+    name: str, fault: Fault, usable: NDArray[np.bool_], windows: NDArray[np.intp]
+) -> None:
+    if name == "bump":
+        usable[fault.rows] = False
+        return
+    c = CHANNELS.index(fault.channel)
+    usable[fault.rows, c] = False
+    if name == "saturation":
+        for first, last in windows:
+            inside = (fault.rows >= first) & (fault.rows < last)
+            if inside.sum() > CLIPPED * (last - first):
+                usable[first:last, c] = False
+
+
+def _off_rails(found: list[Fault], seen: CheckedSamples) -> list[Fault]:
+    """Runs of equal values less those at a rail that a channel returns to.
+
+    What stands still does so once and anywhere; what is clipped always stops there.
+    """
+    if not found:
+        return found
+    rails = {f.channel: f.rows for f in _find("saturation", seen)}
+    clipped = [bool(np.isin(f.rows, rails.get(f.channel, ())).all()) for f in found]
+    often = Counter(f.channel for f, c in zip(found, clipped, strict=True) if c)
+    return [
+        f
+        for f, c in zip(found, clipped, strict=True)
+        if not (c and often[f.channel] > 1)
+    ]
+
+
+def _is_stuck(fault: Fault, faults: list[tuple[str, Fault]]) -> bool:
+    return any(n == "stuck" and f.channel == fault.channel for n, f in faults)
+
+
+def _once(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault]]:
+    """Without runs of equal values that are the rail of a clipped channel."""
+    clipped = {
+        f.channel: {int(r) for r in f.rows} for n, f in faults if n == "saturation"
+    }
+    return [
+        (n, f)
+        for n, f in faults
+        if not (
+            n == "stuck" and clipped.get(f.channel, set()) >= {int(r) for r in f.rows}
+        )
+    ]
+
+
+def recording(
+    block: Block, usable: NDArray[np.bool_], about: Description
+) -> CheckedSamples:
+    """What the checks look at."""
+    windows, rate = spans(block, about), rate_of(block)
+    block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
+    unknown = np.full(6, np.nan)
+    noise = ChannelNoise(unknown, unknown)
+    if len(held):
+        noise = usual_noise(block, held, rate)
+    if about.positions:
+        alpha, beta = angles(about.positions)
+    else:
+        alpha = beta = np.array([np.nan])
+    x = Experience.at_rest(
+        alpha,
+        beta,
+        about.gravity,
+        rate=table_rate(about, np.arange(len(alpha))),
+        base_force=force_home(about.gravity),
+        base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
+        mounting=about.mounting,
+        latitude=about.latitude,
+    )
+    limits = [about.limits.get(k, np.nan) for k in ("acceleration", "angular_rate")]
+    return CheckedSamples(
+        block=block,
+        windows=windows,
+        x=x,
+        scale=np.concatenate([about.nominal["acc_scale"], about.nominal["gyr_scale"]]),
+        bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
+        noise=noise.white,
+        quick=noise.quick,
+        steps=np.array([lsb_of(c) for c in (*block.acc.T, *block.gyr.T)]),
+        limits=np.array(limits),
+        rate_hz=about.rate_hz or np.nan,
+    )

@@ -1,0 +1,231 @@
+"""A line in the spectrum: its frequency, its causes, and what it foretells.
+
+Of the amplitudes A of a wave in windows, or in stretches of them (`moments`), causes c
+make R c, with R of the effect; they follow by least squares, and hz is where they take
+most. What a line is worth on samples that it was not fitted to is held against the same
+amplitudes: a part of the windows is left out, causes and frequency are found from the
+rest, and |A - R c|^2 / 2 of the part left out is what remains of the mean square.
+Source: D. Rife, R. Boorstyn, Single-tone parameter estimation, 1974.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.diagnosis.signal.moments import Moments, moments_of
+from fieldcal.diagnosis.signal.periodogram import LONGEST, Complex, Pieces
+from fieldcal.physics.effect import Line
+
+FEW, STRETCHES, FOLDS = 3, 5, 12
+"""Windows below which stretches of them are left out instead, how many of each, and
+parts of the recording that are left out in turn."""
+
+AT_ONCE = 256
+"""Frequencies tried together: all of a long recording would take much memory."""
+
+SHOWS = 4.0
+"""Standard deviations from which a channel is said to have the line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tone:
+    """A line with its explanation.
+
+    Attributes
+    ----------
+    effect : hum, sway ...
+    hz : frequency
+    causes : (m,) complex amplitudes of the effect's causes
+    values, sigmas : by parameter name
+    channels : outputs in which it stands out
+    amplitude : (6,) mean amplitude in the outputs
+    chi2 : by how much the squares fall with it
+    gain : rise of ln Z, for a prior as wide as the causes are large
+
+    """
+
+    effect: Line
+    hz: float
+    causes: Complex
+    values: dict[str, float]
+    sigmas: dict[str, float]
+    channels: tuple[str, ...]
+    amplitude: Array
+    chi2: float
+    gain: float
+
+    @property
+    def clear(self) -> list[int]:
+        """Indices of the channels in which it stands out."""
+        return [CHANNELS.index(name) for name in self.channels]
+
+
+@dataclass(frozen=True, slots=True)
+class Remains:
+    """Mean squares of the outputs at the frequency of a line, (6,) each.
+
+    Attributes
+    ----------
+    before : as recorded
+    after : less the line
+    held_out : less what the rest of the recording foretells of it
+    foretold : by how much the squares of the samples, whitened, fall with that
+
+    """
+
+    before: Array
+    after: Array
+    held_out: Array
+    foretold: Array
+
+    def gain(self, clear: list[int]) -> float:
+        """Part of the held-out rms that goes, in the channel that shows it best."""
+        most = clear[int(np.argmax(self.foretold[clear]))]
+        return float(1 - np.sqrt(self.held_out[most] / self.before[most]))
+
+
+def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
+    """The effect at the frequency, near that of the sums, at which it takes most."""
+    shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
+    step = 0.2 / max(float(np.ptp(moments.middle)), shortest)
+    offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
+    return _at_best(pieces, effect, moments, offsets, step, 3)
+
+
+def remains(pieces: Pieces, tone: Tone) -> Remains:
+    """What is left of a line, fitted to it or foretold from the rest."""
+    many = len(pieces.samples) >= FEW
+    moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES)
+    groups = np.arange(len(moments.counts))
+    fold = groups % (FOLDS if many else STRETCHES)
+    seen = moments.seen(np.zeros(1))[0]
+    fitted = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[moments.window]
+    ahead = seen.copy()
+    span = max(float(np.ptp(moments.middle)), 1 / tone.hz)
+    for i in np.unique(fold):
+        rest = moments.only(fold != i)
+        step = 0.2 / span
+        near = _at_best(pieces, tone.effect, rest, np.array([-step, 0, step]), step, 2)
+        # amplitudes are those of the wave at tone.hz; one a little off turns against it
+        left = moments.only(fold == i)
+        told = (tone.effect.response(pieces.x, near.hz) @ near.causes)[left.window]
+        ahead[fold == i] -= told * _turning(left, near.hz - tone.hz)
+    noise = np.where(np.nan_to_num(pieces.noise) > 0, pieces.noise, np.inf)
+    fallen = np.abs(seen) ** 2 - np.abs(ahead) ** 2
+    return Remains(
+        _mean_square(seen),
+        _mean_square(seen - fitted),
+        _mean_square(ahead),
+        moments.counts / 2 @ fallen / noise**2,
+    )
+
+
+def _turning(moments: Moments, offset: float) -> Complex:
+    """Mean of exp(2 pi i offset t) over each group, (g, 1)."""
+    turned = np.exp(2j * np.pi * offset * moments.middle)
+    mean: Complex = np.add.reduceat(turned, moments.bound[:-1]).astype(complex)
+    return (mean / np.diff(moments.bound))[:, None]
+
+
+def _mean_square(amplitude: Complex) -> Array:
+    square: Array = (np.abs(amplitude) ** 2 / 2).mean(axis=0)
+    return square
+
+
+def _at_best(
+    pieces: Pieces,
+    effect: Line,
+    moments: Moments,
+    offsets: Array,
+    step: float,
+    rounds: int,
+) -> Tone:
+    for _ in range(rounds):
+        some = np.array_split(offsets, -(-len(offsets) // AT_ONCE))
+        chi2 = [_fitted(pieces, effect, moments, each)[2] for each in some]
+        near = float(offsets[np.argmax(np.concatenate(chi2))])
+        offsets = near + np.linspace(-step, step, 11)
+        step /= 5
+    return _tone(pieces, effect, moments, near)
+
+
+def _fitted(
+    pieces: Pieces, effect: Line, moments: Moments, offset: Array
+) -> tuple[Complex, Array, Array]:
+    """The effect at frequencies a little off, (o,), whatever its causes.
+
+    Returns
+    -------
+    causes : (o, m)
+    sigma : (o, m) their standard deviation
+    chi2 : (o,) by how much the squares fall
+
+    """
+    count, size = len(offset), 6 * len(moments.counts)
+    seen = moments.seen(offset).reshape(count, size, 1)
+    each = [effect.response(pieces.x, hz) for hz in moments.near + offset]
+    response = np.array(each)[:, moments.window].reshape(count, size, -1)
+    # a channel that never changes tells nothing
+    heard = np.nan_to_num(pieces.noise) > 0
+    weight = np.where(heard, 1 / np.where(heard, pieces.noise, 1.0) ** 2, 0.0)
+    weight = np.outer(moments.counts / 2, weight).ravel()
+    weighted = np.conj(np.swapaxes(response, 1, 2)) * weight
+    normal = weighted @ response
+    trace = np.trace(normal, axis1=1, axis2=2).real[:, None, None]
+    normal += 1e-12 * trace * np.eye(normal.shape[-1])
+    causes = np.linalg.solve(normal, weighted @ seen)[..., 0]
+    own = np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2)
+    sigma = np.sqrt(own.real)
+    if effect.kind == "sensor":  # outputs of their own: those without it have none
+        causes = np.where(np.abs(causes) > SHOWS * sigma, causes, 0.0)
+    left = seen - response @ causes[..., None]
+    fallen = np.abs(seen) ** 2 - np.abs(left) ** 2
+    return causes, sigma, fallen[..., 0] @ weight
+
+
+def _tone(pieces: Pieces, effect: Line, moments: Moments, offset: float) -> Tone:
+    """The effect at one frequency, with what it explains."""
+    hz = moments.near + offset
+    found = _fitted(pieces, effect, moments, np.array([offset]))
+    causes, sigma, chi2 = found[0][0], found[1][0], float(found[2][0])
+    response = effect.response(pieces.x, hz)[moments.window]
+    strength = np.abs(causes / sigma) ** 2
+    amplitude = np.sqrt((np.abs(response @ causes) ** 2).mean(axis=0))
+    error = pieces.noise * np.sqrt(2 / moments.counts.sum())
+    clear = [
+        c for c, a, e in zip(CHANNELS, amplitude, error, strict=True) if a > SHOWS * e
+    ]
+    values, sigmas = _named(effect, causes, sigma)
+    values["hz"] = float(hz)
+    spread = float(np.concatenate(pieces.times).std())
+    sigmas["hz"] = float(1 / (2 * np.pi * spread * np.sqrt(max(chi2, 1.0))))
+    return Tone(
+        effect,
+        float(hz),
+        causes,
+        values,
+        sigmas,
+        tuple(clear),
+        amplitude,
+        chi2,
+        chi2 / 2 - float(np.log1p(strength / 2).sum()),
+    )
+
+
+def _named(
+    effect: Line, causes: Complex, sigma: Array
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Amplitudes by name: one for each cause, or one for all of them."""
+    names = [p.name for p in effect.params]
+    if len(names) == len(causes):
+        some = np.flatnonzero(causes)
+        return (
+            {names[i]: float(abs(causes[i])) for i in some},
+            {names[i]: float(sigma[i]) for i in some},
+        )
+    size = float(np.linalg.norm(causes))
+    share = np.abs(causes) / max(size, 1e-300)
+    return {names[0]: size}, {names[0]: float(np.linalg.norm(share * sigma))}

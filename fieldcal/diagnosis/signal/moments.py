@@ -1,0 +1,100 @@
+"""Samples summed up as the amplitude of a wave, in each window or stretch of one.
+
+    A = 2/n sum_k s_k exp(-2 pi i hz t_k)                                           (1)
+
+which in white noise of sigma has the variance 4 sigma^2 / n. Sums over a few parts of
+each window are kept, so that A at a frequency a little off is a sum over the parts.
+Source: D. Rife, R. Boorstyn, Single-tone parameter estimation, 1974.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array
+from fieldcal.diagnosis.signal.periodogram import LONGEST, Complex, Pieces
+
+PARTS, LEAST = 15, 4
+"""Parts of a window, or of as much of it as a periodogram has, whose sums are kept, so
+that a frequency can be shifted by what that leaves open; fewest samples in one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moments:
+    """Sums of the samples times a wave of frequency `near`, over parts of windows.
+
+    Attributes
+    ----------
+    near : Hz
+    sums : (k, 6)
+    middle : (k,) s, mean time of each part
+    bound : (g + 1,) first part of each group, a window or a stretch of one
+    window : (g,) of each group
+    counts : (g,) samples
+
+    """
+
+    near: float
+    sums: Complex
+    middle: Array
+    bound: NDArray[np.intp]
+    window: NDArray[np.intp]
+    counts: Array
+
+    def seen(self, offset: Array) -> Complex:
+        """Amplitudes (o, g, 6) of each group at frequencies a little off, (o,)."""
+        wave = np.exp(-2j * np.pi * offset[:, None] * self.middle)
+        parts = [wave[:, a:b] @ self.sums[a:b] for a, b in pairwise(self.bound)]
+        amplitude: Complex = 2 / self.counts[:, None] * np.stack(parts, axis=1)
+        return amplitude
+
+    def only(self, groups: NDArray[np.bool_]) -> Moments:
+        """Some of the groups."""
+        size = np.diff(self.bound)
+        parts = np.repeat(groups, size)
+        return Moments(
+            self.near,
+            self.sums[parts],
+            self.middle[parts],
+            np.append(0, np.cumsum(size[groups])),
+            self.window[groups],
+            self.counts[groups],
+        )
+
+
+def moments_of(pieces: Pieces, near: float, stretches: int = 1) -> Moments:
+    """Sums over windows, each divided into stretches that are groups of their own."""
+    sums, middle, bound = [], [], [0]
+    counts: list[float] = []
+    for samples, t in zip(pieces.samples, pieces.times, strict=True):
+        for first, last in pairwise(_cuts(0, len(t), stretches)):
+            most = PARTS * max((last - first) // LONGEST, 1)
+            parts = min(most, max((last - first) // LEAST, 1))
+            for a, b in pairwise(_cuts(first, last, parts)):
+                turned = 2 * np.pi * near * t[a:b]
+                real, imaginary = (
+                    np.stack([np.cos(turned), np.sin(turned)]) @ (samples[a:b])
+                )
+                sums.append(real - 1j * imaginary)
+                middle.append(t[a:b].mean())
+            bound.append(len(sums))
+            counts.append(float(last - first))
+    window = np.repeat(np.arange(len(pieces.samples)), stretches)
+    return Moments(
+        near,
+        np.array(sums),
+        np.array(middle),
+        np.array(bound),
+        window,
+        np.array(counts),
+    )
+
+
+def _cuts(first: int, last: int, parts: int) -> list[int]:
+    """Bounds of parts of nearly equal length, the longer ones first."""
+    each, more = divmod(last - first, parts)
+    return [first + i * each + min(i, more) for i in range(parts + 1)]

@@ -1,0 +1,151 @@
+"""Lines in the spectrum of the outputs at rest.
+
+A line found (`periodogram`) is fitted (`line`) to the samples of all windows, one phase
+throughout: as any amplitude in each output, or as what a `Line` effect makes of few
+causes. It is one if the rest of the recording foretells it in what was left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.samples import Block
+from fieldcal.diagnosis.signal.line import Remains, Tone, remains, tuned
+from fieldcal.diagnosis.signal.moments import Moments, moments_of
+from fieldcal.diagnosis.signal.periodogram import (
+    Pieces,
+    held_in,
+    highest,
+    line_of,
+    pieces_of,
+    places_of,
+    spectra_of,
+    stretches,
+    take_out,
+)
+from fieldcal.effects import catalogue
+from fieldcal.model.rows.reduce import Rows, RowSource
+from fieldcal.physics.effect import Line
+
+STEADY = 0.65
+"""Part of the energy that one amplitude and phase must take to be a line."""
+
+LASTS, CHANCE = 0.2, 3.0
+"""Part of it in either half of the windows at least, but for so many sigmas."""
+
+EXTRA = 6.9
+"""Of ln 1000: what a line has to be worth beyond the frequencies tried."""
+
+MOST, LOOKS = 4, 3
+"""Lines looked for, and how often one that stands out may turn out to be none."""
+
+
+def tones(source: RowSource, rows: Rows) -> list[tuple[Tone, Remains]]:
+    """Lines in a recording, the strongest first, with what is left of them."""
+    pieces = pieces_of(source, rows)
+    found: list[tuple[Tone, Remains]] = []
+    looked: list[float] = []
+    spectra = spectra_of(pieces) if pieces.samples else []
+    while spectra and len(found) < MOST and len(looked) < LOOKS + len(found):
+        near = highest(pieces, spectra, looked)
+        if near is None:
+            break
+        looked.append(near)
+        if (tone := _explained(pieces, near)) is None:
+            continue  # something else has much power there, and may hide a line
+        left = remains(pieces, tone)
+        if left.foretold[tone.clear].sum() > 0:
+            found.append((tone, left))
+            looked[-1] = tone.hz
+            _lessen(pieces, tone)
+            spectra = spectra_of(pieces)
+    return found
+
+
+def without(
+    block: Block, source: RowSource, rows: Rows, found: Sequence[Tone]
+) -> Block:
+    """The samples less the lines: of all windows, and on the way what sensors add."""
+    triads = [block.acc, block.gyr]
+    held = held_in(source, rows)
+    x = places_of(rows, held)
+    for tone in found:
+        response = tone.effect.response(x, tone.hz) @ tone.causes
+        where = [
+            (slice(a, b), seen) for (_, a, b), seen in zip(held, response, strict=True)
+        ]
+        if tone.effect.kind == "sensor":
+            where = [(slice(0, len(block)), response[0])]
+        for i, own in enumerate((slice(0, 3), slice(3, 6))):
+            if response[:, own].any():
+                triads[i] = triads[i].copy()
+                for span, seen in where:
+                    take_out(triads[i][span], block.t[span], tone.hz, seen[own])
+    return replace(block, acc=triads[0], gyr=triads[1])
+
+
+def _explained(pieces: Pieces, near: float) -> Tone | None:
+    """The line near a frequency under the explanation that needs least."""
+    moments = moments_of(pieces, near)
+    tried = []
+    for effect in catalogue().values():
+        if not isinstance(effect, Line) or not effect.band[0] <= near <= effect.band[1]:
+            continue
+        if effect.kind == "motion" and not pieces.x.oriented.all():
+            continue
+        tried.append(tuned(pieces, effect, moments))
+    if not tried:
+        return None
+    best = max(tried, key=lambda tone: tone.gain)
+    places = np.log(sum(map(len, pieces.samples)))
+    if best.gain <= places + EXTRA or not best.channels:
+        return None
+    steady = _share(pieces, best, moments) > STEADY and _lasts(pieces, best)
+    return best if steady else None
+
+
+def _lasts(pieces: Pieces, tone: Tone) -> bool:
+    """Whether a line takes of the squares in either half of the windows.
+
+    What fades after turns has lines, too, where positions follow one another evenly.
+    """
+    clear = tone.clear
+    seen = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[:, clear]
+    taken = np.zeros(2)
+    for s, t, one in zip(pieces.samples, pieces.times, seen, strict=True):
+        middle = -(-len(t) // 2)
+        for half, ends in enumerate(((0, middle), (middle, len(t)))):
+            for some in stretches(*ends):
+                line = line_of(t[some], tone.hz, one)
+                fallen = ((2 * s[some, clear] - line) * line).sum(axis=0)
+                taken[half] += (fallen / pieces.noise[clear] ** 2).sum()
+    # half of E varies by 2 sqrt(E / 2)
+    chance = CHANCE * 2 * np.sqrt(max(float(taken.sum()), 0.0) / 2)
+    return bool(taken.min() + chance > LASTS * taken.sum())
+
+
+def _share(pieces: Pieces, tone: Tone, moments: Moments) -> float:
+    """Part of the energy at a line's frequency that one steady line takes.
+
+    A line keeps amplitude and phase through all windows. A hand that trembles or a base
+    that is pushed has as much energy there, but another phase each time.
+    """
+    clear = tone.clear
+    seen = moments.seen(np.array([tone.hz - moments.near]))[0]
+    half = moments.counts[:, None] / 2
+    modelled = tone.effect.response(pieces.x, tone.hz) @ tone.causes
+    energy = (half * np.abs(seen[:, clear]) ** 2).sum(axis=0)
+    left = (half * np.abs((seen - modelled)[:, clear]) ** 2).sum(axis=0)
+    weight = 1 / pieces.noise[clear] ** 2
+    noise = 2.0 * len(half) * len(clear)
+    return float(1 - (weight @ left - noise) / max(weight @ energy - noise, 1e-9))
+
+
+def _lessen(pieces: Pieces, tone: Tone) -> None:
+    """Take a line out of the samples, in place: there are many of them."""
+    response = tone.effect.response(pieces.x, tone.hz) @ tone.causes
+    for samples, t, seen in zip(pieces.samples, pieces.times, response, strict=True):
+        take_out(samples, t, tone.hz, seen)

@@ -1,0 +1,206 @@
+"""The paragraph that says it all to a person."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
+from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quality, Quantity, Verdict
+from fieldcal.diagnosis.wording.deciding_position import decided_by, telling_position
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Scatter
+
+SHOWN = 3.0
+"""Standard deviations from which a parameter is worth its words."""
+
+EACH = 3
+"""Times up to which an effect that happened again is told each time."""
+
+MOST = 6
+"""Places that are told."""
+
+SHOWN_PLACES = 6
+"""Positions of one place that are told."""
+
+
+def said(quantity: Quantity) -> str:
+    """A value with its uncertainty and unit.
+
+    >>> said(Quantity(0.00312, 0.00011, "1"))
+    '0.00312 ± 0.00011'
+    """
+    if isinstance(quantity.value, str):
+        return quantity.value
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+    sigma = quantity.sigma
+    if sigma is None or not math.isfinite(sigma) or sigma <= 0:
+        return f"{quantity.value:.4g}{unit}"
+    digits = 1 - math.floor(math.log10(sigma))
+    if digits > 6:
+        return f"{quantity.value:.3g} ± {sigma:.2g}{unit}"
+    return f"{quantity.value:.{max(digits, 0)}f} ± {sigma:.{max(digits, 0)}f}{unit}"
+
+
+def named(found: FoundEffect) -> str:
+    """An effect with the parameters that stand out."""
+    parts = []
+    for name, q in found.parameters.items():
+        if isinstance(q.value, str) or not q.sigma or abs(q.value) > SHOWN * q.sigma:
+            parts.append(f"{name} = {said(q)}")
+    return f"{found.id} ({', '.join(parts)})" if parts else found.id
+
+
+def paragraph(
+    verdict: Verdict,
+    effects: Sequence[FoundEffect],
+    mismatch: Sequence[Mismatch],
+    unknown: Sequence[Unknown],
+    quality: tuple[Quality, Quality, str],
+    explanation: Explanation,
+    notes: Sequence[str],
+    odd: Sequence[str] = (),
+) -> str:
+    """Say verdict, effects, improvement, doubts and what to do next.
+
+    `odd` are facts of the recording that cannot be.
+    """
+    out = [_wrong(odd)] if odd else []
+    if mismatch or not odd:
+        out.append(_opening(verdict, effects, mismatch))
+    out += [_how_random(f) for f in effects if _is_random(f)]
+    if verdict in ("left_out", "ambiguous") and effects:
+        out += _improvement(*quality)
+    for one in effects:
+        for other in one.aliases:
+            out.append(_deciding(explanation, one.id, other))
+    out += dict.fromkeys(_unexplained(u, unknown) for u in unknown)
+    return " ".join([*filter(None, out), *notes])
+
+
+def _wrong(odd: Sequence[str]) -> str:
+    return f"Something that the recording says of itself is wrong: {'; '.join(odd)}."
+
+
+def _opening(
+    verdict: Verdict, effects: Sequence[FoundEffect], mismatch: Sequence[Mismatch]
+) -> str:
+    listed = _listed(effects)
+    if verdict == "consistent":
+        return (
+            "Recording and simulation agree: bias and scale factor, refitted, leave"
+            " nothing that this recording can show."
+        )
+    if verdict == "left_out":
+        return f"The simulation leaves out {listed}."
+    if verdict == "ambiguous":
+        return f"Something is left out, and it may be {listed}."
+    where = _places(mismatch)
+    some = f" Besides, it leaves out {listed}." if listed else ""
+    return (
+        "Recording and simulation part, and no effect in the catalogue explains it"
+        f" ({where}).{some}"
+    )
+
+
+def _listed(effects: Sequence[FoundEffect]) -> str:
+    """The effects; one that happened often in a word."""
+    often = Counter(f.id for f in effects)
+    told = [
+        named(f) if often[f.id] <= EACH else f"{f.id} ({often[f.id]} times)"
+        for f in effects
+    ]
+    return " and ".join(dict.fromkeys(told))
+
+
+def _places(mismatch: Sequence[Mismatch]) -> str:
+    """Where they part, the clearest first."""
+    clearest = sorted(mismatch, key=lambda m: -m.sigma)
+    places = list(dict.fromkeys(f"{m.channel}, {_where(m)}" for m in clearest))
+    more = len(places) - MOST
+    return "; ".join(places[:MOST]) + (f"; {more} more places" if more > 0 else "")
+
+
+def _where(m: Mismatch) -> str:
+    return f"{listed(m.positions, SHOWN_PLACES)}, {m.from_s:.0f} to {m.to_s:.0f} s"
+
+
+def _is_random(found: FoundEffect) -> bool:
+    return isinstance(catalogue()[found.id], Scatter)
+
+
+def _how_random(found: FoundEffect) -> str:
+    return (
+        f"{found.id} is random: it widens the intervals, and no equation is fitted to"
+        " it."
+    )
+
+
+def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
+    """By how much recording and simulation agree better; nothing that did not fall."""
+    if not after.held_out_rms < before.held_out_rms:
+        return []
+    fell = ""
+    if after.rms < before.rms:
+        fell = f"rms falls from {before.rms:.2g} to {after.rms:.2g} {unit}, and the "
+    return [
+        f"With it the {fell}held-out rms falls from {before.held_out_rms:.2g} to"
+        f" {after.held_out_rms:.2g} {unit}."
+    ]
+
+
+def _deciding(explanation: Explanation, one: str, other: str) -> str:
+    head = f"{other} would explain it as well as {one}"
+    position = telling_position(explanation, one, other)
+    if position is None:
+        return f"{head}; what tells them apart: {decided_by(one)}."
+    alpha, beta, apart = position
+    return (
+        f"{head}; the position α = {alpha:g}°, β = {beta:g}° would decide: there they"
+        f" differ by {apart:.0f} σ."
+    )
+
+
+def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
+    """What is known of a mismatch; channels that are off in the same places in one."""
+    where = one.mismatch
+    if np.isfinite(where.correlation):
+        return (
+            f"{where.channel} follows {where.covariate} (correlation"
+            f" {where.correlation:+.2f}); a smooth function of {one.cause} takes"
+            f" {100 * where.share:.0f} % of its variance."
+        )
+    places = listed(where.positions)
+    if one.turned:
+        angles = " and ".join(
+            f"{joint} had been off by {said(angle)}" for joint, angle in one.turned
+        )
+        return (
+            f"{places.capitalize()} is off by itself, as if {angles} there: set it anew"
+            " and take it again."
+        )
+    alike = [
+        u
+        for u in all_
+        if (u.cause, u.mismatch.positions) == (one.cause, where.positions)
+    ]
+    channels = " and ".join(dict.fromkeys(u.mismatch.channel for u in alike))
+    verb = "is" if len(alike) == 1 else "are"
+    return (
+        f"{channels} {verb} off in {places} by itself; take it again, and look for what"
+        " was different there."
+    )
+
+
+def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
+    """What else a person should know."""
+    out = []
+    if explanation.earth > np.log(1000.0) and not explanation.sees_earth:
+        out.append("The gyroscopes show the Earth's rate, which is taken into account.")
+    if left:
+        out.append(f"The positions leave open: {', '.join(left)}.")
+    return out

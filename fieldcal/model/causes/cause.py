@@ -1,0 +1,90 @@
+"""Causes, and the groups of columns that each of them may be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.causes.columns import Course, General
+from fieldcal.physics.effect import Effect
+
+Basis = Course | General
+Point = tuple[Mapping[str, float], int]
+"""Values of an effect's shape parameters, and the origin of its times."""
+
+FEW = 3
+"""Windows below which nobody can tell what each is off by from the bias."""
+
+CLOSURE = 6
+"""Kind of the closures of turns, beside the six outputs."""
+
+TRIADS = (("acc", (0, 1, 2)), ("gyr", (3, 4, 5)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """Columns that share one size.
+
+    Attributes
+    ----------
+    cause : id of the effect, or what it is called where it is none
+    part : "acc", "gyr", a channel, or "" for all it touches
+    columns : (k,) of the dictionary
+    typical : (k,) size of each at v = 1
+    effect, shape, origin : where it is an effect with an equation
+    params : (k,) index of each column among the effect's parameters
+    position : the one it belongs to, -1 for all
+    in_state : whether its estimate is in the base state, and not only in the columns
+    unsure : standard uncertainty of the shape, where it was refined
+    in_step : whether one cause may change all its columns by the same
+    fixed : v, where that is known
+
+    """
+
+    cause: str
+    part: str
+    columns: Index
+    typical: Array
+    effect: Effect | None = None
+    shape: Mapping[str, float] = field(default_factory=dict)
+    origin: int = 0
+    params: tuple[int, ...] = ()
+    position: int = -1
+    in_state: bool = False
+    in_step: bool = False
+    unsure: float = np.nan
+    fixed: float | None = None
+
+    def sizes(self, v: float) -> Array:
+        """Standard deviation of each column before the rows are seen, (k,)."""
+        wide: Array = v * self.typical
+        return wide
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cause:
+    """One explanation on one triad, with every variant of it.
+
+    Attributes
+    ----------
+    name : of the effect, or of the unknown function
+    part : "acc", "gyr" or ""
+    chance : that a session has it
+    variants : groups, one for each value of the shape
+    kind : "effect", "random", "unknown" or "position"
+
+    """
+
+    name: str
+    part: str
+    chance: float
+    variants: tuple[Group, ...]
+    kind: str = "effect"
+
+    @property
+    def key(self) -> str:
+        """Unique among the causes of a session."""
+        return f"{self.name}:{self.part}" if self.part else self.name

@@ -1,0 +1,211 @@
+"""What could have made the rows: causes, each with the groups of columns it may be.
+
+A session's dictionary holds the columns once; groups say which of them they are made
+of, and how large these are typically. What a device has anyway is always in: bias,
+scale factor where something shows it, instability, the Earth's rate, and the turns of
+positions whose orientation nobody knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array, Index
+from fieldcal.model import priors
+from fieldcal.model.causes import columns
+from fieldcal.model.causes.cause import CLOSURE, FEW, TRIADS, Cause, Group
+from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.columns import General
+from fieldcal.model.causes.effect_causes import at_points, of_effects
+from fieldcal.model.causes.random_causes import flicker, of_chance
+from fieldcal.model.causes.unknown_causes import of_no_effect
+from fieldcal.model.causes.wander import Wander
+from fieldcal.physics.experience import Experience
+
+
+@dataclass(frozen=True, slots=True)
+class Alike:
+    """Groups of causes that are alike in width.
+
+    Attributes
+    ----------
+    blocks : (b, k) columns, each block once, as several groups may be made of it
+    block : (m,) the block of each group
+    typical : (m, k) sizes
+    cause, variant : (m,) their numbers
+
+    """
+
+    blocks: Index
+    block: Index
+    typical: Array
+    cause: Index
+    variant: Index
+
+    @classmethod
+    def of(cls, some: Sequence[tuple[int, int, Group]]) -> Alike:
+        """Of groups with the numbers of their causes and variants."""
+        columns = np.array([g.columns for _, _, g in some])
+        blocks, block = np.unique(columns, axis=0, return_inverse=True)
+        typical = np.array([g.typical for _, _, g in some])
+        cause, variant = np.array([(i, j) for i, j, _ in some]).T
+        return cls(blocks, block.ravel(), typical, cause, variant)
+
+
+class Dictionary(ColumnTable):
+    """All columns of a session, and the groups made of them.
+
+    Parameters
+    ----------
+    x : rows of the windows
+    used : (n, 6) rows that say something, by channel
+    since : (o, n) s since the turn, by origin
+    common : (p, 6) standard deviation of an error that all rows of a window share
+    unit : (6,) outputs per SI unit
+    turns : whether the way between positions is seen
+    wander : how the biases wander inside windows
+
+    """
+
+    def __init__(
+        self,
+        x: Experience,
+        used: NDArray[np.bool_],
+        since: Array,
+        common: Array,
+        unit: Array,
+        turns: bool,
+        wander: Wander,
+    ) -> None:
+        super().__init__(x, used, since, unit, wander)
+        self.common, self.turns = common, turns
+        self.earth = -1
+        self.always: list[Group] = list(self._calibration())
+        self.free = np.array([self._is_free(p) for p in self.held])
+        self._instability()
+        if len(self.held) < FEW < len(x):
+            self.always += flicker(self)
+        self.causes: list[Cause] = list(self._causes())
+
+    def plain(self) -> Dictionary:
+        """The same with what a simulation has only, bias and scale factor being free.
+
+        There is no Earth's rate beside its own, and nothing random: that foretells.
+        """
+        out = copy(self)
+        known = (g for g in self.always if g.in_state and g.cause != "earth")
+        free = float(priors.SIZES[-1])
+        out.always = [replace(g, fixed=free) for g in known]
+        return out
+
+    def apart(self) -> Dictionary:
+        """The same, of which columns that are added are its own."""
+        out = copy(self)
+        out.bases = list(self.bases)
+        return out
+
+    @cached_property
+    def by_width(self) -> list[Alike]:
+        """Groups of causes, those alike in width together."""
+        found: dict[int, list[tuple[int, int, Group]]] = {}
+        for i, cause in enumerate(self.causes):
+            for j, group in enumerate(cause.variants):
+                found.setdefault(len(group.columns), []).append((i, j, group))
+        return [Alike.of(some) for some in found.values()]
+
+    @cached_property
+    def chances(self) -> Array:
+        """Of each variant of every cause, ln."""
+        return np.array([np.log(c.chance / len(c.variants)) for c in self.causes])
+
+    @cached_property
+    def typical(self) -> Array:
+        """The largest typical size of each column."""
+        out = np.ones(self.width)
+        for cause in self.causes:
+            for group in cause.variants:
+                out[group.columns] = group.typical
+        return out
+
+    @cached_property
+    def shown(self) -> NDArray[np.bool_]:
+        """Columns that windows show; filled in by the first linearisation."""
+        return np.zeros(self.width, dtype=bool)
+
+    def _causes(self) -> Iterator[Cause]:
+        """Everything that may be there."""
+        yield from of_effects(self)
+        yield from of_chance(self)
+        yield from of_no_effect(self)
+
+    def _calibration(self) -> Iterator[Group]:
+        """Bias, scale factor, Earth's rate."""
+        sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
+        for part, channels in TRIADS:
+            at = np.intersect1d(channels, self.seen)
+            if len(at):
+                yield Group("bias", part, self.bias + at, sizes[at], in_state=True)
+        rated = bool(self.x.rate.any())
+        for part, channels in TRIADS:
+            at = np.intersect1d(channels, self.seen)
+            if len(at) and (part == "acc" or rated):
+                yield Group(
+                    "scale", part, self.scale + at, priors.SCALE * self.unit[at],
+                    in_state=True, in_step=True,
+                )  # fmt: skip
+        gyro = bool(len(np.intersect1d(self.seen, (3, 4, 5))))
+        if gyro and self.x.oriented.any() and not self.x.base_rate.any():
+            earth = General("earth", columns.earth, sides=columns.earth_sides)
+            self.earth = self.add(earth, 3)
+            size = np.full(3, EARTH_RATE)
+            at = self.earth + np.arange(3)
+            yield Group("earth", "", at, size, fixed=1.0, in_state=True)
+
+    def _is_free(self, p: int) -> bool:
+        """Whether nobody knows the orientation of a position that shows a force."""
+        there = self.x.position == p
+        return bool(self.used[there, :3].any() and not self.x.oriented[there].all())
+
+    def _instability(self) -> None:
+        """What each window is off by for itself, by channel."""
+        self.unstable = np.zeros(7)
+        if len(self.held) >= FEW:
+            typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3)
+            self.unstable[:6] = typical * self.unit * self.used.any(axis=0)
+            self.unstable[CLOSURE] = priors.CLOSURE * self.turns
+
+    def refined(
+        self, cause: Cause, group: Group, values: Sequence[float]
+    ) -> tuple[Cause, list[Group]]:
+        """A cause with more variants, those of one group with its shape elsewhere.
+
+        `group` is one of an effect with an equation.
+        """
+        (name,) = group.shape
+        new = at_points(self, group, [({name: float(v)}, group.origin) for v in values])
+        return self.exchanged(cause, (*cause.variants, *new)), new
+
+    def exchanged(self, cause: Cause, variants: tuple[Group, ...]) -> Cause:
+        """A cause with other variants, in the place of the one that was."""
+        more = replace(cause, variants=variants)
+        self.causes = [more if c is cause else c for c in self.causes]
+        self._changed()
+        return more
+
+    def joined(self, causes: Iterable[Cause]) -> None:
+        """Take in causes that are made of what others leave."""
+        self.causes = [*self.causes, *causes]
+        self._changed()
+
+    def _changed(self) -> None:
+        """Forget what was made of the causes as they were."""
+        self.shown = np.pad(self.shown, (0, self.width - len(self.shown)))
+        for cached in ("by_width", "chances", "typical"):
+            self.__dict__.pop(cached, None)

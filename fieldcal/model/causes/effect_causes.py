@@ -1,0 +1,143 @@
+"""Causes that effects of the catalogue with an equation are, and their columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from fieldcal.core.samples import CHANNELS, Index
+from fieldcal.effects import catalogue
+from fieldcal.model.causes import columns
+from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
+from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.physics.effect import Effect, Motion, Sensor
+from fieldcal.physics.experience import Experience
+
+
+def of_effects(table: ColumnTable) -> Iterator[Cause]:
+    """Every effect of the catalogue that has columns here."""
+    for effect in catalogue().values():
+        if not isinstance(effect, Motion | Sensor) or not effect.params:
+            continue
+        if effect.applies(table.x) and (grid := list(points(table, effect))):
+            yield from _of_effect(table, effect, grid)
+
+
+def _of_effect(
+    table: ColumnTable, effect: Motion | Sensor, grid: Sequence[Point]
+) -> Iterator[Cause]:
+    """The causes that an effect is: one, or one a triad."""
+    places = effect_columns(table, effect, grid)
+    for part, at in parts(table, effect):
+        variants = tuple(
+            _group(table, effect, part, some, point, columns)
+            for some in _axes(table, effect, at)
+            for point, columns in zip(grid, places, strict=True)
+        )
+        if variants:
+            yield Cause(effect.id, part, effect.chance(table.x), variants)
+
+
+def at_points(table: ColumnTable, group: Group, grid: Sequence[Point]) -> list[Group]:
+    """The group of an effect at other points of its shape, with columns of its own."""
+    effect = group.effect
+    if not isinstance(effect, Motion | Sensor) or not grid:
+        return []
+    return [
+        _group(table, effect, group.part, group.params, point, at)
+        for point, at in zip(grid, effect_columns(table, effect, grid), strict=True)
+    ]
+
+
+def _group(
+    table: ColumnTable,
+    effect: Effect,
+    part: str,
+    some: tuple[int, ...],
+    point: Point,
+    at: Index,
+) -> Group:
+    """Some parameters of an effect at one point of its grid."""
+    sizes = np.array([effect.params[j].typical for j in some]) * unit_of(table, effect)
+    shape, origin = point
+    return Group(
+        effect.id, part, at[list(some)], sizes, effect, shape, origin, some,
+        in_state=True,
+    )  # fmt: skip
+
+
+def effect_columns(
+    table: ColumnTable, effect: Motion | Sensor, grid: Sequence[Point]
+) -> list[Index]:
+    """Append the columns of an effect: those of its parameters, for each point."""
+    count = len(effect.params)
+    if isinstance(effect, Sensor) and _of_channels(effect, table.x):
+        course = columns.of_channels(effect, grid)
+        start = table.add(course, 6 * len(grid))
+        channel = np.array([CHANNELS.index(p.name) for p in effect.params])
+        return [start + channel * len(grid) + i for i in range(len(grid))]
+    return [
+        table.add(columns.of_effect(effect, *point), count) + np.arange(count)
+        for point in grid
+    ]
+
+
+def parts(table: ColumnTable, effect: Effect) -> list[tuple[str, tuple[int, ...]]]:
+    """Parameters that go together: those of a triad, where they are by channel."""
+    names = [p.name for p in effect.params]
+    if not set(names) <= set(CHANNELS):
+        return [("", tuple(range(len(names))))]
+    seen = {CHANNELS[c] for c in table.seen}
+    return [
+        (part, tuple(j for j, n in enumerate(names)
+                     if CHANNELS.index(n) in at and n in seen))
+        for part, at in TRIADS
+    ]  # fmt: skip
+
+
+def _axes(
+    table: ColumnTable, effect: Motion | Sensor, at: tuple[int, ...]
+) -> list[tuple[int, ...]]:
+    """Parameters that go together: all, or those of one output or of two alone."""
+    if isinstance(effect, Motion) or not at:
+        return [at] if at else []
+    reach = np.abs(effect.design(table.x, _any(effect))).max(axis=0)[:, at]
+    own = [tuple(np.array(at)[reach[c] > 0].tolist()) for c in range(6)]
+    own = [o for o in own if o and o != at]
+    two = [tuple(sorted(set(o + p))) for o, p in combinations(own, 2)]
+    more = [*own, *([] if effect.shapes else two)]
+    return [at, *(o for o in dict.fromkeys(more) if o != at)]
+
+
+def unit_of(table: ColumnTable, effect: Effect) -> float:
+    """Outputs per SI unit, for what adds to outputs in counts or volts."""
+    if isinstance(effect, Motion):
+        return 1.0
+    gyro = all(p.unit.startswith(("rad", "(rad")) for p in effect.params)
+    return float(np.abs(table.unit[3 if gyro else 0]))
+
+
+def points(table: ColumnTable, effect: Effect) -> Iterator[Point]:
+    """Values of the shape parameters to try, with the origin of times."""
+    if not effect.shapes:
+        yield {}, 0
+    for shape in effect.shapes:
+        for value, origin in shape.grid(table.x, table.since):
+            yield {shape.name: value}, origin
+
+
+def _of_channels(effect: Sensor, x: Experience) -> bool:
+    """Whether an effect does the same to every output, each by its own parameter."""
+    if {p.name for p in effect.params} != set(CHANNELS):
+        return False
+    design = effect.design(x, _any(effect))
+    return bool((design == np.eye(6) * design[:, :1, :1]).all())
+
+
+def _any(effect: Effect) -> dict[str, float]:
+    """Some shape, where only which output has a column is asked."""
+    return {
+        s.name: max(s.low, 1.0) if np.isfinite(s.low) else 0.0 for s in effect.shapes
+    }

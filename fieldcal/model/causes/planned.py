@@ -1,0 +1,114 @@
+"""Columns of positions that are not taken yet, or were not fitted.
+
+What the accelerometers of a device with given parameters read in known positions at
+rest, and how that moves with each parameter: the same columns that are fitted to rows.
+m/s^2, device axes; a tilt in degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.core.frames import force_home
+from fieldcal.core.positions import Position, angles
+from fieldcal.core.samples import Array
+from fieldcal.effects import catalogue
+from fieldcal.model.causes import columns
+from fieldcal.model.causes.columns import RowView
+from fieldcal.model.state import State, Term
+from fieldcal.physics.effect import Motion, Sensor
+from fieldcal.physics.experience import Experience
+
+PLAIN = tuple(f"acc_{group}.{axis}" for group in ("bias", "scale") for axis in "xyz")
+"""Parameters that every device has."""
+
+
+def parameters(*groups: str) -> tuple[str, ...]:
+    """Full names of bias and scale factor, and of some effects of the catalogue.
+
+    >>> parameters("base_tilt")[-2:]
+    ('base_tilt.about_x_deg', 'base_tilt.about_z_deg')
+    """
+    more = (f"{g}.{p.name}" for g in groups for p in catalogue()[g].params)
+    return (*PLAIN, *more)
+
+
+def predicted(
+    names: Sequence[str],
+    values: Array,
+    positions: Sequence[Position],
+    gravity: float,
+    mounting: Array | None = None,
+) -> tuple[Array, Array]:
+    """Means of the accelerometers, and their derivatives.
+
+    Parameters
+    ----------
+    names, values : (k,) full names of parameters; what is not among them is perfect
+    positions : n, with known angles
+    gravity : m/s^2
+    mounting : (3, 3), procedure = mounting @ device
+
+    Returns
+    -------
+    u : (n, 3) m/s^2
+    slope : (n, 3, k)
+
+    """
+    state = state_of(names, values)
+    x = Experience.at_rest(
+        *angles(positions), gravity, base_force=force_home(gravity),
+        mounting=np.eye(3) if mounting is None else mounting,
+    )  # fmt: skip
+    view = RowView.of(x, np.zeros((1, len(x))), state)
+    parts = {"acc_bias": columns.bias(view), "acc_scale": columns.scale(view)}
+    for term in state.terms:
+        parts[term.effect.id] = columns.of_effect(term.effect, {}, 0).of(view)
+    slope = np.stack([_column(parts, n)[:, :3] for n in names], axis=2)
+    return state.output(view.x, view.since)[:, :3], slope
+
+
+def state_of(
+    names: Sequence[str], values: Array, nominal: tuple[Array, Array] | None = None
+) -> State:
+    """The state of a device with given parameters, full names and (k,) values.
+
+    What is not among them is perfect, or as `nominal` has bias and scale factor (6,);
+    groups that are no effect of the rows play no part.
+    """
+    known = dict(zip(names, values, strict=True))
+    bias, scale = nominal or (np.zeros(6), np.ones(6))
+    bias, scale = bias.astype(float), scale.astype(float)
+    for c in range(6):
+        sensor, axis = ("acc", "gyr")[c // 3], "xyz"[c % 3]
+        bias[c] = known.get(f"{sensor}_bias.{axis}", bias[c])
+        scale[c] = known.get(f"{sensor}_scale.{axis}", scale[c])
+    groups = dict.fromkeys(n.partition(".")[0] for n in names)
+    terms = [
+        Term(e, np.array([known.get(f"{group}.{p.name}", 0.0) for p in e.params]))
+        for group in groups
+        if isinstance(e := catalogue().get(group), Motion | Sensor)
+    ]
+    return State(bias, scale, np.zeros((0, 2)), np.zeros(3), tuple(terms))
+
+
+def design(
+    names: Sequence[str],
+    positions: Sequence[Position],
+    gravity: float,
+    mounting: Array | None = None,
+) -> Array:
+    """Derivatives about a perfect device, (n, 3, k)."""
+    perfect = np.array([float(n.startswith("acc_scale")) for n in names])
+    return predicted(names, perfect, positions, gravity, mounting)[1]
+
+
+def _column(parts: dict[str, Array], name: str) -> Array:
+    """Column (n, 6) of a parameter by its full name."""
+    group, _, part = name.partition(".")
+    if group in ("acc_bias", "acc_scale"):
+        one: Array = parts[group][:, :, "xyz".index(part)]
+        return one
+    return np.asarray(parts[group][:, :, catalogue()[group].names.index(part)])

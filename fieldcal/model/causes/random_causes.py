@@ -1,0 +1,91 @@
+"""Causes that are random: walks of the biases, and angles that were set by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fieldcal.core.samples import CHANNELS
+from fieldcal.effects import catalogue
+from fieldcal.model import priors
+from fieldcal.model.causes import smooth
+from fieldcal.model.causes.cause import TRIADS, Cause, Group
+from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.physics.effect import Scatter
+
+
+def of_chance(table: ColumnTable) -> Iterator[Cause]:
+    """Every random effect of the catalogue, and each position set elsewhere."""
+    for effect in catalogue().values():
+        if isinstance(effect, Scatter) and effect.applies(table.x):
+            yield from _of_scatter(table, effect)
+    oriented = table.held[
+        [bool(table.x.oriented[table.x.position == p].all()) for p in table.held]
+    ]
+    if len(oriented) == len(table.held) > 3:
+        size = np.full(2, np.deg2rad(priors.MISSET_DEG))
+        groups = tuple(
+            Group("misset", "", table.aside + 2 * p + np.arange(2), size,
+                  position=int(p), in_state=True)
+            for p in oriented
+        )  # fmt: skip
+        yield Cause("misset", "", priors.PRESENT, groups, "position")
+
+
+def _of_scatter(table: ColumnTable, effect: Scatter) -> Iterator[Cause]:
+    """A random effect by the kind of its parameters."""
+    if not {p.name for p in effect.params} <= set(CHANNELS):  # of the positions' angles
+        if len(table.held) < 3 or not table.x.oriented.all():
+            return
+        at = (table.aside + 2 * table.held[:, None] + [0, 1]).ravel()
+        size = np.full(len(at), np.deg2rad(effect.params[0].typical))
+        group = Group(effect.id, "", at, size, effect, in_state=True)
+        yield Cause(effect.id, "", effect.chance(table.x), (group,), "random")
+        return
+    for part, channels in TRIADS:
+        some = [c for c in channels if c in table.seen]
+        if some:
+            yield _walks(table, effect, part, [some], 1.0)
+            each = [[c] for c in some]
+            yield _walks(table, effect, f"{part}, one axis", each, priors.ALONE)
+
+
+def _walks(
+    table: ColumnTable,
+    effect: Scatter,
+    part: str,
+    sets: Sequence[Sequence[int]],
+    share: float,
+) -> Cause:
+    """Walks of some channels together, or of one of them."""
+    shape, modes = table.span.walk(), table.wander.modes
+    groups = tuple(
+        Group(
+            effect.id, "".join(CHANNELS[c] for c in some),
+            np.concatenate([table.wave(c, modes[c]) for c in some]),
+            np.concatenate([
+                shape[: modes[c]] * effect.params[c].typical * table.unit[c]
+                for c in some
+            ]),
+            effect,
+            params=tuple(some),
+        )
+        for some in sets
+    )  # fmt: skip
+    return Cause(effect.id, part, share * effect.chance(table.x), groups, "random")
+
+
+def flicker(table: ColumnTable) -> Iterator[Group]:
+    """Instability within the windows, where there are too few to have it between.
+
+    Of equal power in every octave: a cosine k has a variance as 1/k.
+    """
+    shape = 1 / np.sqrt(np.arange(1, smooth.WAVES + 1))
+    for part, channels in TRIADS:
+        at = [c for c in channels if c in table.seen]
+        if at:
+            size = priors.INSTABILITY_ACC if part == "acc" else priors.INSTABILITY_GYR
+            columns = np.concatenate([table.wave(c) for c in at])
+            sizes = np.concatenate([shape * size * table.unit[c] for c in at])
+            yield Group("flicker", part, columns, sizes)

@@ -1,0 +1,99 @@
+"""Causes that no effect is: functions of what is known of a row, and offsets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.model import priors
+from fieldcal.model.causes import smooth
+from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
+from fieldcal.model.causes.column_table import ColumnTable
+
+FORCES = 3
+"""Channels that feel a force, those of the accelerometers."""
+
+
+def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
+    """Functions that no effect makes, on each channel."""
+    sizes = typical(table)
+    for c in table.seen.tolist():
+        groups = [
+            Group("time", CHANNELS[c], table.wave(c), sizes[c] * smooth.smooth(span),
+                  shape={"waves": span})
+            for span in smooth.SPANS
+        ]  # fmt: skip
+        yield _cause("time", CHANNELS[c], groups)
+        at = table.window(c)
+        if len(table.held) > 3:
+            groups = [
+                Group("window", CHANNELS[c], at[i : i + 1], sizes[c : c + 1],
+                      position=int(p))
+                for i, p in enumerate(table.held)
+            ]  # fmt: skip
+            yield _cause("window", CHANNELS[c], groups)
+        if len(table.held) > FEW:
+            wide = np.full(len(at), sizes[c])
+            yield _cause(
+                "position", CHANNELS[c], [Group("position", CHANNELS[c], at, wide)]
+            )
+    yield from _together(table, sizes)
+    yield from _of_covariates(table, sizes)
+
+
+def typical(table: ColumnTable) -> Array:
+    """Size of what no effect makes on each channel, (6,)."""
+    out: Array = np.repeat([priors.UNKNOWN_ACC, priors.UNKNOWN_GYR], 3) * table.unit
+    return out
+
+
+def _together(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
+    """The same on all axes of a triad: one cause, not one for each of them."""
+    for part, channels in TRIADS:
+        some = [c for c in channels if c in table.seen]
+        if len(some) < 2:
+            continue
+        waves = np.concatenate([table.wave(c) for c in some])
+        groups = [
+            Group("time", part, waves,
+                  np.outer(sizes[some], smooth.smooth(span)).ravel(),
+                  shape={"waves": span})
+            for span in smooth.SPANS
+        ]  # fmt: skip
+        yield _cause("time", part, groups)
+
+
+def _of_covariates(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
+    """Functions of what is known of a row beside the time."""
+    for covariate, of in smooth.covariates(table.span).items():
+        if not _shows(table, covariate):
+            continue
+        width = of(table.x).shape[1]
+        first = table.course(covariate, of, width, False)
+        for c in table.seen.tolist():
+            at = first + c * width + np.arange(width)
+            parts = [at]
+            if covariate == "force and time" and c < FORCES:
+                parts.append(at[smooth.along(c)])  # a scale factor that changes
+            groups = [Group(covariate, CHANNELS[c], some, np.full(len(some), sizes[c]))
+                      for some in parts]  # fmt: skip
+            yield _cause(covariate, CHANNELS[c], groups)
+
+
+def _cause(name: str, part: str, groups: Sequence[Group]) -> Cause:
+    return Cause(name, part, priors.UNKNOWN, tuple(groups), "unknown")
+
+
+def _shows(table: ColumnTable, covariate: str) -> bool:
+    x = table.x
+    if covariate in ("alpha", "beta", "joints"):
+        return bool(x.oriented.all()) and len(table.held) > 3
+    if covariate == "temperature":
+        return x.warms
+    if covariate == "force and time":
+        return len(table.held) > FEW
+    if covariate == "since turn":
+        return bool(np.isfinite(x.since_turn).all())
+    return len(table.held) > 3

@@ -1,0 +1,264 @@
+"""The evidence of sets of groups, from one Gram matrix.
+
+Rows of a window are off by something that they share (an instability, rounding, the
+turns of an orientation that nobody knows), so a window counts as its course about its
+mean, which that leaves alone, and as its mean, of covariance
+
+    C_p = S_p^-1 + diag(tau^2) + A_p A_p^T                                         (1)
+
+with S_p its information, tau what each channel shares and A_p free turns. With G =
+Phi^T R^-1 Phi and b = Phi^T R^-1 (y - h) of all rows so weighed, and S the sizes v T of
+the columns of a set,
+
+    ln Z = b^T S (I + S G S)^-1 S b / 2 - ln |I + S G S| / 2 - ln |R| / 2           (2)
+
+and for one more group k, after the set is eliminated, with M = U diag(lambda) U^T the
+Schur complement of T G T and q = U^T T b',
+
+    gain(v) = sum_j [ v^2 q_j^2 / (1 + v^2 lambda_j) - ln(1 + v^2 lambda_j) ] / 2   (3)
+
+Nothing here is approximate but the grid of v. Source: M. Tipping and A. Faul, Fast
+marginal likelihood maximisation for sparse Bayesian models, 2003.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.priors import SIZES
+
+ROUNDED = 1e-9
+"""Part of a column's square that eliminating others leaves of it by rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gram:
+    """What the rows say of all columns.
+
+    Attributes
+    ----------
+    within : (k, k) Phi^T R^-1 Phi of the courses of windows about their means, and of
+        turns
+    pull : (k,) Phi^T R^-1 (y - h) of the same
+    square, count : (y - h)^T R^-1 (y - h) of the same, and their degrees of freedom
+    means : (p, 6, k) columns' means in each window
+    off : (p, 6) mean of y - h
+    info : (p, 6) information on each mean, 0 where nothing was measured
+    shared : (p, 6) standard deviation of what windows certainly share
+    loose : (p, 6, 2) A_p
+    kind : (p, 6) index of the instability of each mean; turns' closures have their own
+    bent : (p, 6, 6) by what a closure is off for an instability of one, by channel
+    index : (all,) where each column of the dictionary stands here, -1 where it does not
+
+    """
+
+    within: Array
+    pull: Array
+    square: float
+    count: int
+    means: Array
+    off: Array
+    info: Array
+    shared: Array
+    loose: Array
+    kind: Index
+    bent: Array
+    index: Index
+
+    def only(self, columns: Index) -> Gram:
+        """Some columns of the dictionary."""
+        kept = np.unique(columns)
+        at = self.index[kept]
+        index = np.full(len(self.index), -1, dtype=np.intp)
+        index[kept] = np.arange(len(kept))
+        return replace(
+            self,
+            within=self.within[np.ix_(at, at)],
+            pull=self.pull[at],
+            means=self.means[:, :, at],
+            index=index,
+        )
+
+    def blocks(self, columns: Sequence[Index]) -> list[Array]:
+        """The part of blocks of columns that no instability weighs."""
+        local = [self.index[at] for at in columns]
+        return [self.within[at[:, :, None], at[:, None, :]] for at in local]
+
+    def weighed(self, tau: Array) -> Weighed:
+        """With instabilities by kind."""
+        spread = self.shared**2 + tau[self.kind] ** 2 + self.bent**2 @ tau[:6] ** 2
+        if self.loose.any():
+            return self._loosely(spread)
+        weight = self.info / (1 + self.info * spread)
+        log_det = float(np.log1p(self.info * spread).sum())
+        n, c, k = self.means.shape
+        root = np.sqrt(weight).reshape(-1, 1)
+        return Weighed(
+            self, (root * self.means.reshape(n * c, k)),
+            root[:, 0] * self.off.ravel(), weight, np.zeros(0), log_det,
+        )  # fmt: skip
+
+    def _loosely(self, spread: Array) -> Weighed:
+        """The same where windows are turned freely: channels go together."""
+        known = self.info > 0
+        cov = self.loose @ np.swapaxes(self.loose, 1, 2)
+        cov[:, range(6), range(6)] += spread
+        both = known[:, :, None] & known[:, None, :]
+        scale = np.sqrt(self.info)
+        inner = np.where(both, cov * scale[:, :, None] * scale[:, None, :], 0.0)
+        inner[:, range(6), range(6)] += 1.0
+        root = np.linalg.inv(np.linalg.cholesky(inner)) * scale[:, None, :]
+        log_det = -2 * float(
+            np.log(np.diagonal(root, 0, 1, 2)[known] / scale[known]).sum()
+        )
+        n, c, k = self.means.shape
+        white = (root @ self.means).reshape(n * c, k)
+        off = (root @ self.off[:, :, None]).ravel()
+        weight = np.swapaxes(root, 1, 2) @ root
+        return Weighed(self, white, off, np.diagonal(weight, 0, 1, 2), root, log_det)
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """A Gram matrix at some instabilities.
+
+    Attributes
+    ----------
+    gram : what it was made of
+    white : (6 p, k) whitened means of the columns
+    off : (6 p,) of y - h
+    weight : (p, 6) information on each mean given the rest of its window
+    root : (p, 6, 6) whitening of the means, empty where each is for itself
+    log_det : ln |R| beyond that of white noise
+
+    """
+
+    gram: Gram
+    white: Array
+    off: Array
+    weight: Array
+    root: Array
+    log_det: float
+
+    def matrix(self, one: Index, other: Index | None) -> Array:
+        """Phi^T R^-1 Phi of some columns, or of some and all."""
+        one = self.gram.index[one]
+        if other is None:
+            out: Array = self.white[:, one].T @ self.white
+            out += self.gram.within[one]
+            return out
+        other = self.gram.index[other]
+        out = self.gram.within[np.ix_(one, other)]
+        out += self.white[:, one].T @ self.white[:, other]
+        return out
+
+    def pull(self, columns: Index | None) -> Array:
+        """Phi^T R^-1 (y - h) of some columns, or of all."""
+        some = slice(None) if columns is None else self.gram.index[columns]
+        out: Array = self.gram.pull[some] + self.white[:, some].T @ self.off
+        return out
+
+    def diagonals(self, blocks: Sequence[Index]) -> list[Array]:
+        """Phi^T R^-1 Phi of blocks of columns, (m, k) -> (m, k, k) each."""
+        out: list[Array] = []
+        for at, inner in zip(blocks, self.gram.blocks(blocks), strict=True):
+            some = self.white[:, self.gram.index[at]]
+            means = np.moveaxis(some, 0, 1)  # (m, r, k)
+            out.append(inner + np.swapaxes(means, 1, 2) @ means)
+        return out
+
+    @property
+    def square(self) -> float:
+        """(y - h)^T R^-1 (y - h)."""
+        return self.gram.square + float(self.off @ self.off)
+
+    def shared(self, kind: int) -> Array:
+        """Whitened columns of each mean of a kind by itself, (6 p, m)."""
+        gram = self.gram
+        size = (gram.kind == kind).astype(float)
+        if kind < 6:
+            size += gram.bent[:, :, kind]
+        rows, slots = np.nonzero((size > 0) & (gram.info > 0))
+        out = np.zeros((len(self.weight), 6, len(rows)))
+        at, by = np.arange(len(rows)), size[rows, slots]
+        if self.root.size:
+            out[rows, :, at] = self.root[rows, :, slots] * by[:, None]
+        else:
+            out[rows, slots, at] = np.sqrt(self.weight[rows, slots]) * by
+        return out.reshape(-1, len(rows))
+
+
+@dataclass(frozen=True, slots=True)
+class Eliminated:
+    """A set of columns with their sizes, eliminated.
+
+    Attributes
+    ----------
+    rows : what was eliminated in
+    columns : (a,) of the Gram matrix; one may stand there twice
+    sizes : (a,) standard deviation of each before the rows are seen
+    inverse : (a, a) S (I + S G S)^-1 S, the covariance after
+    estimate : (a,) mean after
+    score : ln Z, (2)
+
+    """
+
+    rows: Weighed
+    columns: Index
+    sizes: Array
+    inverse: Array
+    estimate: Array
+    score: float
+
+    @classmethod
+    def of(cls, rows: Weighed, columns: Index, sizes: Array) -> Eliminated:
+        """Eliminate columns of some sizes."""
+        scaled = rows.matrix(columns, columns) * sizes
+        scaled *= sizes[:, None]
+        scaled.flat[:: len(columns) + 1] += 1.0
+        root = np.linalg.cholesky(scaled)
+        half = np.linalg.inv(root) * sizes
+        seen = half @ rows.pull(columns)
+        score = 0.5 * (float(seen @ seen) - rows.square - rows.log_det)
+        score -= float(np.log(np.diag(root)).sum())  # (2)
+        return cls(rows, columns, sizes, half.T @ half, half.T @ seen, score)
+
+    def rest(self, columns: Index, typical: Array) -> tuple[Array, Array]:
+        """M and T b' of further columns, in units of what is typical."""
+        shared = self.rows.matrix(self.columns, columns)
+        inner = self.rows.matrix(columns, columns)
+        inner -= shared.T @ self.inverse @ shared
+        pull = self.rows.pull(columns) - shared.T @ self.estimate
+        return inner * typical * typical[:, None], pull * typical
+
+    def of_means(self, kind: int, typical: float) -> tuple[Array, Array]:
+        """The same of what each mean of a kind is off by."""
+        white = self.rows.shared(kind) * typical
+        ours = self.rows.white[:, self.rows.gram.index[self.columns]]
+        shared = ours.T @ white
+        inner = white.T @ white - shared.T @ self.inverse @ shared
+        return inner, white.T @ self.rows.off - shared.T @ self.estimate
+
+
+def gains(inner: Array, pull: Array, own: Array | float) -> Array:
+    """Gain (3) over `SIZES` of groups alike in width: (..., k, k), (..., k).
+
+    `own` (...) is the largest diagonal element of T G T before the elimination.
+    """
+    strength, axes = np.linalg.eigh(inner)
+    power = (np.swapaxes(axes, -1, -2) @ pull[..., None])[..., 0] ** 2
+    seen = strength > ROUNDED * np.maximum(np.asarray(own)[..., None], 1e-300)
+    strength, power = np.where(seen, strength, 0.0), np.where(seen, power, 0.0)
+    return gained(strength, power)
+
+
+def gained(strength: Array, power: Array, sizes: Array = SIZES) -> Array:
+    """Gain (3) over some sizes of lambda and q^2, (..., k) each."""
+    load = sizes[:, None] ** 2 * strength[..., None, :]
+    taken = sizes[:, None] ** 2 * power[..., None, :] / (1 + load)
+    gain: Array = 0.5 * (taken - np.log1p(load)).sum(axis=-1)
+    return gain

@@ -1,0 +1,228 @@
+"""The likeliest sizes of one set, each sought beside the others.
+
+Once a set is eliminated with sizes v_0, its covariance says what the evidence would be
+at any other size of one group: with C = U diag(c) U^T the covariance of the group in
+units of what it was before, lambda = (1 / c - 1) / v_0^2 and q = U^T u / (c v_0) are
+those of (3) of `gram`. What the means of windows share likewise: with S = U diag(s)
+U^T the information on them with tau in it, s / (1 - tau^2 s) is that without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.gram import Eliminated, Gram, gained
+
+DENSITY = np.log(priors.density())
+UNSTEADY = np.log(priors.density(priors.STEEP))
+"""The same of instabilities."""
+
+EVEN = int(np.argmin(np.abs(np.log(priors.SIZES))))
+"""Index of v = 1."""
+
+STEP = float(np.log(priors.SIZES[1] / priors.SIZES[0]))
+"""From one size to the next, ln."""
+
+FINER = 129
+"""Sizes that are tried between one size's neighbours, once it is to be told."""
+
+PRIOR_INFO = 0.1
+"""Information on ln v that there is at least."""
+
+ROUNDS = 5
+"""Times that every size is sought beside the others."""
+
+LEAST = 1e-14
+"""Part of its variance before the rows that rounding leaves of a column."""
+
+TRIADS = ((0, 1, 2), (3, 4, 5), (6,))
+"""Kinds of instability that are alike: those of a triad's axes; the turns' closures."""
+
+Member = tuple[Cause, Group]
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Indices in `priors.SIZES`.
+
+    `calibration` of the always-there groups, `instability` of the channels and the
+    turns, and `members` of the causes, in their order.
+    """
+
+    calibration: tuple[int, ...]
+    instability: tuple[int, ...]
+    members: tuple[int, ...] = ()
+
+
+def alike(
+    instability: Sequence[int] | Array, unstable: Array, density: Array = UNSTEADY
+) -> Any:
+    """How likely instabilities (..., 7) are, ln: those of a triad's axes are alike.
+
+    `unstable` (7,) is their typical size, 0 where there is none; `density` is ln of how
+    likely each of `priors.SIZES` is.
+    """
+    sizes = np.asarray(instability, dtype=float)
+    total = np.zeros(sizes.shape[:-1])
+    for triad in TRIADS:
+        if on := [c for c in triad if unstable[c] > 0]:
+            some = sizes[..., on]
+            middle = some.mean(axis=-1)
+            total = total + np.interp(middle, np.arange(len(density)), density)
+            apart = (some - middle[..., None]) * (STEP / priors.UNLIKE)
+            total -= 0.5 * (apart**2).sum(axis=-1)
+    return total if total.ndim else float(total)
+
+
+def _told(state: Eliminated, at: Index, v: float) -> tuple[Array, Array]:
+    """What (3) needs of a group, some columns of a set in which its size is v."""
+    wide = state.sizes[at]
+    cov = state.inverse[np.ix_(at, at)] / wide / wide[:, None]
+    part, axes = np.linalg.eigh(cov)
+    part = np.clip(part, LEAST, 1.0)
+    power = ((axes.T @ (state.estimate[at] / wide)) / (part * v)) ** 2
+    return (1 / part - 1) / v**2, power
+
+
+def likeliest(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
+    """The likeliest size of a group between those tried, and what ln v is uncertain by.
+
+    The information on ln v is that of the shares lambda v^2 / (1 + lambda v^2).
+    """
+    strength, power = _told(state, at, v)
+    near = v * np.exp(np.linspace(-STEP, STEP, FINER))
+    before = np.interp(np.log(near), np.log(priors.SIZES), DENSITY)
+    best = float(near[np.argmax(gained(strength, power, near) + before)])
+    share = best**2 * strength / (1 + best**2 * strength)
+    return best, float(np.maximum(2 * (share**2).sum(), PRIOR_INFO) ** -0.5)
+
+
+class Sizing:
+    """The sizes of one set.
+
+    Parameters
+    ----------
+    dictionary, gram : what the rows say
+    unstable : (7,) typical instability, 0 where there is none
+    members : of the set
+    start : sizes to begin with
+
+    Attributes
+    ----------
+    every : (a,) columns of all groups, of the dictionary
+
+    """
+
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        gram: Gram,
+        unstable: Array,
+        members: tuple[Member, ...],
+        start: Sizes | None,
+    ) -> None:
+        self.groups: list[Group] = [*dictionary.always, *(g for _, g in members)]
+        self.count, self.unstable = len(dictionary.always), unstable
+        begin = start or Sizes(
+            (EVEN,) * self.count, (EVEN,) * 7, (EVEN,) * len(members)
+        )
+        self.sizes = [*begin.calibration, *begin.members]
+        self.instability = list(begin.instability)
+        none = np.empty(0, dtype=np.intp)
+        self.every = np.concatenate([none, *(g.columns for g in self.groups)])
+        widths = np.cumsum([0, *(len(g.columns) for g in self.groups)]).tolist()
+        self.places = [slice(a, b) for a, b in pairwise(widths)]
+        self.gram = gram.only(self.every)
+        self._last: tuple[tuple[int, ...], Eliminated] | None = None
+
+    def run(self) -> tuple[Sizes, float, Array]:
+        """Seek sizes until they stay: sizes, ln Z summed over them, all columns'."""
+        free = [i for i, g in enumerate(self.groups) if g.fixed is None]
+        channels = np.flatnonzero(self.unstable > 0).tolist()
+        profiles: list[Array] = []
+        for _ in range(ROUNDS):
+            before = (*self.sizes, *self.instability)
+            profiles = [self._group(i) for i in free]
+            for triad in TRIADS:
+                if some := [c for c in triad if c in channels]:
+                    profiles += self._triad(some)
+            if (*self.sizes, *self.instability) == before:
+                break
+        score = self.eliminated().score
+        score += sum(DENSITY[self.sizes[i]] for i in free)
+        score += alike(self.instability, self.unstable)
+        for profile in profiles:
+            score += float(np.logaddexp.reduce(profile - profile.max()))
+        k = self.count
+        found = Sizes(
+            tuple(self.sizes[:k]), tuple(self.instability), tuple(self.sizes[k:])
+        )
+        return found, score, self._wide()
+
+    def eliminated(self) -> Eliminated:
+        """The set at the sizes as they are."""
+        key = (*self.sizes, *self.instability)
+        if self._last is None or self._last[0] != key:
+            tau = priors.SIZES[self.instability] * self.unstable
+            state = Eliminated.of(self.gram.weighed(tau), self.every, self._wide())
+            self._last = key, state
+        return self._last[1]
+
+    def _wide(self) -> Array:
+        parts = []
+        for group, size in zip(self.groups, self.sizes, strict=True):
+            free = float(priors.SIZES[size])
+            parts.append(group.sizes(free if group.fixed is None else group.fixed))
+        return np.concatenate([np.empty(0), *parts])
+
+    def _group(self, i: int) -> Array:
+        """F over the sizes of one group, and its size at the top."""
+        state = self.eliminated()
+        v = float(priors.SIZES[self.sizes[i]])
+        every = np.arange(len(self.every))
+        gain = gained(*_told(state, every[self.places[i]], v))
+        profile: Array = state.score + gain - gain[self.sizes[i]] + DENSITY
+        self.sizes[i] = int(np.argmax(profile))
+        return profile
+
+    def _triad(self, channels: Sequence[int]) -> list[Array]:
+        """F over the instabilities of each of some channels that are much alike.
+
+        They are set together: one by one none could leave the others behind.
+        """
+        alone = [self._channel(c) for c in channels]
+        index = np.arange(len(DENSITY))
+        apart = np.subtract.outer(index, index) * STEP / priors.UNLIKE
+        best = [gain - 0.5 * apart**2 for gain in alone]  # by middle, size
+        total = sum(b.max(axis=1) for b in best) + UNSTEADY
+        middle = int(np.argmax(total))
+        for c, one in zip(channels, best, strict=True):
+            self.instability[c] = int(np.argmax(one[middle]))
+        return [self._beside(c, one) for c, one in zip(channels, alone, strict=True)]
+
+    def _beside(self, c: int, gain: Array) -> Array:
+        """F over the sizes of a channel beside those of the others, of its gain."""
+        every = np.tile(self.instability, (len(DENSITY), 1))
+        every[:, c] = np.arange(len(DENSITY))
+        out: Array = gain + alike(every, self.unstable)
+        return out
+
+    def _channel(self, c: int) -> Array:
+        """Gain over the instabilities of one channel, the others as they are."""
+        inner, pull = self.eliminated().of_means(c, 1.0)
+        tau = float(priors.SIZES[self.instability[c]] * self.unstable[c])
+        told, axes = np.linalg.eigh(inner)
+        told = np.clip(told, 0.0, (1 - LEAST) / tau**2)
+        left = 1 - tau**2 * told
+        size = float(self.unstable[c])
+        power = (axes.T @ pull / left * size) ** 2
+        return gained(told / left * size**2, power)

@@ -1,0 +1,216 @@
+"""How well a session's positions are foretold by the others.
+
+Each position in turn is left out and everything is chosen again without it: which of
+the sets in question, with which variants, which sizes, which values. With too few
+windows stretches of time are left out instead. What a position has of its own (the
+angles it was set at, an orientation that nobody knows) is sought in it; nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array
+from fieldcal.model.causes.cause import FEW
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.search.selection import Search
+from fieldcal.model.system.fitted import Fitted, whole
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.turn_rows import TurnRows
+from fieldcal.model.system.window_rows import Linear
+
+FOLDS = 12
+"""Parts left out at most, one position or several far apart in each."""
+
+STRETCHES = 24
+"""Parts of each window where there are too few windows: as short as that, since what is
+random foretells for a short time only."""
+
+IN_QUESTION, BEHIND = 6, 20.0
+"""Sets among which is chosen again, and how far they are behind the best at most, ln:
+further ones no position can bring back."""
+
+
+class HeldOut:
+    """The rows of a session without each of its parts.
+
+    Parameters
+    ----------
+    fitted : the best set
+    sets : of whose columns use is made
+
+    """
+
+    def __init__(self, fitted: Fitted, sets: Sequence[Set]) -> None:
+        self.fitted, self.dictionary = fitted, fitted.dictionary
+        self.fold = folds(fitted.dictionary)
+        columns = _columns(self.dictionary, sets) | (fitted.values != 0)
+        self.columns = np.flatnonzero(columns)
+        self.linear = [_narrowed(part, columns) for part in fitted.linear]
+        self._rest: dict[int, Search | None] = {}
+
+    def residual(self, sets: Sequence[Set]) -> Array:
+        """Residuals of rows foretold from the others, (n, 6); nan where none can be.
+
+        `sets` are those in question; of them one is chosen anew for every part.
+        """
+        d, out = self.dictionary, np.full(self.fitted.rows.y.shape, np.nan)
+        for i in np.unique(self.fold) if self.fold.max() else ():
+            if (search := self._without(int(i))) is None:
+                continue
+            left = self.fold == i
+            chosen = max(
+                (search.evaluated(s.members, s.sizes) for s in sets),
+                key=lambda s: s.score,
+            )
+            step = self.fitted.values - whole(chosen.state, d) + _wander(chosen, d)
+            places = d.held[np.isin(d.held, d.x.position[left])]
+            for p in places if len(d.held) >= FEW else ():
+                step[d.aside + 2 * int(p) : d.aside + 2 * int(p) + 2] = 0.0
+            rows = [_rows(p, left[p.rows]) for p in self.linear]
+            _foretold(out, rows, step, chosen, d)
+        return out
+
+    def _without(self, i: int) -> Search | None:
+        """What the rows say without a part; None where a channel has no others."""
+        if i not in self._rest:
+            left = self.fold == i
+            rest = [_rows(part, ~left[part.rows]) for part in self.linear]
+            values, d = self.fitted.values, self.dictionary
+            told = all(len(part.white) for part in rest)
+            rows = gram(rest, d, values, (), self.columns) if told else None
+            self._rest[i] = None if rows is None else Search(d, rows)
+        return self._rest[i]
+
+
+def held_out(fitted: Fitted, sets: Sequence[Set]) -> Array:
+    """Residuals of rows foretold from the others by sets in question, (n, 6)."""
+    return HeldOut(fitted, sets).residual(sets)
+
+
+def in_question(best: Set, visited: Sequence[Set]) -> list[Set]:
+    """Sets that may turn out better without a part: those near, and the empty one."""
+    ranked = sorted(visited, key=lambda s: -s.score)
+    near = [s for s in ranked if s.score > best.score - BEHIND]
+    none = [s for s in ranked if not s.members]
+    return list(dict.fromkeys([best, *near[:IN_QUESTION], *none]))
+
+
+def turns_foretold(fitted: Fitted, turns: Sequence[TurnRows]) -> Array:
+    """Whitened residuals of turns, each foretold from windows and the other turns."""
+    d, out = fitted.dictionary, []
+    columns = _columns(d, [fitted.set]) | (fitted.values != 0)
+    linear = [_narrowed(part, columns) for part in fitted.linear]
+    for i in range(min(len(turns), FOLDS)):
+        left = turns[i::FOLDS]
+        kept = [t for t in turns if all(t is not one for one in left)]
+        rows = gram(linear, d, fitted.values, kept, np.flatnonzero(columns))
+        chosen = Search(d, rows).evaluated(fitted.set.members, fitted.set.sizes)
+        out += [turn_residual(t, whole(chosen.state, d)) for t in left]
+    return np.concatenate(out) if out else np.zeros(0)
+
+
+def turn_residual(turn: TurnRows, estimate: Array) -> Array:
+    """Whitened residuals of a turn's closure and way at some values of all columns."""
+    values = estimate[turn.columns]
+    closure = (turn.closure - turn.design @ values) * np.sqrt(turn.info)
+    return np.concatenate([closure, turn.way - turn.way_design @ values])
+
+
+def folds(d: Dictionary) -> NDArray[np.intp]:
+    """Number of the part that each row is left out in, (n,)."""
+    index = np.searchsorted(d.held, d.x.position)
+    if len(d.held) >= FEW:
+        out: NDArray[np.intp] = (index % FOLDS).astype(np.intp)
+        return out
+    out = np.zeros(len(index), dtype=np.intp)
+    for p in d.held:
+        for i, part in enumerate(
+            np.array_split(np.flatnonzero(d.x.position == p), STRETCHES)
+        ):
+            out[part] = i % FOLDS
+    return out
+
+
+def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
+    out = np.zeros(d.width, dtype=bool)
+    for one in sets:
+        out[one.state.columns] = True
+    out[d.aside : d.aside + 2 * d.places] = True
+    return out
+
+
+def _narrowed(part: Linear, columns: NDArray[np.bool_]) -> Linear:
+    kept = columns[part.columns]
+    return Linear(
+        part.channel, part.rows, part.window, part.weight,
+        part.columns[kept], part.design[:, kept], part.white,
+    )  # fmt: skip
+
+
+def _rows(part: Linear, kept: NDArray[np.bool_]) -> Linear:
+    return Linear(
+        part.channel, part.rows[kept], part.window[kept], part.weight[kept],
+        part.columns, part.design[kept], part.white[kept],
+    )  # fmt: skip
+
+
+def _foretold(
+    out: Array, left: Sequence[Linear], step: Array, chosen: Set, d: Dictionary
+) -> None:
+    """Residuals of the rows left out, each position's own angles sought in it."""
+    white = {p.channel: p.white + p.design @ step[p.columns] for p in left}
+    wide = _own(chosen, d)
+    for j, at in _angles(left, d):
+        size = wide[at]
+        if not size.any():
+            continue
+        a, z = [], []
+        for part in left:
+            rows = part.window == j
+            some = np.isin(part.columns, at)
+            design = np.zeros((int(rows.sum()), 2))
+            place = np.searchsorted(at, part.columns[some])
+            design[:, place] = part.design[np.ix_(rows, some)]
+            a.append(design * size)
+            z.append(white[part.channel][rows])
+        flat = np.concatenate(a)
+        u = np.linalg.solve(flat.T @ flat + np.eye(2), flat.T @ np.concatenate(z))
+        for part, design in zip(left, a, strict=True):
+            white[part.channel][part.window == j] -= design @ u
+    for part in left:
+        out[part.rows, part.channel] = white[part.channel] / part.weight
+
+
+def _wander(chosen: Set, d: Dictionary) -> Array:
+    """What the instability within windows is estimated at: it foretells nothing."""
+    out, first = np.zeros(d.width), 0
+    for group in d.always:
+        some = slice(first, first := first + len(group.columns))
+        if not group.in_state:
+            np.add.at(out, group.columns, chosen.state.estimate[some])
+    return out
+
+
+def _own(chosen: Set, d: Dictionary) -> Array:
+    """Sizes of the turns of each position, by column."""
+    out = np.zeros(d.width)
+    np.add.at(out, chosen.state.columns, chosen.state.sizes**2)
+    for p, free in zip(d.held, d.free, strict=True):
+        if free:
+            out[d.aside + 2 * int(p) : d.aside + 2 * int(p) + 2] += 1.0
+    only = np.zeros(d.width, dtype=bool)
+    only[d.aside : d.aside + 2 * d.places] = True
+    return np.sqrt(np.where(only, out, 0.0))
+
+
+def _angles(
+    left: Sequence[Linear], d: Dictionary
+) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Windows left out by their number, with the columns of their turns."""
+    for j in np.unique(np.concatenate([p.window for p in left])).tolist():
+        yield j, d.aside + 2 * int(d.held[j]) + np.arange(2)

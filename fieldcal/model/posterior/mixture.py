@@ -1,0 +1,255 @@
+"""What a set is estimated at, whatever its sizes and whichever window is bad.
+
+How much biases wander from window to window is known by the scatter of few windows
+only, and any window may be disturbed in a way that it does not show itself. Both are
+hypotheses h, each with its evidence (`model.evidence`), and the answer is their mixture
+
+    mean = sum_h P(h) mean_h,    cov = sum_h P(h) [cov_h + off_h off_h^T],
+    off_h = mean_h - mean
+
+so of few degrees of freedom an interval is as wide as Student's, and wide as well while
+it is not clear whether a window is bad; one that is for certain has no weight left.
+Source: Bayesian model averaging; for windows, Cook and Weisberg 1982, 2.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model import priors
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.gram import Eliminated, Gram, gains
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sizing import DENSITY, TRIADS, Sizing, alike
+
+KEPT = 4.0
+"""Evidence behind the best, ln, from which a hypothesis no longer counts: 50 to 1."""
+
+UNSTEADY = np.log(priors.loosely())
+"""How likely each size of instability is, ln: with whatever else scatters windows."""
+
+DEVICES = np.log(priors.density(priors.STEEP))
+"""The same where everything else is a cause of its own."""
+
+SHOWS = 0.2
+"""Part of a mean's noise from which what windows wander by beside it can be seen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """Instabilities of the channels, and perhaps a bad window.
+
+    Attributes
+    ----------
+    sizes : (7,) indices in `priors.SIZES`
+    window : number of the bad window, -1 for none
+    size : index of how much it is off by
+    chance : before the rows are seen, ln
+    score : ln of evidence times chance
+
+    """
+
+    sizes: tuple[int, ...]
+    window: int
+    size: int
+    chance: float
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mixture:
+    """The answer.
+
+    Attributes
+    ----------
+    columns : (k,) of the dictionary
+    mean, covariance : (k,), (k, k)
+    sizes : (k,) standard deviation of each before the rows are seen
+    bad : (p,) probability that a window is bad
+    scatter : (7,) rms of what each channel wanders from window to window
+    score : ln of the evidence of the set
+
+    """
+
+    columns: Index
+    mean: Array
+    covariance: Array
+    sizes: Array
+    bad: Array
+    scatter: Array
+    score: float
+
+
+class Mixing:
+    """Hypotheses about a set.
+
+    Parameters
+    ----------
+    dictionary, gram : what the rows say about the set's own state
+    there : the set, its sizes at their likeliest
+    unstable : (7,) typical instability, 0 where there is none
+    given : whether nobody looked for causes: then windows may be bad, or scattered by
+        more than the device
+    doubt : whether a window may be bad; not to be asked again where none is
+
+    """
+
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        gram: Gram,
+        there: Set,
+        unstable: Array,
+        given: bool = True,
+        doubt: bool = True,
+    ) -> None:
+        self.dictionary, self.there, self.unstable = dictionary, there, unstable
+        self.density = UNSTEADY if given else DEVICES
+        sizing = Sizing(dictionary, gram, unstable, there.members, there.sizes)
+        self.columns, self.wide = sizing.every, there.state.sizes
+        self.doubted = self._doubted() if given and doubt else []
+        more = [at for _, at in self.doubted]
+        self.gram = gram.only(np.concatenate([self.columns, *more]))
+        self.bad = np.zeros(len(dictionary.held))
+
+    def run(self) -> Mixture:
+        """Mix."""
+        lists = [self._of_triad(triad) for triad in TRIADS]
+        best = sum(max(h.score for h in some) for some in lists)
+        every = [
+            self._exactly(parts)
+            for parts in product(*lists)
+            if sum(h.score for h in parts) > best - KEPT
+        ]
+        score = np.array([s for s, _, _ in every])
+        score += alike(self.there.sizes.instability, self.unstable, self.density)
+        total = float(np.logaddexp.reduce(score))
+        weight = np.exp(score - total)
+        means = np.array([e.estimate[: len(self.columns)] for _, e, _ in every])
+        mean: Array = weight @ means
+        k = len(self.columns)
+        covariance = np.einsum(
+            "h,hij->ij", weight, np.array([e.inverse[:k, :k] for _, e, _ in every])
+        )
+        off = means - mean
+        covariance += (weight[:, None] * off).T @ off
+        tau = np.array([t for _, _, t in every])
+        scatter = np.sqrt(weight @ tau**2)
+        return Mixture(
+            self.columns, mean, covariance, self.wide, self.bad, scatter, total
+        )
+
+    def _doubted(self) -> list[tuple[int, Index]]:
+        """Windows that may be bad by the accelerometers, with their columns."""
+        d = self.dictionary
+        seen = [c for c in d.seen if c < 3]
+        held = len(d.held)
+        if held <= 2 or not seen:
+            return []
+        every = np.array(seen) * held + d.windows
+        return [(i, (every + i).astype(np.intp)) for i in range(held)]
+
+    def _of_triad(self, triad: Sequence[int]) -> list[Hypothesis]:
+        """Hypotheses about one triad, as likely as counts, the others as they are."""
+        mode = self.there.sizes.instability
+        first = Hypothesis(mode, -1, 0, 0.0, 0.0)
+        if not self.unstable[list(triad)].any():
+            return [first]
+        found: list[Hypothesis] = []
+        total: list[float] = []
+        bad: list[Array] = []
+        for state, sizes, known in self._shifted(triad):
+            found.append(Hypothesis(sizes, -1, 0, known, state.score + known))
+            total.append(found[-1].score)
+            if triad[0] == 0 and self.doubted:
+                some, score = self._with_bad(state, sizes, known)
+                found += some
+                bad.append(score)
+        if bad:
+            each = np.logaddexp.reduce(np.array(bad), axis=0)
+            every = np.logaddexp.reduce([*total, *each.tolist()])
+            self.bad = np.exp(each - every)
+        best = max(h.score for h in found)
+        return [h for h in found if h.score > best - KEPT]
+
+    def _shifted(
+        self, triad: Sequence[int]
+    ) -> Iterator[tuple[Eliminated, tuple[int, ...], float]]:
+        """The set at instabilities of a triad that are larger or smaller together.
+
+        Those too small to show are one, the smallest that could; the chance of each is
+        that beside the likeliest.
+        """
+        mode = self.there.sizes.instability
+        middle = round(float(np.mean([mode[c] for c in triad])))
+        top = len(priors.SIZES) - 1
+        moved = [
+            tuple(int(np.clip(m + s, 0, top)) if c in triad else m
+                  for c, m in enumerate(mode))
+            for s in range(-middle, top + 1 - middle)
+        ]  # fmt: skip
+        chance = np.array(
+            [alike(sizes, self.unstable, self.density) for sizes in moved]
+        )
+        chance -= alike(mode, self.unstable, self.density)
+        first = max(0, self._showing(triad) - 1)
+        chance[first] = np.logaddexp.reduce(chance[: first + 1])
+        for sizes, known in zip(moved[first:], chance[first:].tolist(), strict=True):
+            state = self._at(sizes, self.columns, self.wide)
+            yield state, sizes, known
+
+    def _showing(self, triad: Sequence[int]) -> int:
+        """The smallest of `SIZES` at which what a triad wanders by can be seen."""
+        seen = np.isin(self.gram.kind, triad) & (self.gram.info > 0)
+        noise = 1 / np.sqrt(self.gram.info[seen].max(initial=1e-300))
+        typical = float(self.unstable[list(triad)].max())
+        return int(np.searchsorted(priors.SIZES * typical, SHOWS * noise))
+
+    def _with_bad(
+        self, state: Eliminated, sizes: tuple[int, ...], known: float
+    ) -> tuple[list[Hypothesis], Array]:
+        """The same with each window bad, by each size that counts; scores by window."""
+        alone = state.score + known
+        chance = known + float(np.log(priors.BAD)) + DENSITY
+        found, score = [], np.zeros(len(self.doubted))
+        for i, at in self.doubted:
+            typical = self._typical(at)
+            inner, pull = state.rest(at, typical)
+            own = np.diag(state.rows.matrix(at, at)).max() * typical.max() ** 2
+            every = state.score + chance
+            every += gains(inner[None], pull[None], np.array([own]))[0]
+            score[i] = np.logaddexp.reduce(every)
+            found += [
+                Hypothesis(sizes, i, v, float(chance[v]), float(every[v]))
+                for v in np.flatnonzero(every > alone - KEPT).tolist()
+            ]
+        return found, score
+
+    def _exactly(self, parts: Sequence[Hypothesis]) -> tuple[float, Eliminated, Array]:
+        """Hypotheses of each triad together: their score, estimate, instabilities."""
+        sizes = list(self.there.sizes.instability)
+        for triad, one in zip(TRIADS, parts, strict=True):
+            for c in triad:
+                sizes[c] = one.sizes[c]
+        columns, wide, window = self.columns, self.wide, parts[0].window
+        if window >= 0:
+            at = dict(self.doubted)[window]
+            size = priors.SIZES[parts[0].size] * self._typical(at)
+            columns, wide = np.append(columns, at), np.append(wide, size)
+        state = self._at(sizes, columns, wide)
+        tau = priors.SIZES[sizes] * self.unstable
+        return state.score + sum(h.chance for h in parts), state, tau
+
+    def _at(self, sizes: Sequence[int], columns: Index, wide: Array) -> Eliminated:
+        tau = priors.SIZES[list(sizes)] * self.unstable
+        return Eliminated.of(self.gram.weighed(tau), columns, wide)
+
+    def _typical(self, at: Index) -> Array:
+        unit = self.dictionary.unit[:3][[c for c in self.dictionary.seen if c < 3]]
+        out: Array = priors.UNKNOWN_ACC * unit * np.ones(len(at))
+        return out

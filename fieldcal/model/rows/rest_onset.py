@@ -1,0 +1,60 @@
+"""When the device came to rest in each position.
+
+Between two windows it is turned; the last sign of motion, in the gyroscopes or, without
+them, in the accelerometers, is the arrival. What settles after a turn may count from
+there or from some fixed time before the window (the fixture clamped, the operator's
+hands off); which of them, the samples before the window tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.reduce import RowSource, rate_of, spans
+from fieldcal.session.description import Description
+
+PIECE_S = 0.2
+MOVING = 7.0
+"""Departure of a short mean from the window's that is motion, in standard errors."""
+
+RATE, FORCE = 2e-3, 0.05
+"""Departures that are no motion whatever the noise, rad/s and m/s^2."""
+
+
+def arrivals(block: Block, about: Description, noise: Array) -> Array:
+    """Instant from which the device was at rest in each position, (p,) s."""
+    windows = spans(block, about)
+    m = max(2, round(PIECE_S * rate_of(block)))
+    out = np.full(len(windows), block.t[0])
+    before = 0
+    for p, (first, last) in enumerate(windows):
+        if last > first >= before:
+            held = np.concatenate(
+                [triad[first:last].mean(axis=0) for triad in (block.acc, block.gyr)]
+            )
+            moved = _moved(block[before:first].six, held, noise, m)
+            out[p] = block.t[before + moved if before else 0]
+            before = int(last)
+    return out
+
+
+def _moved(gap: Array, held: Array, noise: Array, m: int) -> int:
+    """Samples of a gap up to the last sign of motion; `held` is the window's mean."""
+    whole = len(gap) // m
+    if not whole:
+        return len(gap)
+    start = len(gap) - whole * m
+    mean = gap[start:].reshape(whole, m, 6).mean(axis=1)
+    limit = np.maximum(MOVING * noise / np.sqrt(m), [FORCE] * 3 + [RATE] * 3)
+    moving = np.abs(mean - held) > limit
+    rated = bool(np.isfinite(mean[:, 3:]).all())
+    at = np.flatnonzero((moving[:, 3:] if rated else moving[:, :3]).any(axis=1))
+    return start + (int(at[-1]) + 1) * m if len(at) else 0
+
+
+def beginnings(source: RowSource) -> Array:
+    """Where each window begins, (p,) s; a position without one has its arrival."""
+    windows = source.about.windows
+    given = [np.nan if w is None else w[0] for w in windows] or [source.block.t[0]]
+    return np.where(np.isnan(given), source.arrived, given)

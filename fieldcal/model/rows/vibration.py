@@ -1,0 +1,164 @@
+"""How noisy each window is, and lines that shake some windows and not others.
+
+An engine or a machine shakes at a few frequencies. Over a second the sine of one does
+not average out, though it says nothing about the sensors, so in windows louder than the
+usual ones the lines that stand out are fitted, a + b cos(2 pi f t) + c sin(2 pi f t) in
+all outputs, and taken out before rows are averaged. How hard each window is shaken is
+measured before that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.noise import grain_of, noise_of
+from fieldcal.windows.noise import ChannelNoise, short_lag
+
+LOUDER = 6.0
+"""Significance from which a window counts as noisier than the others."""
+
+LINES = 8
+"""Of one window at most."""
+
+STANDS = 30.0
+"""Power of a line, in those of its neighbours at the median."""
+
+LOWEST_HZ = 2.0
+"""What is slower may be the sensors' own."""
+
+LONGEST = 1 << 16
+"""Samples of a window in which lines are looked for."""
+
+STEPS = 4
+"""Of Gauss and Newton, to a line's frequency."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shaking:
+    """How noisy the windows of a recording are.
+
+    Attributes
+    ----------
+    noise : (6,) usual deviation of one sample
+    levels : (w, 6) deviation of one sample that the means of each window obey
+    variance : (w, 3) of the accelerometers' samples in each window, (m/s^2)^2
+    block : the samples without the lines that shake single windows
+
+    """
+
+    noise: Array
+    levels: Array
+    variance: Array
+    block: Block
+
+
+def shaking(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Shaking:
+    """Measure the noise of every window.
+
+    The usual noise is that of the quiet windows. Others have more: what their samples
+    have on top of it, or, if that is less, what means over a second have.
+    """
+    found, more, loud = _compared(block, windows, rate_hz)
+    noise = found.white
+    levels = np.sqrt(noise**2 + more)
+    variance = levels[:, :3] ** 2
+    six = block.six if loud.any() else np.empty((0, 6))
+    for i in np.flatnonzero(loud).tolist():
+        a, b = windows[i]
+        variance[i] = np.nan_to_num(np.nanvar(block.acc[a:b], axis=0))
+        six[a:b] = without_lines(six[a:b], rate_hz)
+    if loud.any():
+        block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
+    for i in np.flatnonzero(loud).tolist():
+        alone = noise_of(block, windows[i : i + 1], rate_hz).white
+        levels[i] = np.fmax(noise, np.fmin(levels[i], alone))
+    return Shaking(noise, levels, variance, block)
+
+
+def usual_noise(
+    block: Block, windows: NDArray[np.intp], rate_hz: float
+) -> ChannelNoise:
+    """Noise of one sample in the quiet windows, (6,)."""
+    return _compared(block, windows, rate_hz)[0]
+
+
+def _compared(
+    block: Block, windows: NDArray[np.intp], rate_hz: float
+) -> tuple[ChannelNoise, Array, NDArray[np.bool_]]:
+    """Usual noise (6,), what windows have on top (w, 6), and which are loud (w,)."""
+    out = np.empty((len(windows), 6))
+    for i, (a, b) in enumerate(windows):
+        out[i] = np.concatenate([short_lag(t[a:b]) for t in (block.acc, block.gyr)])
+    grain = grain_of(block, windows)  # outputs may stay on one step all through some
+    low = np.fmax(np.sort(out, axis=0)[(len(out) - 1) // 4], grain)  # nan comes last
+    margin = LOUDER / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
+    louder = out > low * np.exp(margin)
+    loud: NDArray[np.bool_] = np.any(louder, axis=1)
+    noise = noise_of(block, windows if loud.all() else windows[~loud], rate_hz)
+    white, quick = (
+        np.where(grain > 0, np.fmax(n, grain), n) for n in (noise.white, noise.quick)
+    )
+    more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0)
+    return ChannelNoise(white, quick), more, loud
+
+
+def without_lines(piece: Array, rate_hz: float) -> Array:
+    """Samples (n, c) of a window less the lines that stand out of it.
+
+    >>> t = np.arange(400) / 100
+    >>> piece = np.sin(2 * np.pi * 17.3 * t)[:, None] + 9.8
+    >>> bool(np.ptp(without_lines(piece, 100.0)) < 1e-6)
+    True
+    """
+    known: NDArray[np.bool_] = np.all(np.isfinite(piece), axis=1)
+    t = np.arange(len(piece)) / rate_hz
+    out = piece.copy()
+    if known.sum() < 64 or len(piece) > LONGEST:
+        return out
+    for _ in range(LINES):
+        hz = _strongest(out[known], rate_hz)
+        if hz is None:
+            break
+        out = out - _fitted(t, out, known, hz)
+    return out
+
+
+def _strongest(y: Array, rate_hz: float) -> float | None:
+    """Frequency that stands out most, Hz; None if none does."""
+    n = 4 << (len(y) - 1).bit_length()
+    taper = np.hanning(len(y))[:, None]
+    power = np.abs(np.fft.rfft((y - y.mean(axis=0)) * taper, n, axis=0)) ** 2
+    hz = np.fft.rfftfreq(n, 1 / rate_hz)
+    power = power[hz >= LOWEST_HZ]
+    if not len(power):
+        return None
+    level = np.maximum(np.median(power, axis=0), 1e-300)
+    total = (power / level).max(axis=1)
+    at = int(np.argmax(total))
+    return float(hz[hz >= LOWEST_HZ][at]) if total[at] > STANDS else None
+
+
+def _fitted(t: Array, y: Array, known: NDArray[np.bool_], hz: float) -> Array:
+    """The line near a frequency, (n, c), its frequency fitted to all outputs."""
+    for _ in range(STEPS):
+        design = _waves(t, hz)
+        amplitude = np.linalg.lstsq(design[known], y[known], rcond=None)[0]
+        left = (y - design @ amplitude)[known]
+        rise = np.column_stack([-design[:, 2], design[:, 1]]) @ amplitude[1:]
+        slope = (2 * np.pi * t[:, None] * rise)[known]
+        slope -= design[known] @ np.linalg.lstsq(design[known], slope, rcond=None)[0]
+        step = float((slope * left).sum() / max(float((slope**2).sum()), 1e-300))
+        hz += float(np.clip(step, -1 / t[-1], 1 / t[-1]))
+    design = _waves(t, hz)
+    amplitude = np.linalg.lstsq(design[known], y[known], rcond=None)[0]
+    return design[:, 1:] @ amplitude[1:]
+
+
+def _waves(t: Array, hz: float) -> Array:
+    """A constant, a cosine and a sine, (n, 3)."""
+    turned = 2 * np.pi * hz * t
+    return np.column_stack([np.ones_like(t), np.cos(turned), np.sin(turned)])

@@ -1,0 +1,260 @@
+"""What a set may be given: every other cause, with what it is worth.
+
+A cause is offered at its best variant and size, beside the set's instability as it is
+and smaller in one triad, since what it explains there is instability no longer; the
+other triad's stays, which nothing has explained.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed, gains
+from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member, Sizes
+
+LEVELS = (3, 6, 9, 40)
+"""Steps in size by which instability may fall when something is explained."""
+
+FALLING = ((0, 1, 2), (3, 4, 5, 6))
+"""Instabilities that fall together: of a triad, and of turns with the gyroscopes."""
+
+Less = tuple[int, ...]
+"""Indices of instabilities in `priors.SIZES`, (7,)."""
+
+WIDE = 30
+"""Columns of a group from which its eigenvalues cost more than to look them up."""
+
+LEAST = 0.5
+"""Gain of ln L below which an offer is none."""
+
+LOST = -12.0
+"""Worth of an offer that no pair makes up for, ln."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Offer:
+    """A member that a set may be given.
+
+    Attributes
+    ----------
+    member : cause and variant
+    score : of the set with it, foretold
+    size : index of its likeliest size
+    less : instability beside it
+
+    """
+
+    member: Member
+    score: float
+    size: int
+    less: Less
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OfferTable:
+    """What may be added to a set beside one instability.
+
+    Attributes
+    ----------
+    less : its instability
+    state, score : of the set
+    offers : the best first
+
+    """
+
+    less: Less
+    state: Eliminated
+    score: float
+    offers: list[Offer]
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What rows at one instability say of every column, whatever the set.
+
+    Attributes
+    ----------
+    rows : so weighed
+    pull : (k,) of all columns
+    blocks : Phi^T R^-1 Phi of the blocks of each width
+
+    """
+
+    rows: Weighed
+    pull: Array
+    blocks: list[Array]
+
+
+class Offers(Sets):
+    """What sets may be given."""
+
+    def __init__(self, dictionary: Dictionary, gram: Gram) -> None:
+        super().__init__(dictionary, gram)
+        self._tables: dict[tuple[tuple[str, int], ...], list[OfferTable]] = {}
+        self._at: dict[Less, Seen] = {}
+        self._known: dict[int, Array] = {}
+
+    def offers(self, there: Set) -> list[Offer]:
+        """Every cause that a set has not, at its best variant, the best one first."""
+        best: dict[str, Offer] = {}
+        for table in self.tables(there):
+            for offer in table.offers:
+                name = offer.member[0].key
+                if name not in best or offer.score > best[name].score:
+                    best[name] = offer
+        return sorted(best.values(), key=lambda o: -o.score)
+
+    def tables(self, there: Set) -> list[OfferTable]:
+        """What a set may be given, beside each of some instabilities."""
+        key = self.key(there.members)
+        if key not in self._tables:
+            self._tables[key] = [
+                OfferTable(
+                    less, state, score, self._at_level(there, state, score, less)
+                )
+                for less, state, score in self._levels(there)
+            ]
+        return self._tables[key]
+
+    def _at_level(
+        self, there: Set, state: Eliminated, score: float, less: Less
+    ) -> list[Offer]:
+        """Every cause that a set has not, beside one instability, the best first."""
+        d, chances = self.dictionary, self._chances(there)
+        best: dict[int, tuple[float, int, int]] = {}
+        for alike, gain in zip(d.by_width, self._screen(state, less), strict=True):
+            at, variant = alike.cause, alike.variant
+            profile = gain + DENSITY
+            size = profile.argmax(axis=1)
+            worth = np.logaddexp.reduce(profile, axis=1) + chances[at]
+            worth[np.take_along_axis(gain, size[:, None], 1)[:, 0] < LEAST] = -np.inf
+            for m in np.flatnonzero(worth > LOST + chances[at].min()).tolist():
+                if int(at[m]) not in best or worth[m] > best[int(at[m])][0]:
+                    best[int(at[m])] = float(worth[m]), int(variant[m]), int(size[m])
+        offers = [
+            Offer((c, c.variants[v]), score + worth, size, less)
+            for c, (worth, v, size) in ((d.causes[i], b) for i, b in best.items())
+            if c.key not in there.keys
+        ]
+        return sorted(offers, key=lambda o: -o.score)
+
+    def _chances(self, there: Set) -> Array:
+        """Of every cause beside a set, by its number, ln."""
+        names = {c.name for c, _ in there.members if c.kind == "effect"}
+        out = self.dictionary.chances.copy()
+        for i, cause in enumerate(self.dictionary.causes):
+            if cause.name in names and cause.kind == "effect":
+                out[i] += np.log(priors.AGAIN / cause.chance)
+        return out
+
+    def _levels(self, there: Set) -> Iterator[tuple[Less, Eliminated, float]]:
+        """The set with its instability as it is and smaller, and its score then."""
+        sizes = there.sizes
+        base = there.score - there.state.score
+        base -= self.alike(sizes.instability)
+        columns, wide = there.state.columns, there.state.sizes
+        ways = [(wide, 0.0), self.opened(there)]
+        for less in self._less(sizes.instability):
+            fallen = less != sizes.instability
+            rows = self._seen(less).rows
+            for before, cost in ways if fallen and ways[1][1] else ways[:1]:
+                state = Eliminated.of(rows, columns, before)
+                yield less, state, base + cost + state.score + self.alike(less)
+        first, rows = 0, self._seen(sizes.instability).rows
+        for group, size in zip(
+            self.dictionary.always, sizes.calibration, strict=True
+        ):  # what a device has anyway, with next to no change from nominal: what one
+            # cause does to all axes, or in time, looks like it
+            some = slice(first, first := first + len(group.columns))
+            if group.in_step or not group.in_state:
+                small = wide.copy()
+                small[some] = group.sizes(float(priors.SIZES[0]))
+                state = Eliminated.of(rows, columns, small)
+                lost = DENSITY[0] - DENSITY[size]
+                score = there.score - there.state.score + state.score
+                yield sizes.instability, state, score + lost
+
+    def _less(self, instability: Less) -> list[Less]:
+        """Instabilities as they are, and smaller in one triad; each once."""
+        found = [instability]
+        for some in FALLING if self.unstable.any() else ():
+            for down in LEVELS:
+                found.append(fallen(instability, some, down))
+        return list(dict.fromkeys(found))
+
+    def opened(self, there: Set) -> tuple[Array, float]:
+        """Sizes with no calibration below what is typical, and what that costs, ln.
+
+        Held against an instability that makes up for everything, a calibration seems to
+        stay where it was.
+        """
+        wide, first, cost = there.state.sizes.copy(), 0, 0.0
+        pairs = zip(self.dictionary.always, there.sizes.calibration, strict=True)
+        for group, size in pairs:
+            some = slice(first, first := first + len(group.columns))
+            if group.fixed is None and size < EVEN:
+                wide[some] = group.sizes(float(priors.SIZES[EVEN]))
+                cost += float(DENSITY[EVEN] - DENSITY[size])
+        return wide, cost
+
+    def _seen(self, less: Less) -> Seen:
+        """What the rows say of every column at one instability."""
+        if less not in self._at:
+            rows = self.weighed(less)
+            blocks = rows.diagonals(
+                [alike.blocks for alike in self.dictionary.by_width]
+            )
+            self._at[less] = Seen(rows, rows.pull(None), blocks)
+        return self._at[less]
+
+    def _screen(self, state: Eliminated, less: Less) -> Iterator[Array]:
+        """Gains over sizes of every variant of every cause, (m, sizes) by width."""
+        there = self._seen(less)
+        shared = there.rows.matrix(state.columns, None)
+        half = np.linalg.cholesky(state.inverse).T @ shared
+        rest = there.pull - shared.T @ state.estimate
+        for alike, own in zip(self.dictionary.by_width, there.blocks, strict=True):
+            part = np.moveaxis(half[:, alike.blocks], 0, 1)  # (b, a, k)
+            typical, block = alike.typical, alike.block
+            inner = (own - np.swapaxes(part, 1, 2) @ part)[block]
+            inner *= typical[:, :, None] * typical[:, None, :]
+            top = (np.diagonal(own, 0, 1, 2)[block] * typical**2).max(axis=-1)
+            yield self._gains(inner, rest[alike.blocks[block]] * typical, top)
+
+    def _gains(self, inner: Array, pull: Array, own: Array) -> Array:
+        """Gains of groups; of wide ones only where no other instability gave the same.
+
+        What no turn and no orientation connects with a triad does not see its
+        instability.
+        """
+        if inner.shape[-1] < WIDE:
+            return gains(inner, pull, own)
+        keys = [
+            hash(m.tobytes() + q.tobytes()) for m, q in zip(inner, pull, strict=True)
+        ]
+        new = [i for i, key in enumerate(keys) if key not in self._known]
+        found = gains(inner[new], pull[new], own[new])
+        self._known.update(zip((keys[i] for i in new), found, strict=True))
+        return np.array([self._known[key] for key in keys])
+
+    def taken(self, there: Set, *offers: Offer) -> Set:
+        """The set with what was offered."""
+        sizes = there.sizes
+        less = tuple(map(min, *(o.less for o in offers), sizes.instability))
+        more = (o.size for o in offers)
+        start = Sizes(sizes.calibration, less, (*sizes.members, *more))
+        return self.evaluated((*there.members, *(o.member for o in offers)), start)
+
+
+def fallen(instability: Less, some: Sequence[int], down: int) -> Less:
+    """Instabilities of which some are smaller by so many steps."""
+    return tuple(
+        max(size - down, 0) if i in some else size for i, size in enumerate(instability)
+    )

@@ -1,0 +1,71 @@
+"""Offsets of the windows that all axes of a triad share in one proportion.
+
+Where the joints stand otherwise than they are said to, or what holds the device gives,
+all axes of a triad are off together, in a proportion a that nobody knows,
+
+    y_pc = d_p a_c
+
+which is linear in neither alone. About d0 and a0, with r_j the directions across a0,
+
+    y_pc = d_p a0_c + sum_j t_j d0_p r_jc                                          (1)
+
+is, so the group has a column for each window and one for each direction across, and
+what the proportion costs is counted as of any other columns. d0 and a0 are the leading
+singular vectors of what the windows of each axis are off by beside a set: where (1)
+fits best. Source: principal components, one step of Gauss and Newton about them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
+from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.unknown_causes import typical
+from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.sets import Set
+
+
+def in_proportion(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:
+    """Causes of one proportion about what is left beside each of some sets."""
+    for part, channels in TRIADS:
+        some = np.intersect1d(channels, dictionary.seen)
+        if len(some) < 2 or len(dictionary.held) <= FEW:
+            continue
+        about = [_left(dictionary, one, some) for one in sets]
+        groups = tuple(_group(dictionary, part, some, left) for left in about)
+        yield Cause("position", part, priors.UNKNOWN, groups, "unknown")
+
+
+def _left(d: Dictionary, there: Set, some: Array) -> Array:
+    """What windows are off by beside a set, in typical sizes, (p, channels)."""
+    rows = there.state.rows.gram.weighed(priors.SIZES[0] * d.unstable)
+    state = Eliminated.of(rows, there.state.columns, there.state.sizes)
+    columns = np.concatenate([d.window(c) for c in some])
+    inner, pull = state.rest(columns, np.repeat(typical(d)[some], len(d.held)))
+    inner.flat[:: len(columns) + 1] += 1 / priors.SIZES[-1] ** 2
+    left: Array = np.linalg.solve(inner, pull).reshape(len(some), -1).T
+    return left
+
+
+def _group(d: Dictionary, part: str, some: Array, left: Array) -> Group:
+    """The group about the leading singular vectors of what is left."""
+    course, size, directions = np.linalg.svd(left, full_matrices=False)
+    middle = course[:, 0] * np.sqrt(len(left))
+    directions = directions * typical(d)[some]  # (1), in outputs
+
+    def of(view: RowView) -> Array:
+        inside = np.equal.outer(view.x.position, d.held).astype(float)
+        out = np.zeros((len(inside), 6, len(left) + len(directions) - 1))
+        out[:, some, : len(left)] = inside[:, None] * directions[0][:, None]
+        out[:, some, len(left) :] = (inside @ middle)[:, None, None] * directions[1:].T
+        return out
+
+    width = len(left) + len(directions) - 1
+    at = d.add(General("in proportion", of), width) + np.arange(width)
+    return Group("position", part, at, np.ones(width))

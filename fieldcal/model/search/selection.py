@@ -1,0 +1,157 @@
+"""The search for the set of causes that matters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.search.offers import Offer, Offers, OfferTable
+from fieldcal.model.search.pairs import pairs
+
+SETTLED = 0.02
+"""Rise of ln Z that is none."""
+
+MOST = 10
+"""Steps of one search."""
+
+FOLLOWED = 4
+"""Offers that are evaluated in full, at each step."""
+
+NEAR = 12.0
+"""How far an offer may be behind the best one to be followed, ln."""
+
+PROMISING = 16
+"""Causes of which pairs are tried."""
+
+SLACK = 3.0
+"""What the full evaluation of an offer may find beyond what was foretold, ln."""
+
+
+class Search(Offers):
+    """The search over one Gram matrix."""
+
+    def run(self, start: tuple[Member, ...] = ()) -> Set:
+        """The set of the highest weight that is found."""
+        best = self.evaluated(start)
+        for _ in range(MOST):
+            better = self._step(best)
+            if better.score <= best.score + SETTLED:
+                break
+            best = better
+        return best
+
+    def _step(self, there: Set) -> Set:
+        """The best of the set with one or two more, with one less, or with one else."""
+        best = self._followed(there, there.score)
+        if best is there:
+            best = self._paired(there, there.score)
+        for i in range(len(best.members)):
+            less = self.without(best, i)
+            best = max([best, less, self._followed(less, best.score)], key=_score)
+        if best is not there:
+            return best
+        return max(self._instead(best), self._wider(best), key=_score)
+
+    def _wider(self, there: Set) -> Set:
+        """The best set with all the parameters of one of its causes and one more.
+
+        Alone a cause is given those that are worth it, which make up for others; beside
+        another one it may need all, and before it has them the other is worth nothing.
+        """
+        found = [there]
+        for i, (cause, group) in enumerate(there.members):
+            whole = _whole(cause, group)
+            if whole is not group:
+                members = list(there.members)
+                members[i] = (cause, whole)
+                wide = self.evaluated(tuple(members), there.sizes)
+                found.append(self._followed(wide, there.score))
+        return max(found, key=_score)
+
+    def _instead(self, there: Set) -> Set:
+        """The best set with two or three causes in the place of one without physics.
+
+        A function of many columns does for what several effects make together, of which
+        none alone is worth as much: that of the most columns, when nothing else helps.
+        """
+        width = [len(g.columns) * (c.kind == "unknown") for c, g in there.members]
+        if max(width, default=0) <= 1:
+            return there
+        less = self.without(there, int(np.argmax(width)))
+        two = self._paired(less, there.score)
+        return max([there, two, self._followed(two, there.score)], key=_score)
+
+    def _followed(self, there: Set, level: float) -> Set:
+        """The best set with one more; the set itself if none comes near a level."""
+        offers = self.offers(there)
+        found = [there]
+        for offer in offers[:FOLLOWED]:
+            if offer.score > level - SLACK and offer.score > offers[0].score - NEAR:
+                found.append(self.taken(there, offer))
+        return max(found, key=_score)
+
+    def _paired(self, there: Set, level: float) -> Set:
+        """The best set with two more, of which neither is worth it alone.
+
+        The set itself if none comes near a level.
+        """
+        tried: dict[tuple[str, str], tuple[float, Offer, Offer]] = {}
+        for table in self.tables(there):
+            if table.less == there.sizes.instability:
+                continue
+            for one, two, gain in _pairs(table):
+                key = (one.member[0].key, two.member[0].key)
+                total = table.score + gain + self._more(there, one, two)
+                if key not in tried or total > tried[key][0]:
+                    tried[key] = (total, one, two)
+        near = sorted(tried.values(), key=lambda t: -t[0])[:FOLLOWED]
+        near = [t for t in near if t[0] > level - 2 * SLACK]
+        found = [self.taken(there, one, two) for _, one, two in near]
+        return max(found, key=_score, default=there)
+
+    def _more(self, there: Set, one: Offer, two: Offer) -> float:
+        """Chance of two more causes beside those of a set, ln."""
+        both = [*there.members, one.member, two.member]
+        return self.chance(both) - self.chance(there.members)
+
+
+def _pairs(table: OfferTable) -> Iterator[tuple[Offer, Offer, float]]:
+    """Every two offers of a table with their gain.
+
+    Each with all its parameters as well: beside the other it may need them.
+    """
+    known = [o for o in table.offers if o.member[0].kind != "unknown"][:PROMISING]
+    every = [*known, *(_widened(o) for o in known)]
+    new = [a is not b for a, b in zip(known, every[len(known) :], strict=True)]
+    wanted = []
+    for i, j in combinations(range(len(known)), 2):
+        wanted.append((i, j))
+        if new[i] or new[j]:
+            wanted.append((i + new[i] * len(known), j + new[j] * len(known)))
+    groups, sizes = [o.member[1] for o in every], [o.size for o in every]
+    for gain, (i, j), (u, v) in pairs(table.state, groups, sizes, wanted):
+        yield replace(every[i], size=u), replace(every[j], size=v), gain
+
+
+def _widened(offer: Offer) -> Offer:
+    """An offer with all the parameters that its cause has."""
+    cause, group = offer.member
+    whole = _whole(cause, group)
+    return offer if whole is group else replace(offer, member=(cause, whole))
+
+
+def _whole(cause: Cause, group: Group) -> Group:
+    """The variant of a cause with all its parameters, the group itself if it has."""
+    whole = cause.variants[0]
+    part = not group.shape and set(group.params) < set(whole.params)
+    return whole if part else group
+
+
+def _score(one: Set) -> float:
+    return one.score

@@ -1,0 +1,110 @@
+"""A set with its residuals, as rows see them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.system.window_rows import Linear
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A set at a base state.
+
+    Attributes
+    ----------
+    rows, dictionary : of the session
+    linear : rows of each channel about the state
+    values : (k,) of the dictionary's columns in the state
+    set : what is fitted
+
+    """
+
+    rows: Rows
+    dictionary: Dictionary
+    linear: Sequence[Linear]
+    values: Array
+    set: Set
+
+    @property
+    def estimate(self) -> Array:
+        """Of every column of the dictionary, (k,)."""
+        return whole(self.set.state, self.dictionary)
+
+    @property
+    def certain(self) -> Array:
+        """The same without what is random: that takes nothing from a residual."""
+        out = self.estimate
+        for group in self.dictionary.always:
+            if not group.in_state:
+                out[group.columns] = 0.0
+        for cause, group in self.set.members:
+            if cause.kind == "random":
+                out[group.columns] = 0.0
+        return out
+
+    def residual(self, estimate: Array | None = None) -> Array:
+        """Recorded less fitted, (n, 6); nan where nothing was used."""
+        estimate = self.estimate if estimate is None else estimate
+        out = np.full(self.rows.y.shape, np.nan)
+        step = self.values - estimate
+        for part in self.linear:
+            at = np.flatnonzero(step[part.columns])
+            off = part.white + part.design[:, at] @ step[part.columns[at]]
+            out[part.rows, part.channel] = off / part.weight
+        return out
+
+    @property
+    def squares(self) -> Array:
+        """Whitened squares of each channel, its windows' instability counted, (6,)."""
+        return self.squares_of(self.residual())
+
+    def squares_of(self, residual: Array) -> Array:
+        """The same of other residuals, weighed alike."""
+        tau = priors.SIZES[list(self.set.sizes.instability)] * self.dictionary.unstable
+        out = np.zeros(6)
+        for part in self.linear:
+            c = part.channel
+            white = residual[part.rows, c] * part.weight
+            first = np.flatnonzero(np.diff(part.window, prepend=-1))
+            info = np.add.reduceat(part.weight**2, first)
+            mean = np.add.reduceat(white * part.weight, first) / info
+            shared = self.dictionary.common[part.window[first], c] ** 2 + tau[c] ** 2
+            kept = 1 / (1 + info * shared)
+            out[c] = float(white @ white) - float((info * mean**2) @ (1 - kept))
+        return out
+
+    @property
+    def dof(self) -> int:
+        """Rows less what was estimated of them."""
+        free = self.set.state
+        spent = 1 - np.diag(free.inverse) / free.sizes**2
+        return int(sum(len(p.white) for p in self.linear) - round(float(spent.sum())))
+
+
+def whole(state: Eliminated, dictionary: Dictionary) -> Array:
+    """Estimates of a set as values of every column of the dictionary, (k,).
+
+    Turns of positions whose orientation nobody knows are those that fit each best.
+    """
+    out = np.zeros(dictionary.width)
+    np.add.at(out, state.columns, state.estimate)
+    if dictionary.free.any():
+        at = state.rows.gram.index[state.columns]
+        left = state.rows.off - state.rows.white[:, at] @ state.estimate
+        left = left.reshape(-1, 6)
+        for j, p in enumerate(dictionary.held):
+            if dictionary.free[j]:
+                pull = state.rows.gram.loose[j].T @ state.rows.root[j].T @ left[j]
+                first = dictionary.aside + 2 * int(p)
+                out[first : first + 2] += priors.ASIDE * pull
+    return out

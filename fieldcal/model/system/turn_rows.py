@@ -1,0 +1,297 @@
+"""What the turns between windows say: closures, and the accelerometers on the way.
+
+At the end of a turn the attitude R must take the attitude (or, without known angles,
+the force) of p to that of q: what it is off by is phi_T of `turn`, (1), the closure. On
+the way the accelerometers see (2) there (`way_rows`). White noise of the gyroscopes of
+density N makes phi_T a sum with covariance N^2 T.
+
+Source: rotation kinematics to first order in phi.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.causes.columns import Course, General, RowView
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.state import State, Term
+from fieldcal.model.system.way_rows import BUILT_UP, WayRows, on_the_way, settling
+from fieldcal.model.system.window_rows import Linear
+from fieldcal.model.turns.attitude import between, geometry
+from fieldcal.model.turns.turn import Turn, Turning, moved, only
+from fieldcal.physics.experience import Experience
+
+STEADY = 3.0
+"""Squares a row on the way, with everything fitted that shows there, from which a hand
+shook the device and the way says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class TurnRows:
+    """Rows of one turn.
+
+    Attributes
+    ----------
+    positions : from, to
+    closure : (s,) what is seen of phi_T, rad, plus what the state has of the columns
+    columns : (k,) of the dictionary
+    design : (s, k) of the closure
+    info : (s,) information, 1/rad^2
+    bent : (s, 3) by what it is off for accelerometers that are each off at both ends
+    way, way_design : (r,), (r, k) whitened rows of the accelerometers on the way
+
+    """
+
+    positions: tuple[int, int]
+    closure: Array
+    columns: Index
+    design: Array
+    info: Array
+    bent: Array
+    way: Array
+    way_design: Array
+
+    def copied(self, old: Index, new: Index) -> TurnRows:
+        """With new columns that are as some old ones, of a shape next to theirs."""
+        at = [int(np.flatnonzero(self.columns == c)[0]) for c in old.tolist()
+              if c in self.columns]  # fmt: skip
+        kept = np.isin(old, self.columns)
+        return replace(
+            self,
+            columns=np.concatenate([self.columns, new[kept]]),
+            design=np.hstack([self.design, self.design[:, at]]),
+            way_design=np.hstack([self.way_design, self.way_design[:, at]]),
+        )
+
+
+class Turns:
+    """Makes rows of the turns of a recording.
+
+    Parameters
+    ----------
+    turning : what follows the turns
+    dictionary : columns
+    way : whether the accelerometers are looked at on the way
+
+    """
+
+    def __init__(self, turning: Turning, dictionary: Dictionary, way: bool) -> None:
+        self.turning, self.dictionary = turning, dictionary
+        self.rows = turning.rows
+        self.way = way and not dictionary.free.any()
+
+    def linearised(
+        self, state: State, values: Array, windows: Sequence[Linear], known: Set | None
+    ) -> list[TurnRows]:
+        """Rows of all turns about a state; `values` of the columns in it.
+
+        `windows` are the rows of the windows about the same state, `known` is what they
+        say; None where that is still to be sought, and the way is not looked at.
+        """
+        out: list[TurnRows] = []
+        seen = self.way and known is not None and not _strange(known)
+        self.scale, self.known = state.scale, known if seen else None
+        if self.dictionary.free.any():
+            self.means = _means(windows, self.dictionary)
+            self.spread = _spread(windows, self.dictionary)
+        out += [self._rows(t, state, values) for t in self.turning.turns(state)]
+        return _steadied(out)
+
+    def courses(self, state: State, terms: Sequence[Term]) -> Iterator[Array]:
+        """Outputs that some terms make in each turn, at its edges, (m + 1, 6)."""
+        rest = tuple(t for t in state.terms if t not in terms)
+        less = replace(state, terms=rest)
+        for turn in self.turning.turns(state):
+            since = self.turning.after(turn.t, turn.positions[1])
+            x = moved(replace(turn.x, f=turn.felt), less)
+            yield state.output(turn.x, since) - less.output(x, since)
+
+    # -- rows
+
+    def _rows(self, turn: Turn, state: State, values: Array) -> TurnRows:
+        """Closure and way of one turn, by all columns that reach them."""
+        d = self.dictionary
+        since = self.turning.after(turn.x.t, turn.positions[1])
+        view = RowView(turn.x, turn.x, since, state)
+        _, seen, across = geometry(turn.ends, turn.positions, turn.attitude, turn.done)
+        weights = turn.weights(state.scale[3:])
+        at, closing, general = [], [], []
+        for first, one in d.bases:
+            if isinstance(one, Course):
+                if d.free.any():  # it turns the force that is seen at the ends
+                    width = 3 * one.width
+                    at.append(first + np.arange(width))
+                    closing.append(np.zeros((3, width)))
+                if not one.timed:
+                    continue
+                table = one.of(view)
+                for c in (3, 4, 5):
+                    at.append(first + c * table.shape[1] + np.arange(table.shape[1]))
+                    closing.append(weights[:, :, c - 3] @ table)
+                continue
+            outputs, bent = self._of_basis(turn, state, view, one)
+            columns = first + np.arange(outputs.shape[2])
+            at.append(columns)
+            closing.append(np.einsum("ijc,jck->ik", weights, outputs[:, 3:]) - bent)
+            if self.known is not None:
+                kept = on_the_way(columns, d, self.known)
+                general.append((columns[kept], outputs[:, :, kept]))
+        index, close = np.concatenate(at), np.concatenate(closing, axis=1)
+        ends: Array = np.zeros((3, 3))
+        loose = dict(self._loose_ends(turn)) if d.free.any() else {}
+        for p, bent in loose.items():
+            close = close - bent @ self.means[p][:, index]
+            ends += (bent * (self.spread[p] + self.rows.wander**2)) @ bent.T
+        there = np.abs(close).max(axis=0) > 0
+        for columns, outputs in general:
+            there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
+        index = index[there]
+        spread = self.rows.noise[3:] / np.abs(state.scale[3:]) * np.sqrt(turn.interval)
+        length = float(np.ptp(turn.x.t))
+        wide = float(np.sqrt((spread**2).mean())) * np.sqrt(length)
+        fading = settling(state, turn.x, since)[3:] / np.abs(state.scale[3:])
+        unsure = BUILT_UP * length * float(np.abs(fading).max())
+        earth = EARTH_RATE / 3**0.5 * length if d.free.any() else 0.0
+        alike = wide**2 + turn.blur**2 + unsure**2 + earth**2
+        basis, info = _plane(across, ends, alike)
+        close = basis @ close[:, there]
+        closure = basis @ seen + close @ values[index]
+        off = [(basis @ bent) ** 2 for bent in loose.values()]
+        bent = np.sqrt(sum(off, np.zeros((len(basis), 3))))
+        way: Array = np.zeros(0)
+        design: Array = np.zeros((0, len(index)))
+        if self.known is not None:
+            seen_by = WayRows(turn, view, d, self.known, self.rows.noise)
+            way, design = seen_by.rows(general, values, index)
+        return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
+
+    def _loose_ends(self, turn: Turn) -> Iterator[tuple[int, Array]]:
+        """How the closure moves with what is added to the accelerometers at its ends.
+
+        Of a position of unknown orientation, that turns the force that they are taken
+        to see: df = -(1 - n n^T) dU / k. Numbers of the two windows, (3, 3) each.
+        """
+        ends = turn.ends
+        for p in turn.positions:
+            row = int(np.argmax(ends.position == p))
+            f = ends.f[row]
+            up = f / np.linalg.norm(f)
+            across = (np.eye(3) - np.outer(up, up)) / self.scale[:3]
+            bent = np.zeros((3, 3))
+            for j, step in enumerate(1e-4 * np.linalg.norm(f) * np.eye(3)):
+                sides = []
+                for sign in (1.0, -1.0):
+                    g = ends.f.copy()
+                    g[ends.position == p] = f + sign * step
+                    sides.append(self._at_ends(turn, replace(ends, f=g))[1])
+                bent[:, j] = (sides[0] - sides[1]) / (2 * step[j])
+            yield int(np.searchsorted(self.dictionary.held, p)), -bent @ across
+
+    def _of_basis(
+        self, turn: Turn, state: State, view: RowView, one: General
+    ) -> tuple[Array, Array]:
+        """Outputs at the edges (m + 1, 6, k), and by how much the closure moves."""
+        width = len(turn.x)
+        if one.sides is None:
+            table = one.of(view)
+            return table, np.zeros((3, table.shape[2]))
+        p, q = turn.positions
+        rows = [int(np.argmax(turn.ends.position == i)) for i in (p, q)]
+        plain = only(self.rows.x, rows)
+        outputs, moved = [], []
+        for up, down, step in one.sides(plain, state):
+            if up is down:  # of another position
+                outputs.append(np.zeros((width, 6)))
+                moved.append(np.zeros(3))
+                continue
+            (f, close), (g, other) = (self._at_ends(turn, x) for x in (up, down))
+            six = np.zeros((width, 6))
+            six[:, :3] = (f - g) / (2 * step) * state.scale[:3]
+            ends = (up.w - down.w) / (2 * step)
+            six[:, 3:] = between(turn.attitude, turn.done, *ends) * state.scale[3:]
+            outputs.append(six)
+            moved.append((close - other) / (2 * step))
+        return np.stack(outputs, axis=2), np.stack(moved, axis=1)
+
+    @staticmethod
+    def _at_ends(turn: Turn, x: Experience) -> tuple[Array, Array]:
+        f, closure, _ = geometry(x, turn.positions, turn.attitude, turn.done)
+        return f, closure
+
+
+def _strange(known: Set) -> bool:
+    """Whether something that no physics makes acts on accelerometers at rest.
+
+    What it does while the device is turned, nobody can say.
+    """
+    return any(
+        cause.kind == "unknown" and not group.part.startswith("g")
+        for cause, group in known.members
+    )
+
+
+def _plane(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:
+    """What is known of a closure: orthonormal rows, (2 or 3, 3), and information.
+
+    Parameters
+    ----------
+    across : (3, 3) projection on it
+    ends : (3, 3) covariance of what the forces at both ends leave of it, rad^2
+    alike : variance besides, rad^2
+
+    """
+    values, axes = np.linalg.eigh(across)
+    plane: Array = axes[:, values > 0.5].T
+    spread, turned = np.linalg.eigh(plane @ ends @ plane.T)
+    return turned.T @ plane, 1 / (np.maximum(spread, 0.0) + alike)
+
+
+def _means(windows: Sequence[Linear], d: Dictionary) -> Array:
+    """Columns of the accelerometers in the mean of each window, (p, 3, k)."""
+    out = np.zeros((len(d.held), 3, d.width))
+    for part in windows:
+        if part.channel < 3:
+            first = np.flatnonzero(np.diff(part.window, prepend=-1))
+            weight = part.weight[:, None]
+            table = np.add.reduceat(part.design * weight, first, axis=0)
+            table /= np.add.reduceat(weight**2, first, axis=0)
+            out[part.window[first][:, None], part.channel, part.columns] = table
+    return out
+
+
+def _spread(windows: Sequence[Linear], d: Dictionary) -> Array:
+    """Variance of the accelerometers' mean in each window, (p, 3)."""
+    out = d.common[:, :3] ** 2
+    for part in windows:
+        if part.channel < 3:
+            first = np.flatnonzero(np.diff(part.window, prepend=-1))
+            info = np.add.reduceat(part.weight**2, first)
+            out[part.window[first], part.channel] += 1 / info
+    return out
+
+
+def _steadied(rows: list[TurnRows]) -> list[TurnRows]:
+    """Without the way, where a hand shook the device on it."""
+    if not rows or not len(rows[0].way):
+        return rows
+    columns = np.unique(np.concatenate([r.columns for r in rows]))
+    size = sum(len(r.way) for r in rows)
+    design, white, at = np.zeros((size, len(columns))), np.zeros(size), 0
+    for r in rows:
+        there = slice(at, at := at + len(r.way))
+        design[there, np.searchsorted(columns, r.columns)] = r.way_design
+        white[there] = r.way
+    some = design[:, np.abs(design).max(axis=0) > 0]
+    rest = white - some @ np.linalg.lstsq(some, white, rcond=1e-9)[0]
+    if float(rest @ rest) <= STEADY * max(size - some.shape[1], 1):
+        return rows
+    return [
+        replace(r, way=np.zeros(0), way_design=np.zeros((0, len(r.columns))))
+        for r in rows
+    ]

@@ -1,0 +1,182 @@
+"""What the accelerometers say on the way from one window to the next.
+
+They speak of what no window shows; what windows show is as these have it, within its
+uncertainty: on the way the attitude is known by interpolation only, (2) of `turn`. The
+white noise of the gyroscopes of density N makes phi_k - u phi_T a bridge with
+
+    N^2 (min(t, t') - u' t - u t' + u u' T)                                         (1)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model import priors
+from fieldcal.model.causes.columns import Course, RowView
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.state import State
+from fieldcal.model.turns.turn import Turn
+from fieldcal.physics.experience import Experience
+
+ARRIVAL_S = 0.3
+"""Standard uncertainty of the instant at which a turn by hand ends."""
+
+BUILT_UP, AFTERWARDS, BUILDS_S = 0.5, 0.15, 2.0
+"""How far what settles may be off on the way and at its end, in its size, and how
+smoothly, s."""
+
+
+class WayRows:
+    """Rows of the accelerometers of one turn.
+
+    Parameters
+    ----------
+    turn, view : what is followed, and what columns see of it
+    dictionary : columns
+    known : what windows and closures say
+    noise : (6,) standard deviation of one sample
+
+    """
+
+    def __init__(
+        self,
+        turn: Turn,
+        view: RowView,
+        dictionary: Dictionary,
+        known: Set,
+        noise: Array,
+    ) -> None:
+        self.turn, self.view, self.dictionary = turn, view, dictionary
+        self.known, self.noise, self.state = known, noise, view.state
+
+    def rows(
+        self, general: Sequence[tuple[Index, Array]], values: Array, index: Index
+    ) -> tuple[Array, Array]:
+        """Whitened rows (r,), and their design by some columns, (r, k).
+
+        `general` are columns with their outputs at the edges, `values` (all,) those in
+        the state, `index` (k,) the columns wanted.
+        """
+        d, found, turn = self.dictionary, self.known.state, self.turn
+        columns = np.concatenate([c for c, _ in general])
+        design = self._seen(np.concatenate([o for _, o in general], axis=2))
+        flat = design.reshape(-1, len(columns))
+        own = ~d.shown[columns] & np.isin(columns, index)
+        output = self.state.output(turn.x, self.view.since)
+        off = turn.acc - turn.means(output[:, :3])
+        z = off.ravel() + flat[:, own] @ values[columns[own]]
+        held, at = self._held(columns, flat)
+        estimate = np.where(values[found.columns[at]] != 0, 0.0, found.estimate[at])
+        z = z - held @ estimate
+        cov = self._covariance()
+        cov += held @ found.inverse[np.ix_(at, at)] @ held.T
+        whiten = np.linalg.inv(np.linalg.cholesky(cov))
+        whole = np.zeros((len(z), len(index)))
+        order = np.argsort(index)
+        place = order[np.searchsorted(index[order], columns[own])]
+        whole[:, place] = whiten @ flat[:, own]
+        return whiten @ z, whole
+
+    def _seen(self, outputs: Array) -> Array:
+        """What outputs at the edges make of the pieces, (k, 3, columns), (2)."""
+        scale = self.state.scale
+        path = self.turn.carried(outputs[:, 3:] / scale[3:, None])
+        swung = self.turn.swung(path) * scale[:3, None]
+        return self.turn.means(outputs[:, :3] + swung)
+
+    def _held(self, columns: Index, flat: Array) -> tuple[Array, Index]:
+        """Columns that the windows' set holds, on the way, and their number in it."""
+        d, found = self.dictionary, self.known.state
+        out, at = [], []
+        order = np.argsort(columns)
+        for i, column in enumerate(found.columns.tolist()):
+            j = int(np.searchsorted(columns[order], column))
+            if j < len(columns) and columns[order[j]] == column and d.shown[column]:
+                out.append(flat[:, order[j]])
+                at.append(i)
+        for first, one in d.bases:
+            if isinstance(one, Course) and one.timed:
+                for i, course in self._of_course(first, one):
+                    out.append(course)
+                    at.append(i)
+        return np.stack(out, axis=1), np.array(at, dtype=np.intp)
+
+    def _of_course(self, first: int, one: Course) -> Iterator[tuple[int, Array]]:
+        """A course's columns on the accelerometers, as far as the set holds them."""
+        held = self.known.state.columns
+        inside = np.flatnonzero((held >= first) & (held < first + 3 * one.width))
+        if not len(inside):
+            return
+        table = self.turn.means(one.of(self.view))
+        for i in inside.tolist():
+            c, m = divmod(int(held[i]) - first, one.width)
+            seen = np.zeros((len(table), 3))
+            seen[:, c] = table[:, m]
+            yield i, seen.ravel()
+
+    def _covariance(self) -> Array:
+        """Of the rows, (3 k, 3 k)."""
+        turn, x, state = self.turn, self.turn.x, self.state
+        middle = (x.t[turn.cut[1:]] + x.t[turn.cut[:-1]]) / 2 - x.t[0]
+        done = np.interp(middle, x.t - x.t[0], turn.done)
+        length = float(x.t[-1] - x.t[0])
+        bridge = np.minimum.outer(middle, middle) + np.outer(done, done) * length
+        bridge -= np.outer(middle, done) + np.outer(done, middle)  # (1)
+        fading = settling(state, x, self.view.since)
+        cov = np.diag((turn.sd**2).ravel())
+        built = _built_up(x, self.view.since, middle)
+        cov += np.kron(built, np.outer(fading[:3], fading[:3]))
+        density = self.noise[3:] / np.abs(state.scale[3:]) * np.sqrt(turn.interval)
+        building = BUILT_UP * np.sqrt(length) * fading[3:] / state.scale[3:]
+        density = np.hypot(density, building)
+        for axis in range(3):
+            along = np.broadcast_to(np.eye(3)[axis][:, None], (len(x.t), 3, 1))
+            arm = turn.means(turn.swung(along)[:, :, 0]) * state.scale[:3]
+            arm = arm * density[axis]
+            blocks = bridge[:, None, :, None] * np.multiply.outer(arm, arm)
+            cov += blocks.reshape(cov.shape)
+        sizes = priors.SIZES[list(self.known.sizes.instability)]
+        loose = (sizes * self.dictionary.unstable)[:3]
+        # what windows are off by for reasons unknown changes with the attitude as well
+        apart = np.subtract.outer(middle, middle) / BUILDS_S
+        course = 1.0 + np.exp(-(apart**2) / 2)
+        walks = self.dictionary.wander.apart(middle, np.diff(x.t[turn.cut]))
+        for c in range(3):
+            cov[c::3, c::3] += walks[c]
+        out: Array = cov + np.kron(course, np.diag(loose**2))
+        return out
+
+
+def on_the_way(columns: Index, dictionary: Dictionary, known: Set) -> NDArray[np.bool_]:
+    """Columns that no window shows, or that the windows' set holds."""
+    held = np.isin(columns, known.state.columns)
+    out: NDArray[np.bool_] = held | ~dictionary.shown[columns]
+    return out
+
+
+def settling(state: State, x: Experience, since: Array) -> Array:
+    """What begins to fade at the end of a turn, (6,)."""
+    never = state.output(x, np.full_like(since, np.inf))[-1]
+    then = state.output(x, np.zeros_like(since))[-1]
+    sizes: Array = then - never
+    return sizes
+
+
+def _built_up(x: Experience, since: Array, middle: Array) -> Array:
+    """Covariance between pieces of what settling adds to each, for a size of one.
+
+    How it builds up in a turn is not known: smoothly, somewhere between none and all of
+    it; afterwards it fades from an instant that is known so well.
+    """
+    rest = np.isfinite(since[0])
+    k = int(np.argmax(rest)) if rest.any() else len(x.t) - 1
+    arrived = x.t[k] - (since[0, k] if rest.any() else 0.0) - x.t[0]
+    unsure = np.where(middle < arrived + ARRIVAL_S, BUILT_UP, AFTERWARDS)
+    apart = np.subtract.outer(middle, middle) / BUILDS_S
+    out: Array = np.outer(unsure, unsure) * np.exp(-(apart**2) / 2)
+    return out

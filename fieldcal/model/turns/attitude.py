@@ -1,0 +1,109 @@
+"""Kinematics of a turn: what of it is known at both ends.
+
+R (3, 3) takes vectors of the attitude at the start to that on the way (`rotation`);
+angles in rad, t in s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.frames import turn
+from fieldcal.core.samples import Array
+from fieldcal.model.turns.rotation import carry, small_turns
+from fieldcal.physics.experience import Experience
+
+SMOOTH_S = 0.1
+"""Means that the angular acceleration is taken from."""
+
+ASTRAY = 0.3
+"""Misclosure that no gyroscope makes, rad: clipped, or turned in another way."""
+
+
+def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
+    """Means between cuts (indices) of a course given at instants."""
+    gaps = np.diff(t).reshape(-1, *[1] * (values.ndim - 1))
+    total = np.zeros_like(values, dtype=float)
+    total[1:] = np.cumsum((values[1:] + values[:-1]) / 2 * gaps, axis=0)
+    length = np.diff(t[cut]).reshape(-1, *[1] * (values.ndim - 1))
+    mean: Array = np.diff(total[cut], axis=0) / length
+    return mean
+
+
+def between(attitude: Array, done: Array, start: Array, end: Array) -> Array:
+    """A vector of the base on the way, known at both ends, (m + 1, 3)."""
+    back = attitude @ attitude[-1].T
+    out: Array = (1 - done)[:, None] * (attitude @ start) + done[:, None] * (back @ end)
+    return out
+
+
+def blur(t: Array, w: Array, each: int, noise: Array) -> float:
+    """How far the attitude is off for want of samples: twice as many would tell, rad.
+
+    From every other sample it comes out otherwise, for their noise, (3,) rad/s, as much
+    as the whole is uncertain, and for the steps; from all, the steps make a third of
+    that or less (Richardson; the rule is of the second order at least).
+    """
+    whole = (len(t) - 1) // (2 * each) * 2 * each
+    ends = []
+    for skip in (1, 2):
+        some = slice(0, whole + 1, skip)
+        edge = np.arange(0, whole // skip + 1, max(each // skip, 1))
+        ends.append(carry(small_turns(t[some], w[some], edge))[-1])
+    off = ends[0] @ ends[1].T
+    apart = off[2, 1] ** 2 + off[0, 2] ** 2 + off[1, 0] ** 2
+    chance = float(noise @ noise) * float(t[-1] - t[0]) ** 2 / len(t)
+    return float(np.sqrt(max(apart - chance, 0.0)) / 3)
+
+
+def vee(matrix: Array) -> Array:
+    """Vectors v of the antisymmetric parts [v]x of matrices (..., 3, 3), (..., 3).
+
+    >>> vee(np.array([[0.0, -3.0, 2.0], [3.0, 0.0, -1.0], [-2.0, 1.0, 0.0]]))
+    array([1., 2., 3.])
+    """
+    part = (matrix - np.swapaxes(matrix, -1, -2)) / 2
+    return np.stack([part[..., 2, 1], part[..., 0, 2], part[..., 1, 0]], axis=-1)
+
+
+def accelerations(t: Array, w: Array) -> Array:
+    """Angular acceleration at the edges, from means over `SMOOTH_S`."""
+    step = float(t[1] - t[0])
+    m = max(1, round(SMOOTH_S / step)) | 1
+    kernel = np.ones(m) / m
+    padded = np.pad(w, ((m // 2, m // 2), (0, 0)), mode="edge")
+    smooth = np.column_stack([np.convolve(c, kernel, "valid") for c in padded.T])
+    out: Array = np.gradient(smooth, t, axis=0)
+    return out
+
+
+def astray(x: Experience, pair: tuple[int, int], attitude: Array) -> bool:
+    """Whether the gyroscopes lost track of the vertical in a turn."""
+    p, q = (x.f[int(np.argmax(x.position == i))] for i in pair)
+    along = float(p @ (attitude.T @ q)) / float(np.linalg.norm(p) * np.linalg.norm(q))
+    return bool(along < np.cos(ASTRAY))
+
+
+def geometry(
+    x: Experience, pair: tuple[int, int], attitude: Array, done: Array
+) -> tuple[Array, Array, Array]:
+    """What a turn has to do with the positions at its ends.
+
+    Returns
+    -------
+    f : (m + 1, 3) force on the way, from both ends
+    closure : (3,) phi_T in the axes of p
+    across : (3, 3) projection on what of it is known
+
+    """
+    p, q = (int(np.argmax(x.position == i)) for i in pair)
+    f = between(attitude, done, x.f[p], x.f[q])
+    if x.oriented[[p, q]].all():
+        known = x.mounting.T @ turn(x.alpha[[p, q]], x.beta[[p, q]])
+        off = attitude[-1].T @ known[1] @ known[0].T  # I + [phi]x
+        if (np.trace(off) - 1) / 2 > np.cos(ASTRAY):
+            return f, vee(off), np.eye(3)
+    up = x.f[p] / np.linalg.norm(x.f[p])
+    seen = attitude[-1].T @ x.f[q]
+    return f, np.cross(up, seen / np.linalg.norm(seen)), np.eye(3) - np.outer(up, up)

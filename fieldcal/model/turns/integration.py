@@ -1,0 +1,149 @@
+"""The course of a turn: the attitude on the way, integrated from the gyroscopes.
+
+With bias d and scale s of the model, w^ = (W - d)/s - w_earth and steps of dt,
+
+    R_k = exp(-[w^ dt]x) R_{k-1},   u_k = sum_{j<=k} |w^ dt| / sum_j |w^ dt|
+
+R turns what was seen where the turn began into the axes on the way, u is the part of
+the turn that is done. Axes of the device, rad/s. Source: rotation kinematics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array
+from fieldcal.model.rows.reduce import RowSource, rate_of
+from fieldcal.model.turns.attitude import between
+from fieldcal.model.turns.rotation import carry, small_turns
+from fieldcal.physics.experience import Experience
+
+FINE_S = 0.02
+"""Step of the integration at high sampling rates."""
+
+PIECE_S = 0.15
+"""Means of the accelerometers on the way."""
+
+PIECES = 60
+"""Of one turn at most."""
+
+FEWEST = 8
+"""Steps that a turn takes at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One turn to be followed, by the model of the windows.
+
+    Attributes
+    ----------
+    source : samples
+    x : what is experienced in the windows
+    bias, scale : (3,) of the gyroscopes
+    late : s by which they are late
+    pair : windows that the turn leads from and to
+    first, last : bounds of the motion, in samples
+
+    """
+
+    source: RowSource
+    x: Experience
+    bias: Array
+    scale: Array
+    late: float
+    pair: tuple[int, int]
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Samples of a turn, and the m fine steps that it is integrated in.
+
+    Attributes
+    ----------
+    first : sample that it begins with
+    t : (n,) s
+    each : samples in a step
+    edge : (m + 1,) samples at the edges of the steps
+    cut : (k + 1,) edges between the pieces
+
+    """
+
+    first: int
+    t: Array
+    each: int
+    edge: NDArray[np.intp]
+    cut: NDArray[np.intp]
+
+    @property
+    def at(self) -> Array:
+        """Instants of the edges, s."""
+        found: Array = self.t[self.edge]
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Integrated:
+    """What was integrated.
+
+    Attributes
+    ----------
+    rate, earth : (n, 3) rad/s at the samples, and the Earth's part of it
+    attitude : (m + 1, 3, 3) R at the edges
+    done : (m + 1,) u at the edges
+
+    """
+
+    rate: Array
+    earth: Array
+    attitude: Array
+    done: Array
+
+
+def divided(leg: Leg) -> Steps | None:
+    """Steps of about `FINE_S`, and pieces of about `PIECE_S`; None of too few."""
+    block, first = leg.source.block, leg.first
+    rate = rate_of(block)
+    each = max(1, round(FINE_S * rate))
+    count = (leg.last - first - 1) // each
+    if count < FEWEST:
+        return None
+    piece = max(1, round(PIECE_S * rate / each), -(-count // PIECES))
+    cut = np.append(np.arange(0, count - piece // 2, piece), count).astype(np.intp)
+    t = block.t[first : first + count * each + 1]
+    return Steps(first, t, each, np.arange(count + 1) * each, cut)
+
+
+def integrated(leg: Leg, steps: Steps, rid: Array) -> Integrated:
+    """Follow a turn; `rid` (m + 1, 3) are errors of the rates that are known, rad/s."""
+    x, t, edge = leg.x, steps.t, steps.edge
+    part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
+    ends = [x.w[x.position == p].mean(axis=0) for p in leg.pair]
+    earth = (1 - part) * ends[0] + part * ends[1]
+    rate = _undone(leg, t, _between(t, steps.at, rid))
+    for _ in range(2):  # the Earth's rate turns with the device, once it is known how
+        angle = small_turns(t, rate - earth, edge) / leg.source.pace
+        size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
+        attitude, done = carry(angle), size / size[-1]
+        earth = _between(t, steps.at, between(attitude, done, *ends))
+    return Integrated(rate, earth, attitude, done)
+
+
+def _between(t: Array, at: Array, values: Array) -> Array:
+    """Columns of values given at some instants, straight between them, (n, k)."""
+    return np.column_stack([np.interp(t, at, column) for column in values.T])
+
+
+def _undone(leg: Leg, t: Array, rid: Array) -> Array:
+    """Angular rate at some samples, (n, 3) rad/s."""
+    block = leg.source.block
+    first, n = int(np.searchsorted(block.t, t[0])), len(t)
+    span = slice(max(first - n, 0), first + 2 * n)
+    late = t + leg.late
+    seen = [np.interp(late, block.t[span], g) for g in block.gyr[span].T]
+    rate: Array = (np.stack(seen, axis=1) - leg.bias - rid) / leg.scale
+    return rate

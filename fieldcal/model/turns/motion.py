@@ -1,0 +1,70 @@
+"""Where between two windows the device moves, by its gyroscopes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.model.rows.reduce import Rows, RowSource, rate_of
+
+MARGIN_S = 0.6
+"""Time before and after the motion that is taken along."""
+
+LONGEST_S = 60.0
+"""A turn that takes longer is not followed."""
+
+CLEARLY = 2.0
+"""How far motion has to stand out for its ends to be seen; else the gap is taken."""
+
+TOUCH_S = 5.0
+"""Time before and after the motion that shows, in which smaller ones belong to it."""
+
+AWAY = 5.0
+"""Standard deviations of the angle turned from which the device is on its way."""
+
+
+def moving(
+    source: RowSource, rows: Rows, pair: tuple[int, int], first: int, last: int
+) -> tuple[int, int] | None:
+    """Bounds of the motion between two windows, in samples.
+
+    None where samples are missing, or the motion is too long to be followed.
+
+    Parameters
+    ----------
+    pair : the windows
+    first, last : bounds of the gap between them, in samples
+
+    """
+    block, rate = source.block, rate_of(source.block)
+    gap, m = slice(first, last), max(2, round(0.1 * rate))
+    if last - first < 4 * m or not source.usable[gap].all():
+        return None
+    if np.diff(block.t[gap]).max() > 3.5 / rate:
+        return None
+    rest = [np.nanmean(rows.y[rows.x.position == p, 3:], axis=0) for p in pair]
+    total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])
+    level = np.abs(total[m:] - total[:-m]) / m
+    limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
+    if not level.max() > CLEARLY * limit.min():
+        return (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
+    at = np.flatnonzero((level > limit).any(axis=1))
+    noise, each = rows.noise[3:], round(TOUCH_S * rate)
+    before = block.gyr[gap][max(at[0] - each, 0) : at[0]] - rest[0]
+    after = block.gyr[gap][at[-1] + m : at[-1] + m + each] - rest[1]
+    margin = round(MARGIN_S * rate)
+    start = first + int(at[0]) - _touched(before, noise) - margin
+    end = first + int(at[-1]) + m + _touched(after[::-1], noise) + margin
+    start, end = max(start, first), min(end, last)
+    return (start, end) if block.t[end - 1] - block.t[start] < LONGEST_S else None
+
+
+def _touched(off: Array, noise: Array) -> int:
+    """Samples from where the angle turned stands out of the noise, to the end.
+
+    What is turned too slowly to be seen at once is seen by its sum.
+    """
+    angle = np.abs(np.cumsum(off, axis=0))
+    spread = noise * np.sqrt(np.arange(1, len(off) + 1))[:, None]
+    moved = (angle > AWAY * spread).any(axis=1)
+    return len(off) - int(np.argmax(moved)) if moved.any() else 0

@@ -1,0 +1,251 @@
+"""One turn between two windows, followed by the gyroscopes.
+
+With w^ = (W - d)/s - w_earth, rid of what else the state has wrong of the gyroscopes,
+the attitude is carried from position p to q: R_k = exp(-[w^ dt]x) R_{k-1}. If the
+outputs are off by dW, the true attitude is R (I + [phi]x) with
+
+    phi_k = sum_{j<=k} R_j^T dW_j dt / s                                            (1)
+
+On the way the accelerometers see, u being the part of the turn that is done,
+
+    f_k = (1 - u) R_k f_p + u R_k R_T^T f_q + R_k ((phi_k - u phi_T) x f_p)          (2)
+
+Source: rotation kinematics to first order in phi.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.rows.reduce import Rows, RowSource, rate_of, spans
+from fieldcal.model.state import State
+from fieldcal.model.turns.attitude import (
+    accelerations,
+    astray,
+    blur,
+    geometry,
+    trapezoid_means,
+)
+from fieldcal.model.turns.integration import Integrated, Leg, divided, integrated
+from fieldcal.model.turns.motion import moving
+from fieldcal.physics.effect import Motion
+from fieldcal.physics.experience import Experience
+
+LEAST = np.deg2rad(1.0)
+"""A smaller turn says nothing."""
+
+RIDS = 3
+"""Times that what the state has wrong is taken out: each leaves a percent of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One turn, in m fine steps between m + 1 edges and k pieces.
+
+    Attributes
+    ----------
+    positions : from, to
+    ends : what is experienced in the windows
+    x : at the edges, as the gyroscopes tell
+    felt : (m + 1, 3) m/s^2, force there without what acts on the way alone
+    attitude : (m + 1, 3, 3) R
+    done : (m + 1,) u
+    cut : (k + 1,) edges between the pieces
+    acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
+    blur : rad, what sampling leaves open of the closure
+    interval : s between samples
+
+    """
+
+    positions: tuple[int, int]
+    ends: Experience
+    x: Experience
+    felt: Array
+    attitude: Array
+    done: Array
+    cut: Index
+    acc: Array
+    sd: Array
+    blur: float
+    interval: float
+
+    @property
+    def t(self) -> Array:
+        """Instants of the edges, s."""
+        return self.x.t
+
+    @property
+    def closure(self) -> Array:
+        """What is seen of phi_T, (3,) rad in the axes of p."""
+        return geometry(self.ends, self.positions, self.attitude, self.done)[1]
+
+    def means(self, values: Array) -> Array:
+        """Means over the pieces of something known at the edges, (k, ...).
+
+        As the trapezoid rule takes them from samples `interval` apart, by the next term
+        of Euler and Maclaurin, -dt^2/12 (v'(b) - v'(a)).
+        """
+        t = self.x.t
+        mean = trapezoid_means(t, values, self.cut)
+        step = float(t[1] - t[0])
+        slope = np.gradient(values, t, axis=0)[self.cut]
+        length = np.diff(t[self.cut]).reshape(-1, *[1] * (values.ndim - 1))
+        bend: Array = np.diff(slope, axis=0) / length
+        return mean - (step**2 - self.interval**2) / 12 * bend
+
+    def weights(self, scale: Array) -> Array:
+        """Of the outputs at each edge in the closure, (3, m + 1, 3), (1)."""
+        gaps = np.diff(self.x.t)
+        each = np.zeros(len(self.x.t))
+        each[:-1] += gaps / 2
+        each[1:] += gaps / 2
+        out: Array = np.moveaxis(self.attitude, 2, 0) * each[:, None] / scale
+        return out
+
+    def carried(self, off: Array) -> Array:
+        """Phi less its share of the closure at the edges, (m + 1, 3, k)."""
+        turned = np.einsum("mji,mjk->mik", self.attitude, off)
+        gaps = np.diff(self.x.t)[:, None, None]
+        phi = np.zeros_like(turned)
+        phi[1:] = np.cumsum((turned[1:] + turned[:-1]) / 2 * gaps, axis=0)
+        way: Array = phi - self.done[:, None, None] * phi[-1]
+        return way
+
+    def swung(self, phi: Array) -> Array:
+        """R (phi x f_p) at the edges, (m + 1, 3, k), (2)."""
+        start = self.ends.f[self.ends.position == self.positions[0]].mean(axis=0)
+        crossed = np.cross(np.moveaxis(phi, 1, 2), start)
+        out: Array = np.einsum("mij,mkj->mik", self.attitude, crossed)
+        return out
+
+
+class Turning:
+    """Follows the turns of a recording.
+
+    Parameters
+    ----------
+    source, rows : samples, and the windows' rows
+    since : (o, n) s since the turn in each row, by origin
+
+    """
+
+    def __init__(self, source: RowSource, rows: Rows, since: Array) -> None:
+        self.source, self.rows, self.since = source, rows, since
+        self.legs = list(self._found())
+
+    def _found(self) -> Iterator[tuple[tuple[int, int], int, int]]:
+        rows, x = self.rows, self.rows.x
+        if not rows.used.any(axis=0).all():
+            return
+        windows, held = (
+            spans(self.source.block, self.source.about),
+            np.unique(x.position),
+        )
+        for p, q in zip(held[:-1].tolist(), held[1:].tolist(), strict=True):
+            if x.rate[np.isin(x.position, (p, q))].any():
+                continue
+            ends = int(windows[p, 1]), int(windows[q, 0])
+            stretch = moving(self.source, rows, (p, q), *ends)
+            if stretch is not None:
+                yield (p, q), *stretch
+
+    def turns(self, state: State) -> Iterator[Turn]:
+        """Every turn that the gyroscopes have followed, by a state."""
+        ends = state.experienced(self.rows.x)
+        for pair, first, last in self.legs:
+            if (turn := self._turn(state, ends, pair, first, last)) is not None:
+                yield turn
+
+    def _turn(
+        self, state: State, ends: Experience, pair: tuple[int, int], a: int, b: int
+    ) -> Turn | None:
+        """Follow a turn, rid of what the state has wrong of the gyroscopes."""
+        late = sum(t.effect.late(t.values) for t in state.terms)
+        leg = Leg(self.source, ends, state.bias[3:], state.scale[3:], late, pair, a, b)
+        if (steps := divided(leg)) is None:
+            return None
+        rid: Array = np.zeros((len(steps.edge), 3))
+        for _ in range(RIDS):
+            way = integrated(leg, steps, rid)
+            x = self._edges(ends, steps.at, pair, way, steps.edge)
+            felt, x = x.f, moved(x, state)
+            before, rid = rid, wrong(state, x, self.after(steps.at, pair[1]))
+            if np.abs(rid - before).max() * float(np.ptp(steps.at)) < 1e-6:
+                break
+        end = way.attitude[-1]
+        if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < LEAST:
+            return None
+        if astray(ends, pair, end):
+            return None
+        noise = self.rows.noise[3:] / np.abs(state.scale[3:])
+        unsure = blur(steps.t, way.rate - way.earth, steps.each, noise)
+        samples = slice(steps.first, steps.first + len(steps.t))
+        cut = steps.cut
+        acc = trapezoid_means(steps.t, self.source.block.acc[samples], steps.edge[cut])
+        sd = self.rows.noise[:3] / np.sqrt(np.diff(steps.edge[cut]))[:, None]
+        return Turn(
+            pair, ends, x, felt, way.attitude, way.done, cut, acc, sd, unsure,
+            1 / rate_of(self.source.block),
+        )  # fmt: skip
+
+    def after(self, t: Array, q: int) -> Array:
+        """Time since the turn at some instants, by origin: before the arrival none."""
+        x = self.rows.x
+        at = int(np.argmax(x.position == q))
+        arrived = x.t[at] - self.since[:, at]
+        since = t - arrived[:, None]
+        out: Array = np.where(since >= 0, since, np.inf)
+        return out
+
+    def _edges(
+        self,
+        ends: Experience,
+        t: Array,
+        pair: tuple[int, int],
+        way: Integrated,
+        edge: Index,
+    ) -> Experience:
+        """What is experienced at the edges of the steps, as the gyroscopes tell."""
+        f, _, _ = geometry(ends, pair, way.attitude, way.done)
+        w = way.rate[edge]
+        warming, heating = self.source.warmth.at(t)
+        unknown = np.full(len(t), np.nan)
+        out = Experience.at_rest(
+            unknown, unknown, ends.gravity, t=t,
+            since_start=t - self.source.block.t[0],
+            since_turn=np.full(len(t), np.inf), warming=warming, heating=heating,
+            variance=np.full((len(t), 3), ends.variance.min(axis=0)),
+            position=np.full(len(t), -1), mounting=ends.mounting,
+            latitude=ends.latitude, f=f,
+        )  # fmt: skip
+        return replace(out, w=w, w_dot=accelerations(t, w))
+
+
+def only(x: Experience, rows: Sequence[int]) -> Experience:
+    """Some rows."""
+    per_row = {
+        name: getattr(x, name)[list(rows)]
+        for name in ("alpha", "beta", "f", "w", "w_dot", "t", "since_start",
+                     "since_turn", "warming", "heating", "variance", "position", "rate")
+    }  # fmt: skip
+    return replace(x, **per_row)
+
+
+def moved(x: Experience, state: State) -> Experience:
+    """With motion effects that act on the way."""
+    for term in state.terms:
+        if isinstance(term.effect, Motion) and term.effect.on_the_way:
+            x = term.effect.change(x, term.values)
+    return x
+
+
+def wrong(state: State, x: Experience, since: Array) -> Array:
+    """What the state has of the gyroscopes beside bias, scale and delay, (n, 3)."""
+    terms = tuple(t for t in state.terms if not t.effect.late(t.values))
+    off = replace(state, terms=terms).output(x, since)
+    out: Array = off[:, 3:] - state.bias[3:] - state.scale[3:] * x.w
+    return out

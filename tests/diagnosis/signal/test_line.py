@@ -1,0 +1,99 @@
+"""What a line foretells of samples that it was not fitted to."""
+
+import numpy as np
+import pytest
+
+from fieldcal.diagnosis.signal.line import Remains, remains, tuned
+from fieldcal.diagnosis.signal.moments import moments_of
+from fieldcal.diagnosis.signal.periodogram import LONGEST, Pieces
+from fieldcal.effects.hum import Hum
+from fieldcal.effects.sway import Sway
+from fieldcal.physics.experience import Experience
+
+RATE, SIGMA, HZ, SIZE = 100.0, 5e-3, 7.03, 6e-4
+SEEDS = range(12)
+
+
+def recorded(seed: int, windows: int, samples: int, phase: float = 0.0) -> Pieces:
+    """A line on a_y in white noise, its phase perhaps another in each window."""
+    rng = np.random.default_rng(seed)
+    six, times = [], []
+    for i in range(windows):
+        t = 3.0 + i * (samples / RATE + 7.3) + np.arange(samples) / RATE
+        noise = rng.normal(0, SIGMA, (samples, 6))
+        noise[:, 1] += SIZE * np.cos(2 * np.pi * HZ * t + 0.4 + phase * i**2)
+        six.append(noise - noise.mean(axis=0))
+        times.append(t)
+    x = Experience.at_rest(np.zeros(windows), np.zeros(windows), 9.81)
+    return Pieces(x, tuple(six), tuple(times), np.full(6, SIGMA), RATE)
+
+
+def left(pieces: Pieces) -> Remains:
+    """What is left of the line, whatever it is found to be."""
+    tone = tuned(pieces, Hum(), moments_of(pieces, HZ + 2e-4))
+    assert tone.channels == ("ay",)
+    return remains(pieces, tone)
+
+
+@pytest.mark.parametrize(
+    ("windows", "samples", "groups"), [(9, 2000, 9), (1, 18000, 5)]
+)
+def test_a_line_is_foretold_as_well_as_noise_lets_it(
+    windows: int, samples: int, groups: int
+) -> None:
+    """Mean squares are those of the line, and of noise on top as theory has it."""
+    found = [left(recorded(seed, windows, samples)) for seed in SEEDS]
+    before = np.mean([r.before[1] for r in found])
+    ahead = np.mean([r.held_out[1] for r in found])
+    after = np.mean([r.after[1] for r in found])
+    noise = 2 * SIGMA**2 * groups / (windows * samples)  # of |A|^2 / 2 in one group
+    error = noise / np.sqrt(groups * len(SEEDS))
+    assert before == pytest.approx(SIZE**2 / 2 + noise, abs=5 * SIZE * np.sqrt(error))
+    # amplitude, phase and frequency come out of the groups: three of 2 G numbers
+    assert after == pytest.approx(noise * (1 - 1.5 / groups), abs=4 * error)
+    # the frequency is known the worse at either end, so by more than 1.5 / G
+    assert noise - 4 * error < ahead < 2.0 * noise
+    assert all(r.gain([1]) > 0.25 for r in found)
+
+
+def test_what_has_another_phase_each_time_is_not_foretold() -> None:
+    """An amplitude that all windows share is no line if the phase wanders."""
+    found = [left(recorded(seed, 9, 4000, phase=1.1)) for seed in SEEDS]
+    assert np.mean([r.gain([1]) for r in found]) < 0.1
+
+
+def test_channels_without_the_line_stay_as_they_are() -> None:
+    """What is not in a channel is neither taken out of it nor foretold in it."""
+    found = left(recorded(1, 9, 2000))
+    others = [0, 2, 3, 4, 5]
+    assert (found.before[others] == found.held_out[others]).all()
+    assert (found.before[others] == found.after[others]).all()
+
+
+def test_sway_is_foretold_in_positions_not_seen() -> None:
+    """The base's sway in one position follows from that in the others."""
+    rng = np.random.default_rng(5)
+    sway, alpha = Sway(), np.deg2rad(np.arange(0.0, 50.0, 5.0))
+    x = Experience.at_rest(alpha, 0.1 * alpha, 9.81)
+    response = sway.response(x, 0.83)
+    causes = np.array([0.02, 0.01j])  # deg
+    six, times = [], []
+    for i, seen in enumerate(response @ causes):
+        t = 40.0 * i + np.arange(3000) / RATE
+        wave = np.exp(2j * np.pi * 0.83 * t)
+        six.append(np.real(wave[:, None] * seen) + rng.normal(0, SIGMA, (3000, 6)))
+        times.append(t)
+    pieces = Pieces(x, tuple(six), tuple(times), np.full(6, SIGMA), RATE)
+    tone = tuned(pieces, sway, moments_of(pieces, 0.83))
+    found = remains(pieces, tone)
+    assert tone.clear
+    assert found.gain(tone.clear) > 0.7
+
+
+def test_a_line_is_tuned_in_windows_longer_than_a_periodogram() -> None:
+    """What a periodogram tells of its frequency is far from what the window tells."""
+    pieces = recorded(3, 1, 12 * LONGEST)
+    off = 0.3 * RATE / LONGEST
+    tone = tuned(pieces, Hum(), moments_of(pieces, HZ + off))
+    assert tone.channels == ("ay",)
+    assert abs(tone.hz - HZ) < 4 * tone.sigmas["hz"]

@@ -1,0 +1,284 @@
+"""Evidence from a Gram matrix, against rows whose covariance is written out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import pytest
+from dense_model import Dense, shared
+from numpy.typing import NDArray
+
+import fieldcal.diagnosis  # noqa: F401  # model.system cannot be imported before it
+from fieldcal.core.samples import Array, Index
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import CLOSURE
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.gram import Eliminated, Gram, gains
+from fieldcal.model.priors import SIZES
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.turn_rows import TurnRows
+from fieldcal.model.system.window_rows import Linear
+
+WINDOWS, ROWS, WIDTH, ASIDE = 4, 3, 9, 9
+"""Columns that a set may have; those of the positions' turns come after them."""
+
+TAU = np.array([0.3, 0.0, 0.8, 0.1, 0.5, 1.2, 0.4])
+FREE = pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
+SEEDS = pytest.mark.parametrize("seed", range(4))
+
+
+def agree(found: Array, expected: Array) -> None:
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
+
+
+@dataclass
+class Columns:
+    """What of a dictionary a Gram matrix asks for."""
+
+    width: int
+    held: Index
+    common: Array
+    free: NDArray[np.bool_]
+    aside: int
+
+
+@dataclass
+class Case:
+    """A Gram matrix, and the same rows written out."""
+
+    gram: Gram
+    dense: Dense
+
+
+def case(
+    seed: int, free: tuple[int, ...] = (), tau: Array = TAU, turns: bool = True
+) -> Case:
+    """Random rows of windows and turns; a window lacks a channel, another one a row."""
+    rng = np.random.default_rng(seed)
+    width = WIDTH + 2 * WINDOWS
+    held = np.arange(WINDOWS)
+    common = rng.uniform(0.0, 0.5, (WINDOWS, 6))
+    columns = Columns(width, held, common, np.isin(held, free), ASIDE)
+    values = np.where(rng.random(width) < 0.3, rng.standard_normal(width), 0.0)
+    linear, parts = [], []
+    for c in range(6):
+        window = np.repeat(held, ROWS)
+        kept = ~((window == 2) & (c == 4)) & (np.arange(len(window)) != 5 + (c == 0))
+        window = window[kept]
+        touching = np.sort(rng.permutation(WIDTH)[:7])
+        design = rng.standard_normal((len(window), 7))
+        turned = rng.standard_normal((WINDOWS, 2))  # at rest the same in every row
+        aside = np.zeros((len(window), 2 * WINDOWS))
+        for p in held:
+            aside[window == p, 2 * p : 2 * p + 2] = turned[p]
+        at = np.concatenate([touching, WIDTH + np.arange(2 * WINDOWS)])
+        design = np.hstack([design, aside])
+        sd = rng.uniform(0.5, 2.0, len(window))
+        off = rng.standard_normal(len(window)) * 2
+        linear.append(
+            Linear(
+                c, np.flatnonzero(kept), window, 1 / sd, at,
+                design / sd[:, None], off / sd,
+            )
+        )  # fmt: skip
+        whole = np.zeros((len(window), width))
+        whole[:, at] = design
+        size = np.hypot(common[window, c], tau[c])
+        loose = [priors.ASIDE * whole[:, ASIDE + 2 * p :][:, :2] for p in free]
+        parts.append((off + whole @ values, whole, sd, window, c, size, loose))
+    made = [turn(rng, width) for _ in range(2)] if turns else []
+    rows = gram(linear, cast(Dictionary, columns), values, made)
+    y = np.concatenate([p[0] for p in parts])
+    design = np.vstack([p[1] for p in parts])
+    white = np.concatenate([p[2] for p in parts])
+    window = np.concatenate([p[3] for p in parts])
+    channel = np.concatenate([np.full(len(p[0]), p[4]) for p in parts])
+    cov = np.diag(white**2)
+    cov += shared(window, channel, np.concatenate([p[5] for p in parts]))
+    for i in range(len(free)):
+        aside = np.vstack([p[6][i] for p in parts])
+        cov += aside @ aside.T
+    return Case(rows, beside(Dense(y, design, cov, white), made, tau))
+
+
+def turn(rng: np.random.Generator, width: int) -> TurnRows:
+    """A closure of which two parts are known, and three rows on the way."""
+    at = np.sort(rng.permutation(width)[:6])
+    draw = rng.standard_normal
+    return TurnRows(
+        (0, 1), draw(2), at, draw((2, 6)), rng.uniform(1, 4, 2),
+        rng.uniform(0, 1, (2, 3)), draw(3), draw((3, 6)),
+    )  # fmt: skip
+
+
+def beside(windows: Dense, turns: list[TurnRows], tau: Array) -> Dense:
+    """Rows of windows and of turns, which share nothing."""
+    y, design, white = [windows.y], [windows.design], [windows.white]
+    spread = []
+    for one in turns:
+        whole = np.zeros((len(one.closure) + len(one.way), windows.design.shape[1]))
+        whole[:, one.columns] = np.vstack([one.design, one.way_design])
+        y += [one.closure, one.way]
+        design.append(whole)
+        white += [1 / np.sqrt(one.info), np.ones(len(one.way))]
+        ends = np.sqrt(tau[CLOSURE] ** 2 + one.bent**2 @ tau[:3] ** 2)
+        spread += [ends, np.zeros(len(one.way))]
+    n, sd = len(windows.y), np.concatenate(white)
+    cov = np.diag(sd**2)
+    cov[:n, :n] = windows.cov
+    if spread:
+        cov[n:, n:] += np.diag(np.concatenate(spread) ** 2)
+    return Dense(np.concatenate(y), np.vstack(design), cov, sd)
+
+
+SET = np.array([0, 3, 4, 7])
+WIDE = np.array([0.7, 2.0, 0.05, 1.0])
+
+
+@SEEDS
+@FREE
+def test_information_is_that_of_the_rows(seed: int, free: tuple[int, ...]) -> None:
+    one = case(seed, free)
+    rows, every = one.gram.weighed(TAU), np.arange(WIDTH)
+    inner, pull = one.dense.information()
+    agree(rows.matrix(every, every), inner[:WIDTH, :WIDTH])
+    agree(rows.matrix(SET, None), inner[SET])
+    agree(rows.pull(SET), pull[SET])
+    agree(rows.pull(None), pull)
+    blocks = [np.array([[0, 1], [5, 2]]), np.array([[8]])]
+    for at, found in zip(blocks, rows.diagonals(blocks), strict=True):
+        for block, there in zip(at, found, strict=True):
+            agree(there, inner[np.ix_(block, block)])
+
+
+@SEEDS
+@FREE
+def test_squares_and_determinant_are_those_of_the_rows(
+    seed: int, free: tuple[int, ...]
+) -> None:
+    one = case(seed, free)
+    rows, dense = one.gram.weighed(TAU), one.dense
+    square = dense.y @ np.linalg.solve(dense.cov, dense.y)
+    assert rows.square == pytest.approx(square, rel=1e-9)
+    log_det = np.linalg.slogdet(dense.cov)[1] - 2 * np.log(dense.white).sum()
+    assert rows.log_det == pytest.approx(log_det, rel=1e-9)
+    freedom = len(dense.y) - (one.gram.info > 0).sum()
+    assert one.gram.count == freedom
+
+
+@SEEDS
+@FREE
+def test_each_mean_has_the_information_that_the_rest_of_its_window_leaves(
+    seed: int, free: tuple[int, ...]
+) -> None:
+    one = case(seed, free).gram
+    for p, weight in enumerate(one.weighed(TAU).weight):
+        there = one.info[p] > 0
+        cov = one.loose[p][there] @ one.loose[p][there].T
+        spread = one.shared[p] ** 2 + TAU[one.kind[p]] ** 2
+        spread += one.bent[p] ** 2 @ TAU[:6] ** 2
+        cov += np.diag(1 / one.info[p][there] + spread[there])
+        agree(weight[there], np.diag(np.linalg.inv(cov)))
+        assert not weight[~there].any()
+
+
+@SEEDS
+@FREE
+def test_evidence_and_estimates_are_those_of_least_squares(
+    seed: int, free: tuple[int, ...]
+) -> None:
+    one = case(seed, free)
+    found = Eliminated.of(one.gram.weighed(TAU), SET, WIDE)
+    assert found.score == pytest.approx(one.dense.evidence(SET, WIDE), rel=1e-9)
+    mean, cov = one.dense.posterior(SET, WIDE)
+    agree(found.estimate, mean)
+    agree(found.inverse, cov)
+
+
+@SEEDS
+def test_a_column_that_two_causes_have_may_stand_there_twice(seed: int) -> None:
+    one = case(seed)
+    twice, wide = np.array([0, 3, 3]), np.array([0.7, 0.4, 1.5])
+    found = Eliminated.of(one.gram.weighed(TAU), twice, wide)
+    assert found.score == pytest.approx(one.dense.evidence(twice, wide), rel=1e-9)
+    agree(found.estimate, one.dense.posterior(twice, wide)[0])
+
+
+def test_with_nothing_in_it_the_evidence_is_that_of_the_noise() -> None:
+    one, none = case(0), np.empty(0, dtype=np.intp)
+    found = Eliminated.of(one.gram.weighed(TAU), none, np.empty(0))
+    assert found.score == pytest.approx(one.dense.evidence(none, np.empty(0)), rel=1e-9)
+
+
+@SEEDS
+@FREE
+@pytest.mark.parametrize("more", [(1,), (2, 5, 8), (3, 6)], ids=str)
+def test_the_gain_of_one_more_group_is_the_rise_of_the_evidence(
+    seed: int, free: tuple[int, ...], more: tuple[int, ...]
+) -> None:
+    """At every size; the group may share a column with the set."""
+    one, at = case(seed, free), np.array(more)
+    typical = np.linspace(0.02, 0.05, len(at))
+    found = Eliminated.of(one.gram.weighed(TAU), SET, WIDE)
+    inner, pull = found.rest(at, typical)
+    before = one.dense.evidence(SET, WIDE)
+    both = np.concatenate([SET, at])
+    rise = [
+        one.dense.evidence(both, np.concatenate([WIDE, v * typical])) - before
+        for v in SIZES
+    ]
+    gain = gains(inner, pull, np.diag(inner).max())
+    np.testing.assert_allclose(gain, rise, rtol=1e-9, atol=1e-9 * abs(before))
+
+
+@SEEDS
+@FREE
+@pytest.mark.parametrize("kind", [0, 4, CLOSURE])
+def test_the_gain_of_an_instability_is_the_rise_of_the_evidence(
+    seed: int, free: tuple[int, ...], kind: int
+) -> None:
+    none = np.where(np.arange(7) == kind, 0.0, TAU)
+    one, typical = case(seed, free, none), 0.03
+    found = Eliminated.of(one.gram.weighed(none), SET, WIDE)
+    inner, pull = found.of_means(kind, typical)
+    before = one.dense.evidence(SET, WIDE)
+    rise = []
+    for v in SIZES:
+        tau = np.where(np.arange(7) == kind, v * typical, TAU)
+        rise.append(case(seed, free, tau).dense.evidence(SET, WIDE) - before)
+    gain = gains(inner, pull, np.diag(inner).max())
+    np.testing.assert_allclose(gain, rise, rtol=1e-9, atol=1e-9 * abs(before))
+
+
+def test_gains_of_many_groups_are_those_of_each() -> None:
+    one, found = case(1), []
+    rows = Eliminated.of(one.gram.weighed(TAU), SET, WIDE)
+    for at in ([1, 2], [5, 6], [8, 1]):
+        found.append(rows.rest(np.array(at), np.array([0.3, 0.1])))
+    inner, pull = (np.stack(some) for some in zip(*found, strict=True))
+    own = np.diagonal(inner, 0, 1, 2).max(axis=-1)
+    each = [gains(*one, own=top) for one, top in zip(found, own, strict=True)]
+    np.testing.assert_allclose(gains(inner, pull, own), each, rtol=1e-12)
+
+
+@SEEDS
+def test_what_elimination_leaves_by_rounding_gains_nothing(seed: int) -> None:
+    """A column that the set has at any size cannot add anything."""
+    one, at = case(seed), np.array([3])
+    wide = Eliminated.of(one.gram.weighed(TAU), SET, np.full(4, 1e9))
+    inner, pull = wide.rest(at, np.array([1.0]))
+    own = one.gram.weighed(TAU).matrix(at, at)[0, 0]
+    assert np.array_equal(gains(inner, pull, own), np.zeros(len(SIZES)))
+
+
+@FREE
+def test_some_columns_say_the_same_as_they_do_among_all(free: tuple[int, ...]) -> None:
+    whole = case(2, free).gram
+    part = whole.only(np.array([7, 0, 4, 3, 3]))
+    assert part.within.shape == (4, 4)
+    found, same = (Eliminated.of(g.weighed(TAU), SET, WIDE) for g in (part, whole))
+    assert found.score == pytest.approx(same.score, rel=1e-12)
+    np.testing.assert_allclose(found.estimate, same.estimate, rtol=1e-12)
+    np.testing.assert_array_equal(np.flatnonzero(part.index >= 0), SET)

@@ -1,0 +1,206 @@
+"""Rows foretold from the other positions, against a dense refit without them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from dense_model import Dense, shared
+from numpy.typing import NDArray
+from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
+
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.posterior.held_out import folds, held_out
+from fieldcal.model.search.selection import Search
+from fieldcal.model.system.fitted import Fitted, whole
+from fieldcal.model.system.linear_system import System, gram
+
+ROWS = 3 * len(LADDER)
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A session, fitted, and its rows written out.
+
+    Attributes
+    ----------
+    fitted : with a given set of causes
+    dense : rows (n 6) with all columns, y - h + Phi u
+    off : (n, 6) y - h of the state
+
+    """
+
+    fitted: Fitted
+    dense: Dense
+    off: Array
+
+    @property
+    def dictionary(self) -> Dictionary:
+        return self.fitted.dictionary
+
+    def without(self, left: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Estimates of all columns from the rest, and sizes of all."""
+        kept = np.repeat(~left, 6)
+        rest = Dense(
+            self.dense.y[kept], self.dense.design[kept],
+            self.dense.cov[np.ix_(kept, kept)], self.dense.white[kept],
+        )  # fmt: skip
+        state = self.fitted.set.state
+        mean, _ = rest.posterior(state.columns, state.sizes)
+        value = np.zeros(self.dictionary.width)
+        np.add.at(value, state.columns, mean)
+        return value, np.sqrt(np.bincount(state.columns, state.sizes**2, len(value)))
+
+
+def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Refit:
+    """Random rows, with all sizes given, about a state with values of its own."""
+    x, rng = ladder(3, free), np.random.default_rng(seed)
+    d = dictionary(x, common=2e-4)
+    d.always = [replace(g, fixed=0.3) for g in d.always]
+    d.unstable = np.zeros(7)
+    causes = {c.key: c for c in d.causes}
+    members = []
+    for key in keys:
+        group = replace(causes[key].variants[0], fixed=0.5)
+        members.append((_with(causes[key], group), group))
+    state = nominal()
+    y = state.output(x, d.since) + rng.normal(0, 3e-3, (ROWS, 6))
+    y += rng.normal(0, 1e-2, (len(LADDER), 6))[x.position]
+    rows = rows_of(x, y)
+    rows.sd[:] *= rng.uniform(0.5, 2.0, rows.sd.shape)
+    values = np.zeros(d.width)
+    values[d.bias : d.bias + 3] = rng.normal(0, 1e-2, 3)
+    values[d.aside : d.aside + 2 * d.places] = rng.normal(0, 1e-3, 2 * d.places)
+    linear = System(rows, d).linearised(state)
+    search = Search(d, gram(linear, d, values))
+    fitted = Fitted(rows, d, linear, values, search.evaluated(tuple(members)))
+    table = np.zeros((ROWS, 6, d.width))
+    for part in linear:
+        seen = part.design / part.weight[:, None]
+        table[part.rows[:, None], part.channel, part.columns] = seen
+    at, channel = (i.ravel() for i in np.indices((ROWS, 6)))
+    design, sd = table.reshape(ROWS * 6, -1), rows.sd.ravel()
+    window = x.position[at]
+    cov = np.diag(sd**2) + shared(window, channel, d.common[window, channel])
+    for p in free:
+        turns = priors.ASIDE * design[:, d.aside + 2 * p :][:, :2]
+        cov += turns @ turns.T
+    off = y - state.output(x, d.since)
+    return Refit(fitted, Dense(off.ravel() + design @ values, design, cov, sd), off)
+
+
+def _with(cause: Cause, group: Group) -> Cause:
+    return replace(cause, variants=(group, *cause.variants[1:]))
+
+
+def agree(found: Array, expected: Array) -> None:
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9)
+
+
+SETS = pytest.mark.parametrize(
+    "keys", [(), ("cross_coupling", "settling:acc"), ("random_walk:gyr",)], ids=str
+)
+
+
+@SETS
+def test_residuals_are_those_of_a_refit_without_the_position(
+    keys: tuple[str, ...],
+) -> None:
+    one = refit(keys)
+    found = held_out(one.fitted, [one.fitted.set])
+    for p in range(len(LADDER)):
+        left = one.dictionary.x.position == p
+        value, _ = one.without(left)
+        at = one.dictionary.aside + 2 * p + np.arange(2)
+        value[at] = one.fitted.values[at]
+        expected = one.dense.y - one.dense.design @ value
+        agree(found[left], expected.reshape(ROWS, 6)[left])
+
+
+@pytest.mark.parametrize("free", [(), (3, 4)], ids=["misset", "loose"])
+def test_a_positions_own_angles_are_sought_in_it(free: tuple[int, ...]) -> None:
+    """Those it was set at, or those that nobody knows; nothing else is."""
+    one = refit(() if free else ("misset",), free)
+    d, found = one.dictionary, held_out(one.fitted, [one.fitted.set])
+    for p in range(len(LADDER)):
+        left = d.x.position == p
+        value, sizes = one.without(left)
+        at = d.aside + 2 * p + np.arange(2)
+        value[at] = one.fitted.values[at]  # from where the state has them
+        rest, white = one.dense.y - one.dense.design @ value, one.dense.white
+        inside = np.repeat(left, 6)
+        wide = np.full(2, priors.ASIDE) if p in free else sizes[at]
+        own = Dense(
+            rest[inside], one.dense.design[inside],
+            np.diag(white[inside] ** 2), white[inside],
+        )  # fmt: skip
+        if wide.any():
+            turned, _ = own.posterior(at, wide)
+            rest = rest - one.dense.design[:, at] @ turned
+        agree(found[left], rest.reshape(ROWS, 6)[left])
+
+
+def test_sets_are_chosen_again() -> None:
+    """That a position was misset is nothing that the others show."""
+    x, rng = ladder(3), np.random.default_rng(2)
+    d, state = dictionary(x), nominal()
+    away = replace(state, aside=state.aside.copy())
+    away.aside[4] = 0.02, 0.03
+    y = away.output(away.experienced(x), d.since)
+    rows = rows_of(x, y + rng.normal(0, 3e-4, y.shape))
+    linear = System(rows, d).linearised(state)
+    search = Search(d, gram(linear, d, np.zeros(d.width)))
+    misset = next(c for c in d.causes if c.key == "misset")
+    sets = [search.evaluated(m) for m in ((), ((misset, misset.variants[4]),))]
+    assert sets[1].score > sets[0].score + 100
+    best = Fitted(rows, d, linear, np.zeros(d.width), sets[1])
+    found = held_out(best, sets)
+    none, there = (held_out(best, [one]) for one in sets)
+    left = x.position == 4
+    np.testing.assert_allclose(found[left], none[left], rtol=1e-9)
+    np.testing.assert_allclose(found[~left], there[~left], rtol=1e-9)
+    assert np.abs(found[left, :3]).max() > 0.1 > 10 * np.abs(found[~left, :3]).max()
+
+
+def test_each_position_is_left_out_once() -> None:
+    d = dictionary(ladder(2))
+    fold = folds(d)
+    assert len(np.unique(fold)) == len(LADDER)
+    np.testing.assert_array_equal(fold, d.x.position)
+
+
+@pytest.mark.parametrize("free", [(), (3, 4)], ids=["set", "loose"])
+def test_residuals_of_what_is_fitted_are_those_of_a_dense_fit(
+    free: tuple[int, ...],
+) -> None:
+    """Turns that nobody knows are those that fit each position best."""
+    one = refit(("cross_coupling",), free)
+    d, state = one.dictionary, one.fitted.set.state
+    mean, _ = one.dense.posterior(state.columns, state.sizes)
+    value = np.zeros(d.width)
+    np.add.at(value, state.columns, mean)
+    wide = one.dense.design[:, state.columns] * state.sizes
+    total = one.dense.cov + wide @ wide.T
+    back = np.linalg.solve(total, one.dense.y)
+    for p in free:
+        at = d.aside + 2 * p + np.arange(2)
+        value[at] += priors.ASIDE**2 * one.dense.design[:, at].T @ back
+    np.testing.assert_allclose(whole(state, d), value, rtol=1e-5, atol=1e-9)
+    rest = (one.dense.y - one.dense.design @ value).reshape(ROWS, 6)
+    agree(one.fitted.residual(), rest)
+
+
+def test_squares_are_those_of_the_covariance() -> None:
+    """Of each channel by itself, with what its windows share."""
+    one = refit(("cross_coupling",))
+    rest, squares = one.fitted.residual(), one.fitted.squares
+    for c in range(6):
+        at = np.arange(c, ROWS * 6, 6)
+        cov = one.dense.cov[np.ix_(at, at)]
+        expected = rest[:, c] @ np.linalg.solve(cov, rest[:, c])
+        assert squares[c] == pytest.approx(expected, rel=1e-9)

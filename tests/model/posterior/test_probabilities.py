@@ -1,0 +1,210 @@
+"""What is said with a probability is true so often; what is estimated is so near.
+
+Rows are drawn from the prior: causes by their chances, sizes, instabilities and values
+of columns by what the model has of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, chi2
+from small_sessions import Session, ladder
+
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.probabilities import Posterior
+from fieldcal.model.posterior.reported import reported
+from fieldcal.model.priors import SIZES
+from fieldcal.model.search.selection import Search
+
+ODDS, DRAWS = 0.5, 220
+"""Of a cause, for which the chance of one stands where chances are small."""
+
+KEYS = (
+    "angle_offset",
+    "quadratic",
+    "g_sensitivity",
+    "bias_drift:acc",
+    "temperature_bias:gyr",
+)
+SESSION = Session.of(ladder(), KEYS, ODDS)
+DENSITY = priors.density()
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One session drawn from the prior.
+
+    Attributes
+    ----------
+    true : names of the causes that are there
+    value : (k,) of the columns of all groups
+    search : over its rows
+    best : the set that was found
+    known, found : the true set, with its true sizes and with those that are found
+
+    """
+
+    true: frozenset[str]
+    value: Array
+    search: Search
+    best: Set
+    known: Eliminated
+    found: Set
+
+
+def instabilities(rng: np.random.Generator, search: Search) -> Array:
+    """Typical instabilities by `Search.alike`, (7,)."""
+    n = len(SIZES)
+    three = np.stack(np.unravel_index(np.arange(n**3), (n, n, n)), axis=1)
+    found = np.zeros(7)
+    for first in (0, 3):
+        every = np.zeros((n**3, 7))
+        every[:, first : first + 3] = three
+        log = np.asarray(search.alike(every))
+        share = np.exp(log - np.logaddexp.reduce(log))
+        found[first : first + 3] = SIZES[three[rng.choice(n**3, p=share)]]
+    return found * search.unstable
+
+
+@cache
+def draws() -> tuple[Draw, ...]:
+    d, design, out = SESSION.dictionary, SESSION.design, []
+    rng = np.random.default_rng(17)
+    empty = SESSION.search(np.zeros((len(d.x), 6)))
+    for _ in range(DRAWS):
+        members = tuple(
+            (c, c.variants[rng.integers(len(c.variants))])
+            for c in d.causes
+            if rng.random() < ODDS / (1 + ODDS)
+        )
+        groups = [*d.always, *(g for _, g in members)]
+        columns = np.concatenate([g.columns for g in groups])
+        drawn = [float(rng.choice(SIZES, p=DENSITY)) for _ in groups]
+        wide = np.concatenate([
+            g.sizes(v if g.fixed is None else g.fixed)
+            for g, v in zip(groups, drawn, strict=True)
+        ])  # fmt: skip
+        value, tau = wide * rng.standard_normal(len(wide)), instabilities(rng, empty)
+        off = SESSION.noise(rng, tau) + design[:, :, columns] @ value
+        search = SESSION.search(off)
+        known = Eliminated.of(search.gram.weighed(tau), columns, wide)
+        found = search.evaluated(members)
+        true = frozenset(c.name for c, _ in members)
+        out.append(Draw(true, value, search, search.run(), known, found))
+    return tuple(out)
+
+
+@cache
+def said() -> tuple[Array, Array]:
+    """Probabilities that were said, and whether it was so."""
+    found = []
+    for one in draws():
+        for standing in Posterior(one.search, one.best).standing():
+            so = bool(one.true & {standing.name, *standing.aliases})
+            found.append((standing.probability, so))
+    share, true = zip(*found, strict=True)
+    return np.minimum(share, 1.0), np.array(true)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.5, 0.9), (0.9, 0.98), (0.98, 1.01)])
+def test_what_is_said_is_true_as_often_as_is_said(low: float, high: float) -> None:
+    share, so = said()
+    some = (low <= share) & (share < high)
+    assert some.sum() >= 3
+    mean = float(share[some].mean())
+    told = binomtest(int(so[some].sum()), int(some.sum()), mean)
+    assert told.pvalue > 0.01, (so[some].mean(), mean, some.sum())
+
+
+def test_what_is_large_is_said() -> None:
+    """Of causes that the rows show beyond doubt, nearly all."""
+    missed, shown = 0, 0
+    for one in draws():
+        state = one.known
+        names = {s.name for s in Posterior(one.search, one.best).standing()}
+        for cause, group in one.found.members:
+            at = np.isin(state.columns, group.columns)
+            pull = state.estimate[at] / np.sqrt(np.diag(state.inverse)[at])
+            if np.abs(pull).max() > 12.0:
+                shown += 1
+                missed += cause.name not in names
+    assert shown > 50
+    assert missed <= 0.02 * shown
+
+
+def pulls(state: Eliminated, value: Array) -> Array:
+    off: Array = (state.estimate - value) / np.sqrt(np.diag(state.inverse))
+    return off
+
+
+def test_with_known_sizes_estimates_are_as_near_as_they_say() -> None:
+    """Every column, and all of a session together."""
+    away = np.concatenate([pulls(one.known, one.value) for one in draws()])
+    assert 0.93 < np.mean(np.abs(away) < 1.96) < 0.97
+    square, freedom = 0.0, 0
+    for one in draws():
+        root = np.linalg.cholesky(one.known.inverse / np.outer(*[one.known.sizes] * 2))
+        off = (one.known.estimate - one.value) / one.known.sizes
+        square += float(np.sum(np.linalg.solve(root, off) ** 2))
+        freedom += len(off)
+    assert chi2.ppf(0.005, freedom) < square < chi2.ppf(0.995, freedom)
+
+
+def test_with_sizes_found_estimates_are_as_near_as_they_say() -> None:
+    """Bias and scale factor, whose sizes are found with the instability."""
+    away = []
+    for one in draws():
+        count = sum(len(g.columns) for g in SESSION.dictionary.always)
+        state = reported(one.search, one.found).state
+        away.append(pulls(state, one.value)[:count])
+    assert 0.93 < np.mean(np.abs(np.concatenate(away)) < 1.96) < 0.97
+
+
+def test_what_does_the_same_stands_in_its_place() -> None:
+    """A drift with the time, and one with a temperature that rises steadily."""
+    same = {"bias_drift", "temperature_bias"}
+    session = Session.of(
+        ladder(), ("bias_drift:gyr", "temperature_bias:gyr", *KEYS[:2])
+    )
+    drift = session.dictionary.causes[0].variants[0]
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        rise = drift.typical * 0.3 * rng.choice([-1.0, 1.0], 3)
+        off = session.noise(rng, session.dictionary.unstable)
+        search = session.search(off + session.design[:, :, drift.columns] @ rise)
+        (found,) = Posterior(search, search.run()).standing()
+        assert {found.name, *found.aliases} == same
+        assert found.probability > 0.99
+
+
+def test_probabilities_are_shares_of_the_sets_that_were_visited() -> None:
+    one = draws()[0]
+    posterior = Posterior(one.search, one.best)
+    total = sum(share for _, share in posterior.weights)
+    assert total == pytest.approx(1.0)
+    (best, share), *_ = sorted(posterior.weights, key=lambda w: -w[1])
+    assert best is one.best
+    for other, part in posterior.weights:
+        assert np.log(part / share) == pytest.approx(other.score - best.score, abs=1e-6)
+    with_one = [w for s, w in posterior.weights if KEYS[0] in posterior.names(s)]
+    assert posterior.probability([KEYS[0]]) == pytest.approx(sum(with_one))
+
+
+def test_what_accelerometers_show_stands_for_nothing_on_gyroscopes() -> None:
+    d = SESSION.dictionary
+    drift = next(c for c in d.causes if c.key == "bias_drift:acc").variants[0]
+    there = SESSION.design[:, :, drift.columns] @ drift.sizes(1.0)
+    rng = np.random.default_rng(4)
+    search = SESSION.search(SESSION.noise(rng, np.zeros(7)) + there)
+    posterior = Posterior(search, search.run())
+    (one,) = posterior.standing()
+    assert (one.name, one.triads) == ("bias_drift", frozenset("a"))
+    assert posterior.probability(["bias_drift"], frozenset("a")) > 0.99
+    assert posterior.probability(["bias_drift"], frozenset("g")) < 0.05

@@ -1,0 +1,38 @@
+"""Sessions of the virtual device, and what the state that was found leaves of them."""
+
+import numpy as np
+import pytest
+
+from benchmarks.concealed.draws import sized
+from benchmarks.concealed.sessions import Session, plain
+from fieldcal.diagnosis.explain import explain
+from fieldcal.diagnosis.prepare import prepare
+from fieldcal.model.system.fitted import whole
+
+FADING = {
+    "warm_up": {"ax": 0.01, "ay": 0.004, "az": -0.008, "tau_s": 143.0},
+    "settling": {"ax": 0.01, "ay": 0.004, "az": -0.008, "tau_s": 6.1},
+}
+
+
+@pytest.mark.parametrize("name", FADING)
+def test_the_way_is_left_with_its_noise_beside_what_fades(name: str) -> None:
+    """A time constant between the points of the grid; chi2 over several sessions."""
+    square, freedom = 0.0, 0
+    for seed in range(3):
+        session = _having(name, seed)
+        found = explain(prepare(session.record(seed), session.about))
+        assert [one.name for one in found.standing] == [name]
+        values = whole(found.inferred.best.state, found.dictionary)
+        for turn in found.inferred.turned:
+            left = turn.way - turn.way_design @ values[turn.columns]
+            square, freedom = square + float(left @ left), freedom + len(left)
+    assert freedom > 1000
+    assert abs(square - freedom) < 5 * np.sqrt(2 * freedom)
+
+
+def _having(name: str, seed: int) -> Session:
+    session = plain(np.random.default_rng(seed), ("wide",))
+    values = sized(session, name, FADING[name], 30.0)
+    assert values is not None
+    return session.having({name: values})

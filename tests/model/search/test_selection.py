@@ -1,0 +1,248 @@
+"""The search, on rows drawn from the model itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from small_sessions import Session, ladder
+
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.probabilities import Posterior
+from fieldcal.model.priors import SIZES
+from fieldcal.model.search.pairs import pairs
+from fieldcal.model.search.selection import Search
+
+DENSITY = np.log(priors.density())
+EVEN = int(np.argmin(np.abs(np.log(SIZES))))
+KEYS = (
+    "angle_offset",
+    "cross_coupling",
+    "g_sensitivity",
+    "bias_drift:gyr",
+    "settling:acc",
+    "random_walk:gyr",
+    "alpha:ay",
+)
+SUSPECTED = ("angle_offset", "quadratic", "g2_sensitivity", "bias_drift:gyr")
+SESSION = Session.of(ladder(), KEYS)
+CAUSES = {c.key: c for c in SESSION.dictionary.causes}
+QUIET = np.zeros(7)
+
+
+def unstable(share: float = 1.0) -> Array:
+    return SESSION.dictionary.unstable * share
+
+
+def made(groups: Sequence[Group], rng: np.random.Generator, v: float = 1.0) -> Array:
+    """What groups of some size add to the outputs, (n, 6)."""
+    out = np.zeros((len(SESSION.dictionary.x), 6))
+    for g in groups:
+        out += SESSION.design[:, :, g.columns] @ (
+            g.sizes(v) * rng.standard_normal(len(g.columns))
+        )
+    return out
+
+
+def fixed(session: Session) -> Session:
+    """The same where all sizes of what is always there are known."""
+    d = session.dictionary
+    known = replace(session, dictionary=d.plain())
+    known.dictionary.always = [replace(g, fixed=1.0, in_step=False) for g in d.always]
+    known.dictionary.unstable = QUIET
+    return known
+
+
+KNOWN = fixed(SESSION)
+
+
+def there(key: str) -> tuple[Cause, Group]:
+    """A cause with one of its variants, that of the longest time constant."""
+    cause, few = CAUSES[key], len(CAUSES[key].variants[0].columns)
+    return cause, [g for g in cause.variants if len(g.columns) == few][-1]
+
+
+def true_and_found(keys: Sequence[str], seed: int) -> tuple[Set, Set]:
+    """The set that rows were drawn from, and the one that a search finds."""
+    rng = np.random.default_rng(seed)
+    members = tuple(there(key) for key in keys)
+    off = SESSION.noise(rng, unstable(0.1)) + made([g for _, g in members], rng)
+    search = SESSION.search(off)
+    best = search.run()
+    assert best.score == max(s.score for s in search.visited.values())
+    return search.evaluated(members), best
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        ("cross_coupling",),
+        ("settling:acc",),
+        ("random_walk:gyr",),
+        ("bias_drift:gyr", "angle_offset"),
+        ("g_sensitivity", "settling:acc"),
+    ],
+    ids=" ".join,
+)
+def test_a_set_that_is_there_is_found(keys: tuple[str, ...]) -> None:
+    for seed in range(3):
+        true, best = true_and_found(keys, seed)
+        assert best.keys == set(keys)
+        assert best.score >= true.score - 0.05
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_the_instability_of_one_triad_hides_is_found(seed: int) -> None:
+    """Where the other one has an instability that nothing explains."""
+    true, best = true_and_found(("alpha:ay",), seed)
+    assert best.score >= true.score - 0.05
+
+
+def test_where_nothing_is_nothing_is_said() -> None:
+    """Of what is said with half a chance at least, and not of what is suspected."""
+    said, empty = 0, 0
+    session = Session.of(ladder(2), SUSPECTED)
+    for seed in range(200):
+        rng = np.random.default_rng(1000 + seed)
+        tau = unstable() * np.exp(rng.normal(-1.5, priors.UNLIKE, 7))
+        search = session.search(session.noise(rng, tau))
+        best = search.run()
+        empty += not best.members
+        said += bool(Posterior(search, best).standing())
+    assert said <= 2
+    assert empty >= 198
+
+
+def with_sizes(empty: Set, groups: Sequence[Group], sizes: Sequence[int]) -> float:
+    """F of a set with more groups, all of them with these sizes."""
+    columns = np.concatenate([empty.state.columns, *(g.columns for g in groups)])
+    wide = [g.sizes(float(SIZES[i])) for g, i in zip(groups, sizes, strict=True)]
+    whole = np.concatenate([empty.state.sizes, *wide])
+    state = Eliminated.of(empty.state.rows, columns, whole)
+    return state.score + float(sum(DENSITY[i] for i in sizes))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_pairs_gain_is_what_their_sets_gain(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    groups = [c.variants[0] for c in CAUSES.values()]
+    off = KNOWN.noise(rng) + made(groups[:3], rng, 0.02)
+    search = KNOWN.search(off)
+    empty = search.evaluated(())
+    seen = set()
+    alone = [EVEN] * len(groups)
+    for gain, (i, j), (u, v) in pairs(empty.state, groups, alone):
+        two = [groups[i], groups[j]]
+        expected = with_sizes(empty, two, (u, v)) - empty.state.score
+        assert gain == pytest.approx(expected, rel=1e-9, abs=1e-7)
+        members = tuple((c, c.variants[0]) for c in [*CAUSES.values()])
+        start = replace(empty.sizes, members=(u, v))
+        both = search.evaluated((members[i], members[j]), start)
+        found = with_sizes(empty, two, both.sizes.members) - empty.state.score
+        assert -1e-7 <= found - gain < 1.0, "the likeliest sizes of the pair"
+        seen.add((i, j))
+    assert seen == set(combinations(range(len(groups)), 2))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("keys", [("cross_coupling", "angle_offset"),
+                                  ("random_walk:gyr", "bias_drift:gyr")])  # fmt: skip
+def test_sizes_are_those_that_trying_all_finds(
+    keys: tuple[str, str], seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    two = [CAUSES[key].variants[0] for key in keys]
+    search = KNOWN.search(KNOWN.noise(rng) + made(two, rng, 0.3))
+    found = search.evaluated(tuple((CAUSES[k], CAUSES[k].variants[0]) for k in keys))
+    empty = search.evaluated(())
+    some = range(12, 24)
+    every = np.array([[with_sizes(empty, two, (u, v)) for v in some] for u in some])
+    u, v = np.unravel_index(every.argmax(), every.shape)
+    assert found.sizes.members == (some[u], some[v])
+    top = every[u, v]
+    beside = [
+        [with_sizes(empty, two, (i, some[v])) for i in range(len(SIZES))],
+        [with_sizes(empty, two, (some[u], i)) for i in range(len(SIZES))],
+    ]
+    total = top + sum(np.logaddexp.reduce(np.array(b) - top) for b in beside)
+    chance = sum(np.log(CAUSES[k].chance / len(CAUSES[k].variants)) for k in keys)
+    assert found.score == pytest.approx(total + chance, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_instabilities_are_those_that_trying_all_finds(seed: int) -> None:
+    """Of the three accelerometers, each of which may be another."""
+    known = fixed(SESSION)
+    known.dictionary.unstable = np.where(np.arange(7) < 3, unstable(), 0.0)
+    rng = np.random.default_rng(seed)
+    tau = known.dictionary.unstable * 2.0 * np.exp(rng.normal(0, 0.3, 7))
+    search = known.search(known.noise(rng, tau))
+    found, some = search.evaluated(()), range(12, 23)
+    columns, wide = found.state.columns, found.state.sizes
+    small = search.gram.only(columns)
+
+    def score(x: int, y: int, z: int) -> float:
+        sizes = np.array([SIZES[i] for i in (x, y, z, 0, 0, 0, 0)])
+        rows = small.weighed(sizes * known.dictionary.unstable)
+        prior = search.alike((x, y, z, 0, 0, 0, 0))
+        return Eliminated.of(rows, columns, wide).score + float(prior)
+
+    every = {(x, y, z): score(x, y, z) for x in some for y in some for z in some}
+    best = max(every, key=lambda at: every[at])
+    assert every[found.sizes.instability[:3]] > every[best] - 0.2  # type: ignore[index]
+
+
+def test_instabilities_of_a_triad_are_likelier_alike() -> None:
+    search = SESSION.search(SESSION.noise(np.random.default_rng(0)))
+    even = (16, 16, 16, 12, 12, 12, 0)
+    level = search.alike(even)
+    for unlike in ((14, 16, 18), (16, 16, 13), (20, 14, 14)):
+        assert search.alike((*unlike, *even[3:])) < level - 2
+        assert search.alike((*even[:3], *unlike, 0)) < search.alike(
+            (*even[:3], 16, 16, 16, 0)
+        )
+    assert search.alike((12, 12, 12, 16, 16, 16, 0)) == pytest.approx(level)
+    larger = [search.alike((*[i] * 3, 12, 12, 12, 0)) for i in range(len(SIZES))]
+    assert (np.diff(larger) <= 0).all() and larger[24] < larger[16] - 10
+    many = np.array([even, (14, 16, 18, 12, 12, 12, 0)])
+    np.testing.assert_allclose(search.alike(many), [search.alike(row) for row in many])
+
+
+def test_the_chance_of_a_set_is_that_of_its_causes() -> None:
+    """The other triad of an effect that is there is likelier than by itself."""
+    search = Session.of(ladder(), ("settling:acc", "settling:gyr", "alpha:ay"))
+    by_key = {c.key: c for c in search.dictionary.causes}
+    acc, gyr, other = by_key.values()
+    found = search.search(search.noise(np.random.default_rng(0)))
+    first = (acc, acc.variants[0])
+    assert found.chance([]) == 0.0
+    assert found.chance([first]) == pytest.approx(
+        np.log(acc.chance / len(acc.variants))
+    )
+    both = found.chance([first, (gyr, gyr.variants[3])])
+    again = np.log(priors.AGAIN / len(gyr.variants))
+    assert both == pytest.approx(found.chance([first]) + again)
+    three = found.chance([first, (gyr, gyr.variants[3]), (other, other.variants[0])])
+    assert three == pytest.approx(both + np.log(priors.UNKNOWN))
+
+
+def test_an_offer_foretells_the_set_with_it() -> None:
+    """Exactly, but for what other sizes become beside it."""
+    rng = np.random.default_rng(4)
+    search: Search = KNOWN.search(
+        KNOWN.noise(rng) + made([CAUSES["angle_offset"].variants[0]], rng, 0.1)
+    )
+    empty = search.evaluated(())
+    offers = search.offers(empty)
+    assert offers[0].member[0].key == "angle_offset"
+    for offer in offers:
+        foretold = offer.score
+        assert search.taken(empty, offer).score == pytest.approx(foretold, rel=1e-9)
+        assert offer.size == search.taken(empty, offer).sizes.members[0]

@@ -1,0 +1,230 @@
+"""Turns of a virtual device with known errors, against what columns foretell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.diagnosis.explain import inference_of
+from fieldcal.diagnosis.prepare import prepare
+from fieldcal.model.causes.cause import Group
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.search.inference import Inference
+from fieldcal.model.search.selection import Search
+from fieldcal.model.state import Term
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.turn_rows import TurnRows
+from fieldcal.session.description import parse
+from fieldcal.sim_device.effect import SimulatedEffect
+from fieldcal.sim_device.profile import (
+    ONE,
+    ZERO,
+    Climate,
+    NoiseFigures,
+    Profile,
+    Sampling,
+    Truth,
+)
+from fieldcal.sim_device.replay import HeldWindow, simulate
+from fieldcal.sim_device.vocabulary import effect
+
+PLACES = ((0.0, 0.0), (60.0, 0.0), (60.0, -40.0), (-30.0, -40.0), (-30.0, 20.0),
+          (20.0, 50.0))  # fmt: skip
+"""Turned one joint after another, and last both at once, deg."""
+
+SPACING_S, WINDOW_S, TURN_S = 12.0, 6.0, 3.0
+QUIET = NoiseFigures(
+    (1e-4,) * 3,
+    (1e-6,) * 3,
+    acc_instability=ZERO,
+    gyr_instability=ZERO,
+    temperature=0.0,
+)
+ERRORS = {
+    "gyro_scale": {"s1": 2e-3, "s2": -1e-3, "s3": -3e-3},
+    "gyro_cross_coupling": {"s12": 2e-3, "s31": -1e-3, "s23": 1.5e-3},
+    "time_delay": {"seconds": 4e-3},
+    "lever_arm": {"x": 0.01, "y": 0.02, "z": -0.03},
+    "angle_offset": {"alpha0_deg": 0.1, "beta0_deg": -0.15},
+}
+every_error = pytest.mark.parametrize("name", ERRORS)
+
+
+@dataclass(frozen=True)
+class Ride:
+    """A session of a device with one error.
+
+    Attributes
+    ----------
+    inference : of its rows
+    group, true : the error's columns, and their true values
+    values : (k,) the same among all columns
+    known : what windows say
+    turns : rows about the nominal state
+
+    """
+
+    inference: Inference
+    group: Group
+    true: Array
+    values: Array
+    known: Set
+    turns: list[TurnRows]
+
+
+def recorded(*errors: SimulatedEffect) -> tuple[Block, list[HeldWindow]]:
+    """A device with some errors in all places."""
+    starts = SPACING_S * np.arange(len(PLACES)) + 1.0
+    angles = np.deg2rad(PLACES)
+    windows = [
+        HeldWindow(
+            a, b, t, t + WINDOW_S, turn=None if t < 2 else (t - TURN_S - 1, t - 1)
+        )
+        for (a, b), t in zip(angles.tolist(), starts.tolist(), strict=True)
+    ]
+    device = Profile(
+        truth=Truth(ZERO, ONE, ZERO, ONE),
+        noise=QUIET,
+        temperature=Climate(self_heating_k=0.0),
+        sampling=Sampling(100.0),
+        effects=errors,
+    )
+    return simulate(device, windows, seed=3), windows
+
+
+@cache
+def ride(name: str) -> Ride:
+    block, windows = recorded(effect(name, ERRORS[name]))
+    places = [
+        {"alpha_deg": a, "beta_deg": b, "start_s": w.start, "end_s": w.end}
+        for (a, b), w in zip(PLACES, windows, strict=True)
+    ]
+    about = parse({
+        "format": 1, "device": {"name": "turned"}, "position": places,
+        "site": {"latitude_deg": 50.45, "height_m": 170.0},
+    })  # fmt: skip
+    prepared = prepare(block, about)
+    inference = inference_of(prepared.source, prepared.rows, prepared)
+    d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
+    linear = inference.system.linearised(inference.nominal)
+    known = Search(d, gram(linear, d, at_rest)).evaluated(())
+    assert inference.turns is not None
+    turns = inference.turns.linearised(inference.nominal, at_rest, linear, known)
+    group = next(c for c in d.causes if c.name == name).variants[0]
+    assert group.effect is not None
+    sizes = {
+        key.removesuffix("_deg"): np.deg2rad(v) if key.endswith("_deg") else v
+        for key, v in ERRORS[name].items()
+    }
+    names = [p.name.removesuffix("_deg") for p in group.effect.params]
+    degrees = [p.unit == "deg" for p in group.effect.params]
+    true = np.array([
+        np.rad2deg(sizes.get(n, 0.0)) if deg else sizes.get(n, 0.0)
+        for n, deg in zip(names, degrees, strict=True)
+    ])  # fmt: skip
+    values = at_rest.copy()
+    values[group.columns] = true
+    return Ride(inference, group, true, values, known, turns)
+
+
+@every_error
+def test_every_turn_is_followed(name: str) -> None:
+    turns = ride(name).turns
+    assert [t.positions for t in turns] == [(i, i + 1) for i in range(len(PLACES) - 1)]
+    assert all(len(t.closure) == 3 for t in turns)
+
+
+@every_error
+def test_closures_are_what_the_columns_foretell(name: str) -> None:
+    one, largest = ride(name), 0.0
+    for turn in one.turns:
+        foretold = turn.design @ one.values[turn.columns]
+        size = np.linalg.norm(turn.closure)
+        assert np.linalg.norm(turn.closure - foretold) < 0.006 * size + 1e-6
+        largest = max(largest, float(size))
+    shows = name not in ("time_delay", "lever_arm")  # these begin and end at rest
+    assert (largest > 1e-3) == shows
+
+
+@pytest.mark.parametrize("name", [n for n in ERRORS if n != "angle_offset"])
+def test_the_way_is_what_the_columns_foretell(name: str) -> None:
+    """To first order, and but for the noise."""
+    one, largest = ride(name), 0.0
+    for turn in one.turns:
+        foretold = turn.way_design @ one.values[turn.columns]
+        assert len(turn.way) > 50
+        rest, size = np.linalg.norm(turn.way - foretold), np.linalg.norm(turn.way)
+        assert rest < 0.02 * size + 1.4 * np.sqrt(len(turn.way))
+        largest = max(largest, float(size))
+    assert largest > 100
+
+
+@pytest.mark.parametrize("name", ["gyro_scale", "gyro_cross_coupling"])
+def test_about_the_true_state_there_is_nothing_left(name: str) -> None:
+    one = ride(name)
+    inference = one.inference
+    term = Term(one.group.effect, one.true)  # type: ignore[arg-type]
+    state = replace(inference.nominal, terms=(*inference.nominal.terms, term))
+    linear = inference.system.linearised(state)
+    assert inference.turns is not None
+    for turn in inference.turns.linearised(state, one.values, linear, one.known):
+        foretold = turn.design @ one.values[turn.columns]
+        size = np.linalg.norm(turn.closure)
+        assert np.linalg.norm(turn.closure - foretold) < 1e-4 * size + 1e-6
+
+
+def test_information_of_closures_is_that_of_noise() -> None:
+    """Of white noise over the turn, and of nothing that is not there."""
+    for turn in ride("gyro_scale").turns:
+        length = TURN_S + 2.0  # with some time before and after
+        sigma = QUIET.gyr[0] * np.sqrt(length / 100.0)
+        np.testing.assert_allclose(1 / np.sqrt(turn.info), sigma, rtol=0.3)
+
+
+def test_a_copied_column_is_as_the_one_it_is_near() -> None:
+    turn = ride("gyro_scale").turns[2]
+    old, new = turn.columns[[1, 4]], np.array([9001, 9002])
+    more = turn.copied(old, new)
+    np.testing.assert_array_equal(more.columns[-2:], new)
+    for was, found in ((turn.design, more.design), (turn.way_design, more.way_design)):
+        np.testing.assert_array_equal(found[:, -2:], was[:, [1, 4]])
+        np.testing.assert_array_equal(found[:, :-2], was)
+
+
+def test_the_time_since_a_turn_counts_from_where_it_ends() -> None:
+    inference = ride("gyro_scale").inference
+    assert inference.turns is not None
+    turning, x = inference.turns.turning, inference.dictionary.x
+    first = int(np.argmax(x.position == 2))
+    ended = x.t[first] - inference.dictionary.since[:, first]
+    since = turning.after(np.array([ended[0] - 0.5, ended[0], ended[0] + 2.0]), 2)
+    np.testing.assert_allclose(since[0], [np.inf, 0.0, 2.0], atol=1e-9)
+    assert abs(ended[0] - (2 * SPACING_S)) < 0.7
+
+
+def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
+    """Without known angles a closure begins and ends at the forces that are seen."""
+    block, windows = recorded()
+    places = [{"start_s": w.start, "end_s": w.end} for w in windows]
+    prepared = prepare(block, parse({"format": 1, "position": places}))
+    inference = inference_of(prepared.source, prepared.rows, prepared)
+    d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
+    linear = inference.system.linearised(inference.nominal)
+    assert inference.turns is not None and d.free.all()
+    turns = inference.turns.linearised(inference.nominal, at_rest, linear, None)
+    assert len(turns) > 3
+    for turn in turns:
+        whole = np.zeros((len(turn.closure), d.width))
+        whole[:, turn.columns] = turn.design
+        for c in range(3):
+            each = whole[:, d.windows + c * len(d.held) + np.arange(len(d.held))]
+            assert np.flatnonzero(each.any(axis=0)).tolist() == list(turn.positions)
+            for found, expected in (
+                (each.sum(axis=1), whole[:, d.bias + c]),
+                (np.linalg.norm(each, axis=1), turn.bent[:, c]),
+            ):
+                np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9)

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from fieldcal.core import errors
-from fieldcal.core.errors import FieldcalError, Moved, disk_says
+from fieldcal.core.errors import FieldcalError, LinkLost, Moved, disk_says
 
 
 def test_every_error_ends_with_the_code_that_is_documented() -> None:
@@ -25,6 +25,12 @@ def test_every_error_ends_with_the_code_that_is_documented() -> None:
 def test_a_disturbance_carries_its_text_instant_and_axis() -> None:
     moved = Moved("disturbed on ax", 12.5, "ax")
     assert (str(moved), moved.at, moved.axis) == ("disturbed on ax", 12.5, "ax")
+
+
+def test_a_lost_link_carries_what_to_check_apart_from_what_to_do_next() -> None:
+    lost = LinkLost("the port is gone: plug it in")
+    assert lost.fault == "the port is gone: plug it in"
+    assert str(lost) == "the port is gone: plug it in, then start again"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from fieldcal.calibration.names import ParameterName, group_of, sensor_of
 from fieldcal.core.chances import chi2_tail
 from fieldcal.history.family import expected
 from fieldcal.session.description import Description
-from fieldcal.solve.words import SUSPECT
+from fieldcal.solve.doubt import DoubtfulPosition
 
 REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
 """Groups whose uncertainty must be known and small; a sensor not read is excused."""
@@ -146,10 +146,8 @@ def _fit(found: Calibration, limits: GradeLimits) -> Check:
 
 def _odd_positions(found: Calibration) -> list[Check]:
     """Name a position that does not fit the others; the decision stays."""
-    if max(found.info.get("bad_position", ()), default=0.0) < SUSPECT:
-        return []
-    told = [said for said in found.warnings if said.startswith("the position ")]
-    return [Check("positions", None, said) for said in told]
+    doubt = DoubtfulPosition.from_json(found.info.get("doubtful_position"))
+    return [Check("positions", None, doubt.sentence)] if doubt else []
 
 
 def _first(found: Calibration) -> str:

@@ -14,6 +14,9 @@ SENSORS = {
 }
 """The sensor of each group that is always reported in device axes."""
 
+SCALES = frozenset({"acc_scale", "gyr_scale"})
+"""Groups of scale factors."""
+
 
 @dataclass(frozen=True, slots=True)
 class ParameterName:
@@ -43,9 +46,28 @@ class ParameterName:
         return f"{self.group}.{self.component}" if self.component else self.group
 
     @property
+    def sensor(self) -> str:
+        """``acc`` or ``gyr`` for a bias or a scale factor; empty for an effect."""
+        return sensor_of(self.group)
+
+    @property
+    def is_scale(self) -> bool:
+        """Whether it is a scale factor."""
+        return self.group in SCALES
+
+    @property
     def axis(self) -> int:
         """Index of the axis of a bias or a scale factor."""
         return AXES.index(self.component)
+
+    @property
+    def channel(self) -> int:
+        """Index of the output of a bias or a scale factor in `samples.CHANNELS`.
+
+        >>> ParameterName.of("gyr_bias.y").channel
+        4
+        """
+        return self.axis + (3 if self.sensor == "gyr" else 0)
 
     @property
     def entry(self) -> tuple[int, int]:

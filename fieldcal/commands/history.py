@@ -145,10 +145,11 @@ def _trends(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
 
 
 def _wanted(asked: Sequence[str] | None, known: Sequence[str]) -> list[str]:
+    from fieldcal.calibration.names import group_of
     from fieldcal.core.errors import InputError
 
     if not asked:
-        biases = [n for n in known if n.startswith(("acc_bias.", "gyr_bias."))]
+        biases = [n for n in known if group_of(n) in ("acc_bias", "gyr_bias")]
         return biases or list(known)
     odd = [name for name in asked if name not in known]
     if odd:

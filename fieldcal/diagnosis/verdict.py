@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.calibration.names import group_of
 from fieldcal.calibration.parameters import Nominal
 from fieldcal.calibration.plausible import senseless
 from fieldcal.core.samples import Block
@@ -283,7 +284,7 @@ def _warnings(explanation: Explanation) -> tuple[str, ...]:
     loose = [
         name
         for name, (_, sigma, size) in numbers.items()
-        if not sigma < ABSURD[name.partition(".")[0]] * size
+        if not sigma < ABSURD[group_of(name)] * size
     ]
     if loose:
         out.append(f"not determined by these positions: {', '.join(loose)}")

@@ -21,9 +21,9 @@ from fieldcal.model import priors
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.physics.effect import Motion, Sensor
+from fieldcal.solve.doubt import CERTAIN
 from fieldcal.solve.given import Given
 from fieldcal.solve.observations import Mask
-from fieldcal.solve.words import CERTAIN
 
 ROUNDED = 1e-9
 """Share of the longest column below which rounding alone is left of one."""

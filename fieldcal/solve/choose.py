@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.calibration import Calibration, Method
+from fieldcal.calibration.names import group_of
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
 from fieldcal.solve import printed
@@ -205,4 +206,5 @@ def _shows(found: Estimated) -> bool:
     """Whether all of the accelerometers is determined, and the tilt with it."""
     if not found.acc.dof and not found.acc.chi2 and not found.names:
         return False
-    return not any(n.startswith(("acc_", *TILTED)) for n in found.missing)
+    open_ = {group_of(n) for n in found.missing}
+    return not open_ & {"acc_bias", "acc_scale", *TILTED}

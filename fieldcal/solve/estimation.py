@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.evidence.gram import Gram
@@ -24,11 +25,11 @@ from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turning
 from fieldcal.solve.agreement import Fit, agreement
+from fieldcal.solve.doubt import CERTAIN, SUSPECT
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask
 from fieldcal.solve.shown import Shown
 from fieldcal.solve.variants import variants
-from fieldcal.solve.words import CERTAIN, SUSPECT
 
 OPEN = 0.25
 """Part of a variance before the rows from which they determined nothing."""
@@ -278,12 +279,11 @@ def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
     before = np.zeros(len(given.names))
     for i, name in enumerate(given.names):
         picked[i, np.flatnonzero(found.columns == given.place(name)[0])[0]] = 1.0
-        group, _, axis = name.partition(".")
-        sensor, _, kind = group.partition("_")
-        if sensor in ("acc", "gyr") and kind in ("bias", "scale"):
-            c = "xyz".index(axis) + 3 * (sensor == "gyr")
-            picked[i] += given.ending[int(kind == "scale")][c, found.columns]
-            before[i] = (nominal.bias if kind == "bias" else nominal.scale)[c]
+        parameter = ParameterName.of(name)
+        if parameter.sensor:
+            scale, c = parameter.is_scale, parameter.channel
+            picked[i] += given.ending[int(scale)][c, found.columns]
+            before[i] = (nominal.scale if scale else nominal.bias)[c]
     return before + picked @ found.mean, picked @ found.covariance @ picked.T
 
 
@@ -300,7 +300,7 @@ def _determined(
         i
         for i, name in enumerate(given.names)
         if told[i] ** 2 < OPEN * before[given.place(name)[0]] ** 2
-        and told[i] < limits.get(name.partition(".")[0], np.inf)
+        and told[i] < limits.get(group_of(name), np.inf)
     ]
     names = tuple(given.names[i] for i in known)
     missing = tuple(n for i, n in enumerate(given.names) if i not in known)

@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
@@ -102,7 +103,7 @@ class Given(Dictionary):
         common = np.array([rows.common[rows.x.position == p][0] for p in held])
         wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
         super().__init__(rows.x, rows.used, since, common, unit, turns, wander)
-        has = {n.partition(".")[0] for n in self.names}
+        has = {group_of(n) for n in self.names}
         if has & set(TILTS):
             has |= set(TILTS)
         self.explanations = carried(self, shown, has) or (Shown((), 1.0),)
@@ -207,18 +208,18 @@ class Given(Dictionary):
 
     def place(self, name: str) -> Index:
         """Columns of a parameter by its full name; none if it is not in the set."""
-        group, _, part = name.partition(".")
-        if group in ("acc_bias", "gyr_bias", "acc_scale", "gyr_scale"):
-            kind = group.partition("_")[2]
-            channel = "xyz".index(part) + 3 * group.startswith("gyr")
+        parameter = ParameterName.of(name)
+        if parameter.sensor:
+            kind = "scale" if parameter.is_scale else "bias"
             every = [c for g in self.always if g.cause == kind for c in g.columns]
-            at = (self.bias if kind == "bias" else self.scale) + channel
+            first = self.scale if parameter.is_scale else self.bias
+            at = first + parameter.channel
             return np.array([at] if at in every else [], dtype=np.intp)
         for cause, one in self.asked:
-            if cause.name == group and isinstance(one.effect, Effect):
+            if cause.name == parameter.group and isinstance(one.effect, Effect):
                 names = [one.effect.params[j].name for j in one.params]
-                if part in names:
-                    return one.columns[[names.index(part)]]
+                if parameter.component in names:
+                    return one.columns[[names.index(parameter.component)]]
         return np.empty(0, dtype=np.intp)
 
     @property

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.names import group_of
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import GYR, Array
@@ -70,7 +71,7 @@ def solve(seen: Observations, asked: Asked) -> Calibration:
         names=names,
         values=np.concatenate([p.values for p in parts]),
         covariance=covariance,
-        units=tuple(UNITS[n.partition(".")[0]] for n in names),
+        units=tuple(UNITS[group_of(n)] for n in names),
         chi2=0.0,
         dof=0,
         rms=float("nan"),

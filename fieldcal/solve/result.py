@@ -9,11 +9,13 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.gauge import GROUPS
+from fieldcal.calibration.names import AXES, ParameterName, group_of, sensor_of
 from fieldcal.calibration.plausible import senseless
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import UNITS as CHANNEL_UNITS
 from fieldcal.solve import words
 from fieldcal.solve.assumed import Asked
+from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import ladder_remedy
@@ -22,8 +24,16 @@ UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
 UNITS |= {"angle_offset": "deg", "base_tilt": "deg"}
 """Unit of each group's components."""
 
+OF_ACC = frozenset(
+    {"acc_bias", "acc_scale", "cross_coupling", "angle_offset", "base_tilt"}
+)
+"""Groups that the accelerometers at rest determine."""
+
 WRONG = 9.0
 """chi2 per degree of freedom from which the model, not the noise, is at fault."""
+
+OF_TURNS = frozenset({"gyr_scale", "gyro_cross_coupling"})
+"""Groups that turns determine."""
 
 TURNED = 5
 """Degrees of freedom of the turns from which their residual says something."""
@@ -56,11 +66,12 @@ def calibration(
         )
     sigma = np.sqrt(np.diag(covariance))
     odd = senseless(names, values, sigma, seen.nominal)
-    acc = found.acc if any(n.startswith("acc") for n in names) else found.gyr
+    acc = found.acc if any(map(_is_acc, names)) else found.gyr
     good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < WRONG)
+    doubt = DoubtfulPosition.of(seen, found.bad)
     said += [
         *_few(method, found),
-        words.bad_window(seen, found.bad),
+        doubt.sentence if doubt else "",
         *_scattered(found),
     ]
     return Calibration(
@@ -68,7 +79,7 @@ def calibration(
         names=names,
         values=values,
         covariance=covariance,
-        units=tuple(UNITS[n.partition(".")[0]] for n in names),
+        units=tuple(UNITS[group_of(n)] for n in names),
         chi2=acc.chi2,
         dof=acc.dof,
         rms=found.acc.rms,
@@ -82,25 +93,28 @@ def _blind(found: Estimated, seen: Observations) -> bool:
     """Whether the accelerometers at rest gave nothing, and no table turned."""
     if not seen.has_acc or seen.rotating.any():
         return False
-    return not any(n.startswith("acc") for n in found.names)
+    return not any(map(_is_acc, found.names))
+
+
+def _is_acc(name: str) -> bool:
+    """Whether a parameter is a bias or a scale factor of the accelerometers."""
+    return sensor_of(group_of(name)) == "acc"
 
 
 def _open(method: Method, seen: Observations, found: Estimated) -> list[str]:
     """Parameters that the rows leave open, and which positions would give them."""
     said = []
-    acc = [
-        n for n in found.missing if n.startswith(("acc_", "cross_", "angle", "base"))
-    ]
+    acc = [n for n in found.missing if group_of(n) in OF_ACC]
     if acc and found.given.wanted.level_deg is not None:
-        acc = [n for n in acc if not n.startswith("base_tilt")]
+        acc = [n for n in acc if group_of(n) != "base_tilt"]
     if acc:
         said.append(
             _scalar(acc, found, len(seen))
             if method == "scalar"
             else words.not_determined(acc, _remedy(seen, found), "these positions")
         )
-    gyr = [n for n in found.missing if n.startswith("gyr_scale")]
-    cross = [n for n in found.missing if n.startswith("gyro_cross")]
+    gyr = [n for n in found.missing if group_of(n) == "gyr_scale"]
+    cross = [n for n in found.missing if group_of(n) == "gyro_cross_coupling"]
     if not found.given.wanted.gyr_scale and seen.has_gyr:
         said.append(
             "gyr_scale is not determined: the Earth's rate gives it only with two "
@@ -114,7 +128,7 @@ def _open(method: Method, seen: Observations, found: Estimated) -> list[str]:
 
 
 def _remedy(seen: Observations, found: Estimated) -> list[str]:
-    names = [n for n in found.given.names if not n.startswith("gyr")]
+    names = [n for n in found.given.names if group_of(n) in OF_ACC]
     if any(n in found.missing for n in names) and not seen.rotating.any():
         return ladder_remedy(seen, names)
     return []
@@ -131,7 +145,9 @@ def _turning(
             " Earth's rate gives it only roughly in these windows; average longer, or"
             " integrate turns between the positions"
         )
-    about = sorted({"xyz"[int(n[-1]) - 1] for n in cross} | {n[-1] for n in gyr})
+    turned = {ParameterName.of(n).entry[1] for n in cross}
+    turned |= {ParameterName.of(n).axis for n in gyr}
+    about = [AXES[axis] for axis in sorted(turned)]
     if seen.rotating.any():
         return words.not_determined(
             missing, [f"a rate of 20°/s about device axis {a}" for a in about],
@@ -143,12 +159,13 @@ def _turning(
 
 def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
     """What lengths of the force leave open."""
-    hidden = [m for m in missing if m.startswith("cross")]
+    hidden = [m for m in missing if group_of(m) == "cross_coupling"]
     if len(hidden) < len(missing):
         return words.not_determined(
             missing, ["positions with each axis up and down"], "these orientations"
         )
-    pairs = [f"{'xyz'[int(h[-2]) - 1]} and {'xyz'[int(h[-1]) - 1]}" for h in hidden]
+    entries = [ParameterName.of(name).entry for name in hidden]
+    pairs = [f"{AXES[row]} and {AXES[column]}" for row, column in entries]
     why = "axes held up and down alone cannot show it"
     if n < 9:
         why = f"{n} norms cannot carry 9 parameters"
@@ -204,7 +221,7 @@ def _scattered(found: Estimated) -> list[str]:
 def _turns(found: Estimated) -> tuple[float, int]:
     """chi2 of the closures, and how many are left over."""
     chi2, count = found.closures
-    spent = sum(n.startswith(("gyr_scale", "gyro_cross")) for n in found.names)
+    spent = sum(group_of(n) in OF_TURNS for n in found.names)
     return chi2, max(0, count - spent)
 
 
@@ -236,6 +253,8 @@ def _info(
         "extra_scatter": scatter_of(found.found, (0, 1, 2)),
         "angle_sigma_deg": asked.angles_deg,
     }
+    if doubt := DoubtfulPosition.of(seen, found.bad):
+        out["doubtful_position"] = doubt.to_json()
     if np.isfinite(found.acc.left_out):
         out["left_out_rms"] = found.acc.left_out
     if method == "two_position" and asked.level_deg:

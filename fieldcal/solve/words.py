@@ -10,14 +10,9 @@ from fieldcal.core.chances import chi2_tail
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.model.priors import NAMED
-from fieldcal.solve.observations import Observations
 
 UNLIKELY = 0.01
 """Probability of a larger chi2 from which the scatter counts as beyond the noise."""
-
-SUSPECT, CERTAIN = 0.1, 0.99
-"""Probability of a window to be bad from which it is said, and from which it has no
-weight left."""
 
 MENTIONED = 0.1
 """Probability from which a cause is named in a sentence."""
@@ -101,22 +96,4 @@ def carried(
         f"the recording shows {listed}, which the result carries:{when} the"
         f" uncertainties are with it; without it {names[worst]} would be"
         f" {abs(moved[worst]):.1f} σ off; fieldcal diagnose says what to do"
-    )
-
-
-def bad_window(seen: Observations, bad: Array) -> str:
-    """Tell of a window that does not fit the others; nothing where all do."""
-    worst = int(bad.argmax())
-    if bad[worst] < SUSPECT:
-        return ""
-    name = seen.positions[worst].name
-    if bad[worst] > CERTAIN:
-        return (
-            f"the position {name} disagrees with all others and was given no weight: "
-            "take it again"
-        )
-    return (
-        f"the position {name} may be disturbed (probability "
-        f"{100 * bad[worst]:.0f} %) and has less weight, which the uncertainties "
-        "include: take it again"
     )

@@ -10,6 +10,7 @@ from fieldcal.calibration.plausible import senseless
 from fieldcal.core.positions import FIVE, WIDE, Position
 from fieldcal.core.samples import Array
 from fieldcal.solve import solve, words
+from fieldcal.solve.doubt import DoubtfulPosition
 
 NINE = (*WIDE, *FIVE[1:])
 
@@ -84,8 +85,11 @@ def test_scatter_is_told_from_one_in_a_hundred_on() -> None:
 def test_a_bad_window_is_named(bad: float, says: str) -> None:
     doubt = np.zeros(len(NINE))
     doubt[2] = bad
-    said = words.bad_window(observe(NINE, outputs(NINE)), doubt)
+    found = DoubtfulPosition.of(observe(NINE, outputs(NINE)), doubt)
+    said = found.sentence if found else ""
     assert said == "" if not says else says in said and NINE[2].name in said
+    document = found.to_json() if found else None
+    assert DoubtfulPosition.from_json(document) == found
 
 
 def test_an_effect_left_out_is_said_to_be_scatter() -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.model.causes.columns import Course, General
 from fieldcal.physics.effect import Effect
 
@@ -22,6 +23,22 @@ CLOSURE = 6
 """Kind of the closures of turns, beside the six outputs."""
 
 TRIADS = (("acc", (0, 1, 2)), ("gyr", (3, 4, 5)))
+
+BOTH = frozenset({"acc", "gyr"})
+"""Accelerometers and gyroscopes."""
+
+Kind = Literal["effect", "random", "unknown", "position", "given"]
+
+
+def triads_of(part: str) -> frozenset[str]:
+    """Triads that a triad, a channel or, if it is empty, everything belongs to.
+
+    >>> sorted(triads_of("gx")), sorted(triads_of(""))
+    (['gyr'], ['acc', 'gyr'])
+    """
+    if part in CHANNELS:
+        return frozenset({TRIADS[CHANNELS.index(part) // 3][0]})
+    return frozenset({part}) if part else BOTH
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +91,7 @@ class Cause:
     part : "acc", "gyr" or ""
     chance : that a session has it
     variants : groups, one for each value of the shape
-    kind : "effect", "random", "unknown" or "position"
+    kind : of the catalogue, random, without physics, an angle, or asked for
 
     """
 
@@ -82,7 +99,7 @@ class Cause:
     part: str
     chance: float
     variants: tuple[Group, ...]
-    kind: str = "effect"
+    kind: Kind = "effect"
 
     @property
     def key(self) -> str:

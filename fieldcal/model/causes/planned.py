@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.frames import force_home
 from fieldcal.core.positions import Position, angles
 from fieldcal.core.samples import Array
@@ -85,7 +86,7 @@ def state_of(
         sensor, axis = ("acc", "gyr")[c // 3], "xyz"[c % 3]
         bias[c] = known.get(f"{sensor}_bias.{axis}", bias[c])
         scale[c] = known.get(f"{sensor}_scale.{axis}", scale[c])
-    groups = dict.fromkeys(n.partition(".")[0] for n in names)
+    groups = dict.fromkeys(group_of(n) for n in names)
     terms = [
         Term(e, np.array([known.get(f"{group}.{p.name}", 0.0) for p in e.params]))
         for group in groups
@@ -101,14 +102,16 @@ def design(
     mounting: Array | None = None,
 ) -> Array:
     """Derivatives about a perfect device, (n, 3, k)."""
-    perfect = np.array([float(n.startswith("acc_scale")) for n in names])
+    perfect = np.array([float(group_of(n) == "acc_scale") for n in names])
     return predicted(names, perfect, positions, gravity, mounting)[1]
 
 
 def _column(parts: dict[str, Array], name: str) -> Array:
     """Column (n, 6) of a parameter by its full name."""
-    group, _, part = name.partition(".")
-    if group in ("acc_bias", "acc_scale"):
-        one: Array = parts[group][:, :, "xyz".index(part)]
+    parameter = ParameterName.of(name)
+    group = parameter.group
+    if parameter.sensor == "acc":
+        one: Array = parts[group][:, :, parameter.axis]
         return one
-    return np.asarray(parts[group][:, :, catalogue()[group].names.index(part)])
+    at = catalogue()[group].names.index(parameter.component)
+    return np.asarray(parts[group][:, :, at])

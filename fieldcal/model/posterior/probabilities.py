@@ -16,19 +16,11 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.causes.cause import BOTH, Group, triads_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.selection import Search
-
-BOTH = frozenset("ag")
-"""Accelerometers and gyroscopes, by the first letter of their channels."""
-
-
-def triads_of(cause: Cause) -> frozenset[str]:
-    """Those that a cause is on."""
-    return frozenset(cause.part[:1]) or BOTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +44,7 @@ class Standing:
     @property
     def triads(self) -> frozenset[str]:
         """Those that it is on."""
-        return frozenset[str]().union(*(triads_of(c) for c, _ in self.members))
+        return frozenset[str]().union(*(triads_of(c.part) for c, _ in self.members))
 
     @property
     def kind(self) -> str:
@@ -158,7 +150,7 @@ class Posterior:
         return list(zip(sets, share.tolist(), strict=True))
 
     def probability(self, names: Iterable[str], triads: frozenset[str] = BOTH) -> float:
-        """That one of some causes is there, on one of some triads ("a", "g").
+        """That one of some causes is there, on one of some triads.
 
         What stands on the gyroscopes does not stand for what is on accelerometers.
         """
@@ -166,7 +158,9 @@ class Posterior:
         return sum(
             w
             for s, w in self.weights
-            if any(c.name in wanted and triads_of(c) & triads for c, _ in s.members)
+            if any(
+                c.name in wanted and triads_of(c.part) & triads for c, _ in s.members
+            )
         )
 
     def standing(self) -> list[Standing]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
+from fieldcal.model.causes.cause import triads_of
 from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
@@ -231,7 +232,7 @@ def _strange(known: Set) -> bool:
     What it does while the device is turned, nobody can say.
     """
     return any(
-        cause.kind == "unknown" and not group.part.startswith("g")
+        cause.kind == "unknown" and "acc" in triads_of(group.part)
         for cause, group in known.members
     )
 

@@ -1,0 +1,60 @@
+"""A position that disagrees with the others: how likely that is, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fieldcal.core.samples import Array
+from fieldcal.solve.observations import Observations
+
+SUSPECT, CERTAIN = 0.1, 0.99
+"""Probability that a window is bad from which it is reported, and from which it has no
+weight left."""
+
+
+@dataclass(frozen=True, slots=True)
+class DoubtfulPosition:
+    """A position that may be disturbed.
+
+    Attributes
+    ----------
+    name : of the position
+    probability : that its window is bad
+
+    """
+
+    name: str
+    probability: float
+
+    @classmethod
+    def of(cls, seen: Observations, bad: Array) -> DoubtfulPosition | None:
+        """The worst position, (n,) probabilities; None where all positions agree."""
+        worst = int(bad.argmax())
+        if bad[worst] < SUSPECT:
+            return None
+        return cls(seen.positions[worst].name, float(bad[worst]))
+
+    @classmethod
+    def from_json(cls, value: Mapping[str, Any] | None) -> DoubtfulPosition | None:
+        """Read what `to_json` wrote."""
+        return cls(value["name"], value["probability"]) if value else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of result.json."""
+        return {"name": self.name, "probability": self.probability}
+
+    @property
+    def sentence(self) -> str:
+        """What happened, and what to do."""
+        if self.probability > CERTAIN:
+            return (
+                f"the position {self.name} disagrees with all others and was given no"
+                " weight: take it again"
+            )
+        return (
+            f"the position {self.name} may be disturbed (probability"
+            f" {100 * self.probability:.0f} %) and has less weight, which the"
+            " uncertainties include: take it again"
+        )

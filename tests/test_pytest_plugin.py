@@ -28,8 +28,8 @@ def test_whoever_does_not_use_it_does_not_pay_for_it() -> None:
     code = (
         f"import sys, pytest, {entry.value}\n"
         "heavy = {'numpy', 'scipy', 'pyarrow', 'rich', 'serial'} & set(sys.modules)\n"
-        "ours = [m for m in sys.modules if m.startswith('fieldcal')]\n"
-        "sys.exit(str(heavy) if heavy or len(ours) > 2 else 0)"
+        "ours = [m for m in sys.modules if m.startswith('fieldcal.')]\n"
+        "sys.exit(str([*heavy, *ours]) if heavy or len(ours) > 3 else 0)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False

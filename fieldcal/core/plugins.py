@@ -16,7 +16,7 @@ def names(path: Iterable[str]) -> tuple[str, ...]:
 
 
 def class_in(module: str, base: type[T]) -> type[T]:
-    """Subclass of `base` that a module defines.
+    """Public subclass of `base` that a module defines.
 
     Parameters
     ----------
@@ -35,11 +35,13 @@ def class_in(module: str, base: type[T]) -> type[T]:
         if isinstance(thing, type)
         and issubclass(thing, base)
         and thing.__module__ == module
+        and not thing.__name__.startswith("_")
     ]
     last = [c for c in there if not any(c in other.__mro__[1:] for other in there)]
     if len(last) != 1:
         found = ", ".join(c.__name__ for c in last) or "none"
         raise LookupError(
-            f"{module} must define one subclass of {base.__name__}; it has {found}"
+            f"{module} must define one public subclass of {base.__name__};"
+            f" it has {found}"
         )
     return last[0]

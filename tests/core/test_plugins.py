@@ -31,12 +31,13 @@ def module_with(name: str, *classes: str) -> str:
 def test_the_class_that_a_module_defines_is_found() -> None:
     assert class_in(module_with("m_one", "One"), Base).__name__ == "One"
     assert class_in(module_with("m_two", "One", "Two"), Base).__name__ == "Two"
+    assert class_in(module_with("m_own", "One", "_Two"), Base).__name__ == "One"
     found = class_in("fieldcal.effects.hum", Effect)
     assert found.__module__ == "fieldcal.effects.hum"
 
 
 def test_none_is_refused_by_name() -> None:
-    told = "m_none must define one subclass of Base; it has none$"
+    told = "m_none must define one public subclass of Base; it has none$"
     with pytest.raises(LookupError, match=told):
         class_in(module_with("m_none"), Base)
 

@@ -82,7 +82,7 @@ def test_angles_that_were_set_otherwise_are_said(
     assert said.verdict == "unexplained" and not named(said)
     assert {p for _, p in places(said)} == {(window,)}
     assert said.after.held_out_rms < 0.2 * said.before.held_out_rms
-    assert f"Position {window} is off by itself, as if" in said.says
+    assert f"Position {window + 1} is off by itself, as if" in said.says
     for joint, degrees in (("α", alpha), ("β", beta)):
         if degrees:
             _, _, rest = said.says.partition(f"{joint} had been off by ")
@@ -99,7 +99,7 @@ def test_an_effect_besides_has_its_numbers(
     said = diagnosed(tmp_path / "s", TACTICAL, coupling, seed=3)
     assert said.verdict == "unexplained" and named(said) == ["cross_coupling"]
     agrees(said, "cross_coupling", {"k12": 0.008, "k21": -0.006, "k32": 0.007})
-    assert "Position 3 is off by itself, as if α had been off by 0.49" in said.says
+    assert "Position 4 is off by itself, as if α had been off by 0.49" in said.says
 
 
 def test_a_step_behind_the_first_position_is_one(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ counted to the last one.
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -65,6 +66,7 @@ GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 
 
 ALL = 60_000
+HERE = Path(__file__).resolve()
 
 HOST = """
 import pickle, sys
@@ -175,7 +177,7 @@ def test_the_same_on_a_bus_of_datagrams(
     host = subprocess.Popen(
         [*namespace, sys.executable, "-c", HOST, url.format("239.74.163.2")],
         stdout=subprocess.PIPE,
-        cwd=Path(__file__).parents[1],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, HERE.parents[:2]))},
     )
     assert host.stdout and host.stdout.readline() == b"listening\n"
     with device(sent, tmp_path / "truth.json", "5", *namespace):

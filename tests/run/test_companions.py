@@ -140,8 +140,8 @@ def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) ->
     assert said.startswith("fieldcal run: device-2: ")
     assert said.endswith("; the other devices have their results")
     assert result["verdict"] == "good" and set(result["further"]) == {"device-3"}
-    marks = list(Session.open(tmp_path / "s" / "device-2").marks())
-    assert marks[-1]["event"] == "failed"
+    marks = Session.open(tmp_path / "s" / "device-2").marks()
+    assert "failed" in {mark["event"] for mark in marks}
 
 
 def test_times_go_over_the_hosts_clock() -> None:

@@ -70,11 +70,14 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
     add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
     add("--separator", help="between columns (default: found)")
     add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
-    add("--acc-unit", default="", help="m/s^2 (default), g, mg, V, count")
-    add("--gyr-unit", default="", help="rad/s (default), deg/s, mrad/s, V, count")
-    add("--time-unit", default="", help="s (default), ms, us, ns")
+    add("--acc-unit", default="", help="m/s^2, g, mg, V, count")
+    add("--gyr-unit", default="", help="rad/s, deg/s, mrad/s, V, count")
+    add("--time-unit", default="", help="s, ms, us, ns")
     add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
+    add("--temp-unit", default="", help="degC, cdegC, K, count, none")
+    add("--temp-lsb", type=float, default=1.0, metavar="N", help="counts in 1 K")
+    add("--temp-zero", type=float, default=0.0, metavar="C", help="deg C at count 0")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -125,6 +128,9 @@ def _wanted(args: argparse.Namespace, i: int) -> ReadOptions:
         args.acc_lsb,
         args.gyr_lsb,
         args.options,
+        args.temp_unit,
+        args.temp_lsb,
+        args.temp_zero,
     )
 
 
@@ -150,6 +156,7 @@ def _bring(
     args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
 ) -> None:
     from fieldcal.importing.ingest import import_stream
+    from fieldcal.importing.unit_guess import settle_units
     from fieldcal.session.description import UNSCALED
 
     name = recording.path.name.split(".")[0]
@@ -159,6 +166,12 @@ def _bring(
         about["units"] = kept
     if args.rate:
         about["sampling"] = {"rate_hz": args.rate}
+    guessed, bias = settle_units(recording, stream.name)
+    if bias:
+        about["nominal"] = {"acc_bias": bias}
+    if guessed:
+        about["guessed"] = guessed
+        stream = next(s for s in recording.streams() if s.name == stream.name)
     imported = import_stream(recording, stream.name, folder, about, args.still)
     err = sys.stderr.write
     err(
@@ -166,6 +179,8 @@ def _bring(
         f" {_many(len(imported.stretches), 'still stretch', 'es')}"
         f" of {args.still:g} s or more\n"
     )
+    for what, why in guessed.items():
+        err(f"{folder}: {what.replace('_', ' ')} taken as {why}\n")
     for sentence in imported.says:
         err(f"{folder}: {sentence}\n")
     if imported.facts.left_out:

@@ -3,7 +3,7 @@
 To add one, write importers/<name>.py with ``WHAT`` (a line for the help),
 ``recognises(head, path)``, which judges a file by its first bytes, and a subclass of
 `fieldcal.importing.recording.Recording`. Nothing is guessed in silence: units and the
-sensor of several are named by the file, or by the user.
+sensor of several are named by the file or the user, or it is said what was taken.
 """
 
 from __future__ import annotations

@@ -69,6 +69,8 @@ class ArrayFile(Recording):
     _units: dict[str, str] | None = None
     """Of the arrays of an HDF5 file, so that it is looked through once."""
 
+    asks_units = True
+
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
         return (("h5py",) if _is_hdf5(head(self.path)) else ()), "hdf5"

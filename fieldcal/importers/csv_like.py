@@ -65,6 +65,7 @@ def _is_wide(head: bytes) -> bool:
 class TextColumns(Recording):
     """A text file, with one IMU in it."""
 
+    asks_units = True
     _skip = 0
 
     def streams(self) -> list[ImuStream]:

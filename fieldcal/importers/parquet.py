@@ -28,6 +28,8 @@ def recognises(head: bytes, path: Path) -> bool:
 class ParquetFile(Recording):
     """A table with named columns, with one IMU in it."""
 
+    asks_units = True
+
     def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
         with self._batches() as (schema, _):

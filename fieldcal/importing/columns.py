@@ -37,7 +37,7 @@ def check(wanted: ReadOptions) -> None:
         raise InputError("name the columns: neither ax ay az nor gx gy gz is there")
     if "t" not in named and not wanted.rate_hz:
         raise InputError("no column is t, the time: give the rate, e.g. --rate 100")
-    _ = wanted.acc_scale, wanted.gyr_scale, wanted.time_scale
+    _ = wanted.acc_scale, wanted.gyr_scale, wanted.time_scale, wanted.celsius
 
 
 class ColumnReader:
@@ -76,10 +76,15 @@ class ColumnReader:
             t,
             triad("a", wanted.acc_scale),
             triad("g", wanted.gyr_scale),
-            columns.get("temperature"),
+            _warmth(columns.get("temperature"), *wanted.celsius),
             columns.get("seq"),
             columns.get("t_host"),
         )
+
+
+def _warmth(column: Array | None, size: float, zero: float) -> Array | None:
+    """Deg C of a column; as it is where it says so."""
+    return column if column is None or (size, zero) == (1, 0) else zero + size * column
 
 
 def units(wanted: ReadOptions) -> str:
@@ -103,4 +108,7 @@ def notes(wanted: ReadOptions) -> dict[str, object]:
         "gyr_unit": wanted.gyr_unit or "rad/s",
         "gyr_lsb": wanted.gyr_lsb,
         "time_unit": wanted.time_unit or "s",
+        "temp_unit": wanted.temp_unit or "degC",
+        "temp_lsb": wanted.temp_lsb,
+        "temp_zero": wanted.temp_zero,
     }

@@ -13,6 +13,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importing.gzip_stream import PIECE, pieces
@@ -23,6 +25,14 @@ ROWS = 1 << 15
 
 MOST = 12
 """Faults of a file that are listed one by one."""
+
+TEMP_UNITS = {
+    "degC": (1.0, 0.0),
+    "cdegC": (0.01, 0.0),
+    "K": (1.0, -273.15),
+    "none": (np.nan, np.nan),
+}
+"""Kelvin in one of each, and deg C at its 0; "none" leaves it out."""
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
@@ -38,6 +48,8 @@ class ReadOptions:
     separator, skip : of text files
     acc_unit, gyr_unit, time_unit : of the file; "" is not said, and SI
     acc_lsb, gyr_lsb : counts in one unit, for raw counts
+    temp_unit : of the file; "" is not said, and degC
+    temp_lsb, temp_zero : counts in 1 K, and deg C at count 0
     options : as in a device's address, ``name=value&name=value``
 
     """
@@ -52,6 +64,9 @@ class ReadOptions:
     acc_lsb: float = 1.0
     gyr_lsb: float = 1.0
     options: str = ""
+    temp_unit: str = ""
+    temp_lsb: float = 1.0
+    temp_zero: float = 0.0
 
     @property
     def acc_scale(self) -> float:
@@ -67,6 +82,15 @@ class ReadOptions:
     def time_scale(self) -> float:
         """Seconds in one of the file's unit of time."""
         return _unit(self.time_unit or "s", TIME_UNITS)
+
+    @property
+    def celsius(self) -> tuple[float, float]:
+        """Kelvin in one of the file's unit of temperature, and deg C at its 0."""
+        own = {"count": (1 / self.temp_lsb, self.temp_zero)}
+        name = self.temp_unit or "degC"
+        if name not in (known := TEMP_UNITS | own):
+            raise InputError(f"unit {name!r} is none of: {', '.join(known)}")
+        return known[name]
 
 
 def _unit(unit: str, known: dict[str, float]) -> float:
@@ -102,6 +126,8 @@ class Recording(ABC):
     """
 
     ends_early = False
+    asks_units = False
+    """Whether units are the user's to say; other formats say them."""
 
     def __init__(self, path: Path, wanted: ReadOptions, repair: bool = False) -> None:
         self.path, self.wanted, self.repair = path, wanted, repair

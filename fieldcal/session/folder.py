@@ -65,6 +65,7 @@ class Session:
         about = description.read(folder / DESCRIPTION)
         says: list[str] = []
         marks = list(read_marks(folder / MARKS, says))
+        says += _unconfirmed(about.raw)
         return cls(folder, _with_windows(about, marks), tuple(says))
 
     @property
@@ -133,6 +134,15 @@ class Session:
         return write_whole(
             self.folder / name, json.dumps(content, indent=2, allow_nan=False) + "\n"
         )
+
+
+def _unconfirmed(raw: Mapping[str, Any]) -> list[str]:
+    """What an import guessed, until the user takes it out of [guessed]."""
+    return [
+        f"{what.replace('_', ' ')} was taken as {why}: confirm it by deleting {what}"
+        f" under [guessed] in {DESCRIPTION}, or import again with its unit"
+        for what, why in raw.get("guessed", {}).items()
+    ]
 
 
 def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:

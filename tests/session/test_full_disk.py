@@ -73,7 +73,8 @@ def test_nothing_half_written_is_left(
     fill(stick, 8192)
     there = str(stick / "new")
     text = str(tmp_path / "x.csv")
-    wanted = ("--columns", "_,ax,ay,az,gx,gy,gz", "--rate", "100")
+    wanted = ["--columns", "_,ax,ay,az,gx,gy,gz", "--rate", "100"]
+    wanted += ["--acc-unit", "m/s^2", "--gyr-unit", "rad/s"]
     refused(stick, capsys, "import", text, *wanted, "-o", there)
     refused(stick, capsys, "report", str(source), "-o", f"{there}.html")
 

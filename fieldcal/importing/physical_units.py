@@ -1,0 +1,261 @@
+"""Units that a file does not say, told by the physics of what it holds.
+
+    |a| at rest is g                                                               (1)
+    d(u)/dt = u x w,   u = a / |a|                                                 (2)
+
+(1) tells m/s^2, g, mg and counts of the usual full scales apart, once the offset of raw
+counts is known from rests in many directions (a sphere through their means). (2), as
+gravity turns in device axes while the device is turned, gives the scale of the rates.
+A logger writes 1 to 8000 samples a second, which tells s, ms, us and ns apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array
+
+FEWEST = 50
+"""Rows that tell anything."""
+
+_GROUP = 8
+"""Rows of which the mean is taken for (1)."""
+
+_QUIET = 0.3
+"""Part of these groups that is taken for rest, the quietest."""
+
+_ROUND = 0.03
+"""Departure from a sphere, over its radius, of means that lie on one."""
+
+_WIDE = 0.05
+"""Least share of the directions' variance along any axis, for a sphere."""
+
+ACC_OUT = (0.06, 0.15)
+"""Logarithm of what factory scales are out by: offset known, and not."""
+
+GYR_OUT = (0.1, 0.25)
+"""Likewise of (2), where an offset tilts the gravity that is seen to turn."""
+
+_TURNED = 0.5
+"""Turn of gravity that all of a recording must have for (2), rad."""
+
+_AGREES = 0.9
+"""Correlation of both sides of (2) from which on it is believed."""
+
+_SWUNG = 0.3
+"""Part by which |a| is not g: then a hand is felt, and (2) does not hold."""
+
+_LAG = 0.5
+"""Time over which (2) is integrated, s: jerks of a hand are shorter."""
+
+
+class Scale(NamedTuple):
+    """A way to read numbers as a quantity.
+
+    Attributes
+    ----------
+    size : what the quantity reads in it: |a| at rest, or 1 rad/s
+    unit, lsb : as the user would give it
+
+    """
+
+    size: float
+    unit: str
+    lsb: float = 1.0
+
+    def __str__(self) -> str:
+        """Say it: "g" or "counts of 16384 in one g"."""
+        return (
+            self.unit if self.lsb == 1 else f"counts, {self.lsb:.6g} in a {self.unit}"
+        )
+
+
+def _counts(per_unit: float) -> float:
+    """Counts of 16 bits in a unit, by the full scale."""
+    return 2**15 / per_unit
+
+
+_G_COUNTS = (
+    *(_counts(full) for full in (2, 3, 4, 6, 8, 12, 16, 24, 32)),
+    *(512.0, 256.0, 128.0, 64.0),
+)
+_DEG_COUNTS = (
+    *(_counts(full) for full in (125, 250, 500, 1000, 2000)),
+    *(1 / milli for milli in (8.75e-3, 17.5e-3, 35e-3, 70e-3)),
+)
+
+ACC_SCALES = (
+    Scale(G0, "m/s^2"),
+    Scale(1.0, "g"),
+    Scale(1000.0, "mg"),
+    *(Scale(c, "g", c) for c in _G_COUNTS),
+)
+GYR_SCALES = (
+    Scale(1.0, "rad/s"),
+    Scale(180 / np.pi, "deg/s"),
+    Scale(1000.0, "mrad/s"),
+    *(Scale(c * 180 / np.pi, "deg/s", c) for c in _DEG_COUNTS),
+)
+
+RATES_HZ = (1.0, 8000.0)
+"""What a logger of an IMU writes in a second."""
+
+SHORTEST = 5.0
+"""Shortest recording, s, where another unit of time makes it longer."""
+
+TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+
+UNIX = (1e9, 4e9)
+"""Times of day since 1970, s: 2001 to 2096."""
+
+
+class Gravity(NamedTuple):
+    """What the accelerometers read at rest, in numbers of the file.
+
+    Attributes
+    ----------
+    size : |a|, less the offset where that is known
+    offset : (3,) 0 where it is not
+    round : whether it is known
+
+    """
+
+    size: float
+    offset: Array
+    round: bool
+
+
+def gravity_in(acc: Array) -> Gravity | None:
+    """Size of gravity in numbers (n, 3) of a file, by (1); None of too few."""
+    acc = acc[np.isfinite(acc).all(axis=1)]
+    if len(acc) < FEWEST:
+        return None
+    groups = acc[: len(acc) // _GROUP * _GROUP].reshape(-1, _GROUP, 3)
+    means, spread = groups.mean(axis=1), groups.std(axis=1).max(axis=1)
+    quiet = means[spread <= np.quantile(spread, _QUIET)]
+    center, radius = _sphere(quiet)
+    if radius:
+        return Gravity(radius, center, True)
+    size = float(np.median(np.linalg.norm(quiet, axis=1)))
+    return Gravity(size, np.zeros(3), False) if size else None
+
+
+def _sphere(points: Array) -> tuple[Array, float]:
+    """Center and radius of a sphere through points; radius 0 if they lie on none."""
+    middle = points.mean(axis=0)
+    unit = float(np.abs(points - middle).max()) or 1.0
+    x = (points - middle) / unit
+    # |x|^2 = 2 c x + r^2 - c^2
+    left = np.column_stack([2 * x, np.ones(len(x))])
+    found, *_, singular = np.linalg.lstsq(left, (x**2).sum(axis=1), rcond=None)
+    if len(x) < 9 or singular[-1] < 1e-3 * singular[0]:
+        return middle, 0.0
+    radius = float(np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
+    away = x - found[:3]
+    if not radius:
+        return middle, 0.0
+    departs = np.abs(np.linalg.norm(away, axis=1) / radius - 1)
+    share = np.linalg.eigvalsh(np.cov(away.T))[0] / radius**2
+    if np.quantile(departs, 0.9) > _ROUND or share < _WIDE:
+        return middle, 0.0
+    return middle + unit * found[:3], unit * radius
+
+
+def fitting(size: float, scales: tuple[Scale, ...], within: float) -> list[Scale]:
+    """Ways to read a quantity that shows as `size`, within a factor, nearest first.
+
+    Parameters
+    ----------
+    size, scales : what it shows as, and what it might
+    within : logarithm of the factor
+
+    """
+    away = {s: abs(float(np.log(size / s.size))) for s in scales}
+    return sorted((s for s in scales if away[s] <= within), key=away.__getitem__)
+
+
+def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
+    """What 1 rad/s reads in numbers (n, 3) of a file, by (2); None if nothing turns.
+
+    Parameters
+    ----------
+    t : (n,) s
+    acc, gyr : (n, 3) in numbers of the file
+    gravity : what the accelerometers read at rest
+
+    """
+    known = np.isfinite(np.column_stack([t, acc, gyr])).all(axis=1)
+    t, acc, gyr = t[known], acc[known], gyr[known]
+    if len(t) < FEWEST:
+        return None
+    steps = np.diff(t)
+    steps[(steps > _LAG) | (steps < 0)] = np.nan
+    lag = max(2, round(_LAG / float(np.nanmedian(steps))))
+    if len(t) < 4 * lag:
+        return None
+    up = (acc - gravity.offset) / gravity.size
+    length = np.maximum(np.linalg.norm(up, axis=1), 0.1)
+    up, gyr = up / length[:, None], gyr - np.median(gyr, axis=0)
+    turning = np.cross(up, gyr)
+    swung = np.abs(length - 1) > _SWUNG
+    steps[swung[1:] | swung[:-1]] = np.nan
+    middle = (turning[1:] + turning[:-1]) / 2 * steps[:, None]
+    right = _over(middle, lag)
+    left = up[lag:] - up[:-lag]
+    whole = np.isfinite(right).all(axis=1)
+    left, right = left[whole].ravel(), right[whole].ravel()
+    power, moved = float(right @ right), float(left @ left)
+    if not power or moved < _TURNED**2 * lag:
+        return None
+    both = float(left @ right)
+    if both < _AGREES * np.sqrt(power * moved):
+        return None
+    return power / both
+
+
+def _over(steps: Array, lag: int) -> Array:
+    """Sums of `lag` successive steps (n, 3); nan over a pause."""
+    paused = np.isnan(steps)
+    total = np.cumsum(np.where(paused, 0.0, steps), axis=0)
+    gaps = np.cumsum(paused, axis=0)
+    total, gaps = (np.vstack([np.zeros((1, 3)), x]) for x in (total, gaps))
+    sums: Array = total[lag:] - total[:-lag]
+    sums[(gaps[lag:] > gaps[:-lag]).any(axis=1)] = np.nan
+    return sums
+
+
+def time_units(t: Array) -> list[str]:
+    """Units that times (n,) of a file may be in."""
+    t = t[np.isfinite(t)]
+    steps = np.diff(t)
+    steps = steps[steps > 0]
+    if len(steps) < FEWEST:
+        return []
+    day = [u for u, n in TIME_SIZES.items() if UNIX[0] <= t[-1] / n < UNIX[1]]
+    step = float(np.median(steps))
+    low, high = RATES_HZ
+    usual = [u for u, n in TIME_SIZES.items() if low <= n / step <= high]
+    if both := [u for u in usual if u in day]:
+        return both
+    span = float(steps.sum())
+    return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST]
+
+
+def temperature_fits(values: Array) -> Mapping[str, float]:
+    """Readings of temperatures (n,), with the median of each in deg C."""
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return {"degC": np.nan}
+    low, middle, high = (float(f(values)) for f in (np.min, np.median, np.max))
+    if -60 <= low and high <= 150:
+        return {"degC": middle}
+    found = {}
+    if -6000 <= low and high <= 15000 and abs(middle) > 1000:
+        found["cdegC"] = middle / 100
+    if 213 <= low and high <= 423:
+        found["K"] = middle - 273.15
+    return found

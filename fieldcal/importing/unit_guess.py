@@ -1,0 +1,234 @@
+"""What is taken for units that neither the file nor the user says, and why.
+
+What physics tells is taken, said, and kept as a guess until the user confirms it; where
+it leaves a choice, the user is asked, with what to add to the command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block, concat
+from fieldcal.importing import physical_units as physics
+from fieldcal.importing.merge import MergedFiles
+from fieldcal.importing.physical_units import Gravity, Scale
+from fieldcal.importing.recording import ReadOptions, Recording
+
+ROWS = 1 << 17
+"""Rows at the beginning by which units are told."""
+
+FAST = 0.5
+"""Rate, rad/s, that nothing at rest shows: 30 deg/s."""
+
+OFFSET = 0.25
+"""Part of g that no bias is: what raw counts show more is where their zero lies."""
+
+
+class Settled(NamedTuple):
+    """What was taken for what nobody said.
+
+    Attributes
+    ----------
+    guessed : a sentence each, by quantity
+    acc_bias : x y z of [nominal], m/s^2; None where zero lies at zero
+
+    """
+
+    guessed: dict[str, str]
+    acc_bias: list[float] | None = None
+
+
+def settle_units(recording: Recording, stream: str) -> Settled:
+    """Give a recording the units that its numbers tell.
+
+    Raises
+    ------
+    InputError
+        With a question and its answers, where several or none would do.
+
+    """
+    parts = recording.parts if isinstance(recording, MergedFiles) else [recording]
+    if not all(part.asks_units for part in parts):
+        return Settled({})
+    says, mended = list(recording.says), list(recording.mended)
+    block = _beginning(recording, stream)
+    recording.says, recording.mended = says, mended
+    guess = _Guess(str(recording.path), _said(parts), block)
+    for part in parts:
+        part.wanted = guess.on(part.wanted)
+    return Settled(guess.found, guess.acc_bias)
+
+
+def _beginning(recording: Recording, stream: str) -> Block:
+    blocks, rows = [], 0
+    for block in recording.blocks(stream):
+        blocks.append(block)
+        rows += len(block)
+        if rows >= ROWS:
+            break
+    return concat(blocks)[:ROWS]
+
+
+def _said(parts: Sequence[Recording]) -> ReadOptions:
+    """What is said of any part: each channel stands in one of them."""
+    said = parts[0].wanted
+    for part in parts[1:]:
+        w = part.wanted
+        said = replace(
+            said,
+            acc_unit=said.acc_unit or w.acc_unit,
+            gyr_unit=said.gyr_unit or w.gyr_unit,
+            time_unit=said.time_unit or w.time_unit,
+        )
+    return said
+
+
+class _Guess:
+    """Units of the beginning of a recording.
+
+    Attributes
+    ----------
+    found : what was guessed, by quantity
+    said : what is said, with what was found
+    acc_bias : as in `Settled`
+
+    """
+
+    def __init__(self, name: str, said: ReadOptions, block: Block) -> None:
+        self.found: dict[str, str] = {}
+        self.acc_bias: list[float] | None = None
+        self._name, self.said = name, said
+        if not (said.time_unit or said.rate_hz):
+            self._time(block.t)
+        gravity = physics.gravity_in(block.acc)
+        if gravity and not said.acc_unit and said.acc_lsb == 1:
+            self._acceleration(gravity)
+            self._offset(gravity)
+        if not said.gyr_unit and said.gyr_lsb == 1:
+            t = block.t * (self.said.time_scale / said.time_scale)
+            self._rates(replace(block, t=t), gravity)
+        if not said.temp_unit:
+            self._temperature(block.temperature)
+
+    def on(self, wanted: ReadOptions) -> ReadOptions:
+        """Options of a part with what was found."""
+        found = self.said
+        if "time" in self.found:
+            wanted = replace(wanted, time_unit=found.time_unit)
+        if "acceleration" in self.found:
+            wanted = replace(wanted, acc_unit=found.acc_unit, acc_lsb=found.acc_lsb)
+        if "angular_rate" in self.found:
+            wanted = replace(wanted, gyr_unit=found.gyr_unit, gyr_lsb=found.gyr_lsb)
+        if "temperature" in self.found:
+            wanted = replace(wanted, temp_unit=found.temp_unit)
+        return wanted
+
+    def _time(self, t: Array) -> None:
+        fits = physics.time_units(t)
+        steps = np.diff(t[np.isfinite(t)])
+        step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+        if len(fits) == 1 and fits != ["s"]:
+            rate = physics.TIME_SIZES[fits[0]] / step
+            self.said = replace(self.said, time_unit=fits[0])
+            self.found["time"] = f"{fits[0]}, which makes {rate:.4g} Hz"
+        elif len(fits) > 1:
+            rates = (f"{physics.TIME_SIZES[u] / step:.4g} Hz in {u}" for u in fits)
+            self._ask(
+                f"its times may be {' or '.join(rates)}",
+                [f"--time-unit {u}" for u in fits],
+            )
+
+    def _acceleration(self, gravity: Gravity) -> None:
+        fits = physics.fitting(
+            gravity.size, physics.ACC_SCALES, physics.ACC_OUT[not gravity.round]
+        )
+        shows = f"|a| at rest is {gravity.size:.4g}"
+        if gravity.round:
+            shows += " (from a sphere through the rests)"
+        if len(fits) != 1:
+            self._ask(
+                f"{shows}, which is gravity in"
+                f" {' or '.join(map(str, fits)) or 'no usual unit'}",
+                _answers("acc", fits, "g", 2048),
+            )
+        if fits[0].unit != "m/s^2":
+            self.found["acceleration"] = f"{fits[0]}: {shows}"
+            self.said = replace(self.said, acc_unit=fits[0].unit, acc_lsb=fits[0].lsb)
+
+    def _offset(self, gravity: Gravity) -> None:
+        if (np.abs(gravity.offset) > OFFSET * gravity.size).any():
+            reads = " ".join(f"{number:.5g}" for number in gravity.offset)
+            self.acc_bias = [round(b * self.said.acc_scale, 4) for b in gravity.offset]
+            self.found["acc_bias"] = f"{reads} counts: the sphere lies about it"
+
+    def _rates(self, block: Block, gravity: Gravity | None) -> None:
+        gyr = block.gyr[np.isfinite(block.gyr).all(axis=1)]
+        if len(gyr) < physics.FEWEST:
+            return
+        reads = gravity and physics.rate_in(block.t, block.acc, block.gyr, gravity)
+        if reads is None or gravity is None:
+            usual = float(np.median(np.abs(gyr).max(axis=1)))
+            if usual > FAST:
+                self._ask(
+                    f"nothing says the unit of its rates, and {usual:.4g} rad/s is no"
+                    " rest",
+                    _answers("gyr", [], "deg/s", 16.4),
+                )
+            if gravity is not None:
+                self.found["angular_rate"] = (
+                    "rad/s: it is the usual one, and no turn tells"
+                )
+                self.said = replace(self.said, gyr_unit="rad/s")
+            return
+        fits = physics.fitting(
+            reads, physics.GYR_SCALES, physics.GYR_OUT[not gravity.round]
+        )
+        shows = f"as gravity turns, 1 rad/s reads {reads:.4g}"
+        if len(fits) != 1:
+            self._ask(
+                f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
+                _answers("gyr", fits, "deg/s", 16.4),
+            )
+        if fits[0].unit != "rad/s":
+            self.found["angular_rate"] = f"{fits[0]}: {shows}"
+            self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
+
+    def _temperature(self, values: Array) -> None:
+        fits = physics.temperature_fits(values)
+        if "degC" in fits:
+            return
+        low, high = np.nanmin(values), np.nanmax(values)
+        if len(fits) != 1:
+            self._ask(
+                f"its temperature reads {low:.6g} to {high:.6g}, which is no deg C",
+                [
+                    *(f"--temp-unit {unit}" for unit in fits),
+                    "--temp-unit count --temp-lsb 256 --temp-zero 25 (counts in 1 K,"
+                    " deg C at count 0, as its data sheet says)",
+                    "--temp-unit none, which leaves it out",
+                ],
+            )
+        ((unit, middle),) = fits.items()
+        self.said = replace(self.said, temp_unit=unit)
+        self.found["temperature"] = f"{unit}: it is {middle:.1f} deg C then"
+
+    def _ask(self, what: str, answers: list[str]) -> None:
+        raise InputError(f"{self._name}: {what}: add {' or '.join(answers)}")
+
+
+def _answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
+    """Options to paste: those that fit, or examples."""
+    lines = [
+        f"--{kind}-unit {s.unit}" + (f" --{kind}-lsb {s.lsb:.6g}" if s.lsb != 1 else "")
+        for s in fits
+    ]
+    return lines or [
+        f"--{kind}-unit {unit} --{kind}-lsb {lsb:g} (counts in one {unit}, as its data"
+        " sheet says)",
+        f"--{kind}-unit {unit}",
+    ]

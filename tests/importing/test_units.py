@@ -1,0 +1,250 @@
+"""Units that nobody says: the right session, or one question; never a wrong unit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Array
+from fieldcal.importing import physical_units as physics
+from fieldcal.session.folder import Session
+
+G = 9.80665
+COLUMNS = "t,ax,ay,az,gx,gy,gz"
+SIDES = [(0, 0, 1), (0, 1, 0), (0, 0, -1), (1, 0, 0), (0, -1, 0), (-1, 0, 0), (0, 0, 1)]
+ACC = {"m/s^2": 1.0, "g": 1 / G, "mg": 1000 / G} | {
+    f"{lsb} in g": lsb / G for lsb in (16384, 8192, 4096, 2048)
+}
+GYR = {"rad/s": 1.0, "deg/s": 180 / np.pi} | {
+    f"{lsb} in deg/s": lsb * 180 / np.pi for lsb in (131.072, 65.536, 32.768, 16.384)
+}
+TIME = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+
+
+def option(kind: str, unit: str) -> str:
+    """What the user would add for it."""
+    lsb, _, bare = unit.rpartition(" in ")
+    return f"--{kind}-unit {bare}" + (f" --{kind}-lsb {float(lsb):g}" if lsb else "")
+
+
+def turned(seed: int, rate: float, hold: float = 3.0) -> Array:
+    """Rows t, a, w of a device that is laid on each of its sides in turn, SI."""
+    rng = np.random.default_rng(seed)
+    up, rows = np.array(SIDES[0], float), []
+    for side in SIDES:
+        axis, steps = np.cross(up, side), int(1.5 * rate)
+        angle = (1 - np.cos(np.pi * (np.arange(steps) + 0.5) / steps)) * np.pi / 4
+        speed = np.gradient(angle, 1 / rate)
+        for a, w in zip(angle, speed, strict=True) if axis.any() else ():
+            now = np.cos(a) * up + np.sin(a) * np.cross(axis, up)
+            rows.append([*G * now, *(-w * axis)])
+        up = np.array(side, float)
+        rows += [[*G * up, 0, 0, 0]] * int(hold * rate)
+    table = np.array(rows)
+    table[:, :3] += rng.normal(0, 0.02, (len(rows), 3)) + rng.uniform(-0.3, 0.3, 3)
+    table[:, 3:] += rng.normal(0, 0.002, (len(rows), 3)) + rng.uniform(-0.02, 0.02, 3)
+    return np.column_stack([np.arange(len(rows)) / rate, table])
+
+
+def write(folder: Path, rows: Array, name: str = "log.csv") -> Path:
+    path = folder / name
+    path.write_text("\n".join(",".join(f"{x:.10g}" for x in r) for r in rows) + "\n")
+    return path
+
+
+@settings(
+    max_examples=20,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    seed=st.integers(0, 2**20),
+    rate=st.sampled_from([20.0, 50.0, 100.0, 200.0]),
+    acc=st.sampled_from(sorted(ACC)),
+    gyr=st.sampled_from(sorted(GYR)),
+    time=st.sampled_from(sorted(TIME)),
+    zero=st.sampled_from([0.0, 32768.0]),
+)
+def test_an_awkward_log_is_read_right_or_asked_about(
+    tmp_path_factory: pytest.TempPathFactory,
+    capsys: pytest.CaptureFixture[str],
+    seed: int,
+    rate: float,
+    acc: str,
+    gyr: str,
+    time: str,
+    zero: float,
+) -> None:
+    folder, truth = tmp_path_factory.mktemp("log"), turned(seed, rate)
+    zero *= "in" in acc
+    log = np.column_stack(
+        [truth[:, 0] * TIME[time], truth[:, 1:4] * ACC[acc], truth[:, 4:] * GYR[gyr]]
+    )
+    log[:, 1:4] = np.round(log[:, 1:4]) + zero if "in" in acc else log[:, 1:4]
+    log[:, 4:] = np.round(log[:, 4:]) if "in" in gyr else log[:, 4:]
+    path = write(folder, log)
+    call = ["import", str(path), "--columns", COLUMNS, "-o", str(folder / "out")]
+    code = main(call)
+    said = capsys.readouterr().err
+    if code == 2:
+        assert said.count("\n") == 1 and ": add --" in said
+        assert option("acc", acc) in said or option("gyr", gyr) in said
+        return
+    assert code == 0
+    session = Session.open(folder / "out")
+    block, guessed = session.block, session.about.raw.get("guessed", {})
+    np.testing.assert_allclose(block.t, truth[:, 0], atol=1e-5)
+    bias = session.nominal["acc_bias"]
+    np.testing.assert_allclose(block.acc - bias, truth[:, 1:4], atol=0.5)
+    scale = np.polyfit(truth[:, 4:].ravel(), block.gyr.ravel(), 1)[0]
+    assert scale == pytest.approx(1, abs=0.01)
+    for what, unit, usual in (
+        ("time", time, "s"), ("acceleration", acc, "m/s^2"),
+        ("angular_rate", gyr, "rad/s"),
+    ):  # fmt: skip
+        assert (what in guessed) == (unit != usual)
+        assert (f"{what.replace('_', ' ')} taken as" in said) == (unit != usual)
+    assert ("acc_bias" in guessed) == bool(zero)
+
+
+def test_a_guess_is_shown_until_it_is_confirmed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(1, 50.0)
+    rows[:, 1:4] /= G
+    folder = tmp_path / "out"
+    path = write(tmp_path, rows)
+    assert main(["import", str(path), "--columns", COLUMNS, "-o", str(folder)]) == 0
+    for command in ("solve", "diagnose"):
+        main([command, str(folder)])
+        said = " ".join("".join(capsys.readouterr()).split())
+        assert "acceleration was taken as g: |a| at rest is" in said
+    about = folder / "session.toml"
+    text = about.read_text()
+    kept = [line for line in text.split("\n") if not line.startswith("acceleration =")]
+    assert len(kept) == text.count("\n")
+    about.write_text("\n".join(kept))
+    main(["solve", str(folder)])
+    assert "was taken as" not in "".join(capsys.readouterr())
+
+
+def test_what_the_user_says_is_taken(tmp_path: Path) -> None:
+    rows = turned(2, 50.0)
+    path, out = write(tmp_path, rows), tmp_path / "out"
+    said = ["--acc-unit", "g", "--gyr-unit", "deg/s", "--time-unit", "ms"]
+    call = ["import", str(path), "--columns", COLUMNS, "-o", str(out), *said]
+    assert main(call) == 0
+    session = Session.open(out)
+    assert "guessed" not in session.about.raw
+    np.testing.assert_allclose(session.block.acc, rows[:, 1:4] * G, rtol=1e-6)
+    np.testing.assert_allclose(session.block.t, rows[:, 0] / 1000, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "asks"),
+    [(slice(1, 4), 700.0, "--acc-unit g --acc-lsb"),
+     (slice(4, 7), 9.0, "--gyr-unit deg/s --gyr-lsb")],
+)  # fmt: skip
+def test_what_is_no_usual_unit_is_asked(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    column: slice,
+    factor: float,
+    asks: str,
+) -> None:
+    rows = turned(3, 50.0)
+    rows[:, column] *= factor
+    path, out = write(tmp_path, rows), tmp_path / "out"
+    assert main(["import", str(path), "--columns", COLUMNS, "-o", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert asks in said and said.count("\n") == 1 and not out.exists()
+
+
+@pytest.mark.parametrize(("rate", "code"), [(0.01, 0), (3.0, 2)])
+def test_rates_of_which_no_turn_tells_are_said_or_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rate: float, code: int
+) -> None:
+    rng = np.random.default_rng(4)
+    n = 1000
+    acc = [0, 0, G] + rng.normal(0, 0.02, (n, 3))
+    gyr = [rate, 0, 0] + rng.normal(0, 0.002, (n, 3))
+    path = write(tmp_path, np.column_stack([np.arange(n) / 50, acc, gyr]))
+    out = tmp_path / "out"
+    assert main(["import", str(path), "--columns", COLUMNS, "-o", str(out)]) == code
+    said = capsys.readouterr().err
+    assert ("no turn tells" in said) == (code == 0)
+    assert ("is no rest: add --gyr-unit" in said) == (code == 2)
+
+
+@pytest.mark.parametrize(
+    ("reads", "celsius"),
+    [((24.0, 30.0), None), ((-20.0, -5.0), None), ((2400, 3000), (24.0, 30.0)),
+     ((63123, 65249), "asked"), ((296.0, 301.0), (22.85, 27.85)), ((180, 200), "asked"),
+     ],
+)  # fmt: skip
+def test_temperatures(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    reads: tuple[float, float],
+    celsius: object,
+) -> None:
+    rows = turned(5, 50.0)
+    warm = np.linspace(*reads, len(rows))
+    path, out = write(tmp_path, np.column_stack([rows, warm])), tmp_path / "out"
+    call = ["import", str(path), "--columns", f"{COLUMNS},temperature", "-o", str(out)]
+    if celsius == "asked":
+        assert main(call) == 2
+        said = capsys.readouterr().err
+        assert "which is no deg C: add --temp-unit count" in said
+        assert main([*call, "--temp-unit", "none"]) == 0
+        assert np.isnan(Session.open(out).block.temperature).all()
+        return
+    assert main(call) == 0
+    session = Session.open(out)
+    expected = reads if celsius is None else celsius
+    found = session.block.temperature[[0, -1]]
+    np.testing.assert_allclose(found, np.array(expected), atol=1e-6)
+    assert ("temperature" in session.about.raw.get("guessed", {})) == bool(celsius)
+
+
+def test_counts_of_temperature_are_scaled_as_said(tmp_path: Path) -> None:
+    rows = turned(6, 20.0)
+    counts = np.linspace(0, 1024, len(rows))
+    path, out = write(tmp_path, np.column_stack([rows, counts])), tmp_path / "out"
+    call = ["import", str(path), "--columns", f"{COLUMNS},temperature", "-o", str(out)]
+    call += ["--temp-unit", "count", "--temp-lsb", "256", "--temp-zero", "25"]
+    assert main(call) == 0
+    found = Session.open(out).block.temperature[[0, -1]]
+    np.testing.assert_allclose(found, [25, 29])
+
+
+@given(
+    st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=3),
+    st.floats(1e-2, 1e5),
+    st.integers(0, 2**20),
+)
+def test_the_sphere_is_found_wherever_it_lies(
+    center: list[float], radius: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    sides = rng.normal(size=(12, 3))
+    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
+    points = radius * (np.repeat(sides, 64, axis=0) + center)
+    found = physics.gravity_in(points * (1 + 1e-6 * rng.normal(size=points.shape)))
+    assert found is not None
+    if found.round:
+        assert found.size == pytest.approx(radius, rel=0.02)
+        np.testing.assert_allclose(found.offset / radius, center, rtol=1e-3, atol=0.02)
+
+
+@pytest.mark.parametrize("points", [np.ones((200, 3)), np.eye(3).repeat(70, axis=0)])
+def test_few_directions_make_no_sphere(points: Array) -> None:
+    noise = 1e-3 * np.random.default_rng(7).normal(size=points.shape)
+    found = physics.gravity_in(points + noise)
+    assert found is not None and not found.round
+    assert found.size == pytest.approx(np.median(np.linalg.norm(points, axis=1)), 0.01)

@@ -8,12 +8,14 @@ sensor of several are named by the file or the user, or it is said what was take
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.plugins import class_in, names
+from fieldcal.drivers import codec
 from fieldcal.importing.gzip_stream import head
 from fieldcal.importing.recording import ReadOptions, Recording
 
@@ -36,7 +38,7 @@ def open_recording(
     ----------
     path : also .gz
     wanted : what the user says of it
-    name : its format, if it is not to be found
+    name : its format, if it is not to be found; or the wire format of its bytes
     repair : whether damaged places are left out and said, or refused
 
     Raises
@@ -45,8 +47,13 @@ def open_recording(
         If it cannot be read, or nothing knows its format.
 
     """
+    if name in codec.formats():
+        more = f"&{wanted.options}" if wanted.options else ""
+        wanted = replace(wanted, options=f"format={name}{more}")
+        name = "wire"
     if name and name not in formats():
-        raise InputError(f"no format {name!r}: there are {', '.join(formats())}")
+        known = (*formats(), *codec.formats())
+        raise InputError(f"no format {name!r}: there are {', '.join(known)}")
     first = head(path)
     if not first:
         raise InputError(f"{path}: is empty; copy it again from where it came")

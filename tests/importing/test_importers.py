@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -409,3 +410,24 @@ def test_changed_bytes_of_an_imported_session_invent_no_sample(
         return
     for name in ("t", "six"):
         np.testing.assert_array_equal(getattr(found, name), getattr(block, name))
+
+
+def test_bytes_of_a_port_are_named_by_their_wire_format(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frames = b""
+    for _ in range(60):
+        for kind, values in ((0x51, (0, 0, 2048, 2500)), (0x52, (16, 0, 0, 2500))):
+            body = struct.pack("<BB4h", 0x55, kind, *values)
+            frames += body + bytes([sum(body) % 256])
+    path = tmp_path / "port"
+    path.write_bytes(b"noise" + frames)
+    call = [str(path), "--rate", "100"]
+    named = session(tmp_path / "a", *call, "--format", "witmotion").block
+    found = session(tmp_path / "b", *call).block
+    same(named, found)
+    assert len(named) >= 59
+    np.testing.assert_allclose(named.acc[:, 2], 9.8, atol=0.02)
+    assert main(["import", str(path), "--format", "morse"]) == 2
+    said = capsys.readouterr().err
+    assert "no format 'morse'" in said and "witmotion" in said and "csv_like" in said

@@ -56,7 +56,7 @@ def assess(
             earlier = [run.calibration for run in family(runs)]
         except FieldcalError as error:
             warnings.append(str(error))
-    seen = Circumstances(
+    circumstances = Circumstances(
         temperatures=[a.temperature for a in still.averages],
         link=_link(session.block, still.averages, marks),
         verification=_verification(found, session, marks, limits),
@@ -64,7 +64,7 @@ def assess(
         doubts=_doubts(marks),
     )
     warnings += [w for w in _restarts(marks) if w not in warnings]
-    made = decide(found, session.about, limits, seen)
+    made = decide(found, session.about, limits, circumstances)
     site = {"latitude_deg": session.about.latitude_deg}
     site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
     info = {**found.info, "site": site, "taken_at": start_time(marks)}

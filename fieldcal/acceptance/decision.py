@@ -90,7 +90,10 @@ class Circumstances:
 
 
 def decide(
-    found: Calibration, about: Description, limits: GradeLimits, seen: Circumstances
+    found: Calibration,
+    about: Description,
+    limits: GradeLimits,
+    circumstances: Circumstances,
 ) -> Decision:
     """Check a calibration against limits."""
     checks = [
@@ -98,11 +101,11 @@ def decide(
         *_odd_positions(found),
         *_uncertainty(found, limits),
         *_level(found, about),
-        *_change(found, limits, seen.family),
-        _verification(seen.verification, limits),
-        *_temperature(np.asarray(seen.temperatures, float), limits),
-        *_link(seen.link, limits),
-        *(Check("the run", False, doubt) for doubt in seen.doubts),
+        *_change(found, limits, circumstances.family),
+        _verification(circumstances.verification, limits),
+        *_temperature(np.asarray(circumstances.temperatures, float), limits),
+        *_link(circumstances.link, limits),
+        *(Check("the run", False, doubt) for doubt in circumstances.doubts),
     ]
     g, mounting = about.gravity, about.mounting
     grown = tuple(growth(found, g, mounting, seconds) for seconds in TIMES)
@@ -251,22 +254,25 @@ def _compared(
     return Check(f"{parameter.group} change", ok, says, chance, limit, "1")
 
 
-def _verification(seen: Verification | None, limits: GradeLimits) -> Check:
-    if seen is None:
+def _verification(verification: Verification | None, limits: GradeLimits) -> Check:
+    if verification is None:
         return Check("verification", None, "no position was taken to verify (--verify)")
-    far = seen.largest > limits.verification_residual
-    odd = seen.chance < limits.verification_chance
+    far = verification.largest > limits.verification_residual
+    odd = verification.chance < limits.verification_chance
     says = (
-        f"at {seen.position.name}, not fitted, the accelerometers are off by"
-        f" {seen.largest:.2g} ± {np.linalg.norm(seen.sigma):.2g} m/s², allowed"
-        f" {limits.verification_residual:.2g} m/s²"
+        f"at {verification.position.name}, not fitted, the accelerometers are off by"
+        f" {verification.largest:.2g} ± {np.linalg.norm(verification.sigma):.2g} m/s²,"
+        f" allowed {limits.verification_residual:.2g} m/s²"
     )
     if odd:
         says += (
-            f"; the calibration does not explain that (probability {seen.chance:.1g})"
+            "; the calibration does not explain that (probability"
+            f" {verification.chance:.1g})"
         )
     limit = limits.verification_residual
-    return Check("verification", not (far or odd), says, seen.largest, limit, "m/s^2")
+    return Check(
+        "verification", not (far or odd), says, verification.largest, limit, "m/s^2"
+    )
 
 
 def _temperature(

@@ -9,7 +9,7 @@ from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.wording.paragraph import said
+from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 if TYPE_CHECKING:
     from fieldcal.twin import Rerun
@@ -128,7 +128,7 @@ def _effect(found: FoundEffect) -> object:
     table.add_column("parameter")
     table.add_column("value ± 1σ")
     for name, quantity in found.parameters.items():
-        table.add_row(name, said(quantity))
+        table.add_row(name, with_uncertainty(quantity))
     return table
 
 

@@ -1,4 +1,4 @@
-"""What explains a recording: the one model's answer, beside the simulation's."""
+"""The explanation of a recording: the best set of causes, and the simulation."""
 
 from __future__ import annotations
 

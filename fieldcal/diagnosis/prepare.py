@@ -54,7 +54,7 @@ class Prepared:
 
     @property
     def navigation(self) -> bool:
-        """Whether the gyroscopes are said to see the Earth."""
+        """Whether the gyroscopes are of navigation grade and see the Earth turn."""
         return self.source.about.grade == "navigation"
 
 

@@ -182,7 +182,7 @@ def _is_open(explanation: Explanation, one: Standing) -> bool:
 
 
 def _probability(explanation: Explanation, verdict: Verdict) -> float:
-    """That the verdict is right: all that is said to be there is, or nothing is."""
+    """Probability that the verdict is right: all reported causes are there, or none."""
     posterior = explanation.posterior
     if verdict == "consistent":
         return sum(w for s, w in posterior.weights if not s.members)

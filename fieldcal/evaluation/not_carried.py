@@ -34,8 +34,8 @@ WRONG = 5.0
 """Sigmas by which a parameter may move with what is left out before it is no longer to
 be used: no navigator has that in its margin."""
 
-SAID = 1.0
-"""Sigmas from which it is said."""
+REPORTED = 1.0
+"""Standard deviations from which it is reported."""
 
 BYTES = "decode_fault"
 
@@ -72,20 +72,20 @@ def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
     ]
     if not faults:
         return session, ()
-    six, said = session.block.six, []
+    six, sentences = session.block.six, []
     for fault in faults:
         if fault.mended is None:
             continue
         c = CHANNELS.index(fault.channel)
         six[:, c] = fault.mended[:, c]
-        said.append(
+        sentences.append(
             f"{fault.channel}: bytes were decoded wrongly"
             f" ({fault.values.get('kind', 'unknown')}) and are put right here; mend the"
             " driver that wrote them"
         )
     right = replace(session, warnings=())
     right.__dict__["block"] = replace(session.block, acc=six[:, :3], gyr=six[:, 3:])
-    return right, tuple(said)
+    return right, tuple(sentences)
 
 
 def angles_set(explanation: Explanation) -> float:
@@ -134,23 +134,23 @@ def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float
 
 def misread(prepared: Prepared, calibration: Calibration) -> Calibration:
     """The calibration, not to be used where session.toml is found to be wrong."""
-    said = []
+    sentences = []
     for name, fault in prepared.checked.faults:
         effect = catalogue()[name]
         if isinstance(effect, Chain) and effect.misread:
             values = ", ".join(f"{k} = {v}" for k, v in fault.values.items())
-            said.append(
+            sentences.append(
                 f"session.toml is wrong about the {name} ({values}): mend it and solve"
                 " again; the numbers are those of samples that were put right"
             )
-    if not said:
+    if not sentences:
         return calibration
-    warnings = (*said, *calibration.warnings)
+    warnings = (*sentences, *calibration.warnings)
     return replace(calibration, warnings=warnings, good=False)
 
 
-def told(calibration: Calibration, missing: Uncarried) -> Calibration:
-    """The calibration with what it does not carry said, and judged."""
+def with_not_carried(calibration: Calibration, missing: Uncarried) -> Calibration:
+    """The calibration with a warning about causes that it does not carry."""
     if not missing.causes:
         return calibration
     name, sigmas = missing.most
@@ -159,12 +159,12 @@ def told(calibration: Calibration, missing: Uncarried) -> Calibration:
     )
     info = {"causes": dict(missing.causes), "moved_sigmas": dict(missing.moved)}
     found = replace(calibration, info={**calibration.info, "not_carried": info})
-    if abs(sigmas) < SAID:
+    if abs(sigmas) < REPORTED:
         return found
-    said = (
+    sentence = (
         f"the recording shows {listed}, which this result does not carry: with it"
         f" {name} moves by {sigmas:+.1f} σ; fieldcal diagnose says what it is and what"
         " to do"
     )
     good = calibration.good and abs(sigmas) < WRONG
-    return replace(found, warnings=(said, *calibration.warnings), good=good)
+    return replace(found, warnings=(sentence, *calibration.warnings), good=good)

@@ -1,7 +1,7 @@
 """From a session's windows to what the estimators are given.
 
 A window with no calm part or no samples is left out, and so is a sensor that says
-nothing in any window; both are said.
+nothing in any window; both are reported.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def observations(
 
 
 def angle_setting(about: Description) -> float:
-    """How well angles are set, deg; the limit of the grade where nobody said."""
+    """How well angles are set, deg; the limit of the grade where it is not stated."""
     if about.angle_setting_deg is not None:
         return about.angle_setting_deg
     return limits.read(about.grade).angle_setting_deg
@@ -130,15 +130,15 @@ def rests(session: Session) -> Rests:
         rate = table_rate(session.about, i)
         try:
             if rate.any():
-                found, said = take_on_a_table(block, window, rate, grain)
+                found, remark = take_on_a_table(block, window, rate, grain)
             else:
-                found, noise, said = take(block, window, noise, grain)
+                found, noise, remark = take(block, window, noise, grain)
         except FieldcalError as error:
             warnings.append(f"{_named(session, i)} is left out: {error}")
             continue
         taken[i] = found
-        if said:
-            warnings.append(f"{_named(session, i)}: {said}")
+        if remark:
+            warnings.append(f"{_named(session, i)}: {remark}")
     if not taken:
         raise SessionError(
             f"{session.folder}: no window can be used; {warnings[-1]}"
@@ -160,7 +160,7 @@ def _without_dead(averages: list[Average]) -> tuple[list[Average], list[str]]:
 
     A device without gyroscopes may send zeros in their place.
     """
-    said = []
+    remarks = []
     for sensor, channels in (("accelerometers", ACC), ("gyroscopes", GYR)):
         sigma = np.array([a.sigma[channels] for a in averages])
         if not np.isfinite(sigma).any():
@@ -169,9 +169,11 @@ def _without_dead(averages: list[Average]) -> tuple[list[Average], list[str]]:
         if not dead.any():
             continue
         names = " ".join(np.array(CHANNELS[channels])[dead])
-        said.append(f"the {sensor} are not used: {names} never changes, or is missing")
+        remarks.append(
+            f"the {sensor} are not used: {names} never changes, or is missing"
+        )
         averages = [_without(a, channels) for a in averages]
-    return averages, said
+    return averages, remarks
 
 
 def _without(average: Average, channels: slice) -> Average:
@@ -181,7 +183,7 @@ def _without(average: Average, channels: slice) -> Average:
 
 
 def _worth(about: Description) -> str:
-    """What to do where nobody said what a count is worth."""
+    """What to do where the unit of a count is not stated."""
     missing = [
         f"{group} (how many {unit} in one {si})"
         for group, unit, si, size in zip(
@@ -196,9 +198,9 @@ def _worth(about: Description) -> str:
 
 
 def grain_of(session: Session) -> Grain:
-    """What the device said that it rounds to, when it was recorded."""
+    """The rounding that the device reported when it was recorded."""
     marks = [mark for mark in session.marks() if mark.get("event") == "grain"]
     if not marks:
         return Grain()
-    said = marks[-1]
-    return Grain(float(said["acc"]), float(said["gyr"]), bool(said["cut"]))
+    mark = marks[-1]
+    return Grain(float(mark["acc"]), float(mark["gyr"]), bool(mark["cut"]))

@@ -17,7 +17,12 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
-from fieldcal.evaluation.not_carried import angles_set, misread, told, uncarried
+from fieldcal.evaluation.not_carried import (
+    angles_set,
+    misread,
+    uncarried,
+    with_not_carried,
+)
 from fieldcal.evaluation.observations import (
     Rests,
     angle_setting,
@@ -68,7 +73,7 @@ class Laid:
         )
 
     @cached_property
-    def seen(self) -> Observations:
+    def observations(self) -> Observations:
         """Means of the windows, in the order in which they were held."""
         averages = [self.still.averages[i] for i in self.order]
         return observations(self.about, averages, range(len(averages)))
@@ -91,12 +96,12 @@ class Laid:
         if self.prepared is None:
             return None
         source, rows = self.prepared.source, self.prepared.rows
-        measured = (self.seen.has_acc, self.seen.has_gyr)
+        measured = (self.observations.has_acc, self.observations.has_gyr)
         sd = np.full_like(rows.sd, np.nan)
         for c in np.flatnonzero(measured):
             sd[:, 3 * c : 3 * c + 3] = rows.sd[:, 3 * c : 3 * c + 3]
         rows = replace(rows, sd=sd)
-        rows = widened(rows, variances(self.seen))
+        rows = widened(rows, variances(self.observations))
         if shown is None:
             return Recorded(rows, origins(source, rows), source if turns else None)
         likely = tuple(Shown(s.members, p) for s, p in shown.posterior.weights)
@@ -129,16 +134,16 @@ def solved(
         asked["angle_sigma_deg"] = angle_setting(about)
     printed = bool(asked.get("as_printed"))
     shown = None if printed or laid.prepared is None else explain(laid.prepared)
-    asked, said = _as_shown(asked, shown)
+    asked, notes = _as_shown(asked, shown)
     recorded = None if printed else laid.recorded(turns != "no", shown)
-    found = solve(laid.seen, recorded=recorded, **asked)
+    found = solve(laid.observations, recorded=recorded, **asked)
     if turns == "yes":
         _insist(found, session, still)
-    found = replace(found, warnings=(*still.warnings, *said, *found.warnings))
+    found = replace(found, warnings=(*still.warnings, *notes, *found.warnings))
     found = _listed(with_provenance(found, about), laid.order)
     if shown is None:
         return found
-    return misread(shown.prepared, told(found, uncarried(shown, found)))
+    return misread(shown.prepared, with_not_carried(found, uncarried(shown, found)))
 
 
 def _as_shown(
@@ -147,12 +152,12 @@ def _as_shown(
     """What is asked for, with angles that the recording shows to be set less well."""
     if shown is None or not (angles := angles_set(shown)) > asked["angle_sigma_deg"]:
         return asked, []
-    said = (
+    note = (
         f"the recording shows that angles are set to ± {angles:.2g}° only, not"
         f" ± {asked['angle_sigma_deg']:.2g}°: the uncertainties are for that; mend the"
         " fixture, or write down the angles that it really sets"
     )
-    return asked | {"angle_sigma_deg": angles}, [said]
+    return asked | {"angle_sigma_deg": angles}, [note]
 
 
 def _insist(found: Calibration, session: Session, still: Rests) -> None:
@@ -177,7 +182,7 @@ def _insist(found: Calibration, session: Session, still: Rests) -> None:
 
 
 def _listed(found: Calibration, order: list[int]) -> Calibration:
-    """With what is said of each position in the order of session.toml."""
+    """With the probability of each position in the order of session.toml."""
     bad = found.info.get("bad_position")
     if bad is None:
         return found

@@ -60,8 +60,10 @@ def take(
         calm = _calm(part, moved, noise, grain)
         if calm is None:
             raise
-        said = f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
-        return calm, noise, f"{said} is used"
+        remark = (
+            f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
+        )
+        return calm, noise, f"{remark} is used"
 
 
 def _given(span: tuple[float, float] | None) -> tuple[float, float]:
@@ -106,10 +108,10 @@ def take_on_a_table(
     """
     span = _given(span)
     standing, left = steadied(block.between(*span), rate)
-    one, _, said = take(standing, span, None, grain)
+    one, _, remark = take(standing, span, None, grain)
     covariance = one.covariance.copy()
     covariance[3:, 3:] += left
-    return replace(one, covariance=covariance), said
+    return replace(one, covariance=covariance), remark
 
 
 def _calm(

@@ -48,9 +48,9 @@ MOST_WAVES = 160
 leave of one that is far above the noise is as good as white."""
 
 MISSET_DEG = 3.0
-"""Typical error of a position that was set at another angle than is said, deg."""
+"""Typical error of a position whose angle is not the stated one, deg."""
 
-ASIDE = 1.0
+SMALL_ROTATION = 1.0
 """Turns of a position whose orientation nobody knows, rad: any."""
 
 LOOSE, LOOSEST = 0.2, 100.0
@@ -74,7 +74,7 @@ UNKNOWN = 5e-4
 """Chance of a function that no effect makes, for each covariate."""
 
 NAMED = 0.5
-"""Probability from which an effect is said to be there."""
+"""Probability from which an effect is reported."""
 
 SAME = 4.6
 """Evidence, ln, by which an explanation may be behind and still stand for another: 100

@@ -49,7 +49,7 @@ class State:
     Attributes
     ----------
     bias, scale : (6,)
-    aside : (p, 2) small turns of each position, rad
+    small_rotation : (p, 2) small rotations of each position, rad
     earth : (3,) rad/s, rate of the base beyond what is known
     terms : effects
 
@@ -57,14 +57,14 @@ class State:
 
     bias: Array
     scale: Array
-    aside: Array
+    small_rotation: Array
     earth: Array
     terms: tuple[Term, ...] = ()
 
     def experienced(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
-        """What turns aside, the Earth's rate and motion effects make of rows."""
-        if self.aside.any():
-            x = turned_aside(x, self.aside)
+        """What small rotations, the Earth's rate and motion effects make of rows."""
+        if self.small_rotation.any():
+            x = rotated(x, self.small_rotation)
         if self.earth.any():
             x = x.turned(base_rate=x.base_rate + self.earth)
         terms = (*self.terms, *more) if more else self.terms
@@ -87,12 +87,12 @@ class State:
         return out
 
 
-def turned_aside(x: Experience, aside: Array) -> Experience:
-    """Rows with each position turned a little: (p, 2) rad.
+def rotated(x: Experience, small_rotation: Array) -> Experience:
+    """Rows with each position rotated by a little: (p, 2) rad.
 
     By alpha and beta where they are known; else about two axes across the force.
     """
-    small = aside[np.maximum(x.position, 0)] * (x.position >= 0)[:, None]
+    small = small_rotation[np.maximum(x.position, 0)] * (x.position >= 0)[:, None]
     free = ~x.oriented
     x = x.turned(alpha=x.alpha + small[:, 0], beta=x.beta + small[:, 1])
     if free.any():

@@ -35,7 +35,7 @@ UNIT = 1e-6
 """Largest share of what is estimated in a direction that windows do not show."""
 
 UNCHECKED = 1.0
-"""Variance, (m/s^2)^2, of what is foretold of a window that no other one checks: the
+"""Variance, (m/s^2)^2, of what is predicted of a window that no other one checks: the
 wide sizes of what is estimated show."""
 
 

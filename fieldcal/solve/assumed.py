@@ -49,7 +49,7 @@ class Asked:
             )
         _refuse_none((self.level_deg, self.heading_deg, self.angles_deg))
 
-    def method_for(self, seen: Observations) -> Method:
+    def method_for(self, observations: Observations) -> Method:
         """The method that suits the positions, or the one that is asked for.
 
         Raises
@@ -58,8 +58,8 @@ class Asked:
             If the one that is asked for needs other positions.
 
         """
-        still = ~seen.rotating
-        known = int((seen.oriented & still).sum())
+        still = ~observations.rotating
+        known = int((observations.oriented & still).sum())
         if self.method == "auto":
             return _suits(int(still.sum()), known)
         if self.method == "two_position" and (known != 2 or still.sum() != 2):

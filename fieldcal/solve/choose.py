@@ -99,7 +99,7 @@ class _Session:
 
     Parameters
     ----------
-    seen : the windows
+    observations : of the windows
     asked : what for
     method : that was chosen
     recorded : its rows, if there are more than the means
@@ -108,22 +108,24 @@ class _Session:
 
     def __init__(
         self,
-        seen: Observations,
+        observations: Observations,
         asked: Asked,
         method: Method,
         recorded: Recorded | None,
     ) -> None:
-        self.seen, self.asked, self.method = seen, asked, method
-        navigation = seen.grade == "navigation"
-        base, self.unknown = earth_known(seen.latitude, navigation, asked.heading)
-        given = recorded or of_means(seen)
+        self.observations, self.asked, self.method = observations, asked, method
+        navigation = observations.grade == "navigation"
+        base, self.unknown = earth_known(
+            observations.latitude, navigation, asked.heading
+        )
+        given = recorded or of_means(observations)
         rows = given.rows
         if method == "scalar":
             nowhere = np.full(len(rows.x), np.nan)
             rows = replace(rows, x=replace(rows.x, alpha=nowhere, beta=nowhere))
         self.recorded = replace(given, rows=seen_by(rows, base))
-        self.turning = self.recorded.turning() if seen.has_gyr else None
-        nominal = seen.nominal
+        self.turning = self.recorded.turning() if observations.has_gyr else None
+        nominal = observations.nominal
         self.nominal = State(
             np.array([*nominal.acc_bias, *nominal.gyr_bias], dtype=float),
             np.array([*nominal.acc_scale, *nominal.gyr_scale], dtype=float),
@@ -132,7 +134,7 @@ class _Session:
         )
 
     def best(self) -> tuple[Estimated, list[str]]:
-        """The set that fits, with what must be said of the tilt."""
+        """The set that fits, with remarks about the tilt."""
         level, tilt = self.asked.level_deg, self.asked.tilt
         if self.method in ("scalar", "least_squares"):
             return self._with("none"), []
@@ -149,14 +151,16 @@ class _Session:
     ) -> Estimated:
         """A set with a model of the tilt; windows alone are to choose one by."""
         turning = self.turning if follow else None
-        seen, turned = self.seen, turning is not None
-        table = bool(seen.rotating.any())
-        sees_earth = seen.grade == "navigation" and seen.latitude is not None
+        observations, turned = self.observations, turning is not None
+        table = bool(observations.rotating.any())
+        sees_earth = (
+            observations.grade == "navigation" and observations.latitude is not None
+        )
         wanted = Wanted(
             tilt,
             cross=self.asked.cross or self.method == "least_squares",
             gyro_cross=table or turned,
-            gyr_scale=table or turned or (sees_earth and len(seen) > 1),
+            gyr_scale=table or turned or (sees_earth and len(observations) > 1),
             level_deg=level,
             angles_deg=self.asked.angles_deg,
             earth=self.unknown,
@@ -195,7 +199,7 @@ class _Session:
         return found.mixed_with(usable[best], usable[other], weight), [note]
 
     def _level_taken(self) -> str:
-        extra = ladder_remedy(self.seen, parameters("angle_offset"))
+        extra = ladder_remedy(self.observations, parameters("angle_offset"))
         cure = f"; add {join(extra)} to find it" if extra else ""
         return (
             "these positions do not show the tilt, so the base is taken as level" + cure

@@ -28,11 +28,15 @@ class Closed:
 
     @classmethod
     def of(
-        cls, names: Sequence[str], gain: Array, seen: Observations, channels: slice
+        cls,
+        names: Sequence[str],
+        gain: Array,
+        observations: Observations,
+        channels: slice,
     ) -> Closed:
         """Values by their derivatives (p, n, 3) by the means of a triad."""
-        noise = seen.covariance[:, channels, channels]
-        values = np.einsum("pnc,nc->p", gain, seen.mean[:, channels])
+        noise = observations.covariance[:, channels, channels]
+        values = np.einsum("pnc,nc->p", gain, observations.mean[:, channels])
         covariance = np.einsum("pnc,ncd,qnd->pq", gain, noise, gain)
         return cls(tuple(names), values, covariance)
 

@@ -29,12 +29,12 @@ class DoubtfulPosition:
     probability: float
 
     @classmethod
-    def of(cls, seen: Observations, bad: Array) -> DoubtfulPosition | None:
+    def of(cls, observations: Observations, bad: Array) -> DoubtfulPosition | None:
         """The worst position, (n,) probabilities; None where all positions agree."""
         worst = int(bad.argmax())
         if bad[worst] < SUSPECT:
             return None
-        return cls(seen.positions[worst].name, float(bad[worst]))
+        return cls(observations.positions[worst].name, float(bad[worst]))
 
     @classmethod
     def from_json(cls, value: Mapping[str, Any] | None) -> DoubtfulPosition | None:

@@ -294,13 +294,13 @@ def _determined(
     before = np.zeros(given.width)
     for group in given.groups:
         before[group.columns] = group.sizes(group.fixed or 1.0)
-    told = np.sqrt(np.diag(found.covariance))
+    sigma = np.sqrt(np.diag(found.covariance))
     limits = USEFUL | ({"gyr_scale": TURNED} if given.wanted.turned else {})
     known = [
         i
         for i, name in enumerate(given.names)
-        if told[i] ** 2 < OPEN * before[given.place(name)[0]] ** 2
-        and told[i] < limits.get(group_of(name), np.inf)
+        if sigma[i] ** 2 < OPEN * before[given.place(name)[0]] ** 2
+        and sigma[i] < limits.get(group_of(name), np.inf)
     ]
     names = tuple(given.names[i] for i in known)
     missing = tuple(n for i, n in enumerate(given.names) if i not in known)

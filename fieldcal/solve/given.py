@@ -54,7 +54,7 @@ class Wanted:
     tilt : how the base is tilted
     cross, gyro_cross : cross-coupling of the accelerometers, of the gyroscopes
     gyr_scale : whether the scale factor of the gyroscopes is
-    level_deg : how level the base is, about each level axis; None where nobody said
+    level_deg : how level the base is, about each level axis; None if it is not stated
     angles_deg : how well each angle is set
     earth : (3,) rad/s, what is not known of the Earth's rate in base axes
     turned : whether turns between positions were recorded
@@ -134,7 +134,7 @@ class Given(Dictionary):
         """Bias and scale factor, free."""
         sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
         for part, channels in TRIADS:
-            at = np.intersect1d(channels, self.seen)
+            at = np.intersect1d(channels, self.observed)
             if not len(at):
                 continue
             yield Group("bias", part, self.bias + at, sizes[at], fixed=priors.FREE,
@@ -194,12 +194,12 @@ class Given(Dictionary):
         if not oriented:
             return
         size = sigma / np.sqrt(2.0)
-        own = (self.aside + 2 * np.array(oriented)[:, None] + [0, 1]).ravel()
+        own = (self.small_rotation + 2 * np.array(oriented)[:, None] + [0, 1]).ravel()
         wide = np.full(len(own), size)
         yield _given(Group("angle_setting", "own", own, wide, fixed=1.0, in_state=True))
         shared = repeated(self.x, oriented)
         if shared.shape[1]:
-            basis = General("detents", lambda v: columns.aside(v) @ shared)
+            basis = General("detents", lambda v: columns.small_rotation(v) @ shared)
             at = self.add(basis, shared.shape[1]) + np.arange(shared.shape[1])
             wide = np.full(len(at), size)
             yield _given(Group("angle_setting", "repeated", at, wide, fixed=1.0))
@@ -229,7 +229,7 @@ class Given(Dictionary):
                    ("gyr", (3, 4, 5), "gyro_cross_coupling")]  # fmt: skip
         out: list[str] = []
         for sensor, channels, cross in sensors:
-            axes = [CHANNELS[c][-1] for c in channels if c in self.seen]
+            axes = [CHANNELS[c][-1] for c in channels if c in self.observed]
             groups = [f"{sensor}_bias", f"{sensor}_scale"]
             out += [f"{g}.{a}" for g in groups for a in axes]
             out += self._of(cross)

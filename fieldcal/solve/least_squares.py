@@ -32,16 +32,16 @@ def matrix(v: Array, products: bool = False) -> Array:
     return np.hstack(parts)
 
 
-def accelerometers(seen: Observations, products: bool = False) -> Closed:
+def accelerometers(observations: Observations, products: bool = False) -> Closed:
     """Bias, scale factor, cross-coupling, (1.3); with `products` pendulous, (2.3)."""
     names = _names("acc_bias", "acc_scale", "cross_coupling.k", "pendulous_products.l")
-    return _solved(names, matrix(seen.forces, products), seen, ACC)
+    return _solved(names, matrix(observations.forces, products), observations, ACC)
 
 
-def gyroscopes(seen: Observations, products: bool = False) -> Closed:
+def gyroscopes(observations: Observations, products: bool = False) -> Closed:
     """Bias, scale factor, cross-coupling, (3.3); with `products` expanded, (4.3)."""
     names = _names("gyr_bias", "gyr_scale", "gyro_cross_coupling.s", "gyro_products.p")
-    return _solved(names, matrix(seen.rates, products), seen, GYR)
+    return _solved(names, matrix(observations.rates, products), observations, GYR)
 
 
 def _names(bias: str, scale: str, cross: str, product: str) -> list[list[str]]:
@@ -56,11 +56,11 @@ def _names(bias: str, scale: str, cross: str, product: str) -> list[list[str]]:
 
 
 def _solved(
-    names: list[list[str]], g: Array, seen: Observations, channels: slice
+    names: list[list[str]], g: Array, observations: Observations, channels: slice
 ) -> Closed:
     """X = (G^T G)^-1 G^T U of the columns that are determined."""
     known, _ = determined(g)
     inverse = np.linalg.pinv(g[:, known])  # (1.3) (2.3) (3.3) (4.3)
     gain = np.einsum("kn,cd->kcnd", inverse, np.eye(3)).reshape(-1, len(g), 3)
     kept = [n for row, k in zip(names, known, strict=False) if k for n in row]
-    return Closed.of(kept, gain, seen, channels)
+    return Closed.of(kept, gain, observations, channels)

@@ -28,7 +28,7 @@ from fieldcal.solve.result import UNITS
 METHODS = ("two_position", "five_position")
 
 
-def solve(seen: Observations, asked: Asked) -> Calibration:
+def solve(observations: Observations, asked: Asked) -> Calibration:
     """Everything that the print gives.
 
     Raises
@@ -42,22 +42,24 @@ def solve(seen: Observations, asked: Asked) -> Calibration:
             f"the paper prints no {asked.method} method: as printed are two_position"
             " and five_position"
         )
-    still = np.flatnonzero(~seen.rotating)
-    parts, said = [], []
+    still = np.flatnonzero(~observations.rotating)
+    parts, sentences = [], []
     method = asked.method
-    if len(still) and seen.has_acc:
+    if len(still) and observations.has_acc:
         two = len(still) == 2 if method == "auto" else method == "two_position"
         method = "two_position" if two else "five_position"
         if two:
-            parts.append(two_position(seen[still], as_printed=True))
-            said.append(
+            parts.append(two_position(observations[still], as_printed=True))
+            sentences.append(
                 "as printed: the sign of (5) makes the scale factor of z negative"
             )
         else:
-            parts.append(five_position(seen[still], as_printed=True))
-            said.append("as printed: (23) is inverted, (22), (30), (34) lose the sign")
-    if seen.has_gyr:
-        parts.append(_gyroscopes(seen))
+            parts.append(five_position(observations[still], as_printed=True))
+            sentences.append(
+                "as printed: (23) is inverted, (22), (30), (34) lose the sign"
+            )
+    if observations.has_gyr:
+        parts.append(_gyroscopes(observations))
     if not parts:
         raise NotObservable("no sensor was measured; the print gives nothing")
     names = tuple(n for p in parts for n in p.names)
@@ -75,33 +77,37 @@ def solve(seen: Observations, asked: Asked) -> Calibration:
         chi2=0.0,
         dof=0,
         rms=float("nan"),
-        warnings=tuple(said),
+        warnings=tuple(sentences),
     )
 
 
-def _gyroscopes(seen: Observations) -> Closed:
+def _gyroscopes(observations: Observations) -> Closed:
     """Bias, and what the positions or rates give besides."""
-    n = len(seen)
-    if seen.rotating.any():
-        return least_squares.gyroscopes(seen)
-    if seen.grade == "navigation" and seen.latitude is not None and n > 1:
-        return _by_the_earth(seen)
+    n = len(observations)
+    if observations.rotating.any():
+        return least_squares.gyroscopes(observations)
+    if (
+        observations.grade == "navigation"
+        and observations.latitude is not None
+        and n > 1
+    ):
+        return _by_the_earth(observations)
     gain = np.tile(np.eye(3)[:, None] / n, (1, n, 1))  # (36)
-    return Closed.of([f"gyr_bias.{a}" for a in "xyz"], gain, seen, GYR)
+    return Closed.of([f"gyr_bias.{a}" for a in "xyz"], gain, observations, GYR)
 
 
-def _by_the_earth(seen: Observations) -> Closed:
+def _by_the_earth(observations: Observations) -> Closed:
     """Bias and scale factor, (42)-(48), channel by channel."""
-    w = printed_earth_rate(seen) @ seen.mounting
-    gain = np.zeros((6, len(seen), 3))
+    w = printed_earth_rate(observations) @ observations.mounting
+    gain = np.zeros((6, len(observations), 3))
     kept = np.ones(6, dtype=bool)
     for axis in range(3):
-        design = np.column_stack([np.ones(len(seen)), w[:, axis]])  # (42)
+        design = np.column_stack([np.ones(len(observations)), w[:, axis]])  # (42)
         known, _ = determined(design)
         kept[[axis, 3 + axis]] = known
         gain[axis, :, axis], gain[3 + axis, :, axis] = np.linalg.pinv(design)
     names = [f"gyr_{kind}.{a}" for kind in ("bias", "scale") for a in "xyz"]
-    return Closed.of(names, gain, seen, GYR).only(kept)
+    return Closed.of(names, gain, observations, GYR).only(kept)
 
 
 def printed_earth_rate(observations: Observations) -> Array:

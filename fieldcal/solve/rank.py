@@ -85,10 +85,10 @@ def remedy(
     return extra
 
 
-def ladder_remedy(seen: Observations, names: Sequence[str]) -> list[str]:
+def ladder_remedy(observations: Observations, names: Sequence[str]) -> list[str]:
     """Names of the fewest positions of `LADDER` that would determine parameters."""
 
     def rows(places: Sequence[Position]) -> Array:
-        return design(names, places, seen.gravity, seen.mounting)
+        return design(names, places, observations.gravity, observations.mounting)
 
-    return [p.name for p in remedy(rows, seen.positions, LADDER)]
+    return [p.name for p in remedy(rows, observations.positions, LADDER)]

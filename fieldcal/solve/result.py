@@ -41,7 +41,7 @@ TURNED = 5
 
 def calibration(
     method: Method,
-    seen: Observations,
+    observations: Observations,
     asked: Asked,
     found: Estimated,
     notes: Sequence[str],
@@ -59,17 +59,22 @@ def calibration(
     there = words.carried(
         found.sure, found.causes, found.names, found.moved, found.ended_s
     )
-    said = [there, *_open(method, seen, found), *notes, *_level(method, asked, seen)]
-    if not names or _blind(found, seen):
+    sentences = [
+        there,
+        *_open(method, observations, found),
+        *notes,
+        *_level(method, asked, observations),
+    ]
+    if not names or _blind(found, observations):
         raise NotObservable(
-            "these positions determine nothing: " + "; ".join(filter(None, said))
+            "these positions determine nothing: " + "; ".join(filter(None, sentences))
         )
     sigma = np.sqrt(np.diag(covariance))
-    odd = senseless(names, values, sigma, seen.nominal)
+    odd = senseless(names, values, sigma, observations.nominal)
     acc = found.acc if any(map(_is_acc, names)) else found.gyr
     good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < WRONG)
-    doubt = DoubtfulPosition.of(seen, found.bad)
-    said += [
+    doubt = DoubtfulPosition.of(observations, found.bad)
+    sentences += [
         *_few(method, found),
         doubt.sentence if doubt else "",
         *_scattered(found),
@@ -83,15 +88,15 @@ def calibration(
         chi2=acc.chi2,
         dof=acc.dof,
         rms=found.acc.rms,
-        warnings=tuple(dict.fromkeys(w for w in [*odd, *said] if w)),
+        warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
         good=good,
-        info=_info(method, seen, asked, found),
+        info=_info(method, observations, asked, found),
     )
 
 
-def _blind(found: Estimated, seen: Observations) -> bool:
+def _blind(found: Estimated, observations: Observations) -> bool:
     """Whether the accelerometers at rest gave nothing, and no table turned."""
-    if not seen.has_acc or seen.rotating.any():
+    if not observations.has_acc or observations.rotating.any():
         return False
     return not any(map(_is_acc, found.names))
 
@@ -101,45 +106,50 @@ def _is_acc(name: str) -> bool:
     return sensor_of(group_of(name)) == "acc"
 
 
-def _open(method: Method, seen: Observations, found: Estimated) -> list[str]:
+def _open(method: Method, observations: Observations, found: Estimated) -> list[str]:
     """Parameters that the rows leave open, and which positions would give them."""
-    said = []
+    sentences = []
     acc = [n for n in found.missing if group_of(n) in OF_ACC]
     if acc and found.given.wanted.level_deg is not None:
         acc = [n for n in acc if group_of(n) != "base_tilt"]
     if acc:
-        said.append(
-            _scalar(acc, found, len(seen))
+        sentences.append(
+            _scalar(acc, found, len(observations))
             if method == "scalar"
-            else words.not_determined(acc, _remedy(seen, found), "these positions")
+            else words.not_determined(
+                acc, _remedy(observations, found), "these positions"
+            )
         )
     gyr = [n for n in found.missing if group_of(n) == "gyr_scale"]
     cross = [n for n in found.missing if group_of(n) == "gyro_cross_coupling"]
-    if not found.given.wanted.gyr_scale and seen.has_gyr:
-        said.append(
+    if not found.given.wanted.gyr_scale and observations.has_gyr:
+        sentences.append(
             "gyr_scale is not determined: the Earth's rate gives it only with two "
             "known positions and the latitude"
-            if seen.grade == "navigation"
+            if observations.grade == "navigation"
             else words.NO_SCALE
         )
     elif gyr or cross:
-        said.append(_turning(gyr, cross, seen, found))
-    return said
+        sentences.append(_turning(gyr, cross, observations, found))
+    return sentences
 
 
-def _remedy(seen: Observations, found: Estimated) -> list[str]:
+def _remedy(observations: Observations, found: Estimated) -> list[str]:
     names = [n for n in found.given.names if group_of(n) in OF_ACC]
-    if any(n in found.missing for n in names) and not seen.rotating.any():
-        return ladder_remedy(seen, names)
+    if any(n in found.missing for n in names) and not observations.rotating.any():
+        return ladder_remedy(observations, names)
     return []
 
 
 def _turning(
-    gyr: Sequence[str], cross: Sequence[str], seen: Observations, found: Estimated
+    gyr: Sequence[str],
+    cross: Sequence[str],
+    observations: Observations,
+    found: Estimated,
 ) -> str:
     """What of the gyroscopes turns or rates leave open."""
     missing = [*gyr] + ([f"{len(cross)} of 6 gyro_cross_coupling"] if cross else [])
-    if not found.given.wanted.turned and not seen.rotating.any():
+    if not found.given.wanted.turned and not observations.rotating.any():
         return (
             f"{words.join(missing)} {'are' if missing[1:] else 'is'} left out: the"
             " Earth's rate gives it only roughly in these windows; average longer, or"
@@ -148,7 +158,7 @@ def _turning(
     turned = {ParameterName.of(n).entry[1] for n in cross}
     turned |= {ParameterName.of(n).axis for n in gyr}
     about = [AXES[axis] for axis in sorted(turned)]
-    if seen.rotating.any():
+    if observations.rotating.any():
         return words.not_determined(
             missing, [f"a rate of 20°/s about device axis {a}" for a in about],
             "this schedule",
@@ -191,10 +201,10 @@ def _few(method: Method, found: Estimated) -> list[str]:
     return []
 
 
-def _level(method: Method, asked: Asked, seen: Observations) -> list[str]:
+def _level(method: Method, asked: Asked, observations: Observations) -> list[str]:
     if method != "two_position" or asked.level_deg:
         return []
-    moved = seen.gravity * np.deg2rad(0.1)
+    moved = observations.gravity * np.deg2rad(0.1)
     return [
         "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to "
         f"{moved:.3f} m/s^2 unseen; take five positions, or say how level it is"
@@ -205,17 +215,19 @@ def _level(method: Method, asked: Asked, seen: Observations) -> list[str]:
 def _scattered(found: Estimated) -> list[str]:
     """Scatter beyond the noise."""
     what = "norms" if found.given.free.all() else "positions"
-    said = []
+    sentences = []
     for name, agreed, channels in (
         (what, found.acc, (0, 1, 2)), ("gyroscopes' means", found.gyr, (3, 4, 5)),
     ):  # fmt: skip
         if not np.isnan(agreed.rms):
             spread, unit = scatter_of(found.found, channels), CHANNEL_UNITS[channels[0]]
-            said.append(words.excess(name, agreed.chi2, agreed.dof, spread, unit))
+            sentences.append(words.excess(name, agreed.chi2, agreed.dof, spread, unit))
     chi2, dof = _turns(found)
     if dof >= TURNED:
-        said.append(words.excess("turns", chi2, dof, turns_scatter(found.found), "rad"))
-    return said
+        sentences.append(
+            words.excess("turns", chi2, dof, turns_scatter(found.found), "rad")
+        )
+    return sentences
 
 
 def _turns(found: Estimated) -> tuple[float, int]:
@@ -225,48 +237,52 @@ def _turns(found: Estimated) -> tuple[float, int]:
     return chi2, max(0, count - spent)
 
 
-def _carried(seen: Observations, found: Estimated) -> dict[str, Any]:
+def _carried(observations: Observations, found: Estimated) -> dict[str, Any]:
     """What the set has that was not asked for, and what that does."""
     moved = dict(zip(found.names, found.moved.tolist(), strict=True))
     out: dict[str, Any] = {"causes": found.causes, "moved_sigmas": moved}
     if found.ended_s is not None:
-        last = float(seen.temperature[-1]) if len(seen.temperature) else np.nan
+        last = (
+            float(observations.temperature[-1])
+            if len(observations.temperature)
+            else np.nan
+        )
         warm = last if np.isfinite(last) else None
         out["as_of"] = {"since_start_s": found.ended_s, "temperature_degc": warm}
     return out
 
 
 def _info(
-    method: Method, seen: Observations, asked: Asked, found: Estimated
+    method: Method, observations: Observations, asked: Asked, found: Estimated
 ) -> dict[str, Any]:
-    known = seen.temperature[np.isfinite(seen.temperature)]
-    latitude = seen.latitude
+    known = observations.temperature[np.isfinite(observations.temperature)]
+    latitude = observations.latitude
     out: dict[str, Any] = {
         "conditions": {
-            "positions": len(seen),
-            "gravity": seen.gravity,
+            "positions": len(observations),
+            "gravity": observations.gravity,
             "latitude_deg": None if latitude is None else float(np.rad2deg(latitude)),
             "temperature_degc": float(known.mean()) if len(known) else None,
-            "grade": seen.grade,
+            "grade": observations.grade,
         },
         "bad_position": [round(float(p), 4) for p in found.bad],
         "extra_scatter": scatter_of(found.found, (0, 1, 2)),
         "angle_sigma_deg": asked.angles_deg,
     }
-    if doubt := DoubtfulPosition.of(seen, found.bad):
+    if doubt := DoubtfulPosition.of(observations, found.bad):
         out["doubtful_position"] = doubt.to_json()
     if np.isfinite(found.acc.left_out):
         out["left_out_rms"] = found.acc.left_out
     if method == "two_position" and asked.level_deg:
         out["level_sigma_deg"] = asked.level_deg
-    if seen.has_gyr:
+    if observations.has_gyr:
         gyr = found.gyr
         out["gyroscopes"] = {
             "chi2": gyr.chi2, "dof": gyr.dof, "rms": gyr.rms, "unit": "rad/s",
             "extra_scatter": scatter_of(found.found, (3, 4, 5)),
         }  # fmt: skip
     if found.causes:
-        out["carried"] = _carried(seen, found)
+        out["carried"] = _carried(observations, found)
     if found.turns:
         chi2, dof = _turns(found)
         out["turns"] = {"chi2": chi2, "dof": dof}

@@ -19,23 +19,23 @@ from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.observations import Observations
 
 
-def of_means(seen: Observations) -> Recorded:
+def of_means(observations: Observations) -> Recorded:
     """One row for each window; correlations between outputs are not kept."""
-    n, nominal = len(seen), seen.nominal
+    n, nominal = len(observations), observations.nominal
     index = np.arange(n)
-    y = seen.mean.copy()
-    told = variances(seen)
+    y = observations.mean.copy()
+    told = variances(observations)
     sd = np.sqrt(np.where(told > 0, told, np.nan))
     x = Experience.at_rest(
-        *seen.angles,
-        seen.gravity,
-        f=_force(seen),
-        t=np.where(np.isfinite(seen.time), seen.time, index),
+        *observations.angles,
+        observations.gravity,
+        f=_force(observations),
+        t=np.where(np.isfinite(observations.time), observations.time, index),
         position=index,
-        rate=rates(seen.positions),
-        base_force=force_home(seen.gravity),
-        mounting=seen.mounting,
-        latitude=np.nan if seen.latitude is None else seen.latitude,
+        rate=rates(observations.positions),
+        base_force=force_home(observations.gravity),
+        mounting=observations.mounting,
+        latitude=np.nan if observations.latitude is None else observations.latitude,
     )
     sd[~x.force_known, :3] = np.nan
     common = np.zeros_like(sd)
@@ -46,17 +46,17 @@ def of_means(seen: Observations) -> Recorded:
     return Recorded(rows, np.full((1, n), np.inf))
 
 
-def variances(seen: Observations) -> Array:
+def variances(observations: Observations) -> Array:
     """Of the means, (n, 6); of windows whose orientation is free along the force alone.
 
     A device that turns a little at rest, as in a hand, is unsteady across it, and that
     its free orientation takes up.
     """
-    out: Array = np.einsum("nii->ni", seen.covariance).copy()
-    free = ~seen.oriented & np.isfinite(seen.mean[:, ACC]).all(axis=1)
-    f = _force(seen)[free]
+    out: Array = np.einsum("nii->ni", observations.covariance).copy()
+    free = ~observations.oriented & np.isfinite(observations.mean[:, ACC]).all(axis=1)
+    f = _force(observations)[free]
     up = f / np.linalg.norm(f, axis=1, keepdims=True)
-    along = np.einsum("ni,nij,nj->n", up, seen.covariance[free, ACC, ACC], up)
+    along = np.einsum("ni,nij,nj->n", up, observations.covariance[free, ACC, ACC], up)
     out[free, ACC] = along[:, None]
     return out
 
@@ -77,15 +77,15 @@ def widened(rows: Rows, known: Array) -> Rows:
     return replace(rows, common=common)
 
 
-def _force(seen: Observations) -> Array:
+def _force(observations: Observations) -> Array:
     """Force along what the accelerometers read, (n, 3) m/s^2.
 
     Any direction will do where they say nothing.
     """
-    nominal = seen.nominal
-    apart = (seen.mean[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
-    apart[~np.isfinite(apart).all(axis=1)] = force_home(seen.gravity)
-    return free_force(seen.gravity, np.arange(len(seen)), apart)
+    nominal = observations.nominal
+    apart = (observations.mean[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
+    apart[~np.isfinite(apart).all(axis=1)] = force_home(observations.gravity)
+    return free_force(observations.gravity, np.arange(len(observations)), apart)
 
 
 def unseen_earth(scale: Array | tuple[float, ...]) -> Array:

@@ -1,4 +1,4 @@
-"""What the user must know about an estimate, a sentence each."""
+"""Warnings about an estimate, one sentence each."""
 
 from __future__ import annotations
 

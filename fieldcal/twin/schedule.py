@@ -83,9 +83,9 @@ def _angles(state: State, x: Experience, felt: Array) -> tuple[float, float]:
     all that is amiss with the base and the gauges of the joints.
     """
     if x.oriented[0]:
-        small = state.aside[x.position[0]]
+        small = state.small_rotation[x.position[0]]
         return float(x.alpha[0] + small[0]), float(x.beta[0] + small[1])
-    state = replace(state, aside=np.zeros_like(state.aside))
+    state = replace(state, small_rotation=np.zeros_like(state.small_rotation))
     asked = np.array([0.0, 1.0])
     gauged = state.experienced(only(x, [0, 0]).turned(alpha=asked, beta=asked))
     there = _joints(gauged.base_force, x.mounting @ felt)

@@ -174,7 +174,7 @@ def calibrated(
 def fitted(session: Session, **asked: bool) -> Calibration:
     """Without what is said of effects that the calibration does not carry."""
     laid = Laid(session, rests(session))
-    return solve(laid.seen, recorded=laid.recorded(True), **asked)  # type: ignore[arg-type]
+    return solve(laid.observations, recorded=laid.recorded(True), **asked)  # type: ignore[arg-type]
 
 
 def many_ways(seed: int, n: int) -> list[tuple[Array, Array]]:

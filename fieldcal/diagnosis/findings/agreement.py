@@ -1,4 +1,4 @@
-"""Residuals of one model: what was fitted, and what was foretold."""
+"""Residuals of one model: what was fitted, and what was predicted."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Agreement:
     Attributes
     ----------
     rows : they belong to
-    residual, ahead : (n, 6) of what was fitted, and of what was foretold
-    lines, lines_ahead : (6,) mean squares at the lines' frequencies, and as foretold
+    residual, ahead : (n, 6) of what was fitted, and of what was predicted
+    lines, lines_ahead : (6,) mean squares at the lines' frequencies, and as predicted
     chi2_per_dof : of the residual
 
     """
@@ -41,7 +41,7 @@ class Agreement:
 
     @property
     def held_out(self) -> Array:
-        """The same of what was foretold."""
+        """The same of what was predicted."""
         return rms(self.rows, self.ahead)
 
     @property
@@ -53,7 +53,7 @@ class Agreement:
         """In the unit of one triad: 0 accelerometers, 1 gyroscopes."""
         part = slice(3 * triad, 3 * triad + 3)
         held_out = np.sqrt(self.held_out**2 + self.lines_ahead)
-        seen = {
+        by_channel = {
             n: float(v)
             for n, v in zip(CHANNELS, held_out, strict=True)
             if np.isfinite(v)
@@ -62,7 +62,7 @@ class Agreement:
             rms=_mean(self.whole[part]),
             chi2_per_dof=self.chi2_per_dof,
             held_out_rms=_mean(held_out[part]),
-            by_channel=seen,
+            by_channel=by_channel,
         )
 
 

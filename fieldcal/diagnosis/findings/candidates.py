@@ -1,4 +1,4 @@
-"""What was tried on a recording, and why it lost."""
+"""The candidates that were tried on a recording, and why each was rejected."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fieldcal.model.search.offers import Offer
 from fieldcal.physics.effect import Scatter
 
 LARGEST = 40.0
-"""Odds are not said beyond e to this."""
+"""Largest log odds that are stated."""
 
 FOLLOWED = 1
 """Losers whose predictions are worked out: each costs a fit for every position."""

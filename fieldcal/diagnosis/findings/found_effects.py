@@ -19,7 +19,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member, likeliest
-from fieldcal.model.posterior.held_out import turn_residual, turns_foretold
+from fieldcal.model.posterior.held_out import turn_residual, turns_held_out
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.system.way_rows import ARRIVAL_S
@@ -27,11 +27,11 @@ from fieldcal.physics.effect import Scatter
 from fieldcal.physics.recording import Fault
 
 DETERMINED = 0.3
-"""Part of its variance before the rows that a parameter has left at most to be told."""
+"""Largest part of its prior variance that a reported parameter may keep."""
 
 
 SHOWS = 12.0
-"""Squares that windows have to lose for a cause to show in them."""
+"""Decrease of the weighted squares from which a cause shows in the windows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,8 +193,8 @@ def gain(explanation: Explanation, lost: Removed, then: Agreement) -> float:
     best, turned = explanation.best, explanation.inferred.turned
     there = Fitted(best.rows, best.dictionary, best.linear, best.values, lost.set)
     if in_turns(lost):
-        foretold = [rms_of(turns_foretold(f, turned)) for f in (there, best)]
-        return float(1 - foretold[1] / foretold[0])
+        predicted = [rms_of(turns_held_out(f, turned)) for f in (there, best)]
+        return float(1 - predicted[1] / predicted[0])
     ahead = rms(best.rows, explanation.held_out.residual([lost.set]))
     now = then.held_out
     share = np.where(np.isfinite(now) & (ahead > 0), lost.squares, -1.0)

@@ -1,4 +1,4 @@
-"""Where recording and simulation part: channel, positions, stretch of time, covariate.
+"""Where recording and simulation differ: channel, positions, time, covariate.
 
 For a cause the residual without it, all else fitted, is looked at: the channels whose
 squares it accounts for, the positions in which it stands out.

@@ -17,7 +17,7 @@ from fieldcal.diagnosis.findings.agreement import Agreement
 from fieldcal.diagnosis.findings.found_effects import rms_of
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.result import Quality
-from fieldcal.model.posterior.held_out import held_out, turn_residual, turns_foretold
+from fieldcal.model.posterior.held_out import held_out, turn_residual, turns_held_out
 from fieldcal.model.rows.hand_tremor import rows_of
 from fieldcal.model.rows.reduce import reduce
 from fieldcal.model.system.fitted import Fitted
@@ -27,7 +27,7 @@ OF_TURNS = "standard deviations, in turns"
 
 
 def _agreement(
-    fitted: Fitted, ahead: Array, lines: Array, foretold: Array, weighed: Fitted
+    fitted: Fitted, ahead: Array, lines: Array, predicted: Array, weighed: Fitted
 ) -> Agreement:
     """Residuals of a fit; squares are weighed as another has the instability."""
     squares = weighed.squares_of(fitted.residual()) if _alike(fitted, weighed) else None
@@ -37,7 +37,7 @@ def _agreement(
         fitted.residual(fitted.certain),
         ahead,
         lines,
-        foretold,
+        predicted,
         float(total) / max(fitted.dof, 1),
     )
 
@@ -60,13 +60,13 @@ def after(explanation: Explanation) -> Agreement:
     """The simulation with what was found; alone, where rows show nothing more."""
     remains, best = explanation.prepared.remains, explanation.best
     lines = sum((r.after for r in remains), np.zeros(6))
-    foretold = sum((r.held_out for r in remains), np.zeros(6))
+    predicted = sum((r.held_out for r in remains), np.zeros(6))
     if not best.set.members and not explanation.sees_earth:
         base = explanation.base
         ahead = held_out(base, [base.set])
-        return _agreement(base, ahead, lines, foretold, best)
+        return _agreement(base, ahead, lines, predicted, best)
     ahead = explanation.held_out.residual(explanation.in_question)
-    return _agreement(best, ahead, lines, foretold, best)
+    return _agreement(best, ahead, lines, predicted, best)
 
 
 def in_turns(explanation: Explanation) -> tuple[Quality, Quality]:
@@ -78,9 +78,9 @@ def in_turns(explanation: Explanation) -> tuple[Quality, Quality]:
 
 
 def _of_turns(fitted: Fitted, turned: Sequence[TurnRows]) -> Quality:
-    seen = np.concatenate([turn_residual(t, fitted.estimate) for t in turned])
-    ahead = turns_foretold(fitted, turned)
-    return Quality(rms_of(seen), float(np.mean(seen**2)), rms_of(ahead))
+    residual = np.concatenate([turn_residual(t, fitted.estimate) for t in turned])
+    ahead = turns_held_out(fitted, turned)
+    return Quality(rms_of(residual), float(np.mean(residual**2)), rms_of(ahead))
 
 
 def raw(block: Block, explanation: Explanation) -> Fitted:
@@ -100,9 +100,9 @@ def raw(block: Block, explanation: Explanation) -> Fitted:
 
 
 def parted(one: Agreement, other: Agreement) -> int:
-    """The triad in which two models differ most, in what they see or foretell: 0 or 1.
+    """The triad in which two models differ most, in what they see or predict: 0 or 1.
 
-    What is random takes nothing from the residuals, but foretells.
+    What is random takes nothing from the residuals, but predicts.
     """
     sizes = []
     for triad in (0, 1):

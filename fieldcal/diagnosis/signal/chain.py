@@ -68,42 +68,42 @@ def check(block: Block, about: Description) -> Checked:
     """Look for every fault of the chain, and act on what is found."""
     usable = np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)])
     faults: list[tuple[str, Fault]] = []
-    seen = recording(block, usable, about)
+    samples = recording(block, usable, about)
     for name in MENDING:
-        for fault in _find(name, seen):
+        for fault in _find(name, samples):
             faults.append((name, fault))
             if fault.mended is not None:
                 six = _mended(block, fault)
                 block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
-                seen = recording(block, usable, about)
+                samples = recording(block, usable, about)
     for name in MASKING:
         before = len(faults)
-        found = _find(name, seen)
-        for fault in _off_rails(found, seen) if name == "stuck" else found:
+        found = _find(name, samples)
+        for fault in _off_rails(found, samples) if name == "stuck" else found:
             if name == "saturation" and _is_stuck(fault, faults):
                 continue
             faults.append((name, fault))
-            _mask(name, fault, usable, seen.windows)
+            _mask(name, fault, usable, samples.windows)
         if len(faults) > before:
-            seen = recording(block, usable, about)
+            samples = recording(block, usable, about)
     for name in NOTING:
-        faults += [(name, fault) for fault in _find(name, seen)]
-    return Checked(block, usable, tuple(_once(faults)), seen.noise)
+        faults += [(name, fault) for fault in _find(name, samples)]
+    return Checked(block, usable, tuple(_once(faults)), samples.noise)
 
 
 def checked_again(checked: Checked, block: Block, about: Description) -> Checked:
     """The same with what lines in the spectrum can feign looked at without them."""
     faults = [(n, f) for n, f in checked.faults if n != "noise_level"]
-    seen = recording(block, checked.usable, about)
-    faults += [("noise_level", f) for f in _find("noise_level", seen)]
+    samples = recording(block, checked.usable, about)
+    faults += [("noise_level", f) for f in _find("noise_level", samples)]
     return replace(checked, faults=tuple(faults))
 
 
-def _find(name: str, seen: CheckedSamples) -> list[Fault]:
+def _find(name: str, samples: CheckedSamples) -> list[Fault]:
     effect = catalogue()[name]
     if not isinstance(effect, Chain):
         raise TypeError(f"{name} is no effect on samples")
-    return effect.find(seen)
+    return effect.find(samples)
 
 
 def _mended(block: Block, fault: Fault) -> Array:
@@ -131,14 +131,14 @@ def _mask(
                 usable[first:last, c] = False
 
 
-def _off_rails(found: list[Fault], seen: CheckedSamples) -> list[Fault]:
+def _off_rails(found: list[Fault], samples: CheckedSamples) -> list[Fault]:
     """Runs of equal values less those at a rail that a channel returns to.
 
     What stands still does so once and anywhere; what is clipped always stops there.
     """
     if not found:
         return found
-    rails = {f.channel: f.rows for f in _find("saturation", seen)}
+    rails = {f.channel: f.rows for f in _find("saturation", samples)}
     clipped = [bool(np.isin(f.rows, rails.get(f.channel, ())).all()) for f in found]
     often = Counter(f.channel for f, c in zip(found, clipped, strict=True) if c)
     return [

@@ -1,4 +1,4 @@
-"""A line in the spectrum: its frequency, its causes, and what it foretells.
+"""A line in the spectrum: its frequency, its causes, and what it predicts.
 
 Of the amplitudes A of a wave in windows, or in stretches of them (`moments`), causes c
 make R c, with R of the effect; they follow by least squares, and hz is where they take
@@ -27,7 +27,7 @@ AT_ONCE = 256
 """Frequencies tried together: all of a long recording would take much memory."""
 
 SHOWS = 4.0
-"""Standard deviations from which a channel is said to have the line."""
+"""Standard deviations from which a channel counts as having the line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,19 +71,20 @@ class Remains:
     ----------
     before : as recorded
     after : less the line
-    held_out : less what the rest of the recording foretells of it
-    foretold : by how much the squares of the samples, whitened, fall with that
+    held_out : less what the rest of the recording predicts of it
+    predictive_score : by how much the squares of the samples, whitened, fall with
+        that
 
     """
 
     before: Array
     after: Array
     held_out: Array
-    foretold: Array
+    predictive_score: Array
 
     def gain(self, clear: list[int]) -> float:
         """Part of the held-out rms that goes, in the channel that shows it best."""
-        most = clear[int(np.argmax(self.foretold[clear]))]
+        most = clear[int(np.argmax(self.predictive_score[clear]))]
         return float(1 - np.sqrt(self.held_out[most] / self.before[most]))
 
 
@@ -96,7 +97,7 @@ def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
 
 
 def remains(pieces: Pieces, tone: Tone) -> Remains:
-    """What is left of a line, fitted to it or foretold from the rest."""
+    """What is left of a line, fitted to it or predicted from the rest."""
     many = len(pieces.samples) >= FEW
     moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES)
     groups = np.arange(len(moments.counts))

@@ -2,7 +2,7 @@
 
 A line found (`periodogram`) is fitted (`line`) to the samples of all windows, one phase
 throughout: as any amplitude in each output, or as what a `Line` effect makes of few
-causes. It is one if the rest of the recording foretells it in what was left out.
+causes. It is one if the rest of the recording predicts it in what was left out.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def tones(source: RowSource, rows: Rows) -> list[tuple[Tone, Remains]]:
         if (tone := _explained(pieces, near)) is None:
             continue  # something else has much power there, and may hide a line
         left = remains(pieces, tone)
-        if left.foretold[tone.clear].sum() > 0:
+        if left.predictive_score[tone.clear].sum() > 0:
             found.append((tone, left))
             looked[-1] = tone.hz
             _lessen(pieces, tone)

@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
 from fieldcal.diagnosis.result import FoundEffect
-from fieldcal.diagnosis.wording.deciding_position import decided_by, telling_position
+from fieldcal.diagnosis.wording.deciding_position import decided_by, deciding_position
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain, Scatter
 
@@ -46,7 +46,7 @@ def _deciding(
     """How to tell an effect from its aliases."""
     for one in effects:
         for other in one.aliases:
-            place = telling_position(explanation, one.id, other)
+            place = deciding_position(explanation, one.id, other)
             if place is None:
                 yield f"to tell {one.id} from {other}: {decided_by(one.id)}."
             else:

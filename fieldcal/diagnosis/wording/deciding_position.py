@@ -1,4 +1,4 @@
-"""What would tell two explanations apart: the position at which they differ most."""
+"""The position that decides between two explanations: where they differ most."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
 
 REACH = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
-TELLING = 5.0
+DECIDES = 5.0
 """Difference in white noise of a window's mean that decides."""
 
 
-def telling_position(
+def deciding_position(
     explanation: Explanation, one: str, other: str
 ) -> tuple[float, float, float] | None:
     """Position at which two explanations differ most, and by how many sigmas.
 
     Returns
     -------
-    alpha, beta in degrees and the difference, or None if no position in reach tells
+    alpha, beta in degrees and the difference, or None if no position in reach decides
 
     """
     rows, instead = explanation.rows, explanation.posterior.instead.get(one, {})
@@ -45,13 +45,13 @@ def telling_position(
             apart = float(np.nanmax(np.abs(seen[0] - seen[1]) / sd))
             if best is None or apart > best[2] * 1.2:
                 best = (alpha, beta, apart)
-    return best if best is not None and best[2] > TELLING else None
+    return best if best is not None and best[2] > DECIDES else None
 
 
 def _state(explanation: Explanation, found: Set) -> State:
     """The state at a set's estimates, orientations as they are."""
     state, _ = explanation.inferred.inference.moved(found)
-    return replace(state, aside=np.zeros_like(state.aside))
+    return replace(state, small_rotation=np.zeros_like(state.small_rotation))
 
 
 def _place(x: Experience, alpha: float, beta: float) -> Experience:
@@ -79,5 +79,5 @@ def _place(x: Experience, alpha: float, beta: float) -> Experience:
 
 
 def decided_by(name: str) -> str:
-    """What the catalogue says tells an effect from others."""
+    """What the catalogue names to decide between an effect and others."""
     return catalogue()[name].decided_by

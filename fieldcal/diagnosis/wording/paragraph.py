@@ -1,4 +1,4 @@
-"""The paragraph that says it all to a person."""
+"""The summary of a diagnosis, as one paragraph."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ import numpy as np
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
 from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quality, Quantity, Verdict
-from fieldcal.diagnosis.wording.deciding_position import decided_by, telling_position
+from fieldcal.diagnosis.wording.deciding_position import decided_by, deciding_position
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Scatter
 
 SHOWN = 3.0
-"""Standard deviations from which a parameter is worth its words."""
+"""Standard deviations from which the paragraph names a parameter."""
 
 EACH = 3
-"""Times up to which an effect that happened again is told each time."""
+"""Number of times up to which an effect is named each time."""
 
 MOST = 6
-"""Places that are told."""
+"""Places that the paragraph names."""
 
 SHOWN_PLACES = 6
-"""Positions of one place that are told."""
+"""Positions that it names of one place."""
 
 
-def said(quantity: Quantity) -> str:
+def with_uncertainty(quantity: Quantity) -> str:
     """A value with its uncertainty and unit.
 
-    >>> said(Quantity(0.00312, 0.00011, "1"))
+    >>> with_uncertainty(Quantity(0.00312, 0.00011, "1"))
     '0.00312 ± 0.00011'
     """
     if isinstance(quantity.value, str):
@@ -51,7 +51,7 @@ def named(found: FoundEffect) -> str:
     parts = []
     for name, q in found.parameters.items():
         if isinstance(q.value, str) or not q.sigma or abs(q.value) > SHOWN * q.sigma:
-            parts.append(f"{name} = {said(q)}")
+            parts.append(f"{name} = {with_uncertainty(q)}")
     return f"{found.id} ({', '.join(parts)})" if parts else found.id
 
 
@@ -110,15 +110,15 @@ def _opening(
 def _listed(effects: Sequence[FoundEffect]) -> str:
     """The effects; one that happened often in a word."""
     often = Counter(f.id for f in effects)
-    told = [
+    names = [
         named(f) if often[f.id] <= EACH else f"{f.id} ({often[f.id]} times)"
         for f in effects
     ]
-    return " and ".join(dict.fromkeys(told))
+    return " and ".join(dict.fromkeys(names))
 
 
 def _places(mismatch: Sequence[Mismatch]) -> str:
-    """Where they part, the clearest first."""
+    """Where they differ, the largest difference first."""
     clearest = sorted(mismatch, key=lambda m: -m.sigma)
     places = list(dict.fromkeys(f"{m.channel}, {_where(m)}" for m in clearest))
     more = len(places) - MOST
@@ -155,7 +155,7 @@ def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
 
 def _deciding(explanation: Explanation, one: str, other: str) -> str:
     head = f"{other} would explain it as well as {one}"
-    position = telling_position(explanation, one, other)
+    position = deciding_position(explanation, one, other)
     if position is None:
         return f"{head}; what tells them apart: {decided_by(one)}."
     alpha, beta, apart = position
@@ -177,7 +177,8 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
     places = listed(where.positions)
     if one.turned:
         angles = " and ".join(
-            f"{joint} had been off by {said(angle)}" for joint, angle in one.turned
+            f"{joint} had been off by {with_uncertainty(angle)}"
+            for joint, angle in one.turned
         )
         return (
             f"{places.capitalize()} is off by itself, as if {angles} there: set it anew"

@@ -28,11 +28,11 @@ class ColumnTable:
 
     Attributes
     ----------
-    seen : channels that say something
+    observed : channels that were measured
     held : positions that have a window
     bases : what columns are, each with the first that it has
     width : columns so far
-    bias, scale, aside, windows, waves : the first column of each kind
+    bias, scale, small_rotation, windows, waves : the first column of each kind
 
     """
 
@@ -45,7 +45,7 @@ class ColumnTable:
         wander: Wander,
     ) -> None:
         self.x, self.used, self.since, self.unit = x, used, since, unit
-        self.seen = np.flatnonzero(np.any(used, axis=0))
+        self.observed = np.flatnonzero(np.any(used, axis=0))
         self.held = np.unique(x.position)
         self.places = int(x.position.max()) + 1
         self.wander = wander
@@ -54,8 +54,10 @@ class ColumnTable:
         self.width = 0
         self.bias = self.add(General("bias", columns.bias), 6)
         self.scale = self.add(General("scale", columns.scale), 6)
-        turns = General("aside", columns.aside, sides=columns.aside_sides)
-        self.aside = self.add(turns, 2 * self.places)
+        turns = General(
+            "aside", columns.small_rotation, sides=columns.small_rotation_sides
+        )
+        self.small_rotation = self.add(turns, 2 * self.places)
         self.windows = self.course("window", self._inside, len(self.held), False)
         self.waves = self.course("waves", self.span.waves, self.span.count, True)
 

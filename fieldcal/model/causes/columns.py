@@ -187,34 +187,36 @@ def earth_sides(plain: Experience, state: State) -> Iterator[Pair]:
 earth = _of_sides(earth_sides)
 
 
-def aside_sides(plain: Experience, state: State) -> Iterator[Pair]:
+def small_rotation_sides(plain: Experience, state: State) -> Iterator[Pair]:
     """Two small turns of each position, rad, those of a position together."""
     here = state.experienced(plain)
-    for p in range(len(state.aside)):
+    for p in range(len(state.small_rotation)):
         for joint in range(2):
             if p not in plain.position:
                 yield here, here, SMALL
                 continue
             ends = []
             for sign in (1.0, -1.0):
-                small = state.aside.copy()
+                small = state.small_rotation.copy()
                 small[p, joint] += sign * SMALL
-                ends.append(replace(state, aside=small).experienced(plain))
+                ends.append(replace(state, small_rotation=small).experienced(plain))
             yield ends[0], ends[1], SMALL
 
 
-def aside(view: RowView) -> Array:
+def small_rotation(view: RowView) -> Array:
     """The same as columns (n, 6, 2 p), all positions turned at once."""
-    places = len(view.state.aside)
+    places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
     at = view.plain.position
     held = np.flatnonzero(at >= 0)
     for joint in range(2):
         ends = []
         for sign in (1.0, -1.0):
-            small = view.state.aside.copy()
+            small = view.state.small_rotation.copy()
             small[:, joint] += sign * SMALL
-            ends.append(replace(view.state, aside=small).experienced(view.plain))
+            ends.append(
+                replace(view.state, small_rotation=small).experienced(view.plain)
+            )
         change = _apart(ends[0], ends[1], SMALL, view.state)
         out[held, :, 2 * at[held] + joint] = change[held]
     return out

@@ -97,7 +97,7 @@ class Dictionary(ColumnTable):
     def plain(self) -> Dictionary:
         """The same with what a simulation has only, bias and scale factor being free.
 
-        There is no Earth's rate beside its own, and nothing random: that foretells.
+        There is no Earth's rate beside its own, and nothing random: that predicts.
         """
         out = copy(self)
         known = (g for g in self.always if g.in_state and g.cause != "earth")
@@ -149,18 +149,18 @@ class Dictionary(ColumnTable):
         """Bias, scale factor, Earth's rate."""
         sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
         for part, channels in TRIADS:
-            at = np.intersect1d(channels, self.seen)
+            at = np.intersect1d(channels, self.observed)
             if len(at):
                 yield Group("bias", part, self.bias + at, sizes[at], in_state=True)
         rated = bool(self.x.rate.any())
         for part, channels in TRIADS:
-            at = np.intersect1d(channels, self.seen)
+            at = np.intersect1d(channels, self.observed)
             if len(at) and (part == "acc" or rated):
                 yield Group(
                     "scale", part, self.scale + at, priors.SCALE * self.unit[at],
                     in_state=True, in_step=True,
                 )  # fmt: skip
-        gyro = bool(len(np.intersect1d(self.seen, (3, 4, 5))))
+        gyro = bool(len(np.intersect1d(self.observed, (3, 4, 5))))
         if gyro and self.x.oriented.any() and not self.x.base_rate.any():
             earth = General("earth", columns.earth, sides=columns.earth_sides)
             self.earth = self.add(earth, 3)

@@ -89,7 +89,7 @@ def parts(table: ColumnTable, effect: Effect) -> list[tuple[str, tuple[int, ...]
     names = [p.name for p in effect.params]
     if not set(names) <= set(CHANNELS):
         return [("", tuple(range(len(names))))]
-    seen = {CHANNELS[c] for c in table.seen}
+    seen = {CHANNELS[c] for c in table.observed}
     return [
         (part, tuple(j for j, n in enumerate(names)
                      if CHANNELS.index(n) in at and n in seen))

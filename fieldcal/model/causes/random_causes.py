@@ -26,7 +26,7 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
     if len(oriented) == len(table.held) > 3:
         size = np.full(2, np.deg2rad(priors.MISSET_DEG))
         groups = tuple(
-            Group("misset", "", table.aside + 2 * p + np.arange(2), size,
+            Group("misset", "", table.small_rotation + 2 * p + np.arange(2), size,
                   position=int(p), in_state=True)
             for p in oriented
         )  # fmt: skip
@@ -38,13 +38,13 @@ def _of_scatter(table: ColumnTable, effect: Scatter) -> Iterator[Cause]:
     if not {p.name for p in effect.params} <= set(CHANNELS):  # of the positions' angles
         if len(table.held) < 3 or not table.x.oriented.all():
             return
-        at = (table.aside + 2 * table.held[:, None] + [0, 1]).ravel()
+        at = (table.small_rotation + 2 * table.held[:, None] + [0, 1]).ravel()
         size = np.full(len(at), np.deg2rad(effect.params[0].typical))
         group = Group(effect.id, "", at, size, effect, in_state=True)
         yield Cause(effect.id, "", effect.chance(table.x), (group,), "random")
         return
     for part, channels in TRIADS:
-        some = [c for c in channels if c in table.seen]
+        some = [c for c in channels if c in table.observed]
         if some:
             yield _walks(table, effect, part, [some], 1.0)
             each = [[c] for c in some]
@@ -83,7 +83,7 @@ def flicker(table: ColumnTable) -> Iterator[Group]:
     """
     shape = 1 / np.sqrt(np.arange(1, smooth.WAVES + 1))
     for part, channels in TRIADS:
-        at = [c for c in channels if c in table.seen]
+        at = [c for c in channels if c in table.observed]
         if at:
             size = priors.INSTABILITY_ACC if part == "acc" else priors.INSTABILITY_GYR
             columns = np.concatenate([table.wave(c) for c in at])

@@ -1,4 +1,4 @@
-"""What no effect in the catalogue makes: smooth functions of what is known of a row.
+"""Smooth functions of a row's covariates, which no effect in the catalogue makes.
 
 They compete with the effects on the same footing, so that a mismatch that follows the
 angle of a joint or the time, and no physics, is not laid to the physics that comes

@@ -1,4 +1,4 @@
-"""Causes that no effect is: functions of what is known of a row, and offsets."""
+"""Causes without physics: smooth functions of a row's covariates, and offsets."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FORCES = 3
 def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
     """Functions that no effect makes, on each channel."""
     sizes = typical(table)
-    for c in table.seen.tolist():
+    for c in table.observed.tolist():
         groups = [
             Group("time", CHANNELS[c], table.wave(c), sizes[c] * smooth.smooth(span),
                   shape={"waves": span})
@@ -52,7 +52,7 @@ def typical(table: ColumnTable) -> Array:
 def _together(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
     """The same on all axes of a triad: one cause, not one for each of them."""
     for part, channels in TRIADS:
-        some = [c for c in channels if c in table.seen]
+        some = [c for c in channels if c in table.observed]
         if len(some) < 2:
             continue
         waves = np.concatenate([table.wave(c) for c in some])
@@ -72,7 +72,7 @@ def _of_covariates(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
             continue
         width = of(table.x).shape[1]
         first = table.course(covariate, of, width, False)
-        for c in table.seen.tolist():
+        for c in table.observed.tolist():
             at = first + c * width + np.arange(width)
             parts = [at]
             if covariate == "force and time" and c < FORCES:

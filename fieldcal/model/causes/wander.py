@@ -72,9 +72,9 @@ class Wander:
     def of(cls, rows: Rows, unit: Array) -> Wander:
         """Measure it in rows; `unit` (6,) are outputs per SI unit."""
         length, speed = float(np.ptp(rows.x.t)), _speed(rows, unit)
-        told = np.where(rows.used, 1 / rows.sd**2, 0.0).sum(axis=0) / 2
-        seen = speed * np.sqrt(2 * length * told) / np.pi  # (4)
-        modes = np.clip(seen, smooth.WAVES, priors.MOST_WAVES).astype(np.intp)
+        information = np.where(rows.used, 1 / rows.sd**2, 0.0).sum(axis=0) / 2
+        resolved = speed * np.sqrt(2 * length * information) / np.pi  # (4)
+        modes = np.clip(resolved, smooth.WAVES, priors.MOST_WAVES).astype(np.intp)
         return cls(speed, modes, length)
 
     @classmethod

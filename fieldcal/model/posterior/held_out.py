@@ -1,4 +1,4 @@
-"""How well a session's positions are foretold by the others.
+"""Held-out residuals: each position, predicted from the others.
 
 Each position in turn is left out and everything is chosen again without it: which of
 the sets in question, with which variants, which sizes, which values. With too few
@@ -28,7 +28,7 @@ FOLDS = 12
 
 STRETCHES = 24
 """Parts of each window where there are too few windows: as short as that, since what is
-random foretells for a short time only."""
+random predicts for a short time only."""
 
 IN_QUESTION, BEHIND = 6, 20.0
 """Sets among which is chosen again, and how far they are behind the best at most, ln:
@@ -54,7 +54,7 @@ class HeldOut:
         self._rest: dict[int, Search | None] = {}
 
     def residual(self, sets: Sequence[Set]) -> Array:
-        """Residuals of rows foretold from the others, (n, 6); nan where none can be.
+        """Residuals of rows predicted from the others, (n, 6); nan where none can be.
 
         `sets` are those in question; of them one is chosen anew for every part.
         """
@@ -70,9 +70,11 @@ class HeldOut:
             step = self.fitted.values - whole(chosen.state, d) + _wander(chosen, d)
             places = d.held[np.isin(d.held, d.x.position[left])]
             for p in places if len(d.held) >= FEW else ():
-                step[d.aside + 2 * int(p) : d.aside + 2 * int(p) + 2] = 0.0
+                step[
+                    d.small_rotation + 2 * int(p) : d.small_rotation + 2 * int(p) + 2
+                ] = 0.0
             rows = [_rows(p, left[p.rows]) for p in self.linear]
-            _foretold(out, rows, step, chosen, d)
+            _predict(out, rows, step, chosen, d)
         return out
 
     def _without(self, i: int) -> Search | None:
@@ -81,14 +83,14 @@ class HeldOut:
             left = self.fold == i
             rest = [_rows(part, ~left[part.rows]) for part in self.linear]
             values, d = self.fitted.values, self.dictionary
-            told = all(len(part.white) for part in rest)
-            rows = gram(rest, d, values, (), self.columns) if told else None
+            determined = all(len(part.white) for part in rest)
+            rows = gram(rest, d, values, (), self.columns) if determined else None
             self._rest[i] = None if rows is None else Search(d, rows)
         return self._rest[i]
 
 
 def held_out(fitted: Fitted, sets: Sequence[Set]) -> Array:
-    """Residuals of rows foretold from the others by sets in question, (n, 6)."""
+    """Residuals of rows predicted from the others by sets in question, (n, 6)."""
     return HeldOut(fitted, sets).residual(sets)
 
 
@@ -100,8 +102,8 @@ def in_question(best: Set, visited: Sequence[Set]) -> list[Set]:
     return list(dict.fromkeys([best, *near[:IN_QUESTION], *none]))
 
 
-def turns_foretold(fitted: Fitted, turns: Sequence[TurnRows]) -> Array:
-    """Whitened residuals of turns, each foretold from windows and the other turns."""
+def turns_held_out(fitted: Fitted, turns: Sequence[TurnRows]) -> Array:
+    """Whitened residuals of turns, each predicted from windows and the other turns."""
     d, out = fitted.dictionary, []
     columns = _columns(d, [fitted.set]) | (fitted.values != 0)
     linear = [_narrowed(part, columns) for part in fitted.linear]
@@ -140,7 +142,7 @@ def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
     out = np.zeros(d.width, dtype=bool)
     for one in sets:
         out[one.state.columns] = True
-    out[d.aside : d.aside + 2 * d.places] = True
+    out[d.small_rotation : d.small_rotation + 2 * d.places] = True
     return out
 
 
@@ -159,7 +161,7 @@ def _rows(part: Linear, kept: NDArray[np.bool_]) -> Linear:
     )  # fmt: skip
 
 
-def _foretold(
+def _predict(
     out: Array, left: Sequence[Linear], step: Array, chosen: Set, d: Dictionary
 ) -> None:
     """Residuals of the rows left out, each position's own angles sought in it."""
@@ -187,7 +189,7 @@ def _foretold(
 
 
 def _wander(chosen: Set, d: Dictionary) -> Array:
-    """What the instability within windows is estimated at: it foretells nothing."""
+    """What the instability within windows is estimated at: it predicts nothing."""
     out, first = np.zeros(d.width), 0
     for group in d.always:
         some = slice(first, first := first + len(group.columns))
@@ -202,9 +204,11 @@ def _own(chosen: Set, d: Dictionary) -> Array:
     np.add.at(out, chosen.state.columns, chosen.state.sizes**2)
     for p, free in zip(d.held, d.free, strict=True):
         if free:
-            out[d.aside + 2 * int(p) : d.aside + 2 * int(p) + 2] += 1.0
+            out[d.small_rotation + 2 * int(p) : d.small_rotation + 2 * int(p) + 2] += (
+                1.0
+            )
     only = np.zeros(d.width, dtype=bool)
-    only[d.aside : d.aside + 2 * d.places] = True
+    only[d.small_rotation : d.small_rotation + 2 * d.places] = True
     return np.sqrt(np.where(only, out, 0.0))
 
 
@@ -213,4 +217,4 @@ def _angles(
 ) -> Iterator[tuple[int, NDArray[np.intp]]]:
     """Windows left out by their number, with the columns of their turns."""
     for j in np.unique(np.concatenate([p.window for p in left])).tolist():
-        yield j, d.aside + 2 * int(d.held[j]) + np.arange(2)
+        yield j, d.small_rotation + 2 * int(d.held[j]) + np.arange(2)

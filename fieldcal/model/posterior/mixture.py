@@ -1,4 +1,4 @@
-"""What a set is estimated at, whatever its sizes and whichever window is bad.
+"""The estimate of a set, averaged over sizes and over windows that may be bad.
 
 How much biases wander from window to window is known by the scatter of few windows
 only, and any window may be disturbed in a way that it does not show itself. Both are
@@ -147,7 +147,7 @@ class Mixing:
     def _doubted(self) -> list[tuple[int, Index]]:
         """Windows that may be bad by the accelerometers, with their columns."""
         d = self.dictionary
-        seen = [c for c in d.seen if c < 3]
+        seen = [c for c in d.observed if c < 3]
         held = len(d.held)
         if held <= 2 or not seen:
             return []
@@ -250,6 +250,6 @@ class Mixing:
         return Eliminated.of(self.gram.weighed(tau), columns, wide)
 
     def _typical(self, at: Index) -> Array:
-        unit = self.dictionary.unit[:3][[c for c in self.dictionary.seen if c < 3]]
+        unit = self.dictionary.unit[:3][[c for c in self.dictionary.observed if c < 3]]
         out: Array = priors.UNKNOWN_ACC * unit * np.ones(len(at))
         return out

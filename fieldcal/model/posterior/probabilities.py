@@ -86,12 +86,12 @@ class Posterior:
         parts = {c.part for c, _ in self.best.members if c.name == name}
         own, near = self.evidence(self.best), 0
         offers = self.search.offers(less)
-        # what is foretold beside what is left is less than the whole: alike for all
-        foretold = max((self._bare(less, o) for o in offers
+        # what is predicted beside what is left is less than the whole: alike for all
+        predicted = max((self._bare(less, o) for o in offers
                         if o.member[0].name == name), default=own)  # fmt: skip
         for offer in offers:
             cause = offer.member[0]
-            if cause.name == name or self._bare(less, offer) < foretold - FAR:
+            if cause.name == name or self._bare(less, offer) < predicted - FAR:
                 continue
             if (near := near + 1) > LOOKED_AT:
                 break
@@ -189,4 +189,4 @@ LOOKED_AT = 8
 """Causes that are tried in the place of one: further ones are worse."""
 
 FAR = 6.0
-"""How far behind in evidence an offer may be foretold to be looked at, ln."""
+"""How far behind in evidence an offer may be predicted to be looked at, ln."""

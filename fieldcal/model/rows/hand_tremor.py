@@ -1,4 +1,4 @@
-"""A device that is held by hand turns a little all the time.
+"""Hand tremor: a device that is held by hand rotates slightly all the time.
 
 Where orientations are not known, only the length of the force says something about the
 accelerometers. On a table its direction stays within the noise of the rows of a window;

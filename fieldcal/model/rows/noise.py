@@ -31,8 +31,8 @@ def rounding(block: Block, windows: NDArray[np.intp]) -> Array:
     off = []
     for pieces in _pieces(block, windows):
         step = steps_of(pieces)
-        seen = np.nan_to_num([short_lag(piece[:SHOWN]) for piece in pieces])
-        off.append(np.maximum(of_mean(step, seen), of_few(step, seen)))
+        differences = np.nan_to_num([short_lag(piece[:SHOWN]) for piece in pieces])
+        off.append(np.maximum(of_mean(step, differences), of_few(step, differences)))
     deviation: Array = np.sqrt(np.concatenate(off, axis=1))
     return deviation
 

@@ -157,17 +157,17 @@ def reduce(source: RowSource) -> Rows:
     block, rate = masked(source.block, source.usable), rate_of(source.block)
     windows = spans(block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
-    seen = shaking(block, windows[held], rate)
-    noise, source = seen.noise, replace(source, block=seen.block)
+    shaken = shaking(block, windows[held], rate)
+    noise, source = shaken.noise, replace(source, block=shaken.block)
     bounds = [_cut(block.t, a, b, rate, len(held)) for a, b in windows[held]]
     rows = [len(b) for b in bounds]
     out = averaged(
         source,
         np.concatenate(bounds),
         np.repeat(held, rows),
-        np.repeat(seen.levels, rows, axis=0),
+        np.repeat(shaken.levels, rows, axis=0),
         noise,
-        np.repeat(seen.variance, rows, axis=0),
+        np.repeat(shaken.variance, rows, axis=0),
     )
     off = np.repeat(rounding(block, windows[held]), rows, axis=0)
     # the Earth turns a device of unknown orientation about any of its axes; one that

@@ -1,4 +1,4 @@
-"""When the device came to rest in each position.
+"""The instant at which the device came to rest in each position.
 
 Between two windows it is turned; the last sign of motion, in the gyroscopes or, without
 them, in the accelerometers, is the arrival. What settles after a turn may count from

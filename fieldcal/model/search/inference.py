@@ -255,7 +255,7 @@ class Inference:
         for group in [*d.always, *(g for _, g in members)]:
             wanted[group.columns] = True
         if d.free.any():
-            wanted[d.aside : d.aside + 2 * d.places] = True
+            wanted[d.small_rotation : d.small_rotation + 2 * d.places] = True
         return wanted
 
     def gram(self, state: State, values: Array, known: Set | None) -> Gram:
@@ -319,10 +319,12 @@ class Inference:
         kept = np.zeros(d.width, dtype=bool)
         kept[self._nonlinear(found.members)] = True
         if d.free.any():
-            kept[d.aside : d.aside + 2 * d.places] = True
+            kept[d.small_rotation : d.small_rotation + 2 * d.places] = True
         values = np.where(kept, whole(found.state, d), 0.0)
         nominal = self.nominal
-        aside = values[d.aside : d.aside + 2 * d.places].reshape(-1, 2)
+        small_rotation = values[
+            d.small_rotation : d.small_rotation + 2 * d.places
+        ].reshape(-1, 2)
         terms = [Term(t.effect, t.values, t.shape, t.origin) for t in nominal.terms]
         for _, group in found.members:
             if group.effect is None or not isinstance(group.effect, Motion | Sensor):
@@ -333,7 +335,7 @@ class Inference:
         state = State(
             nominal.bias + values[d.bias : d.bias + 6],
             nominal.scale + values[d.scale : d.scale + 6],
-            aside,
+            small_rotation,
             values[d.earth : d.earth + 3] if d.earth >= 0 else np.zeros(3),
             tuple(terms),
         )

@@ -1,4 +1,4 @@
-"""What a set may be given: every other cause, with what it is worth.
+"""Offers: every cause that is not in a set, with the log evidence it would add.
 
 A cause is offered at its best variant and size, beside the set's instability as it is
 and smaller in one triad, since what it explains there is instability no longer; the
@@ -45,7 +45,7 @@ class Offer:
     Attributes
     ----------
     member : cause and variant
-    score : of the set with it, foretold
+    score : of the set with it, predicted
     size : index of its likeliest size
     less : instability beside it
 
@@ -133,14 +133,14 @@ class Offers(Sets):
             at, variant = alike.cause, alike.variant
             profile = gain + DENSITY
             size = profile.argmax(axis=1)
-            worth = np.logaddexp.reduce(profile, axis=1) + chances[at]
-            worth[np.take_along_axis(gain, size[:, None], 1)[:, 0] < LEAST] = -np.inf
-            for m in np.flatnonzero(worth > LOST + chances[at].min()).tolist():
-                if int(at[m]) not in best or worth[m] > best[int(at[m])][0]:
-                    best[int(at[m])] = float(worth[m]), int(variant[m]), int(size[m])
+            evidence = np.logaddexp.reduce(profile, axis=1) + chances[at]
+            evidence[np.take_along_axis(gain, size[:, None], 1)[:, 0] < LEAST] = -np.inf
+            for m in np.flatnonzero(evidence > LOST + chances[at].min()).tolist():
+                if int(at[m]) not in best or evidence[m] > best[int(at[m])][0]:
+                    best[int(at[m])] = float(evidence[m]), int(variant[m]), int(size[m])
         offers = [
-            Offer((c, c.variants[v]), score + worth, size, less)
-            for c, (worth, v, size) in ((d.causes[i], b) for i, b in best.items())
+            Offer((c, c.variants[v]), score + evidence, size, less)
+            for c, (evidence, v, size) in ((d.causes[i], b) for i, b in best.items())
             if c.key not in there.keys
         ]
         return sorted(offers, key=lambda o: -o.score)

@@ -1,4 +1,4 @@
-"""Two causes at once, of which neither may be worth it alone.
+"""Pairs of causes, which may explain rows that neither explains by itself.
 
 Of groups i and j beside a set, the sizes are sought in turn, each beside the other at
 its likeliest, by (3) of `gram`: what one alone needs to make up for both it does

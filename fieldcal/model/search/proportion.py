@@ -34,7 +34,7 @@ from fieldcal.model.evidence.sets import Set
 def in_proportion(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:
     """Causes of one proportion about what is left beside each of some sets."""
     for part, channels in TRIADS:
-        some = np.intersect1d(channels, dictionary.seen)
+        some = np.intersect1d(channels, dictionary.observed)
         if len(some) < 2 or len(dictionary.held) <= FEW:
             continue
         about = [_left(dictionary, one, some) for one in sets]

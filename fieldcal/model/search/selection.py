@@ -30,7 +30,7 @@ PROMISING = 16
 """Causes of which pairs are tried."""
 
 SLACK = 3.0
-"""What the full evaluation of an offer may find beyond what was foretold, ln."""
+"""Log evidence that a full evaluation may add to the predicted score of an offer."""
 
 
 class Search(Offers):
@@ -61,8 +61,9 @@ class Search(Offers):
     def _wider(self, there: Set) -> Set:
         """The best set with all the parameters of one of its causes and one more.
 
-        Alone a cause is given those that are worth it, which make up for others; beside
-        another one it may need all, and before it has them the other is worth nothing.
+        By itself a cause gets the parameters that raise the evidence and stand in for
+        others. Beside another cause it may need all of them, and only then does the
+        other one raise the evidence.
         """
         found = [there]
         for i, (cause, group) in enumerate(there.members):
@@ -97,7 +98,7 @@ class Search(Offers):
         return max(found, key=_score)
 
     def _paired(self, there: Set, level: float) -> Set:
-        """The best set with two more, of which neither is worth it alone.
+        """The best set with two more, of which neither raises the evidence by itself.
 
         The set itself if none comes near a level.
         """

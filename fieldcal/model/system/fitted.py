@@ -105,6 +105,6 @@ def whole(state: Eliminated, dictionary: Dictionary) -> Array:
         for j, p in enumerate(dictionary.held):
             if dictionary.free[j]:
                 pull = state.rows.gram.loose[j].T @ state.rows.root[j].T @ left[j]
-                first = dictionary.aside + 2 * int(p)
-                out[first : first + 2] += priors.ASIDE * pull
+                first = dictionary.small_rotation + 2 * int(p)
+                out[first : first + 2] += priors.SMALL_ROTATION * pull
     return out

@@ -65,12 +65,12 @@ class System:
             kept = np.ones(len(at), bool) if wanted is None else wanted[at]
             if not kept.any():
                 continue
-            for c in self.dictionary.seen:
+            for c in self.dictionary.observed:
                 there = kept & np.any(table[used[:, c], c] != 0.0, axis=0)
                 if there.any():
                     parts[c].append((at[there], table[:, c, there]))
         out = []
-        for c in self.dictionary.seen:
+        for c in self.dictionary.observed:
             use = np.flatnonzero(used[:, c])
             left = self.dictionary.wander.left(rows.length[use], int(c))
             weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
@@ -104,7 +104,7 @@ class System:
         if wanted is not None and not wanted[whole].any():
             return
         table = basis.of(view)
-        for c in self.dictionary.seen:
+        for c in self.dictionary.observed:
             at = first + c * basis.width + np.arange(basis.width)
             if wanted is None:
                 parts[c].append((at, table))
@@ -150,8 +150,8 @@ def gram(
     for i, turn in enumerate(turns, len(held)):
         total.append(_add_turn(out, i, turn, values))
     for j in np.flatnonzero(dictionary.free):
-        at = index[dictionary.aside + 2 * int(held[j]) + np.arange(2)]
-        out.loose[j] = priors.ASIDE * out.means[j, :, at].T
+        at = index[dictionary.small_rotation + 2 * int(held[j]) + np.arange(2)]
+        out.loose[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
     return replace(out, square=sum(t[0] for t in total), count=sum(t[1] for t in total))
 
 

@@ -144,6 +144,6 @@ def _undone(leg: Leg, t: Array, rid: Array) -> Array:
     first, n = int(np.searchsorted(block.t, t[0])), len(t)
     span = slice(max(first - n, 0), first + 2 * n)
     late = t + leg.late
-    seen = [np.interp(late, block.t[span], g) for g in block.gyr[span].T]
-    rate: Array = (np.stack(seen, axis=1) - leg.bias - rid) / leg.scale
+    measured = [np.interp(late, block.t[span], g) for g in block.gyr[span].T]
+    rate: Array = (np.stack(measured, axis=1) - leg.bias - rid) / leg.scale
     return rate

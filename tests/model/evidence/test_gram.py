@@ -21,7 +21,7 @@ from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.model.system.window_rows import Linear
 
-WINDOWS, ROWS, WIDTH, ASIDE = 4, 3, 9, 9
+WINDOWS, ROWS, WIDTH, SMALL_ROTATION = 4, 3, 9, 9
 """Columns that a set may have; those of the positions' turns come after them."""
 
 TAU = np.array([0.3, 0.0, 0.8, 0.1, 0.5, 1.2, 0.4])
@@ -41,7 +41,7 @@ class Columns:
     held: Index
     common: Array
     free: NDArray[np.bool_]
-    aside: int
+    small_rotation: int
 
 
 @dataclass
@@ -60,7 +60,7 @@ def case(
     width = WIDTH + 2 * WINDOWS
     held = np.arange(WINDOWS)
     common = rng.uniform(0.0, 0.5, (WINDOWS, 6))
-    columns = Columns(width, held, common, np.isin(held, free), ASIDE)
+    columns = Columns(width, held, common, np.isin(held, free), SMALL_ROTATION)
     values = np.where(rng.random(width) < 0.3, rng.standard_normal(width), 0.0)
     linear, parts = [], []
     for c in range(6):
@@ -70,11 +70,11 @@ def case(
         touching = np.sort(rng.permutation(WIDTH)[:7])
         design = rng.standard_normal((len(window), 7))
         turned = rng.standard_normal((WINDOWS, 2))  # at rest the same in every row
-        aside = np.zeros((len(window), 2 * WINDOWS))
+        small_rotation = np.zeros((len(window), 2 * WINDOWS))
         for p in held:
-            aside[window == p, 2 * p : 2 * p + 2] = turned[p]
+            small_rotation[window == p, 2 * p : 2 * p + 2] = turned[p]
         at = np.concatenate([touching, WIDTH + np.arange(2 * WINDOWS)])
-        design = np.hstack([design, aside])
+        design = np.hstack([design, small_rotation])
         sd = rng.uniform(0.5, 2.0, len(window))
         off = rng.standard_normal(len(window)) * 2
         linear.append(
@@ -86,7 +86,10 @@ def case(
         whole = np.zeros((len(window), width))
         whole[:, at] = design
         size = np.hypot(common[window, c], tau[c])
-        loose = [priors.ASIDE * whole[:, ASIDE + 2 * p :][:, :2] for p in free]
+        loose = [
+            priors.SMALL_ROTATION * whole[:, SMALL_ROTATION + 2 * p :][:, :2]
+            for p in free
+        ]
         parts.append((off + whole @ values, whole, sd, window, c, size, loose))
     made = [turn(rng, width) for _ in range(2)] if turns else []
     rows = gram(linear, cast(Dictionary, columns), values, made)
@@ -98,8 +101,8 @@ def case(
     cov = np.diag(white**2)
     cov += shared(window, channel, np.concatenate([p[5] for p in parts]))
     for i in range(len(free)):
-        aside = np.vstack([p[6][i] for p in parts])
-        cov += aside @ aside.T
+        small_rotation = np.vstack([p[6][i] for p in parts])
+        cov += small_rotation @ small_rotation.T
     return Case(rows, beside(Dense(y, design, cov, white), made, tau))
 
 

@@ -75,7 +75,9 @@ def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Ref
     rows.sd[:] *= rng.uniform(0.5, 2.0, rows.sd.shape)
     values = np.zeros(d.width)
     values[d.bias : d.bias + 3] = rng.normal(0, 1e-2, 3)
-    values[d.aside : d.aside + 2 * d.places] = rng.normal(0, 1e-3, 2 * d.places)
+    values[d.small_rotation : d.small_rotation + 2 * d.places] = rng.normal(
+        0, 1e-3, 2 * d.places
+    )
     linear = System(rows, d).linearised(state)
     search = Search(d, gram(linear, d, values))
     fitted = Fitted(rows, d, linear, values, search.evaluated(tuple(members)))
@@ -88,7 +90,7 @@ def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Ref
     window = x.position[at]
     cov = np.diag(sd**2) + shared(window, channel, d.common[window, channel])
     for p in free:
-        turns = priors.ASIDE * design[:, d.aside + 2 * p :][:, :2]
+        turns = priors.SMALL_ROTATION * design[:, d.small_rotation + 2 * p :][:, :2]
         cov += turns @ turns.T
     off = y - state.output(x, d.since)
     return Refit(fitted, Dense(off.ravel() + design @ values, design, cov, sd), off)
@@ -116,7 +118,7 @@ def test_residuals_are_those_of_a_refit_without_the_position(
     for p in range(len(LADDER)):
         left = one.dictionary.x.position == p
         value, _ = one.without(left)
-        at = one.dictionary.aside + 2 * p + np.arange(2)
+        at = one.dictionary.small_rotation + 2 * p + np.arange(2)
         value[at] = one.fitted.values[at]
         expected = one.dense.y - one.dense.design @ value
         agree(found[left], expected.reshape(ROWS, 6)[left])
@@ -130,11 +132,11 @@ def test_a_positions_own_angles_are_sought_in_it(free: tuple[int, ...]) -> None:
     for p in range(len(LADDER)):
         left = d.x.position == p
         value, sizes = one.without(left)
-        at = d.aside + 2 * p + np.arange(2)
+        at = d.small_rotation + 2 * p + np.arange(2)
         value[at] = one.fitted.values[at]  # from where the state has them
         rest, white = one.dense.y - one.dense.design @ value, one.dense.white
         inside = np.repeat(left, 6)
-        wide = np.full(2, priors.ASIDE) if p in free else sizes[at]
+        wide = np.full(2, priors.SMALL_ROTATION) if p in free else sizes[at]
         own = Dense(
             rest[inside], one.dense.design[inside],
             np.diag(white[inside] ** 2), white[inside],
@@ -149,8 +151,8 @@ def test_sets_are_chosen_again() -> None:
     """That a position was misset is nothing that the others show."""
     x, rng = ladder(3), np.random.default_rng(2)
     d, state = dictionary(x), nominal()
-    away = replace(state, aside=state.aside.copy())
-    away.aside[4] = 0.02, 0.03
+    away = replace(state, small_rotation=state.small_rotation.copy())
+    away.small_rotation[4] = 0.02, 0.03
     y = away.output(away.experienced(x), d.since)
     rows = rows_of(x, y + rng.normal(0, 3e-4, y.shape))
     linear = System(rows, d).linearised(state)
@@ -188,8 +190,8 @@ def test_residuals_of_what_is_fitted_are_those_of_a_dense_fit(
     total = one.dense.cov + wide @ wide.T
     back = np.linalg.solve(total, one.dense.y)
     for p in free:
-        at = d.aside + 2 * p + np.arange(2)
-        value[at] += priors.ASIDE**2 * one.dense.design[:, at].T @ back
+        at = d.small_rotation + 2 * p + np.arange(2)
+        value[at] += priors.SMALL_ROTATION**2 * one.dense.design[:, at].T @ back
     np.testing.assert_allclose(whole(state, d), value, rtol=1e-5, atol=1e-9)
     rest = (one.dense.y - one.dense.design @ value).reshape(ROWS, 6)
     agree(one.fitted.residual(), rest)

@@ -243,6 +243,6 @@ def test_an_offer_foretells_the_set_with_it() -> None:
     offers = search.offers(empty)
     assert offers[0].member[0].key == "angle_offset"
     for offer in offers:
-        foretold = offer.score
-        assert search.taken(empty, offer).score == pytest.approx(foretold, rel=1e-9)
+        predicted = offer.score
+        assert search.taken(empty, offer).score == pytest.approx(predicted, rel=1e-9)
         assert offer.size == search.taken(empty, offer).sizes.members[0]

@@ -160,11 +160,14 @@ def test_columns_of_turns_are_what_these_change(one: Columns) -> None:
     d, state = one.dictionary, one.state
     for p in range(d.places):
         for joint in range(2):
-            step = np.zeros_like(state.aside)
+            step = np.zeros_like(state.small_rotation)
             step[p, joint] = 1e-4
-            up, down = (replace(state, aside=state.aside + s) for s in (step, -step))
+            up, down = (
+                replace(state, small_rotation=state.small_rotation + s)
+                for s in (step, -step)
+            )
             turned = derivative(d, up, down, 1e-4)
-            one.agree(d.aside + 2 * p + joint, turned, 1e-4)
+            one.agree(d.small_rotation + 2 * p + joint, turned, 1e-4)
 
 
 @everywhere
@@ -227,7 +230,7 @@ def test_the_gram_matrix_is_that_of_the_rows(free: tuple[int, ...]) -> None:
     rng = np.random.default_rng(11)
     y = output(d, one.state) + rng.normal(0, 1e-3, (ROWS, 6))
     some = np.union1d(d.bias + np.arange(40), rng.permutation(d.width)[:60])
-    some = np.union1d(some, d.aside + np.arange(2 * d.places))
+    some = np.union1d(some, d.small_rotation + np.arange(2 * d.places))
     values = np.zeros(d.width)
     values[some[::7]] = rng.standard_normal(len(some[::7])) * 1e-3
     recorded = rows_of(d.x, y)
@@ -239,8 +242,10 @@ def test_the_gram_matrix_is_that_of_the_rows(free: tuple[int, ...]) -> None:
     cov = np.diag(sd**2)
     cov += shared(window, channel, np.hypot(d.common[window, channel], TAU[channel]))
     for p in free:
-        aside = priors.ASIDE * design[:, d.aside + 2 * p :][:, :2]
-        cov += aside @ aside.T
+        small_rotation = (
+            priors.SMALL_ROTATION * design[:, d.small_rotation + 2 * p :][:, :2]
+        )
+        cov += small_rotation @ small_rotation.T
     off = (y - output(d, one.state)).ravel() + design @ values
     inner, pull = Dense(off, design[:, some], cov, sd).information()
     size = np.linalg.norm(design[:, some] / sd[:, None], axis=0) + 1e-300
@@ -255,7 +260,7 @@ def test_a_force_that_is_turned_aside_stays_as_long() -> None:
     """Of a position of unknown orientation, about axes across the force."""
     x = EXPERIENCES["of unknown orientation"]
     state = State(np.zeros(6), np.ones(6), np.zeros((9, 2)), np.zeros(3))
-    state.aside[5] = 0.03, -0.04
+    state.small_rotation[5] = 0.03, -0.04
     turned = state.experienced(x).f
     free = x.position == 5
     assert np.linalg.norm(turned, axis=1) == pytest.approx(np.linalg.norm(x.f, axis=1))

@@ -142,9 +142,9 @@ def test_every_turn_is_followed(name: str) -> None:
 def test_closures_are_what_the_columns_foretell(name: str) -> None:
     one, largest = ride(name), 0.0
     for turn in one.turns:
-        foretold = turn.design @ one.values[turn.columns]
+        predicted = turn.design @ one.values[turn.columns]
         size = np.linalg.norm(turn.closure)
-        assert np.linalg.norm(turn.closure - foretold) < 0.006 * size + 1e-6
+        assert np.linalg.norm(turn.closure - predicted) < 0.006 * size + 1e-6
         largest = max(largest, float(size))
     shows = name not in ("time_delay", "lever_arm")  # these begin and end at rest
     assert (largest > 1e-3) == shows
@@ -155,9 +155,9 @@ def test_the_way_is_what_the_columns_foretell(name: str) -> None:
     """To first order, and but for the noise."""
     one, largest = ride(name), 0.0
     for turn in one.turns:
-        foretold = turn.way_design @ one.values[turn.columns]
+        predicted = turn.way_design @ one.values[turn.columns]
         assert len(turn.way) > 50
-        rest, size = np.linalg.norm(turn.way - foretold), np.linalg.norm(turn.way)
+        rest, size = np.linalg.norm(turn.way - predicted), np.linalg.norm(turn.way)
         assert rest < 0.02 * size + 1.4 * np.sqrt(len(turn.way))
         largest = max(largest, float(size))
     assert largest > 100
@@ -172,9 +172,9 @@ def test_about_the_true_state_there_is_nothing_left(name: str) -> None:
     linear = inference.system.linearised(state)
     assert inference.turns is not None
     for turn in inference.turns.linearised(state, one.values, linear, one.known):
-        foretold = turn.design @ one.values[turn.columns]
+        predicted = turn.design @ one.values[turn.columns]
         size = np.linalg.norm(turn.closure)
-        assert np.linalg.norm(turn.closure - foretold) < 1e-4 * size + 1e-6
+        assert np.linalg.norm(turn.closure - predicted) < 1e-4 * size + 1e-6
 
 
 def test_information_of_closures_is_that_of_noise() -> None:

@@ -1,0 +1,223 @@
+"""A bench, a device and an operator, drawn at random; what the device then puts out.
+
+Written apart from everything that estimates: base axes are east, down and north, the
+device is turned by alpha about z and then by beta about the turned x, and
+
+    U = b + K (A f_0),   f_0 = (0, -g, 0);   W = c + L (A w_0 + turning)
+
+in procedure axes, put into the device's by its mounting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+EARTH = 7.2921150e-5
+
+SETS: dict[str, tuple[tuple[float, float], ...]] = {
+    "two": ((0, 0), (45, 5)),
+    "five": ((0, 0), (22.5, 0), (22.5, 2.5), (45, 2.5), (45, 5)),
+    "wide": ((-45, -5), (-45, 5), (0, 0), (45, -5), (45, 5)),
+    "six_faces": ((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90)),
+    "twelve": (
+        (0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90),
+        (45, 45), (135, -45), (-45, 45), (-135, -45), (45, 0), (0, 135),
+    ),
+}  # fmt: skip
+
+MOUNTINGS = (
+    ("+x", "+y", "+z"),
+    ("+x", "-z", "+y"),
+    ("-y", "-x", "-z"),
+    ("+y", "+z", "+x"),
+)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What is there, and what is written down of it.
+
+    Attributes
+    ----------
+    places : positions, a name of `SETS`
+    latitude, height : of the site, deg and m
+    tilt : of the base about z and about x, rad
+    level_deg, angles_deg : what is said of level and angles, None where nothing is
+    off : (n, 2) what each position's angles are off by, rad
+    hold, way : s in a position, and from one to the next
+    rate : samples a second
+    mounting : of the device
+    acc_bias, acc_scale, gyr_bias, gyr_scale : (3,) of the device
+    acc_noise, gyr_noise : rms of a sample
+    grain : what accelerations are rounded to, m/s^2; 0 for none
+    imported : whether angles are unknown, and the session is no recalibration
+
+    """
+
+    places: str
+    latitude: float
+    height: float
+    tilt: tuple[float, float]
+    level_deg: float | None
+    angles_deg: float | None
+    off: Floats = field(repr=False)
+    hold: float
+    way: float
+    rate: float
+    mounting: tuple[str, str, str]
+    acc_bias: Floats
+    acc_scale: Floats
+    gyr_bias: Floats
+    gyr_scale: Floats
+    acc_noise: float
+    gyr_noise: float
+    grain: float
+    imported: bool
+
+    @property
+    def angles(self) -> Floats:
+        """Angles that are asked for, (n, 2) deg."""
+        return np.array(SETS[self.places], float)
+
+    @property
+    def windows(self) -> Floats:
+        """Start and end of each position, (n, 2) s."""
+        start = 2.0 + (self.hold + self.way) * np.arange(len(self.angles))
+        return np.column_stack([start, start + self.hold])
+
+    @property
+    def gravity(self) -> float:
+        """Normal gravity of the place, m/s^2 (Somigliana, free air)."""
+        s = np.sin(np.deg2rad(self.latitude)) ** 2
+        g = (
+            9.7803253359
+            * (1 + 0.00193185265241 * s)
+            / np.sqrt(1 - 0.00669437999013 * s)
+        )
+        return float(g - 3.086e-6 * self.height)
+
+    @property
+    def truth(self) -> dict[str, float]:
+        """Parameters of the device by full name."""
+        return {
+            f"{group}.{axis}": float(getattr(self, group)[i])
+            for group in ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+            for i, axis in enumerate("xyz")
+        }
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What was recorded: t (n,) s, acc and gyr (n, 3), m/s^2 and rad/s."""
+
+    t: Floats
+    acc: Floats
+    gyr: Floats
+
+    def within(self, start: float, end: float) -> NDArray[np.bool_]:
+        """Whether each sample lies in a span."""
+        return (self.t >= start) & (self.t <= end)
+
+
+def drawn(rng: np.random.Generator) -> Bench:
+    """A sound bench: everything that is written down is so."""
+    places = str(rng.choice(list(SETS)))
+    imported = places == "twelve"
+    angles = np.array(SETS[places], float)
+    said = float(np.exp(rng.uniform(np.log(0.003), np.log(0.05))))
+    level = float(np.exp(rng.uniform(np.log(0.003), np.log(0.05))))
+    wide = 0.5 if places in ("five", "wide", "six_faces") else level
+    acc_noise = float(np.exp(rng.uniform(np.log(3e-4), np.log(2e-2))))
+    return Bench(
+        places=places,
+        latitude=float(rng.uniform(-65, 65)),
+        height=float(rng.uniform(0, 1500)),
+        tilt=tuple(np.deg2rad(rng.normal(0, wide, 2)).tolist()),
+        level_deg=level if places == "two" else None,
+        angles_deg=said,
+        off=np.deg2rad(rng.normal(0, said, angles.shape)),
+        hold=float(rng.uniform(15, 30)),
+        way=float(rng.uniform(4, 10)),
+        rate=float(rng.choice([50.0, 100.0])),
+        mounting=MOUNTINGS[int(rng.integers(len(MOUNTINGS)))],
+        acc_bias=rng.normal(0, 0.08, 3),
+        acc_scale=1 + rng.normal(0, 5e-3, 3),
+        gyr_bias=rng.normal(0, 5e-3, 3),
+        gyr_scale=1 + rng.normal(0, 5e-3, 3),
+        acc_noise=acc_noise,
+        gyr_noise=acc_noise * float(rng.uniform(0.05, 0.3)),
+        grain=float(rng.choice([0.0, 0.0, 1e-3, 9.80665 / 4096])),
+        imported=imported,
+    )
+
+
+def turned(alpha: Floats, beta: Floats, vector: Floats) -> Floats:
+    """A vector of base axes in procedure axes, (n, 3)."""
+    x, y, z = np.moveaxis(np.broadcast_to(vector, (len(alpha), 3)), 1, 0)
+    east = np.cos(alpha) * x + np.sin(alpha) * y
+    down = np.cos(alpha) * y - np.sin(alpha) * x
+    return np.column_stack(
+        [
+            east,
+            np.cos(beta) * down + np.sin(beta) * z,
+            np.cos(beta) * z - np.sin(beta) * down,
+        ]
+    )
+
+
+def to_device(mounting: tuple[str, str, str], values: Floats) -> Floats:
+    """Components along procedure axes as components along the device's, (n, 3)."""
+    out = np.zeros_like(values)
+    for procedure, name in enumerate(mounting):
+        out[:, "xyz".index(name[1])] = values[:, procedure] * (
+            -1 if name[0] == "-" else 1
+        )
+    return out
+
+
+def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
+    """What the device puts out."""
+    held = np.deg2rad(bench.angles) + bench.off
+    windows = bench.windows
+    t = np.arange(0.0, windows[-1, 1] + 2.0, 1 / bench.rate)
+    joints = np.empty((len(t), 2))
+    speed = np.zeros((len(t), 2))
+    joints[:] = held[0]
+    for i in range(1, len(held)):
+        # 0.7 s of rest on both sides, a raised cosine of speed between
+        a, b = windows[i - 1, 1] + 0.7, windows[i, 0] - 0.7
+        s = np.clip((t - a) / (b - a), 0, 1)
+        moved = held[i] - held[i - 1]
+        way = s - np.sin(2 * np.pi * s) / (2 * np.pi)
+        joints = np.where((s > 0)[:, None], held[i - 1] + way[:, None] * moved, joints)
+        rate = (1 - np.cos(2 * np.pi * s)) / (b - a) * ((s > 0) & (s < 1))
+        speed += rate[:, None] * moved
+    alpha, beta = joints[:, 0] + bench.tilt[0], joints[:, 1] + bench.tilt[1]
+    f = turned(alpha, beta, np.array([0.0, -bench.gravity, 0.0]))
+    latitude, heading = np.deg2rad(bench.latitude), rng.uniform(0, 2 * np.pi)
+    north = EARTH * np.cos(latitude)
+    earth = [
+        north * np.sin(heading),
+        -EARTH * np.sin(latitude),
+        north * np.cos(heading),
+    ]
+    w = turned(alpha, beta, np.array(earth))
+    w[:, 0] += speed[:, 1]
+    about_z = np.column_stack([np.zeros_like(beta), np.sin(beta), np.cos(beta)])
+    w += about_z * speed[:, :1]
+    f, w = to_device(bench.mounting, f), to_device(bench.mounting, w)
+    acc = bench.acc_bias + bench.acc_scale * f + rng.normal(0, bench.acc_noise, f.shape)
+    gyr = bench.gyr_bias + bench.gyr_scale * w + rng.normal(0, bench.gyr_noise, w.shape)
+    if bench.grain:
+        acc = np.round(acc / bench.grain) * bench.grain
+    return Samples(t, acc, gyr)
+
+
+def wrongly_set(bench: Bench, off: Floats) -> Bench:
+    """The same with angles set otherwise, (n, 2) rad more."""
+    return replace(bench, off=bench.off + off)

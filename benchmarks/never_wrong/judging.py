@@ -1,0 +1,111 @@
+"""Through the command line: a session folder in, GO or NO-GO and numbers out."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+import tomlkit
+
+from benchmarks.never_wrong.mistakes import Written
+from fieldcal.cli import main
+
+WRONG = 5.0
+"""Standard uncertainties from which a parameter is wrong."""
+
+GROUPS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What `solve` and `diagnose` said of a session.
+
+    Attributes
+    ----------
+    go : whether it may be used
+    off : standard uncertainties that the worst parameter is off by, and its name
+    caught : name of the check that refused it, or the first of several
+    says : its sentence
+    verdict : of `diagnose`, or its exit code
+    leaked : warnings of libraries that came through
+
+    """
+
+    go: bool
+    off: float
+    worst: str
+    caught: str
+    says: str
+    verdict: str
+    leaked: int
+
+
+def write(folder: Path, written: Written) -> None:
+    """Write the folder."""
+    folder.mkdir(parents=True)
+    (folder / "session.toml").write_text(tomlkit.dumps(written.about), "utf-8")
+    s = written.samples
+    columns = {"t": s.t}
+    columns |= {f"a{a}": s.acc[:, i] for i, a in enumerate("xyz")}
+    columns |= {f"g{a}": s.gyr[:, i] for i, a in enumerate("xyz")}
+    table = pa.table(columns)
+    if written.ending == "csv":
+        pyarrow.csv.write_csv(table, folder / "samples.csv")
+    else:
+        pyarrow.parquet.write_table(table, folder / "samples.parquet")
+
+
+def said(words: list[str]) -> tuple[int, dict[str, Any], str, int]:
+    """Exit code, document, what stood on stderr, and warnings that leaked."""
+    out, err = io.StringIO(), io.StringIO()
+    with warnings.catch_warnings(record=True) as leaked:
+        warnings.simplefilter("always")
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = main(words)
+    try:
+        document = json.loads(out.getvalue())
+    except ValueError:
+        document = {}
+    return code, document, err.getvalue(), len(leaked)
+
+
+def judged(folder: Path, truth: dict[str, float], diagnose: bool) -> Judged:
+    """Solve a session, and hold what comes against the truth."""
+    history = str(folder.parent / f"{folder.name}.db")
+    code, found, err, leaked = said(
+        ["solve", str(folder), "--json", "--history", history]
+    )
+    off, worst = 0.0, ""
+    for name, value, sigma in _parameters(found):
+        if name in truth:
+            far = abs(value - truth[name]) / sigma
+            if far > off:
+                off, worst = far, f"{name} {value:.5g} ± {sigma:.2g}, {truth[name]:.5g}"
+    decision = found.get("decision", {})
+    refused = [c for c in decision.get("checks", ()) if c["ok"] is False]
+    caught = refused[0]["name"] if refused else "" if code == 0 else f"exit {code}"
+    says = refused[0]["says"] if refused else err.partition("\n")[0]
+    verdict = ""
+    if diagnose:
+        answer, what, _, more = said(["diagnose", str(folder), "--json"])
+        leaked += more
+        verdict = str(what.get("verdict", f"exit {answer}"))
+    return Judged(code == 0, off, worst, caught, says, verdict, leaked)
+
+
+def _parameters(found: dict[str, Any]) -> list[tuple[str, float, float]]:
+    out = []
+    for group in GROUPS:
+        entry = found.get("parameters", {}).get(group)
+        if entry is not None:
+            three = zip("xyz", entry["value"], entry["sigma"], strict=True)
+            out += [(f"{group}.{a}", v, s) for a, v, s in three if v is not None and s]
+    return out

@@ -1,0 +1,285 @@
+"""Mistakes: what a hand, a plan, a cable, a firmware or a file does wrong.
+
+Each takes a session that is about to be written (what the device does, what it put out,
+what session.toml says of it) and spoils one thing of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.never_wrong.bench import EARTH, Bench, Samples, recorded, wrongly_set
+
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Written:
+    """A session: its tables and its samples; `ending` of the file of samples."""
+
+    about: dict[str, Any]
+    samples: Samples
+    ending: str = "parquet"
+
+
+Before = Callable[[Bench, Rng], Bench]
+After = Callable[[Written, Bench, Rng], Written]
+
+
+def _one(bench: Bench, rng: Rng) -> int:
+    return int(rng.integers(len(bench.angles)))
+
+
+# -- of the hand and the fixture
+
+
+def repeated_angle(bench: Bench, rng: Rng) -> Bench:
+    """One angle of the fixture is off by 0.02 to 0.2 degrees wherever it is set."""
+    off, joint = np.zeros_like(bench.off), int(rng.integers(2))
+    values = bench.angles[:, joint]
+    one = rng.choice(np.unique(values[values != 0]))
+    off[values == one, joint] = np.deg2rad(
+        np.exp(rng.uniform(np.log(0.02), np.log(0.2)))
+    )
+    return wrongly_set(bench, off)
+
+
+def gauge_long(bench: Bench, rng: Rng) -> Bench:
+    """The gauge that sets the angles is 0.05 to 0.5 % long."""
+    return wrongly_set(bench, np.deg2rad(bench.angles) * rng.uniform(5e-4, 5e-3))
+
+
+def position_off(bench: Bench, rng: Rng) -> Bench:
+    """One position is set 0.3 to 10 degrees off."""
+    off = np.zeros_like(bench.off)
+    size = np.deg2rad(np.exp(rng.uniform(np.log(0.3), np.log(10))))
+    off[_one(bench, rng), rng.integers(2)] = size * rng.choice([-1, 1])
+    return wrongly_set(bench, off)
+
+
+def table_tilted(bench: Bench, rng: Rng) -> Bench:
+    """The base is 0.1 to 2 degrees out of level, and nobody says so."""
+    tilt = np.deg2rad(rng.uniform(0.1, 2, 2)) * rng.choice([-1, 1], 2)
+    return replace(bench, tilt=tuple(tilt.tolist()))
+
+
+def swapped(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Two positions are written down in the wrong order."""
+    rows = [dict(row) for row in written.about["position"]]
+    i, j = rng.choice(len(rows), 2, replace=False)
+    for key in ("alpha_deg", "beta_deg"):
+        if key in rows[i]:
+            rows[i][key], rows[j][key] = rows[j][key], rows[i][key]
+    return replace(written, about={**written.about, "position": rows})
+
+
+# -- of what is said
+
+
+def _site(written: Written, **more: Any) -> Written:
+    site = {**written.about["site"], **more}
+    site = {key: value for key, value in site.items() if value is not None}
+    return replace(written, about={**written.about, "site": site})
+
+
+def latitude_unsaid(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Nobody says where the bench is."""
+    return _site(written, latitude_deg=None, height_m=None)
+
+
+def other_hemisphere(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The latitude has the wrong sign."""
+    return _site(written, latitude_deg=-bench.latitude)
+
+
+def level_unsaid(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Nobody says how level the base is, nor how well angles are set."""
+    return _site(written, level_deg=None, angle_setting_deg=None)
+
+
+def default_mounting(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The device is mounted otherwise, and nobody says so."""
+    about = {**written.about, "frame": {"mounting": ["+x", "+y", "+z"]}}
+    return replace(written, about=about)
+
+
+def overlapping(written: Written, bench: Bench, rng: Rng) -> Written:
+    """A window of the list begins before the one before it ends."""
+    rows = [dict(row) for row in written.about["position"]]
+    i = int(rng.integers(1, len(rows)))
+    rows.insert(i, {**rows[i - 1], "start_s": rows[i - 1]["start_s"] + 1.0})
+    return replace(written, about={**written.about, "position": rows})
+
+
+def listed_often(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Every window is listed 20 times."""
+    rows = [dict(row) for row in written.about["position"] for _ in range(20)]
+    return replace(written, about={**written.about, "position": rows})
+
+
+# -- of units, wiring and order
+
+
+def acc_in_g(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Accelerations in g are said to be in m/s^2."""
+    s = written.samples
+    return replace(written, samples=replace(s, acc=s.acc / 9.80665))
+
+
+def gyr_in_deg(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Rates in deg/s are said to be in rad/s."""
+    s = written.samples
+    return replace(written, samples=replace(s, gyr=np.rad2deg(s.gyr)))
+
+
+def gyr_said_deg(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Rates in rad/s are said to be in deg/s."""
+    units = {**written.about.get("units", {}), "angular_rate": "deg/s"}
+    return replace(written, about={**written.about, "units": units})
+
+
+def time_in_ns(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Times in ns are said to be in s."""
+    s = written.samples
+    return replace(written, samples=replace(s, t=s.t * 1e9))
+
+
+def axis_turned_round(written: Written, bench: Bench, rng: Rng) -> Written:
+    """One output has the other sign."""
+    s, c = written.samples, int(rng.integers(6))
+    six = np.hstack([s.acc, s.gyr])
+    six[:, c] *= -1
+    return replace(written, samples=Samples(s.t, six[:, :3], six[:, 3:]))
+
+
+def axes_exchanged(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Two outputs of a triad are exchanged."""
+    s, triad = written.samples, int(rng.integers(2))
+    order = [[1, 0, 2], [0, 2, 1], [2, 1, 0]][int(rng.integers(3))]
+    acc = s.acc[:, order] if triad == 0 else s.acc
+    gyr = s.gyr[:, order] if triad == 1 else s.gyr
+    return replace(written, samples=Samples(s.t, acc, gyr))
+
+
+def gyr_copied(written: Written, bench: Bench, rng: Rng) -> Written:
+    """A gyroscope's channel copies another's."""
+    s = written.samples
+    a, b = rng.choice(3, 2, replace=False)
+    gyr = s.gyr.copy()
+    gyr[:, a] = gyr[:, b]
+    return replace(written, samples=replace(s, gyr=gyr))
+
+
+# -- of the firmware
+
+
+def acc_mean_taken(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The device takes the mean out of its accelerations."""
+    s = written.samples
+    return replace(written, samples=replace(s, acc=s.acc - s.acc.mean(axis=0)))
+
+
+def gyr_tracked(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The device takes the bias out of its rates whenever it is at rest."""
+    s, gyr = written.samples, written.samples.gyr.copy()
+    keep = np.exp(-1 / bench.rate / rng.uniform(0.5, 5))
+    moving = np.linalg.norm(gyr - np.median(gyr, axis=0), axis=1)
+    bias = gyr[: int(bench.rate)].mean(axis=0)
+    bar = 8 * bench.gyr_noise + 2 * EARTH
+    for i in range(len(gyr)):
+        if moving[i] < bar:
+            bias = keep * bias + (1 - keep) * gyr[i]
+        gyr[i] -= bias
+    return replace(written, samples=replace(s, gyr=gyr))
+
+
+def cut_toward_zero(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Accelerations are cut toward zero to a grain larger than their noise."""
+    s = written.samples
+    grain = bench.acc_noise * rng.uniform(2, 20)
+    ending = str(rng.choice(["csv", "parquet"]))
+    acc = np.trunc(s.acc / grain) * grain
+    return replace(written, samples=replace(s, acc=acc), ending=ending)
+
+
+def gravity_said(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The gravity that is written down is off by 0.05 to 0.3 %."""
+    off = rng.uniform(5e-4, 3e-3) * rng.choice([-1, 1])
+    return _site(written, gravity=bench.gravity * (1 + off))
+
+
+def clipped(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The full scale is 8 to 9.6 m/s^2."""
+    s, most = written.samples, rng.uniform(8, 9.6)
+    return replace(written, samples=replace(s, acc=np.clip(s.acc, -most, most)))
+
+
+BEFORE: dict[str, Before] = {
+    "a repeated angle off": repeated_angle,
+    "gauge long": gauge_long,
+    "a position off": position_off,
+    "table tilted": table_tilted,
+}
+
+AFTER: dict[str, After] = {
+    "positions swapped": swapped,
+    "latitude not said": latitude_unsaid,
+    "other hemisphere": other_hemisphere,
+    "level and angles not said": level_unsaid,
+    "mounting not said": default_mounting,
+    "windows overlapping": overlapping,
+    "windows listed 20 times": listed_often,
+    "g labelled m/s²": acc_in_g,
+    "deg/s labelled rad/s": gyr_in_deg,
+    "rad/s labelled deg/s": gyr_said_deg,
+    "time in ns": time_in_ns,
+    "an output reversed": axis_turned_round,
+    "outputs exchanged": axes_exchanged,
+    "a gyroscope copied": gyr_copied,
+    "mean of acc removed": acc_mean_taken,
+    "bias of gyr tracked": gyr_tracked,
+    "cut toward zero": cut_toward_zero,
+    "gravity said wrongly": gravity_said,
+    "clipped": clipped,
+}
+
+
+def tables(bench: Bench) -> dict[str, Any]:
+    """What an honest session.toml says of a bench."""
+    site: dict[str, Any] = {"latitude_deg": bench.latitude, "height_m": bench.height}
+    if bench.level_deg is not None:
+        site["level_deg"] = bench.level_deg
+    if bench.angles_deg is not None and not bench.imported:
+        site["angle_setting_deg"] = bench.angles_deg
+    rows = []
+    for (alpha, beta), (start, end) in zip(bench.angles, bench.windows, strict=True):
+        row = {"start_s": float(start), "end_s": float(end)}
+        if not bench.imported:
+            row |= {"alpha_deg": float(alpha), "beta_deg": float(beta)}
+        rows.append(row)
+    about: dict[str, Any] = {
+        "format": 1,
+        "device": {"name": "drawn", "serial": "N-1", "grade": "tactical"},
+        "site": site,
+        "frame": {"mounting": list(bench.mounting)},
+        "position": rows,
+    }
+    if not bench.imported:
+        about["run"] = {"procedure": "positions"}
+    return about
+
+
+def session(bench: Bench, names: tuple[str, ...], rng: Rng) -> Written:
+    """A session with some mistakes."""
+    for name in names:
+        if name in BEFORE:
+            bench = BEFORE[name](bench, rng)
+    written = Written(tables(bench), recorded(bench, rng))
+    for name in names:
+        if name in AFTER:
+            written = AFTER[name](written, bench, rng)
+    return written

@@ -33,7 +33,7 @@ class Layout:
 
 
 @dataclass(frozen=True, slots=True)
-class Alike:
+class AlikeFields:
     """Frames of one layout.
 
     Attributes
@@ -97,7 +97,7 @@ def in_order(parts: Iterable[RawSamples]) -> RawSamples | None:
 Walk = Callable[[bytes], Layout | None]
 
 
-def sort_by_layout(data: Bytes, found: FrameScan, walk: Walk) -> Iterator[Alike]:
+def sort_by_layout(data: Bytes, found: FrameScan, walk: Walk) -> Iterator[AlikeFields]:
     """Sort frames by layout; those that `walk` knows no layout for are left out."""
     left = np.arange(len(found.starts))
     lengths = found.ends - found.starts
@@ -117,5 +117,5 @@ def sort_by_layout(data: Bytes, found: FrameScan, walk: Walk) -> Iterator[Alike]
         if not match.all():
             same, frames = same[match], frames[match]
             candidates[candidates] = match
-        yield Alike(same, frames, layout.fields)
+        yield AlikeFields(same, frames, layout.fields)
         left = left[~candidates]

@@ -28,7 +28,13 @@ from fieldcal.drivers.framing import (
     Mask,
     find_headed_frames,
 )
-from fieldcal.drivers.layouts import Alike, Layout, RawSamples, in_order, sort_by_layout
+from fieldcal.drivers.layouts import (
+    AlikeFields,
+    Layout,
+    RawSamples,
+    in_order,
+    sort_by_layout,
+)
 from fieldcal.drivers.options import Options
 
 SYNC = b"\x75\x65"
@@ -81,7 +87,7 @@ def _check(data: Bytes, starts: Index, ends: Index) -> Mask:
     return good
 
 
-def _samples(some: Alike) -> RawSamples:
+def _samples(some: AlikeFields) -> RawSamples:
     six = np.hstack([some.numbers(ACC, ">f4", 3) * G0, some.numbers(GYR, ">f4", 3)])
     temperature = some.numbers(TEMPERATURE, ">f4", 3)[:, 2]
     stamps = some.numbers(REFERENCE, ">u8", 1)[:, 0] * 1e-9

@@ -24,7 +24,13 @@ from fieldcal.drivers.checks import crc16
 from fieldcal.drivers.clock import Clock
 from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index
-from fieldcal.drivers.layouts import Alike, Layout, RawSamples, in_order, sort_by_layout
+from fieldcal.drivers.layouts import (
+    AlikeFields,
+    Layout,
+    RawSamples,
+    in_order,
+    sort_by_layout,
+)
 from fieldcal.drivers.options import Options
 
 SYNC = 0xFA
@@ -104,7 +110,7 @@ class VectornavCodec(Codec):
         return self._timed(self._clock, in_order(parts), t_host)
 
 
-def _samples(some: Alike, pair: tuple[int, int]) -> RawSamples:
+def _samples(some: AlikeFields, pair: tuple[int, int]) -> RawSamples:
     acc, gyr = (some.numbers(key, "<f4", 6 if key == IMU else 3) for key in pair)
     temperature = some.numbers(TEMPERATURE, "<f4", 1)
     if MAG_PRES in some.fields:

@@ -30,7 +30,13 @@ from fieldcal.drivers.framing import (
     Mask,
     find_headed_frames,
 )
-from fieldcal.drivers.layouts import Alike, Layout, RawSamples, in_order, sort_by_layout
+from fieldcal.drivers.layouts import (
+    AlikeFields,
+    Layout,
+    RawSamples,
+    in_order,
+    sort_by_layout,
+)
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
 
@@ -111,7 +117,7 @@ def walk(message: bytes) -> Layout | None:
     return Layout(fields, tuple(marks))
 
 
-def _samples(some: Alike) -> RawSamples | None:
+def _samples(some: AlikeFields) -> RawSamples | None:
     acc, gyr = _reals(some, *ACC), _reals(some, *GYR)
     if acc is None and gyr is None:
         return None
@@ -126,7 +132,7 @@ def _samples(some: Alike) -> RawSamples | None:
     )
 
 
-def _reals(some: Alike, *kinds: int) -> Array | None:
+def _reals(some: AlikeFields, *kinds: int) -> Array | None:
     """Values of the first of these kinds that there is, (m, n)."""
     key = some.first_of(tuple(kind | p for kind in kinds for p in range(len(BYTES))))
     if key is None:

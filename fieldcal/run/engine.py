@@ -27,7 +27,7 @@ from fieldcal.run.operator.protocol import Display, Operator, Wish
 from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import GAP, PositionWait, force
-from fieldcal.run.warm_up import WarmUp
+from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window
 
@@ -63,7 +63,7 @@ class Engine:
         recorder: MarkedRecorder,
         give_up: float | None = None,
         taken: dict[int, Average] | None = None,
-        warm_up: WarmUp | None = None,
+        warm_up: WarmUpWatch | None = None,
     ) -> None:
         self._driver = driver
         self._operator = operator

@@ -34,7 +34,7 @@ from fieldcal.run.engine import Engine
 from fieldcal.run.interruptions import RepeatPosition
 from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, Task
-from fieldcal.run.warm_up import WarmUp
+from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.folder import RESULT, Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average, average
@@ -75,7 +75,7 @@ class SessionRun:
         self._taken = {} if taken is None else taken
         self._lost: tuple[float, DeviceError] | None = None
         wait = float(task.run.get("warm_up_s", WARM_UP))
-        self._warm_up = WarmUp(limits.temperature_rate_k_min, wait)
+        self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
 
     def run(self, driver: Driver) -> Calibration:
         """Carry the task out, beginning with a device that is open; it is closed.

@@ -26,7 +26,7 @@ FEWEST = 5
 """Seconds before anything is said."""
 
 
-class WarmUp:
+class WarmUpWatch:
     """Temperatures as they come, and how fast they change.
 
     Parameters

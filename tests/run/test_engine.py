@@ -23,7 +23,7 @@ from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait
-from fieldcal.run.warm_up import WarmUp
+from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
@@ -340,7 +340,7 @@ def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
     driver = InProcess(VirtualDevice(replace(Profile(), temperature=warming), seed=3))
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         turner = Turner(driver)
-        warm_up = WarmUp(0.5, 40.0)
+        warm_up = WarmUpWatch(0.5, 40.0)
         engine = Engine(driver, turner, ABOUT, recorder, warm_up=warm_up)
         engine.run(hold_all(TWO[:1], 10.0))
     assert "still warming up" in turner.told[0] and "Enter goes on" in turner.told[0]
@@ -355,7 +355,7 @@ def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("step", "rate"), [(0.0, 0.0), (1.0, 0.0), (0.01, 0.3)])
 def test_a_steady_temperature_is_no_warming_up(step: float, rate: float) -> None:
     for seed in range(20):
-        warm_up = WarmUp(0.5, 600.0)
+        warm_up = WarmUpWatch(0.5, 600.0)
         for block in _temperatures(seed, step, rate):
             warm_up.add(block)
             assert not warm_up.says
@@ -365,7 +365,7 @@ def test_a_steady_temperature_is_no_warming_up(step: float, rate: float) -> None
 def test_warming_up_is_noticed_also_in_whole_degrees(
     step: float, within: float
 ) -> None:
-    warm_up, said = WarmUp(0.5, 600.0), np.inf
+    warm_up, said = WarmUpWatch(0.5, 600.0), np.inf
     for block in _temperatures(1, step, 4.0):
         warm_up.add(block)
         if warm_up.says:

@@ -31,7 +31,7 @@ from fieldcal.physics.experience import Experience
 
 
 @dataclass(frozen=True, slots=True)
-class Alike:
+class AlikeGroups:
     """Groups of causes that are alike in width.
 
     Attributes
@@ -50,7 +50,7 @@ class Alike:
     variant: Index
 
     @classmethod
-    def of(cls, some: Sequence[tuple[int, int, Group]]) -> Alike:
+    def of(cls, some: Sequence[tuple[int, int, Group]]) -> AlikeGroups:
         """Of groups with the numbers of their causes and variants."""
         columns = np.array([g.columns for _, _, g in some])
         blocks, block = np.unique(columns, axis=0, return_inverse=True)
@@ -112,13 +112,13 @@ class Dictionary(ColumnTable):
         return out
 
     @cached_property
-    def by_width(self) -> list[Alike]:
+    def by_width(self) -> list[AlikeGroups]:
         """Groups of causes, those alike in width together."""
         found: dict[int, list[tuple[int, int, Group]]] = {}
         for i, cause in enumerate(self.causes):
             for j, group in enumerate(cause.variants):
                 found.setdefault(len(group.columns), []).append((i, j, group))
-        return [Alike.of(some) for some in found.values()]
+        return [AlikeGroups.of(some) for some in found.values()]
 
     @cached_property
     def chances(self) -> Array:

@@ -90,13 +90,34 @@ class Installed:
 
     @property
     def missing(self) -> list[str]:
-        """Parameters that have not come."""
+        """Parameters that have not come, or came as no number."""
         known = names(self.autopilot, self.instance).values()
-        return [name for some in known for name in some if name not in self.values]
+        return [
+            name
+            for some in known
+            for name in some
+            if not np.isfinite(self.values.get(name, np.nan))
+        ]
+
+    @property
+    def impossible(self) -> str:
+        """What no autopilot works with, one sentence; empty if all can be."""
+        scales = names(self.autopilot, self.instance).get("acc_scale", ())
+        odd = {n: v for n, v in self.values.items() if not np.isfinite(v)}
+        odd |= {n: v for n in scales if (v := self.values.get(n, 1.0)) <= 0}
+        if not odd:
+            return ""
+        listed = ", ".join(f"{name} = {value:g}" for name, value in odd.items())
+        return (
+            f"the autopilot says {listed}, which no sensor can be scaled by: its"
+            " installed calibration is damaged; set it anew, and record again"
+        )
 
     @property
     def remark(self) -> str:
         """What the operator should know of it, one sentence; empty if nothing."""
+        if self.impossible:
+            return self.impossible
         on = [n for n, v in self.values.items() if n.endswith("_ENABLE") and v]
         if not on:
             return ""
@@ -126,6 +147,8 @@ class Installed:
             If a parameter is not known, or the board is mounted turned.
 
         """
+        if self.impossible:
+            raise InputError(self.impossible)
         known = names(self.autopilot, self.instance)
         if self.missing or not known:
             lacking = ", ".join(self.missing) or "any parameter of this autopilot"
@@ -157,7 +180,7 @@ class Installed:
         return {
             "autopilot": self.autopilot,
             "instance": self.instance,
-            "parameters": self.values,
+            "parameters": {n: v for n, v in self.values.items() if np.isfinite(v)},
             "missing": self.missing,
             "taken_out": self.taken_out,
         }

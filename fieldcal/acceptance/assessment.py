@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.acceptance.centred import centred, tracked
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
 from fieldcal.acceptance.verification import Verification, planned, verify
 from fieldcal.calibration import Calibration
@@ -61,6 +62,8 @@ def assess(
         link=_link(session.block, still.averages, marks),
         verification=_verification(found, session, marks, limits),
         family=earlier,
+        tracked=tracked(still.at_rest(session).averages),
+        centred=centred(session.block),
         doubts=_doubts(marks),
     )
     warnings += [w for w in _restarts(marks) if w not in warnings]

@@ -15,7 +15,9 @@ import numpy as np
 
 from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.level import level_missing, tilt_is_found
+from fieldcal.acceptance.site import gravity_unknown
 from fieldcal.acceptance.verification import Verification
+from fieldcal.acceptance.witnesses import has_witnesses, left_out, witnesses
 from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import ParameterName, group_of, sensor_of
@@ -78,6 +80,8 @@ class Circumstances:
     link : counts of `driver.Health`; empty where unknown
     verification : of a position that was not fitted, if one was held
     family : earlier calibrations of the device, oldest first; None without a history
+    tracked : probability of gyroscopes' means so close to zero, and what was seen
+    centred : the same of accelerometers' means over the recording, by channel
     doubts : sentences about what happened on the way that make it NO-GO
 
     """
@@ -86,6 +90,8 @@ class Circumstances:
     link: Mapping[str, int] | None = None
     verification: Verification | None = None
     family: Sequence[Calibration] | None = None
+    tracked: tuple[float, str] = (1.0, "")
+    centred: Sequence[tuple[str, float]] = ()
     doubts: Sequence[str] = ()
 
 
@@ -96,13 +102,16 @@ def decide(
     circumstances: Circumstances,
 ) -> Decision:
     """Check a calibration against limits."""
+    verification = _verification(circumstances.verification, limits)
     checks = [
         _fit(found, limits),
-        *_odd_positions(found),
+        *_odd_positions(found, verification.ok is True),
         *_uncertainty(found, limits),
+        *_site(found, about),
         *_level(found, about),
+        *_centred(circumstances, limits),
         *_change(found, limits, circumstances.family),
-        _verification(circumstances.verification, limits),
+        verification,
         *_temperature(np.asarray(circumstances.temperatures, float), limits),
         *_link(circumstances.link, limits),
         *(Check("the run", False, doubt) for doubt in circumstances.doubts),
@@ -147,10 +156,13 @@ def _fit(found: Calibration, limits: GradeLimits) -> Check:
     return Check("fit", ok, says, chance, limits.fit_chance, "1")
 
 
-def _odd_positions(found: Calibration) -> list[Check]:
-    """Name a position that does not fit the others; the decision stays."""
+def _odd_positions(found: Calibration, verified: bool) -> list[Check]:
+    """Name a position that does not fit the others; without witnesses it is NO-GO."""
     doubt = DoubtfulPosition.from_json(found.info.get("doubtful_position"))
-    return [Check("positions", None, doubt.sentence)] if doubt else []
+    checks = [Check("positions", None, doubt.sentence)] if doubt else []
+    if verified or not left_out(found):
+        return checks
+    return [*checks, Check("witnesses", has_witnesses(found), witnesses(found))]
 
 
 def _first(found: Calibration) -> str:
@@ -196,6 +208,12 @@ def _by_angles(found: Calibration, limits: GradeLimits) -> str:
     )
 
 
+def _site(found: Calibration, about: Description) -> list[Check]:
+    """Whether gravity is known, which every accelerometer's scale is measured by."""
+    unknown = gravity_unknown(about) if "acc_scale" in found.groups else ""
+    return [Check("site", False, unknown)] if unknown else []
+
+
 def _level(found: Calibration, about: Description) -> list[Check]:
     """Whether the level of the base is known: an unseen tilt acts as a bias."""
     if tilt_is_found(found) or "acc_bias" not in found.groups:
@@ -205,6 +223,29 @@ def _level(found: Calibration, about: Description) -> list[Check]:
         return [Check("level", False, level_missing(about))]
     says = f"the base is level to ± {level:.2g}°, as stated; each ± includes it"
     return [Check("level", True, says)]
+
+
+def _centred(seen: Circumstances, limits: GradeLimits) -> list[Check]:
+    """Whether a bias was taken out of what was recorded, and is not in it any more."""
+    checks = []
+    chance, what = seen.tracked
+    if chance < limits.fit_chance:
+        says = (
+            "the gyroscopes' means at rest lie closer to zero than their own noise"
+            f" allows {what}: the device takes its bias out while it rests, so the"
+            " recording does not hold it; switch that off (gyro bias estimation, auto"
+            " calibration, zero velocity update), and record again"
+        )
+        checks.append(Check("bias taken out", False, says, chance, limits.fit_chance))
+    odd = [name for name, p in seen.centred if p < limits.fit_chance]
+    if odd:
+        says = (
+            f"the mean of the whole recording is zero in {', '.join(odd)}, closer than"
+            " noise allows: whoever wrote it took the mean out, and the bias with it;"
+            " record or export what the device sends"
+        )
+        checks.append(Check("mean taken out", False, says))
+    return checks
 
 
 def _change(

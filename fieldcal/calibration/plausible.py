@@ -2,7 +2,8 @@
 
 A scale factor far from nominal is another unit or full scale, a bias of half a g a
 device or a driver that takes its mean out, a scale factor of the other sign an axis
-that points the other way: facts that are wrong, however well everything else agrees.
+that points the other way, a base out of level by tens of degrees another mounting:
+facts that are wrong, however well everything else agrees.
 """
 
 from __future__ import annotations
@@ -20,6 +21,10 @@ UNREAL = {"acc_scale": 0.1, "gyr_scale": 0.1, "acc_bias": 5.0, "gyr_bias": 0.5}
 """Change from nominal that no sensor has: 10 %, three times what consumer grade is sold
 with; half a g; 30 deg/s."""
 
+TILTS, STEEP = ("angle_offset", "base_tilt"), 10.0
+"""Groups in degrees that say how a base is tilted, and the tilt from which it is none:
+session.toml takes no larger one for a level either."""
+
 
 def senseless(
     names: Sequence[str], values: Array, sigma: Array, nominal: Nominal
@@ -28,6 +33,8 @@ def senseless(
     said = []
     for name, value, s in zip(names, values, sigma, strict=True):
         parameter = ParameterName.of(name)
+        if parameter.group in TILTS:
+            said += _tilt(name, float(value), float(s))
         if parameter.group not in UNREAL:
             continue
         usual = getattr(nominal, parameter.group)[parameter.axis]
@@ -36,6 +43,16 @@ def senseless(
         else:
             said += _bias(name, float(value), float(s), usual, nominal)
     return said
+
+
+def _tilt(name: str, value: float, sigma: float) -> list[str]:
+    if abs(value) - UNSEEN * sigma <= STEEP:
+        return []
+    return [
+        f"{name} is {value:.3g}° ± {sigma:.2g}°: no base is that far out of level; the"
+        " device is mounted otherwise than [frame] mounting says (a z-up unit is"
+        ' ["+x", "-z", "+y"]), or was turned otherwise'
+    ]
 
 
 def _scale(name: str, value: float, sigma: float, usual: float) -> list[str]:

@@ -182,6 +182,7 @@ def _record(
 ) -> tuple[Calibration, dict[str, Any] | None, Sequence[Companion]]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
     from fieldcal.acceptance.level import level_unknown
+    from fieldcal.acceptance.site import gravity_unknown
     from fieldcal.commands.run_device import device
     from fieldcal.run.companions import record_companions
     from fieldcal.run.session_run import SessionRun, recorded_averages
@@ -200,8 +201,9 @@ def _record(
         )
         operator = stack.enter_context(_operator(args, task, mover, folder))
         recorder.tell = operator.tell
-        if unseen := level_unknown(task.about):
-            operator.tell(unseen)
+        for unseen in (level_unknown(task.about), gravity_unknown(task.about)):
+            if unseen:
+                operator.tell(unseen)
         if args.resume:
             recorder.mark("resumed", taken=sorted(taken))
         how_long = (_patience(args), _give_up(args, task))

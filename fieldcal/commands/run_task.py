@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 EXACT_DEG = 0.001
 """How well a virtual fixture sets its angles, deg: as it turns them, to rounding."""
 
+VIRTUAL_DEG = 45.0
+"""Latitude that a virtual device is told where nobody says one."""
+
 OFF = "angle"
 """What is in the name of every effect that makes it stand elsewhere."""
 
@@ -43,7 +46,7 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         name, tables = "the options", _tables_of_options(args)
     else:
         name, tables = args.procedure, _tables_of_file(args)
-    task = plan_file.task(overlay(tables, _site(args)), name)
+    task = plan_file.task(_stood(overlay(tables, _site(args))), name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
 
@@ -97,6 +100,19 @@ def _site(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
     said = {"level_deg": args.level, "angle_setting_deg": angles}
     site = {key: value for key, value in said.items() if value is not None}
     return {"site": site} if site else {}
+
+
+def _stood(tables: dict[str, Any]) -> dict[str, Any]:
+    """With the place of a virtual device, which stands where it is told."""
+    run, site = tables.get("run"), tables.get("site", {})
+    mover = run.get("mover") if isinstance(run, dict) else None
+    if not isinstance(mover, dict) or mover.get("kind") != "virtual":
+        return tables
+    if "control" in mover or not isinstance(site, dict):
+        return tables
+    if any(word in str(mover.get("options")) for word in ("--latitude", "--gravity")):
+        return tables
+    return {**tables, "site": {"latitude_deg": VIRTUAL_DEG, **site}}
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:

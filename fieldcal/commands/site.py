@@ -20,7 +20,7 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
     else:
         add("--serial", help="its serial number, the key of its history")
     add("--grade", choices=("tactical", "navigation"), help="default: tactical")
-    add("--latitude", type=float, metavar="DEG", help="default: 45")
+    add("--latitude", type=float, metavar="DEG", help="which says how strong gravity is")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
     add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
     add(
@@ -35,7 +35,7 @@ def site_tables(args: argparse.Namespace, name: str) -> dict[str, Any]:
     """Tables of a session.toml from the options; `name` where none is given."""
     tables = {
         "device": {"name": name, "grade": "tactical"},
-        "site": {"latitude_deg": 45.0, "height_m": 0.0},
+        "site": {"height_m": 0.0},
         "frame": {"mounting": ["+x", "+y", "+z"]},
     }
     return overlay(tables, given_tables(args))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from fieldcal.model.rows.rest_onset import arrivals
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import Term
 from fieldcal.physics.effect import Chain, Line, Scatter
+from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
 
 SHORTEST = 20
@@ -68,8 +68,9 @@ def prepare(block: Block, about: Description) -> Prepared:
 
     """
     _refuse_empty(block, about)
+    refuse_copies(block)
     about = about.in_time()
-    _refuse_overlap(about)
+    about.refuse_overlap()
     known = known_terms(about.model)
     checked = check(block, about)
     rest = arrivals(checked.block, about, checked.noise)
@@ -118,18 +119,6 @@ def _refuse_empty(block: Block, about: Description) -> None:
         )
     if not (np.isfinite(block.acc).any() or np.isfinite(block.gyr).any()):
         raise InputError("the samples hold no output of any sensor; record them again")
-
-
-def _refuse_overlap(about: Description) -> None:
-    """Windows are to follow each other, so that turns lie between them."""
-    held = [(w, n) for w, n in zip(about.windows, about.numbers, strict=True) if w]
-    for (window, number), (then, following) in pairwise(held):
-        if then[0] < window[1]:
-            raise InputError(
-                f"position {following + 1}: its window starts at {then[0]:g} s,"
-                f" before that of position {number + 1} ends ({window[1]:g} s): the"
-                " device cannot be in both; mend start_s and end_s"
-            )
 
 
 def _refuse_turning(rows: Rows, about: Description) -> None:

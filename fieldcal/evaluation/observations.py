@@ -17,10 +17,14 @@ from fieldcal.core.errors import FieldcalError, SessionError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Grain
 from fieldcal.core.version import __version__
 from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
+from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, LearnedNoise
+
+ROUNDED = 1e-6
+"""Share of a full scale that units and rounding may make of it."""
 
 
 def observations(
@@ -112,6 +116,8 @@ def rests(session: Session) -> Rests:
     ------
     SessionError
         If it has no position, or no window of any position can be used.
+    InputError
+        If windows overlap, or a channel is another's copy.
 
     """
     if not session.positions:
@@ -119,9 +125,11 @@ def rests(session: Session) -> Rests:
             f"{session.folder}: session.toml has no [[position]]: write down when each"
             " position was held, or let fieldcal import find the still stretches"
         )
+    session.about.refuse_overlap()
     block = session.block
+    refuse_copies(block)
     taken: dict[int, Average] = {}
-    warnings = list(session.warnings)
+    warnings = [*session.warnings, *_beyond(session)]
     noise: LearnedNoise | None = None
     grain = grain_of(session)
     # each tells the noise for the next
@@ -147,6 +155,21 @@ def rests(session: Session) -> Rests:
     rows = sorted(taken)
     averages, dead = _without_dead([taken[i] for i in rows])
     return Rests(tuple(rows), tuple(averages), (*warnings, *dead))
+
+
+def _beyond(session: Session) -> list[str]:
+    """Sentences where samples lie beyond the full scale that session.toml states."""
+    said = []
+    triads = {"acceleration": session.block.acc, "angular_rate": session.block.gyr}
+    for (kind, values), si in zip(triads.items(), SI, strict=True):
+        limit = session.about.limits.get(kind, np.inf)
+        most = float(np.nanmax(np.abs(values), initial=0.0))
+        if most > limit * (1 + ROUNDED):
+            said.append(
+                f"samples reach {most:.4g} {si}, beyond [range] {kind} ="
+                f" {limit:.4g} {si}: range or unit in session.toml is another"
+            )
+    return said
 
 
 def _named(session: Session, row: int) -> str:

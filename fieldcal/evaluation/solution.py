@@ -79,12 +79,28 @@ class Laid:
         return observations(self.about, averages, range(len(averages)))
 
     @cached_property
-    def prepared(self) -> Prepared | None:
-        """The recording, checked and reduced; None where it is too short for that."""
+    def examined(self) -> tuple[Prepared | None, str]:
+        """The recording, checked and reduced, or why it cannot be."""
         try:
-            return prepare(self.session.block, self.about)
-        except InputError:
-            return None
+            return prepare(self.session.block, self.about), ""
+        except InputError as error:
+            return None, str(error)
+
+    @property
+    def prepared(self) -> Prepared | None:
+        """The recording, checked and reduced; None where it cannot be."""
+        return self.examined[0]
+
+    @property
+    def unexamined(self) -> list[str]:
+        """Sentence where nothing but the means of the windows was looked at."""
+        why = self.examined[1]
+        if not why:
+            return []
+        return [
+            f"only the windows' means are used, neither samples nor turns nor [model],"
+            f" since the recording cannot be examined: {why}"
+        ]
 
     def recorded(
         self, turns: bool, shown: Explanation | None = None
@@ -135,6 +151,7 @@ def solved(
     printed = bool(asked.get("as_printed"))
     shown = None if printed or laid.prepared is None else explain(laid.prepared)
     asked, notes = _as_shown(asked, shown)
+    notes += [] if printed else laid.unexamined
     recorded = None if printed else laid.recorded(turns != "no", shown)
     found = solve(laid.observations, recorded=recorded, **asked)
     if turns == "yes":

@@ -10,6 +10,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +101,11 @@ class Description:
         """Latitude in rad."""
         return float(np.deg2rad(self.latitude_deg))
 
+    @property
+    def gravity_said(self) -> bool:
+        """Whether somebody said how strong gravity is, or where that is."""
+        return bool({"latitude_deg", "gravity"} & set(self.raw.get("site", {})))
+
     def in_time(self) -> Description:
         """The same with the positions in the order in which they were held."""
         begins = [w[0] for w in self.windows if w is not None]
@@ -113,6 +119,28 @@ class Description:
             windows=tuple(self.windows[i] for i in order),
             numbers=tuple(self.numbers[i] for i in order),
         )
+
+    def refuse_overlap(self) -> None:
+        """Refuse windows that do not follow each other.
+
+        Samples in two windows would count twice, and turns lie between windows.
+
+        Raises
+        ------
+        InputError
+            Naming both positions.
+
+        """
+        ordered = self.in_time()
+        rows = zip(ordered.windows, ordered.numbers, strict=True)
+        held = [(window, number) for window, number in rows if window]
+        for (window, number), (then, following) in pairwise(held):
+            if then[0] < window[1]:
+                raise InputError(
+                    f"position {following + 1}: its window starts at {then[0]:g} s,"
+                    f" before that of position {number + 1} ends ({window[1]:g} s): the"
+                    " device cannot be in both; mend start_s and end_s"
+                )
 
     def numbered(self, positions: Iterable[int]) -> tuple[int, ...]:
         """Return what session.toml counts them as; a recording without any is 0."""

@@ -299,3 +299,55 @@ def test_a_wrong_file_of_limits_names_file_key_and_remedy(
     with pytest.raises(InputError) as error:
         limits.read("tactical", path)
     assert says in str(error.value) and "limits.toml" in str(error.value)
+
+
+def test_gravity_that_nobody_said_is_no_go_and_one_that_was_is_not() -> None:
+    known = {"temperatures": [21.0], "link": LINK}
+    seen = Circumstances(**known)  # type: ignore[arg-type]
+    unsaid = decide(calibration(), description.parse({}), BOUNDS, seen)
+    assert not unsaid.go and len(unsaid.reasons) == 1
+    assert "--latitude" in unsaid.reasons[0] and "9.780 m/s²" in unsaid.reasons[0]
+    for site in ({"latitude_deg": 0.0}, {"gravity": G}):
+        about = description.parse({"site": site})
+        assert decide(calibration(), about, BOUNDS, seen).go
+    gyroscopes = _only(calibration(), ("gyr_bias",))
+    made = decide(gyroscopes, description.parse({}), BOUNDS, seen)
+    assert "site" not in [check.name for check in made.checks]
+
+
+@pytest.mark.parametrize(
+    ("held", "method", "go"),
+    [(6, "joint", True), (5, "joint", True), (4, "joint", False),
+     (12, "scalar", True), (11, "scalar", False)],
+)  # fmt: skip
+def test_a_position_left_out_is_go_only_with_witnesses(
+    held: int, method: str, go: bool
+) -> None:
+    """Six parameters take two windows with angles, or six lengths of the force."""
+    chances = [0.0] * (held - 1) + [0.999]
+    found = replace(
+        calibration(),
+        method=method,  # type: ignore[arg-type]
+        info={**calibration().info, "bad_position": chances},
+    )
+    if method == "scalar":
+        found = replace(found, info={**found.info, "bad_position": [*chances, 0.0]})
+    made = decided(found)
+    assert made.go == go
+    said = [check.says for check in made.checks if check.name == "witnesses"]
+    assert len(said) == 1 and "1 position disagreed" in said[0]
+    assert ("--verify" in said[0]) == (not go)
+
+
+def test_a_position_that_was_not_fitted_is_a_witness() -> None:
+    chances = [0.0, 0.0, 0.0, 0.999]
+    found = calibration()
+    found = replace(found, info={**found.info, "bad_position": chances})
+    assert "witnesses" in [c.name for c in decided(found).checks if c.ok is False]
+    about = description.parse({"site": {"gravity": G}})
+    held = Position.deg(30, 0)
+    truth = 0.1 + np.array([-G * np.sin(np.pi / 6), -G * np.cos(np.pi / 6), 0.0])
+    mean = np.concatenate([truth, np.full(3, 0.01)])
+    window = Average(mean, np.eye(6) * 1e-8, 21.0, 3000, 0.0, 30.0)
+    agrees = verify(found, about, held, window)
+    assert decided(found, verification=agrees).go

@@ -133,7 +133,7 @@ def test_a_log_of_an_autopilot_plays_through_the_same_code(shared: Path) -> None
 def test_a_recorded_session_is_taken_through_a_procedure_again(tmp_path: Path) -> None:
     """The arrivals in it are of long ago; they are the clock while it plays."""
     run = ["run", "two_position", "--headless", "--seconds=10", "--level=0.001"]
-    run += ["--angles=0.001"]
+    run += ["--angles=0.001", "--latitude=45"]
     virtual = ["--virtual=--can slcan", "--speed", "20", "-o", str(tmp_path / "first")]
     assert main([*run, *virtual]) == 0
     url = f"replay:{tmp_path / 'first'}?speed=20"

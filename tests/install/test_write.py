@@ -246,3 +246,16 @@ def test_a_session_of_no_autopilot_is_refused(tmp_path: Path) -> None:
         recorder.mark("device", serial="7")
     with pytest.raises(InputError, match="not recorded from an autopilot"):
         prepared(Session.open(tmp_path / "s"), calibration())
+
+
+@pytest.mark.parametrize("scale", [float("nan"), 0.0, -1.0])
+def test_a_damaged_installed_scale_is_said_and_never_built_on(scale: float) -> None:
+    there = installed()
+    name = names(ARDUPILOT, 0)["acc_scale"][1]
+    there.values[name] = scale
+    assert name in there.remark and "set it anew" in there.remark
+    with pytest.raises(InputError, match=name):
+        there.next(np.array(BIAS), np.array(SCALE), np.array(GYR))
+    json.dumps(there.as_table(), allow_nan=False)
+    again = Installed.from_table(there.as_table())
+    assert again.missing == ([name] if np.isnan(scale) else [])

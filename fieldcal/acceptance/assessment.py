@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.acceptance.centred import centred, tracked
+from fieldcal.acceptance.centred import biases_taken_out
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
 from fieldcal.acceptance.verification import Verification, planned, verify
 from fieldcal.calibration import Calibration
@@ -57,14 +57,14 @@ def assess(
             earlier = [run.calibration for run in family(runs)]
         except FieldcalError as error:
             warnings.append(str(error))
+    held = still.at_rest(session).averages
+    taken_out = biases_taken_out(held, session.block, limits.fit_chance)
     circumstances = Circumstances(
         temperatures=[a.temperature for a in still.averages],
         link=_link(session.block, still.averages, marks),
         verification=_verification(found, session, marks, limits),
         family=earlier,
-        tracked=tracked(still.at_rest(session).averages),
-        centred=centred(session.block),
-        doubts=_doubts(marks),
+        doubts=[*_doubts(marks), *taken_out],
     )
     warnings += [w for w in _restarts(marks) if w not in warnings]
     made = decide(found, session.about, limits, circumstances)

@@ -1,6 +1,6 @@
 """Outputs that somebody has centred: their mean is closer to zero than noise allows.
 
-Means of n windows, each with its standard error, of an output with any offset at all have
+Means of n windows of an output with any offset at all, each with its error, have
 
     chi2 = sum over windows of (mean / sigma)^2,   P(chi2 or less; n)              (1)
 
@@ -27,6 +27,37 @@ from fieldcal.windows import Average
 
 LEAST = 3
 """Windows below which three axes say too little, (1)."""
+
+
+def biases_taken_out(
+    windows: Sequence[Average], block: Block, least: float
+) -> list[str]:
+    """Sentences about biases that are not in the recording any more.
+
+    Parameters
+    ----------
+    windows : at rest
+    block : the whole recording
+    least : probability below which it is no chance
+
+    """
+    said = []
+    chance, what = tracked(windows)
+    if chance < least:
+        said.append(
+            "the gyroscopes' means at rest lie closer to zero than their own noise"
+            f" allows {what}: the device takes its bias out while it rests, so the"
+            " recording does not hold it; switch that off (gyro bias estimation, auto"
+            " calibration, zero velocity update), and record again"
+        )
+    odd = [name for name, p in centred(block) if p < least]
+    if odd:
+        said.append(
+            f"the mean of the whole recording is zero in {', '.join(odd)}, closer than"
+            " noise allows: whoever wrote it took the mean out, and the bias with it;"
+            " record or export what the device sends"
+        )
+    return said
 
 
 def tracked(windows: Sequence[Average]) -> tuple[float, str]:

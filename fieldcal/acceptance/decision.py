@@ -80,8 +80,6 @@ class Circumstances:
     link : counts of `driver.Health`; empty where unknown
     verification : of a position that was not fitted, if one was held
     family : earlier calibrations of the device, oldest first; None without a history
-    tracked : probability of gyroscopes' means so close to zero, and what was seen
-    centred : the same of accelerometers' means over the recording, by channel
     doubts : sentences about what happened on the way that make it NO-GO
 
     """
@@ -90,8 +88,6 @@ class Circumstances:
     link: Mapping[str, int] | None = None
     verification: Verification | None = None
     family: Sequence[Calibration] | None = None
-    tracked: tuple[float, str] = (1.0, "")
-    centred: Sequence[tuple[str, float]] = ()
     doubts: Sequence[str] = ()
 
 
@@ -109,7 +105,6 @@ def decide(
         *_uncertainty(found, limits),
         *_site(found, about),
         *_level(found, about),
-        *_centred(circumstances, limits),
         *_change(found, limits, circumstances.family),
         verification,
         *_temperature(np.asarray(circumstances.temperatures, float), limits),
@@ -223,29 +218,6 @@ def _level(found: Calibration, about: Description) -> list[Check]:
         return [Check("level", False, level_missing(about))]
     says = f"the base is level to ± {level:.2g}°, as stated; each ± includes it"
     return [Check("level", True, says)]
-
-
-def _centred(seen: Circumstances, limits: GradeLimits) -> list[Check]:
-    """Whether a bias was taken out of what was recorded, and is not in it any more."""
-    checks = []
-    chance, what = seen.tracked
-    if chance < limits.fit_chance:
-        says = (
-            "the gyroscopes' means at rest lie closer to zero than their own noise"
-            f" allows {what}: the device takes its bias out while it rests, so the"
-            " recording does not hold it; switch that off (gyro bias estimation, auto"
-            " calibration, zero velocity update), and record again"
-        )
-        checks.append(Check("bias taken out", False, says, chance, limits.fit_chance))
-    odd = [name for name, p in seen.centred if p < limits.fit_chance]
-    if odd:
-        says = (
-            f"the mean of the whole recording is zero in {', '.join(odd)}, closer than"
-            " noise allows: whoever wrote it took the mean out, and the bias with it;"
-            " record or export what the device sends"
-        )
-        checks.append(Check("mean taken out", False, says))
-    return checks
 
 
 def _change(

@@ -12,7 +12,7 @@ or where a position that was not fitted agrees.
 from __future__ import annotations
 
 from fieldcal.calibration import Calibration
-from fieldcal.solve.words import CERTAIN
+from fieldcal.solve.doubt import CERTAIN
 
 
 def left_out(found: Calibration) -> int:

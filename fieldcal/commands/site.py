@@ -20,7 +20,7 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
     else:
         add("--serial", help="its serial number, the key of its history")
     add("--grade", choices=("tactical", "navigation"), help="default: tactical")
-    add("--latitude", type=float, metavar="DEG", help="which says how strong gravity is")
+    add("--latitude", type=float, metavar="DEG", help="says how strong gravity is")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
     add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
     add(

@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import CHANNELS, Block
+from fieldcal.core.samples import CHANNELS, Array, Block
 
 
 def refuse_copies(block: Block) -> None:
@@ -38,6 +38,6 @@ def refuse_copies(block: Block) -> None:
                     )
 
 
-def _varies(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
+def _varies(values: Array) -> bool:
     known = values[np.isfinite(values)]
     return len(known) > 1 and bool((known != known[0]).any())

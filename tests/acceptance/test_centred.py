@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.acceptance.centred import centred, tracked
+from fieldcal.acceptance.centred import biases_taken_out, centred, tracked
 from fieldcal.core.samples import Block
 from fieldcal.windows import Average
 
@@ -57,3 +57,14 @@ def test_a_recording_without_its_mean() -> None:
     assert all(p == 1.0 for _, p in centred(block))
     block.acc[:] -= block.acc.mean(axis=0)
     assert [name for name, p in centred(block) if p < 1e-9] == ["ax", "ay", "az"]
+
+
+def test_both_are_told_apart_and_said() -> None:
+    rng = np.random.default_rng(4)
+    sound, block = windows(rng, 1.0, bias=1e-3), recording(rng, 5.0)
+    assert biases_taken_out(sound, block, 1e-4) == []
+    (said,) = biases_taken_out(windows(rng, 0.1), block, 1e-4)
+    assert "takes its bias out while it rests" in said
+    block.acc[:, 1] -= block.acc[:, 1].mean()
+    (said,) = biases_taken_out(sound, block, 1e-4)
+    assert "is zero in ay, closer" in said

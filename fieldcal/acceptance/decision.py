@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.acceptance.growth import TIMES, Growth, growth
+from fieldcal.acceptance.harmless import harmless
 from fieldcal.acceptance.level import level_missing, tilt_is_found
 from fieldcal.acceptance.site import gravity_unknown
 from fieldcal.acceptance.verification import Verification
@@ -141,14 +142,17 @@ def _fit(found: Calibration, limits: GradeLimits) -> Check:
     if found.dof <= 0 or not np.isfinite(found.chi2):
         return Check("fit", None, "no degree of freedom is left to check the fit")
     chance = chi2_tail(found.chi2, found.dof)
-    ok = chance >= limits.fit_chance
-    word = "agree" if ok else "do not agree"
+    agree = chance >= limits.fit_chance
+    word = "agree" if agree else "do not agree"
     says = (
         f"the positions {word} with each other: χ² = {found.chi2:.1f} with"
         f" {found.dof} degrees of freedom, probability {chance:.2g}, at least"
         f" {limits.fit_chance:.2g}"
     )
-    return Check("fit", ok, says, chance, limits.fit_chance, "1")
+    if not agree and (small := harmless(found, limits)):
+        says += f"; {small}"
+        agree = True
+    return Check("fit", agree, says, chance, limits.fit_chance, "1")
 
 
 def _odd_positions(found: Calibration, verified: bool) -> list[Check]:

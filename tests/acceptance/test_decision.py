@@ -351,3 +351,19 @@ def test_a_position_that_was_not_fitted_is_a_witness() -> None:
     window = Average(mean, np.eye(6) * 1e-8, 21.0, 3000, 0.0, 30.0)
     agrees = verify(found, about, held, window)
     assert decided(found, verification=agrees).go
+
+
+@pytest.mark.parametrize(
+    ("scatter", "doubt", "go"),
+    [(3.4e-5, 0.0, True), (1.9e-3, 0.0, True), (2.1e-3, 0.0, False),
+     (3.4e-5, 0.5, False), (0.0, 0.0, False), (None, 0.0, False)],
+)  # fmt: skip
+def test_a_misfit_counts_by_what_it_does_to_the_navigator(
+    scatter: float | None, doubt: float, go: bool
+) -> None:
+    found = replace(calibration(), chi2=57.0, dof=22)
+    more = {"extra_scatter": scatter, "bad_position": [0.0, doubt]}
+    made = decided(replace(found, info={**found.info, **more}))
+    fit = next(check for check in made.checks if check.name == "fit")
+    assert (fit.ok, made.go) == (go, go)
+    assert "57.0 with 22" in fit.says and ("no navigator" in fit.says) == go

@@ -126,6 +126,8 @@ class Bump(Chain):
 
     shapes = (Shape("at_s", "s"), Shape("for_s", "s"))
     covariate = "a stretch far beyond the noise"
+    treatment = "mask"
+    place = 2
     decided_by = "the window taken again"
     cure = "Take the window again; nothing else is lost."
     source = "model of this project"

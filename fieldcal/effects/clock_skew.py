@@ -49,6 +49,7 @@ class ClockSkew(Chain):
 
     params = (Param("ppm", "ppm", 2000.0),)
     covariate = "t against t_host"
+    place = 2
     decided_by = "a longer recording, and a host clock kept by a time server"
     cure = (
         "Use the host's times over long stretches, or correct the rate by the "

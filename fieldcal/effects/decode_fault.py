@@ -90,6 +90,7 @@ class DecodeFault(Chain):
 
     params = (Param("step", "LSB", 65536.0),)
     covariate = "clusters 256 LSB apart, jumps at ±2^15"
+    treatment = "mend"
     decided_by = "the byte order and width in the device's manual"
     cure = "Correct byte order, width or sign in the decoder."
     source = "model of this project"

@@ -75,6 +75,7 @@ class Dropped(Chain):
 
     params = (Param("fraction", "1", 0.1),)
     covariate = "gaps in the times or the counter"
+    place = 1
     decided_by = "the link's own count of lost frames"
     cure = "Lower the rate or raise the baud rate; look at cable and connectors."
     source = "model of this project"

@@ -136,6 +136,8 @@ class Mounting(Chain):
 
     misread = True
     covariate = "force at rest is not where it should be"
+    treatment = "mend"
+    place = 1  # a channel with wrong bytes looks like one of another axis
     decided_by = "the drawing on the device, and its data sheet"
     cure = "Correct [frame] mounting, or the unit, by the drawing on the device."
     source = "model of this project"

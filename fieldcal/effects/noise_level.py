@@ -35,6 +35,7 @@ class NoiseLevel(Chain):
     params = (Param("ratio", "1", 10.0),)
     covariate = "spectrum at high frequency"
     seen_in = "spectrum"
+    place = 3
     decided_by = "the axes exchanged: what stays with the axis is the sensor's"
     cure = (
         "Compare with the data sheet; a single axis that is noisier points to a "

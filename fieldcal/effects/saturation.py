@@ -63,6 +63,7 @@ class Saturation(Chain):
 
     params = (Param("limit", "m/s^2 or rad/s", 1e3),)
     covariate = "samples at the rail"
+    treatment = "mask"
     decided_by = "a larger range, or positions that load the axis less"
     cure = "Choose a larger range, or positions that load the axis less."
     source = "model of this project"

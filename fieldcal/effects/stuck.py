@@ -64,6 +64,8 @@ class Stuck(Chain):
 
     shapes = (Shape("from_s", "s"), Shape("to_s", "s"))
     covariate = "runs of equal values"
+    treatment = "mask"
+    place = 1
     decided_by = "the stretch recorded again"
     cure = "Restart the device; if it comes back, the sensor is defective."
     source = "model of this project"

@@ -180,6 +180,13 @@ class Chain(Effect):
     kind = "chain"
     seen_in: ClassVar[Seen] = "samples"
 
+    treatment: ClassVar[Literal["mend", "mask", "note"]] = "note"
+    """What is done about its faults: samples are put right, left out, or kept."""
+
+    place: ClassVar[int] = 0
+    """Its place among those of the same treatment, where one is found less than
+    certainly before another has been dealt with."""
+
     misread: ClassVar[bool] = False
     """Whether session.toml is wrong and not the samples: a calibration of samples that
     are put right is none of those that the device sends."""

@@ -24,12 +24,6 @@ from fieldcal.physics.recording import CheckedSamples, Fault, lsb_of
 from fieldcal.session.description import Description
 from fieldcal.windows.noise import ChannelNoise
 
-MENDING = ("decode_fault", "mounting")
-"""In this order: a channel with wrong bytes looks like one of another axis."""
-
-MASKING = ("saturation", "stuck", "bump")
-NOTING = ("quantisation", "dropped", "clock_skew", "noise_level")
-
 CLIPPED = 1e-3
 """Part of a window at the rail that makes its mean useless."""
 
@@ -69,14 +63,14 @@ def check(block: Block, about: Description) -> Checked:
     usable = np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)])
     faults: list[tuple[str, Fault]] = []
     samples = recording(block, usable, about)
-    for name in MENDING:
+    for name in _treated("mend"):
         for fault in _find(name, samples):
             faults.append((name, fault))
             if fault.mended is not None:
                 six = _mended(block, fault)
                 block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
                 samples = recording(block, usable, about)
-    for name in MASKING:
+    for name in _treated("mask"):
         before = len(faults)
         found = _find(name, samples)
         for fault in _off_rails(found, samples) if name == "stuck" else found:
@@ -86,7 +80,7 @@ def check(block: Block, about: Description) -> Checked:
             _mask(name, fault, usable, samples.windows)
         if len(faults) > before:
             samples = recording(block, usable, about)
-    for name in NOTING:
+    for name in _treated("note"):
         faults += [(name, fault) for fault in _find(name, samples)]
     return Checked(block, usable, tuple(_once(faults)), samples.noise)
 
@@ -97,6 +91,13 @@ def checked_again(checked: Checked, block: Block, about: Description) -> Checked
     samples = recording(block, checked.usable, about)
     faults += [("noise_level", f) for f in _find("noise_level", samples)]
     return replace(checked, faults=tuple(faults))
+
+
+def _treated(treatment: str) -> list[str]:
+    """Ids of the effects on samples with one treatment, in their order."""
+    chain = [e for e in catalogue().values() if isinstance(e, Chain)]
+    some = [e for e in chain if e.treatment == treatment]
+    return [e.id for e in sorted(some, key=lambda e: (e.place, e.id))]
 
 
 def _find(name: str, samples: CheckedSamples) -> list[Fault]:

@@ -22,9 +22,9 @@ import sys
 from pathlib import Path
 from fieldcal.importing.ingest import import_stream
 from fieldcal.importers import open_recording
-from fieldcal.importing.recording import ReadOptions as Wanted
+from fieldcal.importing.recording import ReadOptions
 names = ("t", "ax", "ay", "az", "gx", "gy", "gz")
-recording = open_recording(Path(sys.argv[1]), Wanted(names))
+recording = open_recording(Path(sys.argv[1]), ReadOptions(names))
 name = recording.streams()[0].name
 imported = import_stream(recording, name, Path(sys.argv[2]), {"format": 1}, 1.0)
 # ru_maxrss would begin with that of the process that started this one

@@ -19,6 +19,7 @@ HELP = "say what physics the simulation leaves out of a recording"
 
 EXAMPLE = """\
   fieldcal diagnose bench-7/2026-03-01
+  fieldcal diagnose bench-7/2026-03-01 --details
   fieldcal diagnose bench-7/2026-03-01 --json > diagnosis.json
   fieldcal diagnose bench-7/2026-03-01 --twin bench-7.toml
   fieldcal sim --profile bench-7.toml
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("session", type=Path, metavar="SESSION", help="session folder")
     add("--json", action="store_true", help="print diagnosis.json instead of the view")
+    add("--details", action="store_true", help="all numbers behind the view as well")
     add("--report", action="store_true", help="write report.html as well")
     add(
         "--twin",
@@ -66,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         from fieldcal.commands.diagnosis_view import show
 
-        show(found, again)
+        show(found, again, details=args.details)
         sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.commands.report import write

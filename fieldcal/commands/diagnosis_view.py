@@ -1,17 +1,24 @@
-"""A diagnosis as a person at a terminal reads it."""
+"""A diagnosis as a person at a terminal reads it.
+
+First the verdict and what to do; then each effect in one line and one picture. What is
+behind them follows where it is asked for.
+"""
 
 from __future__ import annotations
 
 from typing import IO, TYPE_CHECKING
 
-from fieldcal.calibration.wording import position_numbers
+from fieldcal.calibration.wording import position_numbers, pretty
 from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
+from fieldcal.diagnosis.wording.lines import format_probability
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from fieldcal.twin import Rerun
 
 STYLES = {
@@ -21,7 +28,16 @@ STYLES = {
     "unexplained": "bold red",
 }
 
-WIDEST = 8
+STEPS = 3
+"""Steps of what to do that are shown without being asked for."""
+
+BAR = 24
+"""Width of a bar of the picture, characters."""
+
+FOLLOWS = 22
+"""Least width of what a mismatch follows, characters: some words on each line."""
+
+WIDEST = 4
 """Cells of the bar that shows how significant a mismatch is."""
 
 BRIEF = 5.0
@@ -29,37 +45,119 @@ BRIEF = 5.0
 
 
 def show(
-    diagnosis: Diagnosis, again: Rerun | None = None, out: IO[str] | None = None
+    diagnosis: Diagnosis,
+    again: Rerun | None = None,
+    out: IO[str] | None = None,
+    details: bool = False,
+    width: int | None = None,
 ) -> None:
-    """Print verdict, mismatch, effects, improvement, calibration, and the replay."""
+    """Print verdict, what to do, effects and picture; all else if `details`.
+
+    `width` is that of the terminal unless it is said.
+    """
     from rich.console import Console
+
+    console = Console(file=out, highlight=False, width=width)
+    _verdict(console, diagnosis)
+    steps = diagnosis.next if details else diagnosis.next[:STEPS]
+    for step in steps or ("Nothing: the simulation has all that this can show.",):
+        _step(console, step)
+    if more := len(diagnosis.next) - len(steps):
+        _step(console, f"{more} more: --details")
+    if diagnosis.lines:
+        console.print(_lines(diagnosis))
+    _picture(console, diagnosis)
+    if details:
+        _details(console, diagnosis)
+    if again is not None:
+        console.print(_replays(again))
+
+
+def _verdict(console: Console, diagnosis: Diagnosis) -> None:
     from rich.text import Text
 
-    console = Console(file=out, highlight=False)
     verdict = diagnosis.verdict.replace("_", " ")
     head = Text(verdict.upper(), style=STYLES[diagnosis.verdict])
     console.print(
         head + Text(f"  probability {format_probability(diagnosis.probability)}")
     )
-    console.print(diagnosis.says, markup=False)
+
+
+def _step(console: Console, text: str) -> None:
+    """One thing to do; further lines of it stand under its words."""
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table.grid(padding=(0, 1))
+    grid.add_row("→", Text(text))
+    console.print(grid)
+
+
+def _lines(diagnosis: Diagnosis) -> object:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, expand=True)
+    for name, ratio in (("left out", 5), ("how big", 7)):
+        table.add_column(name, ratio=ratio)
+    table.add_column("how sure", no_wrap=True)
+    table.add_column("what it does to the calibration", ratio=7)
+    for line in diagnosis.lines:
+        cells = (line.what, line.size, line.sure, line.does)
+        table.add_row(*map(Text, cells))
+    return table
+
+
+def _picture(console: Console, diagnosis: Diagnosis) -> None:
+    """What was predicted without having been seen, before and after, by channel."""
+    from rich.table import Table
+
+    before, after = diagnosis.before.by_channel, diagnosis.after.by_channel
+    names = [n for n in before if before[n] > 0 and after.get(n, 0.0) > 0]
+    if not names:
+        return
+    console.print("held-out rms  ░ before  █ after", style="bold", highlight=False)
+    grid = Table.grid(padding=(0, 1))
+    for name in names:
+        alike = [n for n in names if n[0] == name[0]]
+        most = max(max(before[n], after[n]) for n in alike)
+        first, then = (round(BAR * q[name] / most) for q in (before, after))
+        bar = "█" * max(1, then) + "░" * (first - max(1, then))
+        unit = UNITS[0] if name[0] == "a" else UNITS[1]
+        change = f"{before[name]:.3g} → {after[name]:.3g} {pretty(unit)}"
+        grid.add_row(name, f"{bar:<{BAR}}", change)
+    console.print(grid)
+
+
+def _details(console: Console, diagnosis: Diagnosis) -> None:
+    """Everything that stands behind the lines."""
+    console.print(f"\n{diagnosis.says}", markup=False)
     if diagnosis.mismatch:
         console.print(_mismatch(diagnosis.mismatch))
     for found in diagnosis.effects:
         console.print(_heading(found), markup=False)
-        console.print(_effect(found))
+        if found.parameters:
+            console.print(_effect(found))
     console.print(_fit(diagnosis))
     console.print(_calibration(diagnosis))
-    if again is not None:
-        console.print(_replays(again))
 
 
 def _mismatch(mismatch: tuple[Mismatch, ...]) -> object:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    table = Table(title="Where the two part", title_justify="left", box=SIMPLE_HEAD)
-    for name in ("channel", "follows", "positions", "time, s"):
-        table.add_column(name, no_wrap=name == "time, s", min_width=7)
+    table = Table(
+        title="Where the two part",
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+    table.add_column("channel")
+    table.add_column("follows", min_width=FOLLOWS)
+    for name in ("positions", "time, s"):
+        table.add_column(name, no_wrap=name == "time, s")
     table.add_column("rms", justify="right", no_wrap=True)
     table.add_column("σ", no_wrap=True)
     most = max((m.sigma for m in mismatch if m.sigma < float("inf")), default=1.0)
@@ -93,15 +191,6 @@ def _rms(names: list[str], rms: float) -> str:
     """Size of a residual with its unit; sensors with different units have no common."""
     unit = common_unit(names)
     return "–" if unit is None else f"{rms:.3g} {unit}".strip()
-
-
-def format_probability(probability: float) -> str:
-    """A probability, without more digits than are worth saying.
-
-    >>> format_probability(0.873), format_probability(0.9996)
-    ('0.87', 'above 0.99')
-    """
-    return "above 0.99" if probability > 0.99 else f"{probability:.2f}"
 
 
 def _heading(found: FoundEffect) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -95,6 +95,8 @@ class FoundEffect:
     aliases : ids that would explain the same in this recording
     evidence : delta_chi2, delta_bic, held_out_gain, log_evidence
     probability : that it, or one of its aliases, is there
+    moves : by how much each parameter of the calibration changes when it is taken into
+        account, by full name, each with the sigma that it then has
 
     """
 
@@ -103,6 +105,7 @@ class FoundEffect:
     aliases: tuple[str, ...] = ()
     evidence: Mapping[str, float] = field(default_factory=dict)
     probability: float = 1.0
+    moves: Mapping[str, Quantity] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
@@ -112,7 +115,31 @@ class FoundEffect:
             "parameters": {n: q.to_json() for n, q in self.parameters.items()},
             "aliases": list(self.aliases),
             "evidence": {n: number(v) for n, v in self.evidence.items()},
+            "moves": {n: q.to_json() for n, q in self.moves.items()},
         }
+
+
+@dataclass(frozen=True, slots=True)
+class EffectLine:
+    """An effect in one line, in the words of screen and report.
+
+    Attributes
+    ----------
+    what : its id, and how often it is there
+    size : its clearest parameter with its sigma and unit
+    sure : its probability
+    does : what it does to the calibration
+
+    """
+
+    what: str
+    size: str
+    sure: str
+    does: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of diagnosis.json."""
+        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,6 +286,7 @@ class Diagnosis:
     candidates : what was tried on the windows, and why it lost
     curves : residuals over what they follow, before and after
     next : what to do in the field now
+    lines : the effects, one line each
 
     """
 
@@ -275,6 +303,7 @@ class Diagnosis:
     candidates: tuple[Candidate, ...] = ()
     curves: tuple[Curve, ...] = ()
     next: tuple[str, ...] = ()
+    lines: tuple[EffectLine, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of diagnosis.json."""
@@ -294,6 +323,7 @@ class Diagnosis:
             "candidates": [c.to_json() for c in self.candidates],
             "curves": [c.to_json() for c in self.curves],
             "next": list(self.next),
+            "lines": [line.to_json() for line in self.lines],
         }
 
 

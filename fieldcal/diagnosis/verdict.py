@@ -14,6 +14,7 @@ from fieldcal.core.samples import Block
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.findings import found_effects, mismatches
 from fieldcal.diagnosis.findings.agreement import UNITS, Agreement
+from fieldcal.diagnosis.findings.calibrated import ABSURD, calibrated, with_effects
 from fieldcal.diagnosis.findings.candidates import candidates
 from fieldcal.diagnosis.findings.curves import curves
 from fieldcal.diagnosis.findings.found_effects import Removed
@@ -27,7 +28,6 @@ from fieldcal.diagnosis.findings.quality import (
 from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, unknown
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.diagnosis.result import (
-    CalibrationGroup,
     Diagnosis,
     FoundEffect,
     Mismatch,
@@ -35,19 +35,13 @@ from fieldcal.diagnosis.result import (
     Verdict,
 )
 from fieldcal.diagnosis.wording.advice import advice
+from fieldcal.diagnosis.wording.lines import lines
 from fieldcal.diagnosis.wording.paragraph import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.probabilities import Standing
-from fieldcal.model.posterior.reported import reported
 from fieldcal.model.rows.reduce import spans
 from fieldcal.session.description import Description
-
-GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}
-
-ABSURD = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
-"""Sigma from which a parameter of a group counts as not determined."""
 
 
 def diagnose(block: Block, about: Description) -> Diagnosis:
@@ -97,12 +91,13 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
         unit=quality[2],
         before=quality[0],
         after=quality[1],
-        calibration=_calibration(explanation),
+        calibration=with_effects(explanation),
         warnings=(*odd, *_warnings(explanation)),
         says=words,
         candidates=candidates(explanation, effects),
         curves=tuple(curves(explanation, mismatch, first, then)),
-        next=tuple(advice(explanation, effects, strange)),
+        next=tuple(advice(explanation, effects, strange, mismatch)),
+        lines=lines(effects),
     )
 
 
@@ -209,51 +204,6 @@ def _mismatch(
             out += mismatches.of_cause(explanation, one, lost[one.name])
     out += [u.mismatch for u in strange]
     return sorted(out, key=lambda m: -m.sigma)
-
-
-def _calibration(explanation: Explanation) -> dict[str, CalibrationGroup]:
-    about = explanation.prepared.source.about
-    nominal, gauge = about.nominal, about.gauge
-    found = calibrated(explanation, explanation.best.set)
-    out = {}
-    for group, unit in GROUPS.items():
-        value, sigma = np.full(3, np.nan), np.full(3, np.nan)
-        for i, axis in enumerate("xyz"):
-            if f"{group}.{axis}" in found:
-                v, s, size = found[f"{group}.{axis}"]
-                if s < ABSURD[group] * size:
-                    value[i], sigma[i] = v, s
-        if np.isfinite(value).any():
-            change = value - nominal[group]
-            size, unit = gauge.of(group) or (1.0, unit)
-            three = [tuple((size * part).tolist()) for part in (value, sigma, change)]
-            out[group] = CalibrationGroup(three[0], three[1], three[2], unit)
-    return out
-
-
-def calibrated(
-    explanation: Explanation, one: Set
-) -> dict[str, tuple[float, float, float]]:
-    """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
-    d = explanation.dictionary
-    found = one.state  # of what was found the numbers are taken already
-    if one is not explanation.best.set:
-        found = reported(explanation.posterior.search, one).state
-    nominal = explanation.inferred.inference.nominal
-    sigma = np.sqrt(np.diag(found.inverse))
-    out = {}
-    for first, base, kind in (
-        (d.bias, nominal.bias, "bias"),
-        (d.scale, nominal.scale, "scale"),
-    ):
-        for c in range(6):
-            at = np.flatnonzero(found.columns == first + c)
-            if len(at):
-                name = f"{'acc' if c < 3 else 'gyr'}_{kind}.{'xyz'[c % 3]}"
-                value = float(base[c] + found.estimate[at].sum())
-                size = float(abs(explanation.state.scale[c])) or 1.0
-                out[name] = value, float(sigma[at].max()), size
-    return out
 
 
 def _open(explanation: Explanation) -> list[str]:

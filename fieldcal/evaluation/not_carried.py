@@ -20,10 +20,10 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.findings.calibrated import calibrated
 from fieldcal.diagnosis.findings.found_effects import sizes
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.signal.chain import check
-from fieldcal.diagnosis.verdict import calibrated
 from fieldcal.effects import catalogue
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.probabilities import Standing

@@ -1,12 +1,8 @@
 """What the simulation leaves out, as diagnosis.json says.
 
 Every key may be absent: an older file, or a diagnosis that had nothing to say of it.
-Besides the keys that `fieldcal.diagnosis.result` writes and the twin's replay, three
-are shown where a diagnosis has them:
-
-    candidates   what was tried: id, delta_chi2, delta_bic, held_out_gain, chosen, why
-    curves       residuals: channel, covariate, unit, x, before, after, sigma
-    next         what to do now, a text or a list of texts
+Verdict, what to do, each effect in one line and the picture come first, in the words
+of the terminal; what stands behind them follows.
 """
 
 from __future__ import annotations
@@ -19,6 +15,7 @@ import numpy as np
 
 from fieldcal.calibration.wording import TITLES, number, position_numbers, pretty
 from fieldcal.core.samples import CHANNELS, common_unit
+from fieldcal.diagnosis.wording.lines import format_probability
 from fieldcal.report import evidence
 from fieldcal.report.blocks import (
     Block,
@@ -56,30 +53,40 @@ TONES: dict[str, Tone] = {
 
 
 def diagnosis(material: Material) -> Section | None:
-    """Verdict, mismatch, effects, improvement; None where none was made."""
+    """Verdict, what to do, effects, and why; None where no diagnosis was made."""
     found = material.diagnosis
     if found is None:
         return None
     verdict = str(found.get("verdict", "unknown"))
-    said = str(found.get("says", ""))
-    chance = real(found.get("probability"))
-    sure = f" (probability {chance:.2f})" if math.isfinite(chance) else ""
-    lead = f"{verdict.replace('_', ' ').capitalize()}{sure}. {said}"
-    blocks: list[Block] = [WarningBox(lead.strip(), TONES.get(verdict, "warn"))]
-    blocks += [WarningBox(str(w)) for w in list_at(found, "warnings")]
+    sure = format_probability(real(found.get("probability")))
+    lead = f"{verdict.replace('_', ' ').upper()}, probability {sure}"
+    blocks: list[Block] = [WarningBox(lead, TONES.get(verdict, "warn"))]
     blocks += evidence.next_steps(found)
+    blocks += _lines(objects_at(found, "lines"))
+    effects = objects_at(found, "effects")
+    if effects:
+        blocks += _fit(table_at(found, "fit"))
+    if said := str(found.get("says", "")):
+        blocks.append(Text(said))
+    blocks += [WarningBox(str(w)) for w in list_at(found, "warnings")]
     mismatch = objects_at(found, "mismatch")
     if mismatch:
         blocks += _mismatch(mismatch)
     blocks += evidence.curves(objects_at(found, "curves"))
-    effects = objects_at(found, "effects")
     if effects:
         blocks.append(_effects(effects))
-        blocks += _fit(table_at(found, "fit"))
         blocks += _calibration(table_at(found, "calibration"))
     blocks += evidence.replay(table_at(found, "twin"))
     blocks += evidence.candidates(objects_at(found, "candidates"))
     return Section("diagnosis", "Diagnosis", tuple(blocks))
+
+
+def _lines(found: Sequence[Json]) -> list[Block]:
+    """Each effect in one line, as the terminal shows it."""
+    keys = ("what", "size", "sure", "does")
+    rows = [[str(line.get(key, "")) for key in keys] for line in found]
+    columns = ("left out", "how big", "how sure", "what it does to the calibration")
+    return [table("What is left out", columns, rows)] if rows else []
 
 
 def _mismatch(rows: Sequence[Json]) -> list[Block]:
@@ -141,7 +148,7 @@ def _effects(effects: Sequence[Json]) -> Block:
             rows.append([lead, str(name), *_quantity(quantity), *rest])
     columns = ("effect", "parameter", ">value", ">± 1σ", "unit")
     return table(
-        "What is left out", (*columns, ">Δχ²", ">held-out rms", "or else"), rows
+        "The effects' parameters", (*columns, ">Δχ²", ">held-out rms", "or else"), rows
     )
 
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from fieldcal.calibration.wording import pretty
 from fieldcal.core.samples import Array
-from fieldcal.effects import catalogue
 from fieldcal.report.blocks import Block, Cell, Figure, foldable_table, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
 from fieldcal.report.loose import (
@@ -120,34 +119,8 @@ def candidates(found: Sequence[Json]) -> list[Block]:
 
 
 def next_steps(found: Json) -> list[Block]:
-    """What to do in the field now."""
+    """What to do in the field now, one row each."""
     said = found.get("next")
     given = [said] if isinstance(said, str) else list_at(found, "next")
-    once = dict.fromkeys(str(text) for text in given if text)
-    rows: list[list[str | Cell]] = [["", text] for text in once]
-    rows += _cures(found)
-    rows += [["to tell", text] for text in _decisions(found)] if not given else []
-    return [table("What to do next", ("for", "do"), rows)] if rows else []
-
-
-def _cures(found: Json) -> list[list[str | Cell]]:
-    """What helps against each effect that was found, once each."""
-    ids = dict.fromkeys(str(e.get("id", "")) for e in objects_at(found, "effects"))
-    known = catalogue()
-    return [[i.replace("_", " "), known[i].cure] for i in ids if i in known]
-
-
-def _decisions(found: Json) -> list[str]:
-    """What would tell the effects apart that this recording cannot."""
-    known = catalogue()
-    texts = []
-    for effect in objects_at(found, "effects"):
-        name = str(effect.get("id", ""))
-        others = [str(a) for a in list_at(effect, "aliases")]
-        if name in known and others:
-            listed = " or ".join(o.replace("_", " ") for o in others)
-            texts.append(
-                f"{name.replace('_', ' ')} from {listed}: record"
-                f" {known[name].decided_by}."
-            )
-    return texts
+    rows: list[list[str | Cell]] = [[t] for t in dict.fromkeys(map(str, given)) if t]
+    return [table("What to do next", ("do",), rows)] if rows else []

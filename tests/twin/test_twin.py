@@ -93,7 +93,7 @@ def test_a_position_set_otherwise_is_replayed_where_it_was(
     assert code == 1 and said["verdict"] == "unexplained" and not twin.effects
     assert {tuple(m["positions"]) for m in said["mismatch"]} == {(4,)}
     assert said["next"] == [
-        "set position 5 anew and take it again: its angles were others."
+        "Set position 5 anew and take it again: its angles were others."
     ]
     replays = said["twin"]
     assert 0.8 < replays["twin"]["chi2_per_dof"] < 1.2

@@ -10,6 +10,7 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.agreement import Agreement
+from fieldcal.diagnosis.findings.calibrated import moved
 from fieldcal.diagnosis.findings.instant import instant
 from fieldcal.diagnosis.findings.stretch_means import rms
 from fieldcal.diagnosis.result import FoundEffect, Quantity
@@ -105,6 +106,7 @@ def of_rows(
         known,
         evidence,
         standing.probability,
+        moved(explanation, lost.set),
     )
 
 

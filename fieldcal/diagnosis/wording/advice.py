@@ -8,64 +8,132 @@ import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
-from fieldcal.diagnosis.result import FoundEffect
-from fieldcal.diagnosis.wording.deciding_position import decided_by, deciding_position
+from fieldcal.diagnosis.result import FoundEffect, Mismatch
+from fieldcal.diagnosis.wording.deciding_position import (
+    decided_by,
+    deciding_position,
+    extent,
+    ladder,
+)
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain, Scatter
 
 LESS_THAN = 3
 """Positions below which none can be held out."""
 
+MOST = 6
+"""Positions that a sentence names."""
+
 
 def advice(
-    explanation: Explanation, effects: Sequence[FoundEffect], unknown: Sequence[Unknown]
+    explanation: Explanation,
+    effects: Sequence[FoundEffect],
+    unknown: Sequence[Unknown],
+    mismatch: Sequence[Mismatch],
 ) -> Iterator[str]:
-    """Sentences, the most urgent first."""
-    for one in effects:
-        if isinstance(catalogue()[one.id], Chain):
-            yield f"{one.id}: {decided_by(one.id)}, then diagnose again."
+    """Sentences, the most urgent first; `mismatch` names positions as listed."""
+    yield from _look(unknown)
     yield from _deciding(explanation, effects)
-    yield from dict.fromkeys(_look(mystery) for mystery in unknown)
-    known = [f.id for f in effects if not f.aliases and _deterministic(f)]
+    for name in dict.fromkeys(f.id for f in effects):
+        yield _cure(name, mismatch)
+    known = dict.fromkeys(f.id for f in effects if not f.aliases and _deterministic(f))
     if known and not unknown:
         ids = ", ".join(f'"{i}"' for i in known)
         yield (
-            f"put effects = [{ids}] with the values found into [model] of"
-            " session.toml, or keep the device file that --twin writes."
+            f"To simulate it: put effects = [{ids}] with the values found into [model]"
+            " of session.toml, or keep the device file that --twin writes."
         )
     if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
-        yield "hold more positions, or longer ones: what is random averages out."
+        yield "Hold more positions, or longer ones: what is random averages out."
     held = len(explanation.dictionary.held)
     if held < LESS_THAN:
-        yield f"record more than {held} position{'s' * (held > 1)}: few tell little."
+        yield f"Record more than {held} position{'s' * (held > 1)}: few tell little."
+
+
+def _cure(name: str, mismatch: Sequence[Mismatch]) -> str:
+    """What to do about an effect, and where it was if it is one on samples."""
+    effect = catalogue()[name]
+    places = {
+        p
+        for m in mismatch
+        if (m.kind, m.covariate) == (effect.seen_in, effect.covariate)
+        for p in m.positions
+    }
+    if not isinstance(effect, Chain) or not places:
+        return f"{name}: {effect.cure}"
+    return f"{name} at {listed(sorted(places), MOST)}: {effect.cure}"
 
 
 def _deciding(
     explanation: Explanation, effects: Sequence[FoundEffect]
 ) -> Iterator[str]:
-    """How to tell an effect from its aliases."""
+    """How to tell an effect from its aliases: one sentence for each way to do it."""
     for one in effects:
+        ways: dict[str, list[str]] = {}
+        open_ = []
         for other in one.aliases:
             place = deciding_position(explanation, one.id, other)
             if place is None:
-                yield f"to tell {one.id} from {other}: {decided_by(one.id)}."
+                open_.append(other)
             else:
-                yield (
-                    f"to tell {one.id} from {other}: record the position"
-                    f" α = {place[0]:g}°, β = {place[1]:g}° as well."
-                )
+                apart = f"{other} ({place.apart:.0f} σ apart there)"
+                ways.setdefault(place.text, []).append(apart)
+        for way, others in ways.items():
+            told = _list(others, "and")
+            yield f"{_capital(way)}: it tells {one.id} from {told}."
+        if open_:
+            yield (
+                f"{one.id} or {_list(open_, 'or')}? {_none_in_reach(explanation)}"
+                f"{decided_by(one.id)}."
+            )
 
 
-def _look(unknown: Unknown) -> str:
-    one = unknown.mismatch
-    places = listed(one.positions)
+def _list(names: Sequence[str], word: str) -> str:
+    """Names with commas, the last behind a word.
+
+    >>> _list(["a", "b", "c"], "or")
+    'a, b or c'
+    """
+    return f" {word} ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def _none_in_reach(explanation: Explanation) -> str:
+    """That no position of the ladder decides, where positions are known."""
+    positions = explanation.prepared.source.about.positions
+    if not explanation.rows.x.oriented.all() or not ladder(positions):
+        return "What tells: "
+    return f"No position {extent(positions)} tells; what does: "
+
+
+def _look(unknown: Sequence[Unknown]) -> Iterator[str]:
+    """What to do about mismatches without an effect, channels alike in one sentence."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for mystery in unknown:
+        alike.setdefault(_remedy(mystery), []).append(mystery.mismatch.channel)
+    for (what, why), names in alike.items():
+        once = list(dict.fromkeys(names))
+        several = len(once) > 1
+        yield what + why.format(
+            channels=_list(once, "and"),
+            follow="follow" if several else "follows",
+            be="are" if several else "is",
+        )
+
+
+def _remedy(unknown: Unknown) -> tuple[str, str]:
+    """What to do about a mismatch, and why, with room for the channels."""
+    places = listed(unknown.mismatch.positions)
     if unknown.turned:
-        return f"set {places} anew and take it again: its angles were others."
-    if not np.isfinite(one.correlation):
-        return f"take {places} again: {one.channel} is off there by itself."
+        return f"Set {places} anew and take it again", ": its angles were others."
+    if not np.isfinite(unknown.mismatch.correlation):
+        return f"Take {places} again", ": {channels} {be} off there by itself."
     return (
-        f"vary {unknown.cause} on purpose and hold the rest: {one.channel} follows it,"
-        " and no effect in the catalogue does."
+        f"Vary {unknown.cause} on purpose and hold the rest",
+        ": {channels} {follow} it, and no effect in the catalogue does.",
     )
 
 

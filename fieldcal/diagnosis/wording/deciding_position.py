@@ -1,12 +1,19 @@
-"""The position that decides between two explanations: where they differ most."""
+"""The position that decides between two explanations: where they differ most.
+
+Only positions are named that the ladder of the session has: angles that it was set to,
+to either side, and home. What a fixture cannot do is no advice.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from fieldcal.core.frames import turn
+from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.effects import catalogue
@@ -14,38 +21,84 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
 
-REACH = (0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0)
 DECIDES = 5.0
 """Difference in white noise of a window's mean that decides."""
 
 
+@dataclass(frozen=True, slots=True)
+class DecidingPosition:
+    """A position at which two explanations differ.
+
+    Attributes
+    ----------
+    alpha_deg, beta_deg : where
+    apart : by how many standard deviations of a window's mean they differ there
+    number : of the position of the session that it is, from 1; 0 for a new one
+
+    """
+
+    alpha_deg: float
+    beta_deg: float
+    apart: float
+    number: int
+
+    @property
+    def text(self) -> str:
+        """How the operator is asked for it."""
+        angles = f"α = {self.alpha_deg:g}°, β = {self.beta_deg:g}°"
+        if self.number:
+            return f"take position {self.number} ({angles}) once more at the end"
+        return f"take the position α = {self.alpha_deg:g}°, β = {self.beta_deg:g}° too"
+
+
+def ladder(positions: Sequence[Position]) -> list[tuple[float, float]]:
+    """Angles that a session's ladder can be set to, deg: each it had, to either side.
+
+    >>> ladder([Position.deg(0, 0), Position.deg(45, 5)])[:4]
+    [(0.0, 0.0), (0.0, -5.0), (0.0, 5.0), (-45.0, 0.0)]
+    """
+    had = [p.degrees for p in positions if p.degrees]
+    joints = []
+    for angles in zip(*had, strict=True) if had else ():
+        sizes = {round(abs(a), 6) for a in angles} | {0.0}
+        joints.append(sorted({s * a for a in sizes for s in (-1.0, 1.0)}, key=abs))
+    return [(a + 0.0, b + 0.0) for a, b in product(*joints)] if joints else []
+
+
+def extent(positions: Sequence[Position]) -> str:
+    """How far the ladder of a session was turned, for a sentence."""
+    a, b = (max(map(abs, joint)) for joint in zip(*ladder(positions), strict=True))
+    return f"within |α| ≤ {a:g}°, |β| ≤ {b:g}°"
+
+
 def deciding_position(
     explanation: Explanation, one: str, other: str
-) -> tuple[float, float, float] | None:
-    """Position at which two explanations differ most, and by how many sigmas.
+) -> DecidingPosition | None:
+    """Position of the session's ladder at which two explanations differ most.
 
-    Returns
-    -------
-    alpha, beta in degrees and the difference, or None if no position in reach decides
-
+    None if no position that it has decides, or angles are not known.
     """
     rows, instead = explanation.rows, explanation.posterior.instead.get(one, {})
     if other not in instead or not rows.x.oriented.all():
         return None
     states = [_state(explanation, s) for s in (explanation.best.set, instead[other])]
-    x, best = rows.x, None
+    x = rows.x
     sd = np.nanmedian(rows.sd, axis=0)
     sd = sd / np.sqrt(len(x) / len(explanation.dictionary.held))
     sd = np.hypot(sd, np.nanmedian(rows.common, axis=0))
     since = explanation.dictionary.since[:, -1:]
-    for alpha in REACH:
-        for beta in REACH[:5]:
-            place = _place(x, alpha, beta)
-            seen = [s.output(s.experienced(place), since) for s in states]
-            apart = float(np.nanmax(np.abs(seen[0] - seen[1]) / sd))
-            if best is None or apart > best[2] * 1.2:
-                best = (alpha, beta, apart)
-    return best if best is not None and best[2] > DECIDES else None
+    about = explanation.prepared.source.about
+    held = [p.degrees for p in about.positions]
+    best: DecidingPosition | None = None
+    for alpha, beta in ladder(about.positions):
+        place = _place(x, alpha, beta)
+        seen = [s.output(s.experienced(place), since) for s in states]
+        apart = float(np.nanmax(np.abs(seen[0] - seen[1]) / sd))
+        if best is None or apart > best.apart * 1.2:
+            at = [i for i, angles in enumerate(held) if angles == (alpha, beta)]
+            number = about.numbered(at[:1])[0] + 1 if at else 0
+            best = DecidingPosition(alpha, beta, apart, number)
+    return best if best is not None and best.apart > DECIDES else None
 
 
 def _state(explanation: Explanation, found: Set) -> State:

@@ -158,11 +158,7 @@ def _deciding(explanation: Explanation, one: str, other: str) -> str:
     position = deciding_position(explanation, one, other)
     if position is None:
         return f"{head}; what tells them apart: {decided_by(one)}."
-    alpha, beta, apart = position
-    return (
-        f"{head}; the position α = {alpha:g}°, β = {beta:g}° would decide: there they"
-        f" differ by {apart:.0f} σ."
-    )
+    return f"{head}; {position.text}: there they differ by {position.apart:.0f} σ."
 
 
 def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:

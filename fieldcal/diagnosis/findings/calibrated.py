@@ -1,0 +1,88 @@
+"""Bias and scale factor beside the effects, and what each effect does to them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.result import CalibrationGroup, Quantity
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.reported import reported
+
+GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}
+
+ABSURD = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
+"""Sigma from which a parameter of a group counts as not determined."""
+
+
+def with_effects(explanation: Explanation) -> dict[str, CalibrationGroup]:
+    """Groups that the recording determines, in the unit of the outputs."""
+    about = explanation.prepared.source.about
+    nominal, gauge = about.nominal, about.gauge
+    found = calibrated(explanation, explanation.best.set)
+    out = {}
+    for group, unit in GROUPS.items():
+        value, sigma = np.full(3, np.nan), np.full(3, np.nan)
+        for i, axis in enumerate("xyz"):
+            if f"{group}.{axis}" in found:
+                v, s, size = found[f"{group}.{axis}"]
+                if s < ABSURD[group] * size:
+                    value[i], sigma[i] = v, s
+        if np.isfinite(value).any():
+            change = value - nominal[group]
+            size, unit = gauge.of(group) or (1.0, unit)
+            three = [tuple((size * part).tolist()) for part in (value, sigma, change)]
+            out[group] = CalibrationGroup(three[0], three[1], three[2], unit)
+    return out
+
+
+def calibrated(
+    explanation: Explanation, one: Set
+) -> dict[str, tuple[float, float, float]]:
+    """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
+    d = explanation.dictionary
+    found = one.state  # of what was found the numbers are taken already
+    if one is not explanation.best.set:
+        found = reported(explanation.posterior.search, one).state
+    nominal = explanation.inferred.inference.nominal
+    sigma = np.sqrt(np.diag(found.inverse))
+    out = {}
+    for first, base, kind in (
+        (d.bias, nominal.bias, "bias"),
+        (d.scale, nominal.scale, "scale"),
+    ):
+        for c in range(6):
+            at = np.flatnonzero(found.columns == first + c)
+            if len(at):
+                name = f"{'acc' if c < 3 else 'gyr'}_{kind}.{'xyz'[c % 3]}"
+                value = float(base[c] + found.estimate[at].sum())
+                size = float(abs(explanation.state.scale[c])) or 1.0
+                out[name] = value, float(sigma[at].max()), size
+    return out
+
+
+def moved(explanation: Explanation, less: Set) -> dict[str, Quantity]:
+    """By how much a calibration changes when a cause is taken into account.
+
+    Parameters
+    ----------
+    explanation : with the cause
+    less : the best set without it
+
+    Returns
+    -------
+    by full name: value with the cause less value without it, and the sigma that it has
+    with the cause, in the unit of the outputs; what either leaves open is absent
+
+    """
+    gauge = explanation.prepared.source.about.gauge
+    now, before = (calibrated(explanation, s) for s in (explanation.best.set, less))
+    out = {}
+    for name, (value, sigma, size) in now.items():
+        group = name.partition(".")[0]
+        allowed = ABSURD[group] * size
+        was, sigma_was, _ = before.get(name, (np.nan, np.inf, 1.0))
+        if 0 < sigma < allowed and sigma_was < allowed:
+            part, unit = gauge.of(group) or (1.0, GROUPS[group])
+            out[name] = Quantity(part * (value - was), part * sigma, unit)
+    return out

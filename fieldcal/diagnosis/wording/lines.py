@@ -1,0 +1,105 @@
+"""Each effect in one line: what, how big, how sure, what it does to the calibration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from fieldcal.calibration.wording import pretty, title
+from fieldcal.diagnosis.result import EffectLine, FoundEffect, Quantity
+from fieldcal.diagnosis.wording.paragraph import with_uncertainty
+from fieldcal.effects import catalogue
+from fieldcal.physics.effect import Chain, Line, Scatter
+
+SEEN = 1.0
+"""Standard deviations below which a parameter counts as not moved."""
+
+TREATED = {
+    "mend": "none: samples are put right first",
+    "mask": "none: its samples are left out",
+    "note": "none that is known",
+}
+"""What faults of samples do to a calibration, by what is done about them."""
+
+
+def lines(effects: Sequence[FoundEffect]) -> tuple[EffectLine, ...]:
+    """One line for each effect; one that happened often has one with its largest."""
+    alike: dict[str, list[FoundEffect]] = {}
+    for found in effects:
+        alike.setdefault(found.id, []).append(found)
+    return tuple(_line(name, found) for name, found in alike.items())
+
+
+def _line(name: str, found: Sequence[FoundEffect]) -> EffectLine:
+    largest = max(
+        found, key=lambda f: max(map(_clear, f.parameters.values()), default=0)
+    )
+    often = f" ({len(found)} times)" if len(found) > 1 else ""
+    what = name.replace("_", " ") + often
+    if others := largest.aliases:
+        what += f", or {' or '.join(o.replace('_', ' ') for o in others)}"
+    sure = format_probability(min(f.probability for f in found))
+    return EffectLine(what, size(largest.parameters), sure, _does(largest))
+
+
+def size(parameters: Mapping[str, Quantity]) -> str:
+    """The clearest parameter of an effect, and how many more there are.
+
+    When it happened is no size: an instant stands for it only where nothing else does.
+
+    >>> size({"k12": Quantity(0.008, 1e-4, "1"), "k13": Quantity(0.0, 1e-4, "1")})
+    'k12 0.00800 ± 0.00010'
+    """
+    if not parameters:
+        return "not known"
+    told = [n for n, q in parameters.items() if q.unit != "s"] or list(parameters)
+    name = max(told, key=lambda n: _clear(parameters[n]))
+    clear = sum(_clear(q) > 3 for n, q in parameters.items() if n != name)
+    more = f" (+ {clear} more)" if clear else ""
+    return f"{name.removesuffix('_deg')} {pretty_quantity(parameters[name])}{more}"
+
+
+def pretty_quantity(quantity: Quantity) -> str:
+    """A value with its uncertainty, its unit with raised figures."""
+    text = with_uncertainty(quantity)
+    unit = quantity.unit
+    return text.removesuffix(unit) + pretty(unit) if unit != "1" else text
+
+
+def _clear(quantity: Quantity) -> float:
+    """By how many standard deviations a value stands out; text not at all."""
+    if isinstance(quantity.value, str) or not quantity.sigma:
+        return 0.0
+    return abs(quantity.value) / quantity.sigma
+
+
+def _does(found: FoundEffect) -> str:
+    """What it does to the calibration, in a few words."""
+    effect = catalogue()[found.id]
+    if isinstance(effect, Chain):
+        return TREATED[effect.treatment]
+    if isinstance(effect, Scatter):
+        return "widens its ±"
+    if isinstance(effect, Line):
+        return "none: it is subtracted"
+    if not found.moves:
+        return "nothing that shows"
+    name = max(found.moves, key=lambda n: _clear(found.moves[n]))
+    most = found.moves[name]
+    sigmas = _clear(most)
+    if sigmas < SEEN:
+        return f"less than {SEEN:g} σ"
+    unit = pretty(most.unit)
+    by = f"{most.value:+.2g} {unit}".rstrip()
+    return f"{title(name)} {by} ({sigmas:.0f} σ)"
+
+
+def format_probability(probability: float) -> str:
+    """A probability, without more digits than are worth saying.
+
+    >>> format_probability(0.873), format_probability(0.9996)
+    ('0.87', 'above 0.99')
+    """
+    if not math.isfinite(probability):
+        return "not known"
+    return "above 0.99" if probability > 0.99 else f"{probability:.2f}"

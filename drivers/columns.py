@@ -117,8 +117,13 @@ def _time_unit(span: float, seconds: float) -> str:
 
 
 def _gravity(values: Array, names: list[str]) -> tuple[int, str] | None:
-    """First of three neighbours whose norm is one gravity, and their unit."""
+    """First of three neighbours whose norm is one gravity, and their unit.
+
+    Triads stand behind one another: where zeros beside it make several norms alike, it
+    is the one a multiple of three from the first column that is free.
+    """
     found = []
+    free = names.index("-") if "-" in names else 0
     for at in range(len(names) - 2):
         if names[at : at + 3] != ["-"] * 3:
             continue
@@ -126,5 +131,5 @@ def _gravity(values: Array, names: list[str]) -> tuple[int, str] | None:
         for unit in ("m/s^2", "g", "mg"):
             off = abs(norm * ACC_UNITS[unit] / G0 - 1)
             if off < 0.1:
-                found.append((off, at, unit))
-    return min(found)[1:] if found else None
+                found.append(((at - free) % 3 > 0, off, at, unit))
+    return min(found)[2:] if found else None

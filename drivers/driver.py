@@ -160,6 +160,15 @@ class Driver(ABC):
             elif monotonic() >= deadline:
                 raise DeviceSilent(self._silence(timeout, before))
 
+    def why_silent(self, before: Health) -> str:
+        """Why no sample came since the link did like `before`, and what to do."""
+        now = self.health
+        if now.received == before.received:
+            return "not a byte came; check cable, power and port"
+        if now.skipped - before.skipped > (now.received - before.received) / 2:
+            return self._garbage()
+        return "frames come, but no whole sample; check what the device is to send"
+
     def drain(self) -> Block:
         """Take what has queued up by now, so that the next block is from now on.
 
@@ -175,15 +184,8 @@ class Driver(ABC):
         return concat(taken)
 
     def _silence(self, timeout: float, before: Health) -> str:
-        now = self.health
-        sent = "went silent" if now.samples else "has sent no sample"
-        if now.received == before.received:
-            cause = "not a byte came; check cable, power and port"
-        elif now.skipped - before.skipped > (now.received - before.received) / 2:
-            cause = self._garbage()
-        else:
-            cause = "frames come, but no whole sample; check what the device is to send"
-        return f"{self.name} {sent} for {timeout:g} s: {cause}"
+        sent = "went silent" if self.health.samples else "has sent no sample"
+        return f"{self.name} {sent} for {timeout:g} s: {self.why_silent(before)}"
 
     def _garbage(self) -> str:
         return "bytes come, but none that this format knows; check format and baud rate"

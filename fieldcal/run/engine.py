@@ -13,6 +13,7 @@ broke or whose process was killed, is handed back at once and not asked for agai
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -32,6 +33,9 @@ from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window
 
 R = TypeVar("R")
+
+SAID = 2
+"""Silences of half a second after which the operator is told."""
 
 PIECE = 0.1
 """Longest stretch of samples that is looked at as one, s."""
@@ -78,7 +82,7 @@ class Engine:
         self._left: int | None = None
         self._before: int | None = None
         self._link = LinkMarks(driver, recorder)
-        self._silence = 0
+        self._silence, self._heard = 0, replace(driver.health)
         driver.on_silence = self._silent
         self._stream = self._record(driver)
         self._display = Display(operator, driver)
@@ -157,7 +161,7 @@ class Engine:
 
     def _record(self, driver: Driver) -> Iterator[Block]:
         for raw in driver.blocks():
-            self._silence = 0
+            self._silence, self._heard = 0, replace(driver.health)
             block = self._recorder.append(raw)
             self._link.take(block)
             self._display.heard(block)
@@ -166,17 +170,19 @@ class Engine:
             yield from pieces(block, PIECE)
 
     def _silent(self) -> None:
-        """Report that no samples arrive."""
+        """Report that no samples arrive, and what comes instead."""
         self._silence += 1
-        reason = WaitReason(
-            WaitState.NO_SAMPLES,
-            f"no samples come from {self._driver.name}: check cable and power; it"
-            " goes on by itself once they do",
-        )
-        if self._silence >= 2 and self._hold_now:
-            self._display.silent(self._hold_now, reason)
-        if self._silence == 2:
-            self._alarm(reason)
+        if self._silence >= SAID:
+            why = self._driver.why_silent(self._heard)
+            if self._driver.health.received == self._heard.received:
+                why += "; it goes on by itself once they do"
+            reason = WaitReason(
+                WaitState.NO_SAMPLES, f"no samples come from {self._driver.name}: {why}"
+            )
+            if self._hold_now:
+                self._display.silent(self._hold_now, reason)
+            if self._silence == SAID:
+                self._alarm(reason)
         if self._operator.wish() == "stop":
             raise Stopped("stopped by the operator")
 

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from talking import talking
 
 from fieldcal.core.errors import CalibrationFailed, DeviceSilent, Stopped, WrongPosition
 from fieldcal.core.frames import turn
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.driver import Driver, Health
+from fieldcal.drivers.driver import Driver, Health, open_driver
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, hold
 from fieldcal.run.engine import Engine
@@ -224,6 +225,30 @@ class Dead(Driver):
 
     def blocks(self, timeout: float = 0.1):  # type: ignore[no-untyped-def]
         return super().blocks(0.05)
+
+
+def test_a_wrong_format_is_said_at_once_with_the_one_that_comes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What comes instead is on the screen while the run still waits for samples."""
+    monkeypatch.setattr("fieldcal.drivers.driver.LOOK", 0.1)
+    lines = (b"%d,0.01,-9.81,0.02,0,0,0.00%d\n" % (10 * i, i % 3) for i in range(10**6))
+    with talking(lambda i: next(lines)) as port:
+        told: list[str] = []
+
+        class Impatient(Turner):
+            def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+                told.append(reason.text)
+                self.wishes.append("stop")
+
+        driver = open_driver(f"serial:{port}?format=witmotion")
+        operator = Impatient(InProcess(VirtualDevice(seed=3)))
+        with driver, Recorder(tmp_path / "s", {"format": 1}) as recorder:
+            engine = Engine(driver, operator, ABOUT, recorder)
+            with pytest.raises(Stopped):
+                engine.run(hold_all(TWO, 10.0))
+    assert "these are no witmotion bytes; try format=text&columns=t,ax" in told[0]
+    assert "by itself" not in told[0]
 
 
 def test_a_silent_device_is_said_to_be_silent(tmp_path: Path) -> None:

@@ -58,6 +58,22 @@ class ClockLine(NamedTuple):
         return abs(self.fast_ppm) < REAL_TIME
 
 
+class Readings(NamedTuple):
+    """What a device was asked about what it does to its samples by itself.
+
+    Attributes
+    ----------
+    same : how often it said the same as before
+    changed : how often it said something else
+    pending : whether it has yet to answer
+
+    """
+
+    same: int = 0
+    changed: int = 0
+    pending: bool = False
+
+
 @dataclass(slots=True)
 class Health:
     """How the link does, counted since it was opened.
@@ -131,6 +147,15 @@ class Driver(ABC):
     def notes(self) -> Mapping[str, Any]:
         """What a recording keeps of the device beside its samples, as JSON."""
         return {}
+
+    @property
+    def readings(self) -> Readings:
+        """What it said of its own processing, where it can be asked."""
+        return Readings()
+
+    def read_again(self) -> None:
+        """Ask it once more; `readings` is pending until it has answered."""
+        return
 
     def blocks(self, timeout: float = 3.0) -> Iterator[Block]:
         """Yield blocks as they come.

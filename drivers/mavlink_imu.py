@@ -8,7 +8,8 @@ SCALED_IMU, 2, 3), ``system``, ``component`` and ``instance`` where there are se
 serial port, ``speed`` of a log.
 
 What an autopilot sends is not raw, whatever the message is called: the calibration it
-has is built in. That is read and kept in `MavlinkImu.installed`; with
+has is built in. That is read and kept in `MavlinkImu.installed`, and read again now and
+then, since it changes: at each start most average their gyroscopes. With
 ``installed=identity`` it is set to none meanwhile, and given back when the link is
 closed.
 """
@@ -25,7 +26,7 @@ import numpy as np
 
 from fieldcal.core.errors import DeviceError, FieldcalError, InputError
 from fieldcal.core.samples import Block, Grain
-from fieldcal.drivers.driver import Driver, Health
+from fieldcal.drivers.driver import Driver, Health, Readings
 from fieldcal.drivers.mavlink_log import PlayedMavlinkLog, is_log
 from fieldcal.drivers.mavlink_talk import Talk, listed
 from fieldcal.drivers.options import Options, split
@@ -96,6 +97,7 @@ class MavlinkImu(Driver):
         self._early: list[Block] = []
         self._recent: deque[float] = deque(maxlen=RECENT)
         self._last = monotonic()
+        self._restarts, self._asked_again = 0, False
         if is_log(endpoint):
             self._log = PlayedMavlinkLog(Path(endpoint), speed(options))
             options.finish()
@@ -164,6 +166,16 @@ class MavlinkImu(Driver):
         """True while the link is gone and is being tried again."""
         return self._reader is not None and self._reader.reconnecting
 
+    @property
+    def readings(self) -> Readings:
+        """How often the installed calibration was read, and had changed."""
+        same, changed = self._talk.readings
+        return Readings(same, changed, self._asked_again or self._talk.rereads)
+
+    def read_again(self) -> None:
+        """Have the installed calibration read again by whoever receives."""
+        self._asked_again = self._log is None
+
     def host_time(self) -> float:
         """Now, in s of the clock that stamps `Block.t_host`: for a log, its own."""
         return self._log.now if self._log else super().host_time()
@@ -221,8 +233,13 @@ class MavlinkImu(Driver):
         quiet = monotonic() - self._last > QUIET
         if block is not None or quiet:
             self._last = monotonic()
-        if any(chunk.broken for chunk in chunks) or (quiet and self._talk.settled):
+        restarts, self._restarts = self._restarts, self.health.restarts
+        broken = any(chunk.broken for chunk in chunks)
+        if broken or self._restarts > restarts or (quiet and self._talk.settled):
             self._talk.again()
+        if self._asked_again:
+            self._asked_again = False
+            self._talk.read()
         if self._talk.vehicle:
             self._decoder.choose(*self._talk.vehicle)
         self._check_one()

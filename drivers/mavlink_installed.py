@@ -30,6 +30,9 @@ ARDUPILOT, PX4 = 3, 12
 
 AXES = "XYZ"
 
+AT_START = "INS_GYR_CAL"
+"""Whether ArduPilot averages its gyroscopes at each start, as it usually does."""
+
 
 def names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
     """Parameters with offsets, scales and mounting, by what they are.
@@ -57,13 +60,13 @@ def names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
 
 
 def other_processing(autopilot: int, instance: int) -> tuple[str, ...]:
-    """Parameters of what else is done to the samples: low-pass, temperature.
+    """Parameters of what else is done to the samples: low-pass, temperature, at start.
 
     Not every program has them; where one is not answered, nothing is concluded.
     """
     if autopilot == ARDUPILOT:
         corrects = f"INS_TCAL{instance + 1}_ENABLE"
-        return ("INS_ACCEL_FILTER", "INS_GYRO_FILTER", corrects)
+        return ("INS_ACCEL_FILTER", "INS_GYRO_FILTER", corrects, AT_START)
     if autopilot == PX4:
         cutoffs = ("IMU_ACCEL_CUTOFF", "IMU_GYRO_CUTOFF")
         return (*cutoffs, "TC_A_ENABLE", "TC_G_ENABLE")
@@ -80,6 +83,8 @@ class Installed:
     instance : which of its sensors, from 0
     values : by name of the parameter, as far as they came
     taken_out : whether the autopilot was told to do without, o = 0 and k = 1
+    used : what its parameters were when they were last read, all of them: what is in
+        the samples. Where nothing is taken out these are among `values`.
 
     """
 
@@ -87,6 +92,7 @@ class Installed:
     instance: int
     values: dict[str, float] = field(default_factory=dict)
     taken_out: bool = False
+    used: dict[str, float] = field(default_factory=dict)
 
     @property
     def missing(self) -> list[str]:
@@ -183,7 +189,18 @@ class Installed:
             "parameters": {n: v for n, v in self.values.items() if np.isfinite(v)},
             "missing": self.missing,
             "taken_out": self.taken_out,
+            "in_samples": self._in_samples(),
         }
+
+    def _in_samples(self) -> dict[str, list[float]] | None:
+        """Offsets and scales of (1) that are in the samples; None if unknown."""
+        known = names(self.autopilot, self.instance)
+        used = {what: [self.used.get(n, np.nan) for n in known[what]] for what in known}
+        if not known or not np.isfinite(np.concatenate([*used.values()])).all():
+            return None
+        if used.pop("rotation") != [0.0] or min(used["acc_scale"]) <= 0:
+            return None  # the axes of the samples are not those of the parameters
+        return used
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> Installed:

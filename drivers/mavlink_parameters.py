@@ -214,7 +214,8 @@ class ParameterLink:
             if self.autopilot == PX4 and message.param_type == INT32:
                 bits = struct.pack("<f", message.param_value)
                 value = float(struct.unpack("<i", bits)[0])
-            self._heard[message.param_id] = value
+            # the shortest number that is this float of 32 bits
+            self._heard[message.param_id] = float(str(np.float32(value)))
 
     def _send(self, message: Any) -> None:
         packed = message.pack(self._out)

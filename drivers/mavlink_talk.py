@@ -3,8 +3,10 @@
 Once a heartbeat tells who is there, the rate of the message is asked for
 (SET_MESSAGE_INTERVAL, and where that is denied or not answered the raw sensor stream,
 REQUEST_DATA_STREAM), then the parameters of the installed calibration are read, and
-where that is wanted set to no calibration until they are given back. Our own heartbeat
-goes out every second, since some send nothing to who is silent.
+where that is wanted set to no calibration until they are given back. They are read
+again every `AGAIN` s, whenever that is asked for, and after a restart until they are
+stable. Our own heartbeat goes out every second, since some send nothing to who is
+silent.
 """
 
 from __future__ import annotations
@@ -19,9 +21,9 @@ from fieldcal.drivers.mavlink_installed import (
     PX4,
     Installed,
     identity,
-    names,
     other_processing,
 )
+from fieldcal.drivers.mavlink_watch import STABLE, InstalledWatch, close
 
 EVERY = 1.0
 """Between two heartbeats, s."""
@@ -31,6 +33,13 @@ PATIENCE = 0.7
 
 TRIES = 3
 """How often a question is put."""
+
+AGAIN = 10.0
+"""Between two readings of the installed calibration, s."""
+
+SILENT = 40
+"""Heartbeats without an answer after which one who used to answer is given up: while it
+starts an autopilot may hear nobody."""
 
 STATION = (255, 190)
 """System and component that ground stations call themselves."""
@@ -84,24 +93,36 @@ class Talk:
         self._beat = self._asked = -inf
         self._tries, self._denied = 0, ""
         self._rated = rate == 0
-        self._read, self._take_out = False, take_out
+        self._watch: InstalledWatch | None = None
+        self._read_at, self._unanswered, self._take_out = -inf, 0, take_out
         self._goal: dict[str, float] = {}
-        self._now: dict[str, float] = {}
 
     @property
     def settled(self) -> bool:
         """Whether all that is asked has been answered, or given up."""
-        answered = self.vehicle is not None and self._rated and self._read
+        answered = self.vehicle is not None and self._rated and not self.reads
         return answered and not self._take_out and not self.unset
+
+    @property
+    def reads(self) -> bool:
+        """Whether the installed calibration is being read."""
+        return self._watch is not None and self._watch.waits
+
+    @property
+    def rereads(self) -> bool:
+        """Whether it is being read once more, from one who has answered before."""
+        return self._watch is not None and self._watch.answers and self._watch.waits
+
+    @property
+    def readings(self) -> tuple[int, int]:
+        """How many readings said the same as before, and how many something else."""
+        return (self._watch.readings, self._watch.changes) if self._watch else (0, 0)
 
     @property
     def unset(self) -> dict[str, float]:
         """Parameters that were to be set, and are not yet."""
-        return {
-            name: value
-            for name, value in self._goal.items()
-            if not abs(self._now.get(name, inf) - value) <= 1e-6 * max(1, abs(value))
-        }
+        now = self.installed.used if self.installed else {}
+        return {n: v for n, v in self._goal.items() if not close(now.get(n), v)}
 
     def give_back(self) -> None:
         """Set the parameters to what they were, if they were changed at all."""
@@ -110,9 +131,15 @@ class Talk:
             self._goal = {name: self.installed.values[name] for name in self._goal}
 
     def again(self) -> None:
-        """Ask for the rate again: the link was away."""
+        """Ask for all of it again: the link was away, or the autopilot started anew."""
         self._rated, self._tries = self._rate == 0, 0
-        self._asked = -inf
+        self.read(STABLE)
+
+    def read(self, rounds: int = 1) -> None:
+        """Read the installed calibration again, if it was ever told."""
+        if self._watch is not None and self._watch.answers:
+            self._watch.again(rounds)
+            self._unanswered, self._asked = 0, -inf
 
     def hear(self, message: Any) -> None:
         """Take note of a message, as pymavlink makes it."""
@@ -133,12 +160,16 @@ class Talk:
         if now - self._beat >= EVERY:
             self._beat = now
             out += self._packed(self._out.heartbeat_encode(6, NO_AUTOPILOT, 0, 0, 4))
+        if self.reads:
+            self._read_at = now
+        elif now - self._read_at >= AGAIN:
+            self.read()
         if self.vehicle is None or self.settled or now - self._asked < PATIENCE:
             return out
         self._asked = now
         if not self._rated:
             return out + self._ask_rate()
-        return out + (self._set() if self._read else self._ask_parameters())
+        return out + (self._ask_parameters() if self.reads else self._set())
 
     def _packed(self, message: Any) -> bytes:
         packed: bytes = message.pack(self._out)
@@ -148,10 +179,11 @@ class Talk:
     def _heartbeat(self, message: Any, source: tuple[int, int]) -> None:
         if message.autopilot == NO_AUTOPILOT or not self._wants(*source):
             return
+        self._unanswered += 1
         if self.vehicle is None:
             self.vehicle = source
             self.installed = Installed(message.autopilot, self._instance)
-            self._read = not self.installed.missing
+            self._watch = InstalledWatch(self.installed)
         elif source != self.vehicle:
             self.others.add(source)
 
@@ -197,24 +229,30 @@ class Talk:
         self._asked = -inf
 
     def _ask_parameters(self) -> bytes:
-        if self.installed is None:
+        installed, watch = self.installed, self._watch
+        if installed is None or watch is None:
             return b""
         self._tries += 1
-        if self._tries > TRIES:
-            self._read = True
+        if watch.answers and self._unanswered > SILENT:
+            raise DeviceError(
+                "the autopilot answers no more for its parameters, so nobody knows"
+                f" what is in its samples: {', '.join(watch.open)}; check the link"
+            )
+        if not watch.answers and self._tries > TRIES:
+            watch.give_up()
             self.says.append(
                 "parameters that the autopilot did not answer: "
-                + ", ".join(self.installed.missing)
+                + ", ".join(installed.missing)
             )
             return b""
         target = self.vehicle or (0, 0)
-        more = other_processing(self.installed.autopilot, self._instance)
-        unheard = [name for name in more if name not in self.installed.values]
+        more = other_processing(installed.autopilot, self._instance)
+        unheard = [name for name in more if name not in installed.values]
         return b"".join(
             self._packed(
                 self._out.param_request_read_encode(*target, name.encode(), -1)
             )
-            for name in (*unheard, *self.installed.missing)
+            for name in (*unheard, *watch.open)
         )
 
     def _set(self) -> bytes:
@@ -242,25 +280,20 @@ class Talk:
         )
 
     def _value(self, message: Any) -> None:
-        installed = self.installed
-        if installed is None:
-            return
-        known = names(installed.autopilot, installed.instance).values()
-        more = other_processing(installed.autopilot, installed.instance)
-        if message.param_id not in {*more, *(name for some in known for name in some)}:
+        installed, watch = self.installed, self._watch
+        if installed is None or watch is None:
             return
         value = float(message.param_value)
         if installed.autopilot == PX4 and message.param_type == INT32:
             # PX4 sends the bits of a whole number, others its value
             (value,) = struct.unpack("<i", struct.pack("<f", message.param_value))
-        if message.param_id in more:
+        if message.param_id in other_processing(installed.autopilot, self._instance):
             installed.values[message.param_id] = float(value)
             return
-        self._now[message.param_id] = float(value)
-        if not self._read:
-            installed.values[message.param_id] = float(value)
-            self._read = not installed.missing
-            self._asked, self._tries = (-inf, 0) if self._read else (self._asked, 1)
+        self._unanswered, waited = 0, watch.waits
+        ended = watch.hear(message.param_id, float(value))
+        at_once = ended or watch.waits != waited
+        self._asked, self._tries = (-inf, 0) if at_once else (self._asked, 1)
 
 
 def listed(parameters: Mapping[str, float]) -> str:

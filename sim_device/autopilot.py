@@ -7,6 +7,9 @@ commas), ``deny=1`` (no SET_MESSAGE_INTERVAL), ``acc_unit`` (mg, mm/s^2), ``mute
 parameter is answered), and any parameter by its name. ``drop`` names parameters, joined
 by commas, that it does not take; ``alter`` some that it answers rightly and keeps
 wrongly; ``glitch`` the same, but the first time only.
+
+With ``INS_GYR_CAL=1``, as ArduPilot has it, it calibrates its gyroscopes when it starts
+anew: after `BOOT_S` s of samples INS_GYROFFS is their mean.
 """
 
 from __future__ import annotations
@@ -49,6 +52,10 @@ WHOLE = ("SENS_BOARD_ROT", "TC_A_ENABLE", "TC_G_ENABLE")
 """Parameters of PX4 that are whole numbers."""
 
 COPTER = 2
+
+BOOT_S = 2.0
+"""How long it averages its gyroscopes when it starts anew, s of device time."""
+
 SET_INTERVAL = 511
 
 
@@ -68,7 +75,8 @@ def parameters(kind: str) -> dict[str, float]:
             table[f"INS_GYR{n}OFFS_{x}"] = 0.0
     filters = {"INS_ACCEL_FILTER": 20.0, "INS_GYRO_FILTER": 20.0}
     corrects = {f"INS_TCAL{n}_ENABLE": 0.0 for n in (1, 2, 3)}
-    return {**table, **filters, **corrects, "AHRS_ORIENTATION": 0.0}
+    board = {"AHRS_ORIENTATION": 0.0, "INS_GYR_CAL": 1.0}
+    return {**table, **filters, **corrects, **board}
 
 
 class Autopilot:
@@ -112,6 +120,8 @@ class Autopilot:
                 raise InputError(f"streams={name!r} is none of {', '.join(STREAMS)}")
             self._unasked[STREAMS[name]] = 0.0
         self._every = dict(self._unasked)
+        self._booting: list[Block] = []
+        self._boots = False
 
     @property
     def sends(self) -> bool:
@@ -119,8 +129,12 @@ class Autopilot:
         return bool(self._every)
 
     def reboot(self) -> None:
-        """Send only what is sent unasked; parameters outlast it."""
+        """Send only what is sent unasked; parameters outlast it, but what it measures.
+
+        That it measures its gyroscopes at each start is ArduPilot's INS_GYR_CAL.
+        """
         self._every = dict(self._unasked)
+        self._booting, self._boots = [], bool(self.parameters.get("INS_GYR_CAL"))
 
     def heartbeat(self) -> bytes:
         """Say that it is there."""
@@ -136,6 +150,7 @@ class Autopilot:
         rate : of the sensor, Hz
 
         """
+        self._calibrate(block)
         block = self._corrected(block)
         packets: list[bytes] = []
         for number, interval in self._every.items():
@@ -157,6 +172,16 @@ class Autopilot:
         heard = self._mav.parse_buffer(data) or []
         return b"".join(self._answer(message) for message in heard)
 
+    def _calibrate(self, block: Block) -> None:
+        """Take the gyroscopes' mean as their offset, once it has booted."""
+        if not self._boots:
+            return
+        self._booting.append(block)
+        if block.t[-1] - self._booting[0].t[0] >= BOOT_S:
+            mean = np.concatenate([some.gyr for some in self._booting]).mean(axis=0)
+            self.parameters |= dict(zip(self._names("gyr", "off"), mean, strict=True))
+            self._boots = False
+
     def _corrected(self, block: Block) -> Block:
         """Apply the calibration that it has."""
         acc = (block.acc - self._triad("acc", "off")) * self._triad("acc", "scale")
@@ -164,13 +189,16 @@ class Autopilot:
         return Block.of(block.t, acc, gyr, block.temperature, block.seq)
 
     def _triad(self, sensor: str, what: str) -> Array:
+        return np.array([self.parameters[n] for n in self._names(sensor, what)])
+
+    def _names(self, sensor: str, what: str) -> list[str]:
         n = self._instance
         if self._kind == "px4":
             name = f"CAL_{'ACC' if sensor == 'acc' else 'GYRO'}{n}_{{}}{what.upper()}"
         else:
             number, word = n + 1 if n else "", {"off": "OFFS", "scale": "SCAL"}[what]
             name = f"INS_{sensor.upper()}{number}{word}_{{}}"
-        return np.array([self.parameters[name.format(axis)] for axis in "XYZ"])
+        return [name.format(axis) for axis in "XYZ"]
 
     def _answer(self, message: Any) -> bytes:
         kind = message.get_type()

@@ -89,7 +89,12 @@ def prepared(
 
     """
     from fieldcal.calibration import Nominal
-    from fieldcal.install.proposal import changes, installed_in, unsupported_parameters
+    from fieldcal.install.proposal import (
+        changes,
+        installed_in,
+        replaced_at_start,
+        unsupported_parameters,
+    )
 
     installed = installed_in(session)
     if installed is None:
@@ -98,7 +103,8 @@ def prepared(
             " record it over mavlink:, or write a file by fieldcal export"
         )
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
-    return changes(found, nominal, installed), installed, unsupported_parameters(found)
+    says = (*unsupported_parameters(found), *replaced_at_start(installed))
+    return changes(found, nominal, installed), installed, says
 
 
 def _refuse(
@@ -178,6 +184,7 @@ def _to_device(
     wanted: Sequence[Change],
     installed: Installed,
 ) -> None:
+    from fieldcal.drivers.mavlink_parameters import same
     from fieldcal.install.transaction import (
         WriteRolledBack,
         check_unchanged,
@@ -186,11 +193,14 @@ def _to_device(
         save,
     )
 
-    old = {c.name: c.old for c in wanted}
+    known = {c.name: c.old for c in wanted}
     new = {c.name: c.new for c in wanted}
     with opened(args.device) as link:
         check_ready(link, installed.autopilot)
-        check_unchanged(link, old, "while it was recorded")
+        old = check_unchanged(link, known, "while it was recorded", new)
+        if all(same(old[name], value) for name, value in new.items()):
+            sys.stderr.write(f"all {len(new)} parameters are installed already\n")
+            return
         ask(f"write these {len(new)} parameters to {args.device}", args.yes)
         path = save(session.folder, args.device, old, new)
         try:

@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import diagonal
-from fieldcal.drivers.mavlink_installed import Installed, names
+from fieldcal.drivers.mavlink_installed import AT_START, Installed, names
 from fieldcal.session.folder import Session
 
 WIDEST = {"acc_offset": 3.5, "gyr_offset": 0.5}
@@ -108,6 +108,18 @@ def unsupported_parameters(found: Calibration) -> tuple[str, ...]:
         f"{group} stays out: the autopilot has no parameter for it"
         for group in LEFT_OUT
         if group in found.groups
+    )
+
+
+def replaced_at_start(installed: Installed) -> tuple[str, ...]:
+    """What of it an autopilot replaces when it starts, a sentence if it does."""
+    if not installed.values.get(AT_START, 0.0):
+        return ()
+    first, *_ = names(installed.autopilot, installed.instance)["gyr_offset"]
+    return (
+        f"{AT_START} = {installed.values[AT_START]:g}: the autopilot averages its"
+        f" gyroscopes at each start and replaces {first.rstrip('XYZ')}X, Y, Z, whatever"
+        f" is written; set {AT_START} = 0 to keep them",
     )
 
 

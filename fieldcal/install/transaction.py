@@ -14,13 +14,28 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.core.errors import DeviceError, InputError
-from fieldcal.drivers.mavlink_installed import Installed, identity
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    PX4,
+    Installed,
+    identity,
+    names,
+)
 from fieldcal.drivers.mavlink_parameters import ParameterLink, same
 from fieldcal.drivers.mavlink_talk import listed
 from fieldcal.session.folder import DESCRIPTION, Session, write_whole
 
 SAVED = "installed-before-"
 """What the name of a file with an old set begins with."""
+
+
+GYR_OFFSETS = {
+    name
+    for autopilot in (ARDUPILOT, PX4)
+    for instance in range(3)
+    for name in names(autopilot, instance)["gyr_offset"]
+}
+"""Parameters that an autopilot sets by itself."""
 
 
 class WriteRolledBack(DeviceError):
@@ -32,8 +47,11 @@ def check_unchanged(
     known: Mapping[str, float],
     since: str,
     other: Mapping[str, float] | None = None,
-) -> None:
-    """Refuse if the autopilot's parameters are not those of the proposal.
+) -> dict[str, float]:
+    """Return what the autopilot keeps; refuse if that is not as in the proposal.
+
+    Offsets of gyroscopes are its own to change: it averages them at each start, and
+    what is written replaces them whatever they are.
 
     Parameters
     ----------
@@ -50,12 +68,15 @@ def check_unchanged(
     """
     now = link.read(known)
     for name, value in known.items():
+        if name in GYR_OFFSETS:
+            continue
         also = (other or {}).get(name, value)
         if not (same(now[name], value) or same(now[name], also)):
             raise InputError(
                 f"{name} = {now[name]:.9g} on the autopilot, and was {value:.9g}"
                 f" {since}: somebody has changed it since; record again"
             )
+    return now
 
 
 def install(

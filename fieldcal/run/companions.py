@@ -96,6 +96,7 @@ class Companion:
         if last > first:
             end_s = float(np.nextafter(last, np.inf))
             self.mark("window", position=position, start_s=first, end_s=end_s)
+            self._driver.read_again()
 
     def end(self) -> None:
         """End the recording; safe to call twice."""
@@ -110,7 +111,7 @@ class Companion:
                     recorded = self._recorder.append(block)
                     self._times.add(recorded)
                 marks.take(recorded)
-                if self._ends:
+                if self._ends and not self._driver.readings.pending:
                     break
             marks.end()
         except FieldcalError as fault:

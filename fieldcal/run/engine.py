@@ -22,7 +22,13 @@ from fieldcal.core.errors import FieldcalError, Moved, Skipped, Stopped, WrongPo
 from fieldcal.core.samples import Block, pieces
 from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Hold, Note, Plan, Step
-from fieldcal.run.interruptions import RepeatPosition, gap, restart_notice, restarted
+from fieldcal.run.interruptions import (
+    RepeatPosition,
+    gap,
+    processed_anew,
+    restart_notice,
+    restarted,
+)
 from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
 from fieldcal.run.operator.protocol import Display, Operator, Wish
 from fieldcal.run.position_check import AcceptedPosition
@@ -263,12 +269,15 @@ class Engine:
         """Average a window; None if the operator wants to begin it again."""
         window, last = Window(noise=self._noise, grain=self._driver.grain), np.nan
         restarts = self._driver.health.restarts
+        changed = self._driver.readings.changed
         try:
             for block in self._stream:
                 if block.t[0] - last > GAP:
                     raise gap(last, float(block.t[0]))
                 if self._driver.health.restarts != restarts:
                     raise restarted(float(block.t[0]))
+                if self._driver.readings.changed != changed:
+                    raise processed_anew(float(block.t[0]))
                 last = float(block.t[-1])
                 window.add(block)
                 if window.moved:
@@ -280,6 +289,7 @@ class Engine:
                 if window.elapsed >= hold.seconds or window.done(hold.sigma):
                     break
             average = window.average()
+            self._confirm(changed)
         except Moved as moved:
             self._left = hold.index
             what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
@@ -292,6 +302,24 @@ class Engine:
         self._display.taken(hold, window)
         self._say_if_cold()
         return average
+
+    def _confirm(self, changed: int) -> None:
+        """Have the device say that it did the same to all samples of a window.
+
+        Raises
+        ------
+        Moved
+            If it did not.
+
+        """
+        self._driver.read_again()
+        if not self._driver.readings.pending:
+            return
+        for block in self._stream:
+            if self._driver.readings.changed != changed:
+                raise processed_anew(float(block.t[-1]))
+            if not self._driver.readings.pending:
+                return
 
     def _say_if_cold(self) -> None:
         if self._warm_up and (said := self._warm_up.says):

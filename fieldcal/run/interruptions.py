@@ -52,3 +52,13 @@ def restarted(now: float) -> Moved:
         now,
         "t",
     )
+
+
+def processed_anew(now: float) -> Moved:
+    """The device has changed what it does to its samples, noticed at a time, s."""
+    return Moved(
+        f"the device changed its own calibration before {now:.2f} s, as autopilots do"
+        " when they start",
+        now,
+        "t",
+    )

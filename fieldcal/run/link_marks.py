@@ -63,18 +63,23 @@ class LinkMarks:
         self._clocked = monotonic()
         self._grain = Grain()
         self._facts = self._told()
+        self._same, self._sure = driver.readings.same, float("nan")
 
     def take(self, block: Block) -> None:
         """Note what happened up to these samples."""
         edges = np.concatenate([[self._last], block.t])
         steps = np.diff(edges)
+        if self._driver.readings.same != self._same:
+            # the answer may be older than these samples, but not than those before
+            self._same, self._sure = self._driver.readings.same, self._last
         self._last = float(block.t[-1])
         if self._grain != self._driver.grain:
             self._grain = self._driver.grain
             self._recorder.mark("grain", **asdict(self._grain))
         if self._told() != self._facts:
             self._facts = self._told()
-            self._recorder.mark("device", **self._driver.notes)
+            until = {"until_s": self._sure} if np.isfinite(self._sure) else {}
+            self._recorder.mark("device", **self._driver.notes, **until)
         if self._counts() == self._before:
             self._clock()
             return

@@ -29,6 +29,7 @@ from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block
 from fieldcal.session import description, sample_files
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS, Description
+from fieldcal.session.installed import in_one_calibration
 
 DESCRIPTION = "session.toml"
 MARKS = "marks.jsonl"
@@ -113,7 +114,10 @@ class Session:
 
     @cached_property
     def block(self) -> Block:
-        """All samples, in SI units; volts and counts by the nominal scale factors."""
+        """All samples, in SI units; volts and counts by the nominal scale factors.
+
+        Where the device changed its own calibration meanwhile, as under the last one.
+        """
         raw, cut = sample_files.read(sample_files.find(self.folder))
         self.warnings += cut
         units, gauge = self.about.units, self.about.gauge.size
@@ -123,7 +127,9 @@ class Session:
         ):
             if unit != 1.0:
                 np.multiply(triad, unit, out=triad)
-        return raw
+        whole, changed = in_one_calibration(raw, self.marks())
+        self.warnings += changed
+        return whole
 
     def marks(self) -> Iterator[dict[str, Any]]:
         """Marks in order."""

@@ -226,7 +226,12 @@ class Recorder:
             self._fault = None
 
     def mark(self, event: str, **what: Any) -> None:
-        """Append a mark: what happened, with the host's time."""
+        """Append a mark: what happened, with the host's time.
+
+        Of what the device is, the time of the last sample before is kept as well.
+        """
+        if event == "device" and self._last is not None:
+            what["at_s"] = self._last[0]
         line = mark_line({"event": event, **what, "host_s": round(time(), 3)})
         self.flush()
         try:

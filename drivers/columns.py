@@ -1,8 +1,8 @@
 """Guess what the columns of lines of numbers are, from a device that lies still.
 
 Three neighbours whose norm is one gravity are the accelerometers, and the norm tells
-their unit; the three beside them are the gyroscopes, whose unit nothing tells at rest;
-a column that only grows is the time or a counter.
+their unit; the three beside them are the gyroscopes, which at rest read what is no rest
+in rad/s, or leave their unit open; a column that only grows is the time or a counter.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ import numpy as np
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.session.description import ACC_UNITS
+
+REST = 0.1
+"""What no gyroscope of a device at rest reads, rad/s: 6 deg/s."""
 
 LEAST = 5
 """Lines that make a guess worth while."""
@@ -31,7 +34,7 @@ def guess(data: bytes, seconds: float) -> str | None:
 
     >>> lines = b"".join(b"%d;0;0;1000;1;2;3\n" % (1000 * i) for i in range(20))
     >>> guess(lines, 0.02)
-    'columns=t,ax,ay,az,gx,gy,gz&separator=;&t_unit=us&acc_unit=mg'
+    'columns=t,ax,ay,az,gx,gy,gz&separator=;&t_unit=us&acc_unit=mg&gyr_unit=deg/s'
     """
     lines = [line.strip() for line in data.decode("latin-1").split("\n")[1:-1]]
     checked = sum(CHECKED.fullmatch(line) is not None for line in lines)
@@ -99,6 +102,9 @@ def _names(values: Array, seconds: float) -> list[str]:
         for beside in (at + 3, at - 3):
             if beside >= 0 and names[beside : beside + 3] == ["-"] * 3:
                 names[beside : beside + 3] = ["gx", "gy", "gz"]
+                rates = values[:, beside : beside + 3]
+                if float(np.median(np.abs(rates).max(axis=1))) > REST:
+                    units.append("gyr_unit=deg/s")
                 break
     mean = values.mean(axis=0)
     for i in [i for i, name in enumerate(names) if name == "-"]:

@@ -14,6 +14,12 @@ from fieldcal.drivers.serial_imu import open_port
 SILENT = 2
 """Baud rates at which not a byte came, after which there is no device."""
 
+OPEN = (
+    "; nothing tells the unit of its gyroscopes at rest: rad/s is taken, add"
+    " &gyr_unit=deg/s if they send that (a run sees it by the first turn)"
+)
+"""What is said of lines whose rates may be in either unit."""
+
 ENOUGH = 4000
 """Bytes after which a format shows."""
 
@@ -81,6 +87,8 @@ def _told(port: str, baud: int, data: bytes, took: float) -> DetectedDevice | No
         url = f"serial:{port}?format={name}&baud={baud}{query}"
         rate = like.samples / took
         says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
+        if "gx" in query and "gyr_unit" not in query:
+            says += OPEN
         return DetectedDevice(port, url, name, baud, rate, says)
     if heard := detect_autopilot(data):
         query = f"&{heard.query}" if heard.query else ""

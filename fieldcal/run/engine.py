@@ -22,6 +22,7 @@ from fieldcal.core.errors import FieldcalError, Moved, Skipped, Stopped, WrongPo
 from fieldcal.core.samples import Block, pieces
 from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Hold, Note, Plan, Step
+from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import (
     RepeatPosition,
     gap,
@@ -87,6 +88,8 @@ class Engine:
         self._noise: LearnedNoise | None = None
         self._left: int | None = None
         self._before: int | None = None
+        self._units = GyroUnitWatch(about.gravity)
+        self._warned_of_unit = False
         self._link = LinkMarks(driver, recorder)
         self._silence, self._heard = 0, replace(driver.health)
         driver.on_silence = self._silent
@@ -173,7 +176,9 @@ class Engine:
             self._display.heard(block)
             if self._warm_up:
                 self._warm_up.add(block)
-            yield from pieces(block, PIECE)
+            for piece in pieces(block, PIECE):
+                self._units.add(piece)
+                yield piece
 
     def _silent(self) -> None:
         """Report that no samples arrive, and what comes instead."""
@@ -194,7 +199,8 @@ class Engine:
 
     def _arrive(self, hold: Hold) -> None:
         """Wait until the device rests where it should."""
-        waiting = PositionWait(hold, self._about, self._held, self._left == hold.index)
+        left = self._left == hold.index
+        waiting = PositionWait(hold, self._about, self._held, left, self._units)
         asked = self._driver.host_time()
         insisted = warned = False
         for block in self._stream:
@@ -214,6 +220,7 @@ class Engine:
             if waiting.arrived and self._warm_up and self._warm_up.says and waits:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.says)
             self._display.turning(hold, waiting, reason)
+            self._warn_of_unit()
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
                 self._alarm(reason)
@@ -221,6 +228,12 @@ class Engine:
                 return
             self._complain(hold, waiting, quiet=wish == "wait")
         raise AssertionError("blocks() ends in an exception only")
+
+    def _warn_of_unit(self) -> None:
+        """Say once that the gyroscopes are in another unit."""
+        if self._units.says and not self._warned_of_unit:
+            self._warned_of_unit = True
+            self._alarm(WaitReason(WaitState.WRONG_UNIT, self._units.says))
 
     def _complain(self, hold: Hold, waiting: PositionWait, quiet: bool) -> None:
         """Say that it rests at a wrong place, and give up in the end."""

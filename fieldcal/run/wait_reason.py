@@ -17,6 +17,7 @@ class WaitState(Enum):
     MISPLACED = auto()
     WARMING_UP = auto()
     NO_SAMPLES = auto()
+    WRONG_UNIT = auto()
     TAKEN_BEFORE = auto()
 
 
@@ -30,7 +31,12 @@ TEXTS = {
 }
 """What is shown of the states that need no explanation."""
 
-FOR_OPERATOR = {WaitState.MISPLACED, WaitState.WARMING_UP, WaitState.NO_SAMPLES}
+FOR_OPERATOR = {
+    WaitState.MISPLACED,
+    WaitState.WARMING_UP,
+    WaitState.NO_SAMPLES,
+    WaitState.WRONG_UNIT,
+}
 """States in which the operator has to do something."""
 
 

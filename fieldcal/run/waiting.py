@@ -10,9 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.core.positions import Position
+from fieldcal.core.positions import Position, forces
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.planning.steps import Hold
+from fieldcal.run.gyro_unit import GyroUnitWatch
+from fieldcal.run.mounting_check import mounted_otherwise
 from fieldcal.run.position_check import (
     NORM,
     AcceptedPosition,
@@ -52,6 +54,7 @@ class PositionWait:
     about : site, mounting and nominal calibration
     held : a position that was accepted before, if any
     left : whether a window here was broken off by a movement just before
+    units : what is known of the gyroscopes' unit
 
     Attributes
     ----------
@@ -70,8 +73,10 @@ class PositionWait:
         about: Description,
         held: AcceptedPosition | None,
         left: bool = False,
+        units: GyroUnitWatch | None = None,
     ) -> None:
         self._hold, self._about, self._held, self._left = hold, about, held, left
+        self._units = units
         self._others = _others(hold, about)
         self._began: float | None = None
         self._start()
@@ -143,6 +148,8 @@ class PositionWait:
     def reason(self) -> WaitReason:
         """What it waits for."""
         if self._stillness.since is None:
+            if wrong := self._units and (self._units.says or self._units.asks):
+                return WaitReason(WaitState.WRONG_UNIT, wrong)
             measured = np.isfinite(self.meter)
             return WaitReason(WaitState.MOVING if measured else WaitState.LISTENING)
         if self.arrival is not None and not self.arrival.ok:
@@ -157,10 +164,22 @@ class PositionWait:
         if self.arrival is None or self.arrival.ok or self.f is None:
             return ""
         problem = self.arrival.problem
+        if self._held is None and self.usable:
+            problem = self._otherwise() or problem
         number = self._hold.index + 1
         if self._left:
             problem = f"turned too early, position {number} is not done: {problem}"
         return problem
+
+    def _otherwise(self) -> str:
+        """What to say if it stands squarely on another face; empty if it does not."""
+        if self.f is None or not self._hold.position.oriented:
+            return ""
+        wanted = forces([self._hold.position], self._about.gravity)[0]
+        device = self._about.mounting.T @ self.f
+        said = mounted_otherwise(device, wanted, self._about.axes)
+        problem = self.arrival.problem if self.arrival else ""
+        return said and f"{said}; else {problem}"
 
     def waited_enough(self, give_up: float) -> bool:
         """Whether it was waited for so many s, and whoever turns it had the time to."""

@@ -95,11 +95,17 @@ def test_lines_of_numbers_are_told_with_their_columns(
         assert answer["baud"] == bauds()[0]
         assert answer["url"].endswith(
             "&columns=t,seq,gx,gy,gz,ax,ay,az,temperature&t_unit=ms&acc_unit=g"
-            "&prefix=IMU&checksum=xor"
+            "&gyr_unit=deg/s&prefix=IMU&checksum=xor"
         )
         with open_driver(answer["url"]) as imu:
             block = next(imu.blocks(3.0))
             assert np.linalg.norm(block.acc[0]) == pytest.approx(9.80665, abs=1e-3)
+
+
+def test_rates_whose_unit_nothing_tells_are_said_to_be_open() -> None:
+    with talking(lambda i: b"%d,0.01,-9.81,0.02,0.001,-.002,.003\n" % (5 * i)) as port:
+        found = probe(port, 0.5)
+    assert "gyr_unit" not in found.url and "add &gyr_unit=deg/s" in found.says
 
 
 def test_the_table_says_how_to_use_it(capsys: pytest.CaptureFixture[str]) -> None:

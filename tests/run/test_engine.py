@@ -11,14 +11,20 @@ import numpy as np
 import pytest
 from talking import talking
 
-from fieldcal.core.errors import CalibrationFailed, DeviceSilent, Stopped, WrongPosition
+from fieldcal.core.errors import (
+    CalibrationFailed,
+    DeviceSilent,
+    Stopped,
+    WrongPosition,
+)
 from fieldcal.core.frames import turn
 from fieldcal.core.positions import FIVE, TWO, Position
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, pieces
 from fieldcal.drivers.driver import Driver, Health, open_driver
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, hold
 from fieldcal.run.engine import Engine
+from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import RepeatPosition
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.position_check import AcceptedPosition
@@ -428,3 +434,84 @@ def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
     leaning = Leaning(turner.driver)
     Engine(turner.driver, leaning, ABOUT, bench.recorder).run(hold_all(TWO[:1], 20.0))
     assert "hold still, the window starts again" in leaning.told[0]
+
+
+class InDegrees(InProcess):
+    """A device whose gyroscopes send deg/s under a driver that was told rad/s."""
+
+    def receive(self, timeout: float) -> Block | None:
+        block = super().receive(timeout)
+        return block and replace(block, gyr=np.rad2deg(block.gyr))
+
+
+def test_gyroscopes_in_degrees_are_asked_about_before_any_turn(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        made = make(recorder, InDegrees(VirtualDevice(seed=3)))
+        with pytest.raises(WrongPosition):
+            made.engine.run(hold_all(TWO, 10.0))
+    reasons = {v.reason.text for v in made.turner.views}
+    assert any("if they are in deg/s, begin again" in text for text in reasons)
+
+
+@pytest.mark.parametrize(("scale", "wrong"), [(np.rad2deg(1.0), True), (1.0, False)])
+def test_gyroscopes_in_degrees_are_told_by_a_turn(scale: float, wrong: bool) -> None:
+    """Forty-five degrees about a level axis in two seconds, there and back."""
+    units, rng = GyroUnitWatch(9.81), np.random.default_rng(2)
+    t = np.arange(1200) / 100
+    rate = np.deg2rad(22.5) * (((t > 5) & (t < 7)) * 1.0 - ((t > 8) & (t < 10)) * 1.0)
+    angle = np.cumsum(rate) / 100
+    acc = 9.81 * np.column_stack([0 * t, -np.cos(angle), np.sin(angle)])
+    gyr = np.column_stack([rate, 0 * t, 0 * t]) + 2e-3 * rng.standard_normal((1200, 3))
+    block = Block.of(t, acc + 0.02 * rng.standard_normal((1200, 3)), scale * gyr)
+    for piece in pieces(block, 0.1):
+        units.add(piece)
+    assert ("they are in deg/s and not in rad/s" in units.says) == wrong
+    assert not units.asks
+
+
+def test_gyroscopes_in_rad_are_no_matter(bench: Bench) -> None:
+    bench.engine.run(hold_all(FIVE, 10.0))
+    assert not any("gyr_unit" in text for text in bench.turner.told)
+    states = {view.reason.state for view in bench.turner.views}
+    assert WaitState.WRONG_UNIT not in states
+
+
+def test_rates_that_move_where_nothing_is_felt_ask_for_their_unit() -> None:
+    """Before any turn: the accelerometers rest for seconds, the rates do not."""
+    rng, wait = np.random.default_rng(1), GyroUnitWatch(9.81)
+    for start in np.arange(0.0, 20.0, 0.1):
+        t = start + np.arange(10) / 100
+        acc = [0.0, -9.81, 0.0] + 0.01 * rng.standard_normal((10, 3))
+        gyr = 2.0 + 0.3 * rng.standard_normal((10, 3))
+        wait.add(Block.of(t, acc, gyr))
+        assert not wait.says
+        assert not wait.asks or t[-1] > 5.0
+    assert "if they are in deg/s" in wait.asks
+
+
+@pytest.mark.parametrize(
+    ("up", "axes"), [("+z", "+x,-z,+y"), ("-z", "+x,+z,-y"), ("+y", "+x,-y,-z")]
+)
+def test_a_unit_on_another_face_is_recognised(up: str, axes: str) -> None:
+    """Lying flat with z up is a mounting, and not -89.3° in β."""
+    f = np.zeros(3)
+    f["xyz".index(up[1])] = 9.7 if up[0] == "+" else -9.7
+    waiting = PositionWait(Hold(0, FIVE[0], 10.0), ABOUT, None)
+    rng = np.random.default_rng(0)
+    for start in np.arange(0.0, 8.0, 0.1):
+        t = start + np.arange(10) / 100
+        acc = f + [0.05, 0.02, -0.03] + 0.01 * rng.standard_normal((10, 3))
+        waiting.add(Block.of(t, acc, 1e-3 * rng.standard_normal((10, 3))), t[0])
+    assert waiting.problem.startswith(f"{up} of the device is up")
+    assert f"--mounting={axes}" in waiting.problem
+    assert waiting.reason.state is WaitState.MISPLACED
+
+
+def test_a_turn_that_was_not_made_is_no_mounting() -> None:
+    waiting = PositionWait(Hold(0, FIVE[3], 10.0), ABOUT, None)
+    rng = np.random.default_rng(0)
+    for start in np.arange(0.0, 8.0, 0.1):
+        t = start + np.arange(10) / 100
+        acc = [0.0, -9.81, 0.0] + 0.01 * rng.standard_normal((10, 3))
+        waiting.add(Block.of(t, acc, 1e-3 * rng.standard_normal((10, 3))), t[0])
+    assert waiting.problem and "mounting" not in waiting.problem

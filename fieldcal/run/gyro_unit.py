@@ -1,0 +1,113 @@
+"""Whether the gyroscopes are in the unit that they are taken for, by the first turns.
+
+As gravity turns in device axes, the rates say how fast: what 1 rad/s reads is then 1,
+or 57.3 of a device that sends deg/s. Before anything turned there is a hint: it rests
+by its accelerometers while the rates move as no device at rest does.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.importing.physical_units import (
+    GYR_OUT,
+    GYR_SCALES,
+    Gravity,
+    fitting,
+    rate_in,
+)
+from fieldcal.windows import Stillness
+
+PART = 0.05
+"""Device time of which one mean is kept, s."""
+
+MEMORY = 6000
+"""Means that are kept: five minutes."""
+
+EVERY = 1.0
+"""Device time between two looks, s."""
+
+HINT = 5.0
+"""Rest by the accelerometers alone after which moving rates are asked about, s."""
+
+
+class GyroUnitWatch:
+    """Samples as they come, and what the unit of the rates must be.
+
+    Parameters
+    ----------
+    gravity : m/s^2
+
+    Attributes
+    ----------
+    says : what a turn has shown, one sentence; empty while nothing is wrong
+
+    """
+
+    def __init__(self, gravity: float) -> None:
+        self._gravity = Gravity(gravity, np.zeros(3), False)
+        self._means: deque[Array] = deque(maxlen=MEMORY)
+        self._part: list[Block] = []
+        self._looked = -np.inf
+        self._felt, self._whole = Stillness(), Stillness()
+        self._last = self._moves = np.nan
+        self._proved = False
+        self.says = ""
+
+    def add(self, block: Block) -> None:
+        """Take in the block that follows."""
+        self._felt.add(replace(block, gyr=np.full_like(block.gyr, np.nan)))
+        self._whole.add(block)
+        self._last = float(block.t[-1])
+        if self._felt.since is None or self._whole.still:
+            self._moves = self._last
+        self._part.append(block)
+        if self._last - self._part[0].t[0] >= PART:
+            rows = [np.column_stack([b.t, b.acc, b.gyr]) for b in self._part]
+            self._means.append(np.vstack(rows).mean(axis=0))
+            self._part = []
+        if self._last - self._looked >= EVERY and not self.says:
+            self._looked = self._last
+            self.says = self._look()
+
+    def _look(self) -> str:
+        if not self._means:
+            return ""
+        table = np.array(self._means)
+        reads = rate_in(table[:, 0], table[:, 1:4], table[:, 4:], self._gravity)
+        if reads is None:
+            return ""
+        fits = fitting(reads, GYR_SCALES, GYR_OUT[1])
+        self._proved = bool(fits) and fits[0].unit == "rad/s"
+        if not fits or self._proved:
+            return ""
+        said = f"as gravity turns, the gyroscopes read {reads:.3g} for 1 rad/s: they"
+        if fits[0].lsb != 1:
+            return (
+                f"{said} send {fits[0]}, and are taken for rad/s; end this (q), and say"
+                " their range in the device's address"
+            )
+        return (
+            f"{said} are in {fits[0].unit} and not in rad/s; end this (q) and begin"
+            f" again with gyr_unit={fits[0].unit} in the device's address"
+        )
+
+    @property
+    def asks(self) -> str:
+        """What moves although it rests, as long as no turn has told; empty if nothing.
+
+        To be asked where rates alone keep the device from being at rest.
+        """
+        if self.says or self._proved or not self._last - self._moves >= HINT:
+            return ""
+        rates = np.array(self._means)[-int(HINT / PART) :, 4:]
+        size = float(np.nanmax(np.abs(rates), initial=0.0))
+        return (
+            f"the accelerometers rest, the gyroscopes read up to {size:.2g} rad/s: if"
+            " they are in deg/s, begin again with gyr_unit=deg/s in the device's"
+            " address; a turn of the device will tell"
+        )

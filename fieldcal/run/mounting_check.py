@@ -1,0 +1,61 @@
+"""Whether a device that stands squarely on another face is mounted otherwise.
+
+Gravity along another axis than the first position has it is either a turn that is still
+to be made, or a mounting that nobody declared. Gravity alone leaves four mountings, a
+quarter turn about the vertical apart: the one is named that keeps most of what is
+declared.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.frames import mounting_matrix
+from fieldcal.core.samples import Array
+from fieldcal.run.position_check import FIRST
+
+
+def other_mounting(
+    device: Array, wanted: Array, declared: tuple[str, ...]
+) -> tuple[str, ...] | None:
+    """Mounting by which the device would stand where it should; None if none does.
+
+    Parameters
+    ----------
+    device : (3,) specific force, device axes
+    wanted : (3,) where it should be, procedure axes
+    declared : the mounting so far
+
+    >>> z_up, home = np.array([0.0, 0.1, 9.8]), np.array([0.0, -9.81, 0.0])
+    >>> other_mounting(z_up, home, ("+x", "+y", "+z"))
+    ('+x', '-z', '+y')
+    """
+    length = float(np.linalg.norm(device) * np.linalg.norm(wanted))
+    near: list[tuple[int, tuple[str, ...]]] = []
+    for names in permutations("xyz"):
+        for signs in product("+-", repeat=3):
+            axes = tuple(s + n for s, n in zip(signs, names, strict=True))
+            try:
+                turned = mounting_matrix(axes) @ device
+            except InputError:
+                continue  # left-handed
+            if turned @ wanted >= np.cos(FIRST) * length:
+                changed = sum(a != b for a, b in zip(axes, declared, strict=True))
+                near.append((changed, axes))
+    return min(near)[1] if near else None
+
+
+def mounted_otherwise(device: Array, wanted: Array, declared: tuple[str, ...]) -> str:
+    """What to say of a device that would be in place if it were mounted otherwise."""
+    axes = other_mounting(device, wanted, declared)
+    if axes is None or axes == declared:
+        return ""
+    i = int(np.argmax(np.abs(device)))
+    up = f"{'+' if device[i] > 0 else '-'}{'xyz'[i]}"
+    return (
+        f"{up} of the device is up, by the mounting {','.join(declared)} it is not: if"
+        f" it is mounted so, begin again with --mounting={','.join(axes)}"
+    )

@@ -101,14 +101,11 @@ def run(args: argparse.Namespace) -> int:
         if args.output and len(opened) > 1:
             folder = args.output / name
         names = _chosen(recording, args.instance)
-        says, mended = list(recording.says), list(recording.mended)
         for stream in names:
             # what was said of one IMU of the file is no matter of another
-            recording.says, recording.mended = list(says), list(mended)
+            one = recording.alone(stream.name)
             inner = re.sub(r"[^\w.-]+", "_", stream.name).strip("_")
-            _bring(
-                args, recording, stream, folder / inner if len(names) > 1 else folder
-            )
+            _bring(args, one, stream, folder / inner if len(names) > 1 else folder)
     return 0
 
 

@@ -17,9 +17,10 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing import columns, headings
+from fieldcal.importing import columns
+from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.gzip_stream import head, on_disk
-from fieldcal.importing.recording import ImuStream, Recording
+from fieldcal.importing.headings import Column
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
 
@@ -27,6 +28,12 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 MATLAB = b"MATLAB 5.0 MAT-file"
 WIDEST = 64
 """Columns of a table that are read together: they lie side by side in the file."""
+
+BEGINNING = 1 << 16
+"""Rows at the beginning by which physics tells columns."""
+
+GROWS = 0.99
+"""Share of steps of a column that are not backwards, if it is the time."""
 
 ROWS = 1 << 14
 """Rows read together: few enough to stay in the processor's cache."""
@@ -61,33 +68,49 @@ class ArrayTable(NamedTuple):
     unit: str = ""
 
 
-class ArrayFile(Recording):
-    """Arrays with names, with one IMU in them."""
+class ArrayFile(ColumnRecording):
+    """Arrays with names, with one IMU in them or several."""
 
     _loaded: dict[str, ArrayTable] | None = None
     """Of a format whose reader gives all arrays at once, so that it does so once."""
     _units: dict[str, str] | None = None
     """Of the arrays of an HDF5 file, so that it is looked through once."""
 
-    asks_units = True
-
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
         return (("h5py",) if _is_hdf5(head(self.path)) else ()), "hdf5"
 
-    def streams(self) -> list[ImuStream]:
-        """Return the one IMU."""
+    def heading(self) -> list[Heading]:
+        """Names of the columns of its arrays."""
         with self._opened() as tables:
-            named = self._named(tables)
-        columns.check(replace(self.wanted, columns=tuple(named)))
-        return [ImuStream("0", f"columns in {columns.units(self.wanted)}")]
+            return [Heading(_columns(tables))]
 
-    def notes(self, stream: str) -> dict[str, Any]:
-        """Return the units."""
-        return columns.notes(self.wanted)
+    def beginning(self) -> Array:
+        """First rows of the columns of its longest arrays; of others nothing."""
+        with self._opened() as tables:
+            longest = max((t.shape[0] for t in tables.values()), default=0)
+            rows = slice(0, min(longest, BEGINNING))
+            found: list[Array] = []
+            for table in tables.values():
+                many = range(table.shape[1] if table.shape[1] <= WIDEST else 0)
+                whole = table.shape[0] == longest
+                nothing = np.full(rows.stop, np.nan)
+                found += table.read(rows, many) if whole else [nothing for _ in many]
+            return np.reshape(found, (len(found), rows.stop)).T
+
+    def ask(self) -> str:
+        """Say which arrays there are."""
+        with self._opened() as tables:
+            return (
+                f"{self.path}: say which arrays are the channels, such as --columns "
+                f"t=time,ax=acc.0,ay=acc.1; there are {_listed(tables)}"
+            )
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, some rows at a time."""
+        if len(self.imus()) > 1:
+            yield from self.alone(stream).blocks(stream)
+            return
         with self._opened() as tables:
             named = self._named(tables)
             samples = columns.ColumnReader(replace(self.wanted, columns=tuple(named)))
@@ -113,15 +136,6 @@ class ArrayFile(Recording):
 
     def _named(self, tables: Mapping[str, ArrayTable]) -> dict[str, tuple[str, int]]:
         """Array and its column, by column of a session."""
-        if not self.wanted.columns:
-            self.wanted, says = headings.resolve_headings(
-                self.path,
-                self.wanted,
-                headings.read(_columns(tables)),
-                f"{self.path}: say which arrays are the channels, such as --columns "
-                f"t=time,ax=acc.0,ay=acc.1; there are {_listed(tables)}",
-            )
-            self.says.append(says)
         given = self.wanted.columns
         if not any("=" in column for column in given):
             return self._of_one(tables, given)
@@ -192,19 +206,31 @@ class ArrayFile(Recording):
         return {name: _table(file[name], unit) for name, unit in self._units.items()}
 
 
-def _columns(tables: Mapping[str, ArrayTable]) -> list[headings.Column]:
+def _columns(tables: Mapping[str, ArrayTable]) -> list[Column]:
     """Columns of the arrays; those of a table of three are axes."""
     found = []
     for name, table in tables.items():
         bare, many = name.rpartition("/")[2], table.shape[1]
         if many == 1:
-            found.append(headings.Column(name, bare, table.unit))
-        elif many == len("xyz"):
+            found.append(Column(name, bare, table.unit))
+        elif many <= WIDEST:
+            names = _names(bare, many, table)
             found += [
-                headings.Column(f"{name}.{i}", f"{bare}_{axis}", table.unit)
-                for i, axis in enumerate("xyz")
+                Column(f"{name}.{i}", one, "" if one == "t" else table.unit)
+                for i, one in enumerate(names)
             ]
     return found
+
+
+def _names(bare: str, many: int, table: ArrayTable) -> list[str]:
+    """Names of a table's columns: three are axes, and before them may be the time."""
+    three = [f"{bare}_{axis}" for axis in "xyz"]
+    behind = {2: [bare], 1 + len(three): three}.get(many)
+    if behind is not None:
+        (first,) = table.read(slice(0, min(table.shape[0], ROWS)), [0])
+        if len(first) > 1 and (np.diff(first) >= 0).mean() > GROWS:
+            return ["t", *behind]
+    return three if many == len(three) else [f"{bare}_{i}" for i in range(many)]
 
 
 def _listed(tables: Mapping[str, ArrayTable]) -> str:

@@ -1,9 +1,9 @@
-"""Text files of numbers in columns: what each column is, is said by the user.
+"""Text files of numbers in columns.
 
-Nothing is guessed in silence: columns, rate and units come from the command line, or
-from a line of names that says all of it; the separator and lines at the top that are no
-numbers are found by themselves. Times are made from the rate where the file has none;
-otherwise they count from the first line.
+Columns, rate and units come from the command line, from the lines above the numbers, or
+from physics, which is said; the separator and lines at the top that are no numbers are
+found by themselves. Times are made from the rate where the file has none; otherwise
+they count from the first line.
 
 Arrow reads what is plain, a piece at a time; lines that it does not understand are read
 again one by one, so that each that is none can be named.
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +21,19 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing import columns, headings
+from fieldcal.importing import columns
+from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.gzip_stream import HEAD
-from fieldcal.importing.recording import ImuStream, Recording
+from fieldcal.importing.text_top import (
+    headings_above,
+    is_number,
+    numbers_of,
+    rate_above,
+    separator_of,
+)
 from fieldcal.session.arrow_stream import numbers
 
 WHAT = "text with columns"
-
-SEPARATORS = (";", "\t", ",")
-"""Between columns; a comma in a line with one of the others is a decimal comma."""
 
 MARK = b"\xef\xbb\xbf"
 """What some programs write before UTF-8."""
@@ -40,7 +45,10 @@ TOP = 1000
 """Lines at the top among which the first of numbers is looked for."""
 
 NAMED = 50
-"""Lines at the top among which the names of the columns are looked for."""
+"""Lines at the top by which their width is judged."""
+
+BEGINNING = 1 << 16
+"""Rows at the beginning by which physics tells columns."""
 
 PLAIN = bytes([*range(32, 127), *b"\t\r\n"])
 """Characters of a text."""
@@ -62,48 +70,53 @@ def _is_wide(head: bytes) -> bool:
     return head.startswith(WIDE) and head.count(0) > len(head) / 3
 
 
-class TextColumns(Recording):
-    """A text file, with one IMU in it."""
+class TextColumns(ColumnRecording):
+    """A text file, with one IMU in it or several side by side."""
 
-    asks_units = True
     _skip = 0
-
-    def streams(self) -> list[ImuStream]:
-        """Return the one IMU."""
-        self._settle()
-        columns.check(self.wanted)
-        return [ImuStream("0", f"columns in {columns.units(self.wanted)}")]
-
-    def notes(self, stream: str) -> dict[str, Any]:
-        """Return the units."""
-        return columns.notes(self.wanted)
 
     def place(self, row: int) -> str:
         """Name a line; empty ones are not counted."""
         return f"line {self._skip + row + 1}"
 
-    def _settle(self) -> None:
-        """Take the columns from a line of names, where the user does not name them."""
-        if self.wanted.columns:
-            return
-        lines = next((_top(data)[:NAMED] for data in self._pieces()), [""])
-        found = (self._names(line) for line in lines)
-        self.wanted, says = headings.resolve_headings(
-            self.path,
-            self.wanted,
-            next((names for names in found if names), None),
-            f"{self.path}: say what its columns are, such as --columns "
-            f"t,ax,ay,az,gx,gy,gz; its first line is {lines[0][:60]!r}",
-        )
-        self.says.append(says)
+    def heading(self) -> list[Heading]:
+        """What stands above its numbers."""
+        return headings_above(self._lines, self.wanted.separator)
 
-    def _names(self, line: str) -> headings.HeadingMatch | None:
-        cells = line.lstrip("#% ").split(self._parted(line))
-        return headings.read([headings.Column("", c) for c in cells], columns.SKIP)
+    def beginning(self) -> Array:
+        """Numbers of the first lines."""
+        return self._numbers
+
+    def ask(self) -> str:
+        """Say how its columns are named."""
+        lines = self._lines or [""]
+        return (
+            f"{self.path}: say what its columns are, such as --columns"
+            f" t,ax,ay,az,gx,gy,gz; its first line is {lines[0][:60]!r}"
+        )
+
+    @cached_property
+    def _lines(self) -> list[str]:
+        return next((_top(data) for data in self._pieces()), [])
+
+    @cached_property
+    def _numbers(self) -> Array:
+        lines: list[str] = []
+        for data in self._pieces():
+            lines += _split(data)
+            if len(lines) > BEGINNING:
+                break
+        return numbers_of(lines[:BEGINNING], self.wanted.separator)
+
+    def rate_said(self) -> tuple[float, str] | None:
+        """Rate that a line above its numbers says."""
+        return rate_above(self._lines, self.wanted.separator)
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, a piece of the file at a time."""
-        self._settle()
+        if len(self.imus()) > 1:
+            yield from self.alone(stream).blocks(stream)
+            return
         columns.check(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != columns.SKIP]
@@ -115,7 +128,7 @@ class TextColumns(Recording):
                 if not 0 <= self._skip < len(top):
                     break
                 data, first = _behind(data, self._skip), top[self._skip]
-                separator = self.wanted.separator or _separator(first)
+                separator = self.wanted.separator or separator_of(first)
                 self._check_width(first, separator)
                 if separator != "," and "," in first:
                     self.says.append("its numbers have decimal commas")
@@ -179,12 +192,12 @@ class TextColumns(Recording):
             wanted = [cells[j] for j in use if j < len(cells)]
             whole = separator is None or len(cells) == full or len(cells) == width
             comma = separator != ","
-            if whole and any(wanted) and all(_is_number(c, comma) for c in wanted if c):
+            if whole and any(wanted) and all(is_number(c, comma) for c in wanted if c):
                 return i
         return -1
 
     def _parted(self, line: str) -> str | None:
-        return self.wanted.separator or _separator(line)
+        return self.wanted.separator or separator_of(line)
 
     def _check_width(self, line: str, separator: str | None) -> None:
         width, named = _width(line, separator), len(self.wanted.columns)
@@ -290,18 +303,5 @@ def _behind(data: bytes, many: int) -> bytes:
     return data[at:]
 
 
-def _separator(line: str) -> str | None:
-    return next((s for s in SEPARATORS if s in line), None)
-
-
 def _width(line: str, separator: str | None) -> int:
     return len(line.split(separator))
-
-
-def _is_number(cell: str, comma: bool) -> bool:
-    """Whether a cell is a number, where a comma is a decimal comma or no part of it."""
-    try:
-        float(cell.replace(",", ".") if comma else cell)
-    except ValueError:
-        return False
-    return True

@@ -8,11 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing import columns, headings
+from fieldcal.importing import columns
+from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.gzip_stream import on_disk
-from fieldcal.importing.recording import ROWS, ImuStream, Recording
+from fieldcal.importing.headings import Column
+from fieldcal.importing.recording import ROWS
 from fieldcal.session.arrow_stream import numbers
 
 WHAT = "Parquet and Arrow"
@@ -25,23 +29,44 @@ def recognises(head: bytes, path: Path) -> bool:
     return head.startswith((PARQUET, FEATHER, STREAM))
 
 
-class ParquetFile(Recording):
-    """A table with named columns, with one IMU in it."""
+class ParquetFile(ColumnRecording):
+    """A table with named columns, with one IMU in it or several side by side."""
 
-    asks_units = True
-
-    def streams(self) -> list[ImuStream]:
-        """Return the one IMU."""
+    def heading(self) -> list[Heading]:
+        """Names of its columns, with their units."""
         with self._batches() as (schema, _):
-            self._named(schema)
-        return [ImuStream("0", f"columns in {columns.units(self.wanted)}")]
+            return [Heading([Column(f.name, f.name, _unit(f)) for f in schema])]
 
-    def notes(self, stream: str) -> dict[str, Any]:
-        """Return the units."""
-        return columns.notes(self.wanted)
+    def beginning(self) -> Array:
+        """Numbers of its first batch; columns of other things are unknown."""
+        import pyarrow as pa
+
+        with self._batches() as (schema, batches):
+            first = next(batches, None)
+            if first is None:
+                return np.empty((0, len(schema)))
+            kinds = [pa.types.is_floating(f.type) or pa.types.is_integer(f.type)
+                     for f in schema]  # fmt: skip
+            found = np.full((first.num_rows, len(schema)), np.nan)
+            for i, plain in enumerate(kinds):
+                if plain:
+                    found[:, i] = self._numbers(first, schema.names[i])
+            return found
+
+    def ask(self) -> str:
+        """Say which columns there are."""
+        with self._batches() as (schema, _):
+            names = schema.names
+        return (
+            f"{self.path}: say which are the channels with --columns t=…,ax=…: there"
+            f" are {', '.join(names[:30])}"
+        )
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, a batch at a time."""
+        if len(self.imus()) > 1:
+            yield from self.alone(stream).blocks(stream)
+            return
         samples = columns.ColumnReader(self.wanted)
         with self._batches() as (schema, batches):
             named = self._named(schema)
@@ -63,7 +88,9 @@ class ParquetFile(Recording):
                 if magic.startswith(PARQUET):
                     opened = pyarrow.parquet.ParquetFile(file)
                     schema = opened.schema_arrow
-                    wanted = [n for n in self._named(schema).values()]
+                    wanted = (
+                        [*self._named(schema).values()] if self.wanted.columns else None
+                    )
                     one = {"columns": wanted, "use_threads": False}
                     yield schema, opened.iter_batches(ROWS, **one)
                 elif magic == FEATHER:
@@ -81,23 +108,14 @@ class ParquetFile(Recording):
 
     def _named(self, schema: Any) -> dict[str, str]:
         """Names in the file by column."""
-        names = schema.names
-        ask = (
-            f"say which are the channels with --columns t=…,ax=…: there are"
-            f" {', '.join(names[:30])}"
-        )
-        if not self.wanted.columns:
-            said = [headings.Column(f.name, f.name, _unit(f)) for f in schema]
-            found = headings.read(said)
-            self.wanted, says = headings.resolve_headings(
-                self.path, self.wanted, found, f"{self.path}: {ask}"
-            )
-            self.says.append(says)
         pairs = [c.partition("=") for c in self.wanted.columns]
         named = {column: name or column for column, _, name in pairs}
-        missing = [name for name in named.values() if name not in names]
+        missing = [name for name in named.values() if name not in schema.names]
         if missing:
-            raise InputError(f"{self.path}: has no column {missing[0]}; {ask}")
+            raise InputError(
+                f"{self.path}: has no column {missing[0]}; say which are the channels"
+                f" with --columns t=…,ax=…: there are {', '.join(schema.names[:30])}"
+            )
         columns.check(replace(self.wanted, columns=tuple(named)))
         return named
 

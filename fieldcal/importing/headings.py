@@ -1,64 +1,35 @@
-"""Headings of columns that state channel and unit.
+"""Headings of columns that state channels and units, of one IMU or of several.
 
-``ax [m/s^2]``, ``gyro_x (deg/s)``, ``time_us``: a name, and a unit in brackets or
-behind a sign that parts words. Taken is only what leaves no choice: each channel is
-there once, axes come in threes, and every unit is said, by the name or by the user.
-Otherwise the user is offered what to write. Counts are no unit: their scale is missing.
-"Linear acceleration" is no channel, for some mean one without gravity by it.
+Taken is only what leaves no choice: each channel of an IMU is there once, and axes come
+in threes. A unit that no heading says is left to physics or to the user. Where a log
+has several IMUs, what their names do not share tells them apart, and what one alone has
+(the time, the only thermometer, the only gyroscopes) belongs to all.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from shlex import quote
 from typing import NamedTuple
 
-from fieldcal.core.errors import InputError
+from fieldcal.importing.heading_words import UNITS, Meaning, bare_label, meaning
 from fieldcal.importing.recording import ReadOptions
 
-_ACC = r"a|f|acc|accel|accelerometer|acceleration"
-_GYR = r"g|w|gyr|gyro|gyroscope|omega|angular[_ ]?(?:velocity|rate)"
-_AXIS = r"[_ .]?([xyz])"
+SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "noise")
+"""Words of columns that hold how much values scatter."""
 
-NAMES = (
-    (re.compile(rf"(?:{_ACC}){_AXIS}"), "a"),
-    (re.compile(rf"(?:{_GYR}){_AXIS}"), "g"),
-    (re.compile("t|time|timestamp"), "t"),
-    (re.compile("temp|temperature"), "temperature"),
-    (re.compile("seq|sequence"), "seq"),
-    (re.compile("t_host"), "t_host"),
-)
-"""What a channel may be called."""
+MEAN = ("mean", "avg", "average")
 
-SPELLINGS = {
-    "m/s^2": ("m/s^2", "m/s2", "m/s²", "m/s/s", "m/s**2", "mps2", "m s-2"),
-    "mg": ("mg",),
-    "g": ("g",),
-    "deg/s": ("deg/s", "°/s", "dps", "degps", "deg s-1"),
-    "mrad/s": ("mrad/s", "mradps"),
-    "rad/s": ("rad/s", "radps", "rad s-1"),
-    "s": ("s", "sec", "seconds"),
-    "ms": ("ms",),
-    "us": ("us", "µs", "μs"),
-    "ns": ("ns",),
-    "deg C": ("c", "°c", "degc", "deg c"),
-}
-"""How each unit is written."""
+NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered")
+"""Words of columns that are no samples of a sensor."""
 
-UNITS = {
-    "a": ("m/s^2", "g", "mg"),
-    "g": ("rad/s", "deg/s", "mrad/s"),
-    "t": ("s", "ms", "us", "ns"),
-    "temperature": ("deg C",),
-    "seq": (),
-    "t_host": (),
-}
-"""Units that a kind of channel may have."""
+FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air",
+           "board", "env", "cpu", "case", "gps", "room")  # fmt: skip
+"""Words of thermometers that lie apart from the IMU."""
 
-_BRACKETS = re.compile(r"(.*?)\s*[\[(](.*)[\])]")
-_WRITTEN = {text: unit for unit, texts in SPELLINGS.items() for text in texts}
+OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "log")
+"""Words of times that are another clock's than the device's."""
 
 
 class Column(NamedTuple):
@@ -77,36 +48,48 @@ class Column(NamedTuple):
     unit: str = ""
 
 
+class Named(NamedTuple):
+    """A column by its number, and what its name says."""
+
+    number: int
+    says: Meaning
+
+
 @dataclass(frozen=True, slots=True)
 class HeadingMatch:
-    """What the names of some columns say.
+    """What the names of some columns say of one IMU.
 
     Attributes
     ----------
     columns : as ``--columns`` names them, all
-    units : said by the names, by kind of channel; None where they differ
+    units : said by the names, by kind of channel; None where they say none
+    name : of the IMU, "0" where there is one
+    says : what the user must know of them, a sentence each
 
     """
 
     columns: tuple[str, ...]
     units: Mapping[str, str | None]
+    name: str = "0"
+    says: tuple[str, ...] = ()
 
-    def taken(self, wanted: ReadOptions) -> ReadOptions | None:
-        """Return what the user says, with what the names say; None if units lack."""
+    def taken(self, wanted: ReadOptions) -> ReadOptions:
+        """Return what the user says, with what the names say."""
         given = {"a": wanted.acc_unit, "g": wanted.gyr_unit, "t": wanted.time_unit}
         units = {k: given.get(k) or unit for k, unit in self.units.items()}
-        if not all(units.values()):
-            return None
+        by_name = {k for k, unit in self.units.items() if unit and not given.get(k)}
         return replace(
             wanted,
             columns=self.columns,
             acc_unit=units.get("a") or "",
             gyr_unit=units.get("g") or "",
             time_unit=units.get("t") or "",
+            temp_unit=wanted.temp_unit or ("degC" if units.get("temperature") else ""),
+            named=frozenset(by_name),
         )
 
-    def offer(self, wanted: ReadOptions) -> str:
-        """Write the options that the user may give."""
+    def sentence(self, wanted: ReadOptions) -> str:
+        """Say what is taken from the names, as options that do the same."""
         text = f"--columns {quote(','.join(self.columns))}"
         if "t" not in self.units and not wanted.rate_hz:
             text += " --rate HZ"
@@ -115,14 +98,13 @@ class HeadingMatch:
             "g": ("--gyr-unit", wanted.gyr_unit),
             "t": ("--time-unit", wanted.time_unit),
         }.items():
-            if kind in self.units:
-                unit = given or self.units[kind] or UNITS[kind][0]
+            if kind in self.units and (unit := given or self.units[kind]):
                 text += f" {option} {quote(unit)}"
-        return text
+        return f"taken from the names of its columns: {text}"
 
 
-def read(columns: Sequence[Column], skip: str = "") -> HeadingMatch | None:
-    """Channels and units from headings; None if they are not those of one IMU.
+def read(columns: Sequence[Column], skip: str = "") -> tuple[HeadingMatch, ...]:
+    """Channels and units from headings, by IMU; none if they are not those of IMUs.
 
     Parameters
     ----------
@@ -130,64 +112,114 @@ def read(columns: Sequence[Column], skip: str = "") -> HeadingMatch | None:
     skip : what stands for one that is not wanted; where nothing does, it is left out
 
     """
+    named = [
+        Named(i, said)
+        for i, column in enumerate(columns)
+        if "," not in column.place
+        and (said := meaning(column.name, column.unit)) is not None
+        and not set(said.label) & set(NOT_SAMPLES)
+    ]
+    acc, gyr = _triads(named, "a"), _triads(named, "g")
+    if acc is None or gyr is None:
+        return ()
+    if not (acc or gyr):
+        return _of_a_thermometer(columns, named, skip)
+    # without gyroscopes beside it, a "linear acceleration" may lack gravity
+    if not gyr and all(one.says.weak for three in acc.values() for one in three):
+        return ()
+    times = _one([n for n in named if n.says.kind == "t"], OTHER_CLOCK)
+    found = []
+    for label in acc or gyr:
+        both = [*acc.get(label, ()), *_beside(label, gyr)]
+        warm, says = _thermometer(named, label)
+        rest = _one([n for n in named if n.says.kind == "seq"], ())
+        rest += [n for n in named if n.says.kind == "t_host"][:1]
+        chosen = [*times, *both, *warm, *rest]
+        found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
+    if len(found) == 1:
+        found = [replace(found[0], name="0")]
+    return tuple(found)
+
+
+def _of_a_thermometer(
+    columns: Sequence[Column], named: Sequence[Named], skip: str
+) -> tuple[HeadingMatch, ...]:
+    """Columns of times and temperatures alone: a file beside those of the IMU."""
+    kinds = [n.says.kind for n in named]
+    if sorted(kinds) != ["t", "temperature"] or len(columns) != len(kinds):
+        return ()
+    return (_match(columns, named, skip, "0", ()),)
+
+
+def _triads(
+    named: Iterable[Named], kind: str
+) -> dict[tuple[str, ...], list[Named]] | None:
+    """Axes of a kind by what their names do not share; None if some are not whole.
+
+    Nor are axes in different units.
+    """
+    groups: dict[tuple[str, ...], list[Named]] = {}
+    for one in named:
+        if one.says.kind == kind:
+            label = tuple(w for w in bare_label(one.says.label) if w not in MEAN)
+            groups.setdefault(label, []).append(one)
+    for three in groups.values():
+        if sorted(one.says.axis for one in three) != ["x", "y", "z"]:
+            return None
+        if len({one.says.unit for one in three}) > 1:
+            return None
+    return groups
+
+
+def _beside(
+    label: tuple[str, ...], gyr: Mapping[tuple[str, ...], list[Named]]
+) -> list[Named]:
+    """Gyroscopes of an IMU: those with its label, or the only ones there are."""
+    return gyr.get(label) or (next(iter(gyr.values())) if len(gyr) == 1 else [])
+
+
+def _one(named: Sequence[Named], but: Sequence[str]) -> list[Named]:
+    """One of several of a kind: the plainest name, with no word of `but` if can be."""
+    return sorted(
+        named, key=lambda n: (bool(set(n.says.label) & set(but)), len(n.says.label))
+    )[:1]
+
+
+def _thermometer(
+    named: Iterable[Named], label: tuple[str, ...]
+) -> tuple[list[Named], tuple[str, ...]]:
+    """Return the thermometer nearest to an IMU, and what must be said of it."""
+    warm = [n for n in named if n.says.kind == "temperature"]
+    own = [n for n in warm if label and set(label) <= set(n.says.label)]
+    near = own or [n for n in warm if not set(n.says.label) & set(FOREIGN)]
+    if near or not warm:
+        return _one(near, ()), ()
+    chosen = _one(warm, ())
+    other = " ".join(chosen[0].says.label)
+    return chosen, (
+        f"its only thermometer is that of the {other}: it is taken, but lies apart from"
+        " the IMU, so what goes with temperature may lag",
+    )
+
+
+def _match(
+    columns: Sequence[Column],
+    chosen: Sequence[Named],
+    skip: str,
+    name: str,
+    says: tuple[str, ...],
+) -> HeadingMatch:
+    """What is taken of the columns for one IMU."""
+    kinds = {n.number: n.says for n in chosen}
     found: list[str] = []
     units: dict[str, str | None] = {}
-    for column in columns:
-        kind, axis, unit = _channel(column)
-        channel = kind + axis
-        if not channel or "," in column.place:
+    for i, column in enumerate(columns):
+        said = kinds.get(i)
+        if said is None:
             found += [skip] if skip else []
             continue
+        channel = said.kind + said.axis
         found.append(f"{channel}={column.place}" if column.place else channel)
-        if UNITS[kind]:
-            units[kind] = unit if units.get(kind, unit) == unit else None
-    known = [name.partition("=")[0] for name in found]
-    named = [name for name in known if name != skip]
-    axes = [{f"{kind}{axis}" for axis in "xyz"} for kind in "ag"]
-    whole = [triad for triad in axes if triad <= set(named)]
-    some = [triad for triad in axes if triad & set(named)]
-    if len(set(named)) < len(named) or not whole or whole != some:
-        return None
-    return HeadingMatch(tuple(found), units)
-
-
-def _channel(column: Column) -> tuple[str, str, str | None]:
-    """Kind, axis and unit of a column; "" for no kind, None where no unit is said."""
-    name = column.name.strip().strip('"').strip().lower()
-    bracketed = _BRACKETS.fullmatch(name)
-    if bracketed:
-        ways = [(bracketed.group(1), bracketed.group(2))]
-    else:
-        cuts = [cut.span() for cut in re.finditer("[_ ]", name)]
-        ways = [(name, column.unit)]
-        ways += [(name[:a], name[b:].replace("_", "/")) for a, b in cuts]
-    for bare, text in ways:
-        unit = _WRITTEN.get(text.strip().lower())
-        for pattern, kind in NAMES:
-            matched = pattern.fullmatch(bare)
-            fits = unit in UNITS[kind] if unit else bracketed or bare == name
-            if matched and fits:
-                axis = matched.group(1) if matched.groups() else ""
-                return kind, axis, unit
-    return "", "", None
-
-
-def resolve_headings(
-    path: object, wanted: ReadOptions, found: HeadingMatch | None, else_say: str
-) -> tuple[ReadOptions, str]:
-    """Options from the headings, and a sentence about them.
-
-    Raises
-    ------
-    InputError
-        If they do not say all; `else_say` is for names that say nothing.
-
-    """
-    if found is None:
-        raise InputError(else_say)
-    if taken := found.taken(wanted):
-        return taken, f"taken from the names of its columns: {found.offer(taken)}"
-    raise InputError(
-        f"{path}: the names of its columns do not say the units: give"
-        f" {found.offer(wanted)}, with its units in place of these"
-    )
+        if UNITS[said.kind]:
+            units[said.kind] = said.unit
+    return HeadingMatch(tuple(found), units, name, says)

@@ -37,6 +37,10 @@ class MergedFiles(Recording):
             found += streams
         return [ImuStream(found[0].name, "; ".join(s.says for s in found))]
 
+    def alone(self, stream: str) -> Recording:
+        """The files, each with what is said of its one IMU alone."""
+        return MergedFiles([p.alone(p.streams()[0].name) for p in self.parts])
+
     def notes(self, stream: str) -> dict[str, Any]:
         """Return what each file says, by its name."""
         return {"files": {p.path.name: p.notes(stream) for p in self.parts}}

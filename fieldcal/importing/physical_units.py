@@ -37,7 +37,7 @@ _WIDE = 0.05
 ACC_OUT = (0.06, 0.15)
 """Logarithm of what factory scales are out by: offset known, and not."""
 
-GYR_OUT = (0.1, 0.25)
+GYR_OUT = (0.05, 0.25)
 """Likewise of (2), where an offset tilts the gravity that is seen to turn."""
 
 _TURNED = 0.5
@@ -194,7 +194,8 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
         return None
     steps = np.diff(t)
     steps[(steps > _LAG) | (steps < 0)] = np.nan
-    lag = max(2, round(_LAG / float(np.nanmedian(steps))))
+    step = float(np.nanmean(steps)) if np.isfinite(steps).any() else 0.0
+    lag = max(2, round(_LAG / step)) if step > 0 else len(t)
     if len(t) < 4 * lag:
         return None
     up = (acc - gravity.offset) / gravity.size
@@ -259,3 +260,28 @@ def temperature_fits(values: Array) -> Mapping[str, float]:
     if 213 <= low and high <= 423:
         found["K"] = middle - 273.15
     return found
+
+
+_THERMOMETERS = ((256.0, 25.0), (340.0, 36.53), (333.87, 21.0))
+"""Counts in 1 K, and deg C at count 0, of the usual sensors."""
+
+
+def temperature_counts(low: float, high: float) -> list[str]:
+    """Options that make deg C of counts from `low` to `high`, as the usual sensors do.
+
+    >>> temperature_counts(65236, 65240)[0]
+    '--temp-unit count --temp-lsb 256 --temp-zero -231 (23.8 to 23.8 deg C)'
+    """
+    wrapped = 2**16 if low >= 2**15 else 0
+    found = []
+    for lsb, zero in _THERMOMETERS:
+        coldest, warmest = (zero + (n - wrapped) / lsb for n in (low, high))
+        if -45 <= coldest and warmest <= 105:
+            found.append(
+                f"--temp-unit count --temp-lsb {lsb:g} --temp-zero"
+                f" {zero - wrapped / lsb:.6g} ({coldest:.1f} to {warmest:.1f} deg C)"
+            )
+    return found or [
+        "--temp-unit count --temp-lsb 256 --temp-zero 25 (counts in 1 K, deg C at count"
+        " 0, as its data sheet says)"
+    ]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -51,6 +52,7 @@ class ReadOptions:
     temp_unit : of the file; "" is not said, and degC
     temp_lsb, temp_zero : counts in 1 K, and deg C at count 0
     options : as in a device's address, ``name=value&name=value``
+    named : kinds of channel (a, g, t) whose unit the file's headings say
 
     """
 
@@ -67,6 +69,7 @@ class ReadOptions:
     temp_unit: str = ""
     temp_lsb: float = 1.0
     temp_zero: float = 0.0
+    named: frozenset[str] = frozenset()
 
     @property
     def acc_scale(self) -> float:
@@ -121,6 +124,7 @@ class Recording(ABC):
     ----------
     says : what the user must know, one sentence each; grows while it is read
     mended : what was left out because it was damaged, grows likewise
+    guessed : what was taken for what nobody said, and why, by what it is
     ends_early : whether it was cut off, as far as it was read
 
     """
@@ -139,6 +143,7 @@ class Recording(ABC):
             )
         self.says: list[str] = []
         self.mended: list[str] = []
+        self.guessed: dict[str, str] = {}
         self._more = 0
 
     def needs(self) -> tuple[tuple[str, ...], str]:
@@ -152,6 +157,13 @@ class Recording(ABC):
     @abstractmethod
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of one of them in the order of the file, SI units, device axes."""
+
+    def alone(self, stream: str) -> Recording:
+        """The recording with what is said of one of its IMUs alone."""
+        one = copy(self)
+        one.says, one.mended = list(self.says), list(self.mended)
+        one.guessed = dict(self.guessed)
+        return one
 
     def notes(self, stream: str) -> dict[str, Any]:
         """What the file says of the device: units, what it has installed."""

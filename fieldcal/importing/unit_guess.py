@@ -13,17 +13,28 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing import physical_units as physics
 from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.physical_units import Gravity, Scale
 from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.session.description import UNSCALED
 
 ROWS = 1 << 17
 """Rows at the beginning by which units are told."""
 
 FAST = 0.5
 """Rate, rad/s, that nothing at rest shows: 30 deg/s."""
+
+ROUGH = 0.02
+"""Scatter of rates from sample to sample, rad/s, that nothing at rest shows."""
+
+FAR = 0.25
+"""Logarithm of what no sensor in the unit that is said is out by."""
+
+NO_GRAVITY = 0.05
+"""Part of g below which gravity was taken out; mg and g in m/s^2 read otherwise."""
 
 OFFSET = 0.25
 """Part of g that no bias is: what raw counts show more is where their zero lies."""
@@ -55,13 +66,13 @@ def settle_units(recording: Recording, stream: str) -> Settled:
     parts = recording.parts if isinstance(recording, MergedFiles) else [recording]
     if not all(part.asks_units for part in parts):
         return Settled({})
-    says, mended = list(recording.says), list(recording.mended)
-    block = _beginning(recording, stream)
-    recording.says, recording.mended = says, mended
+    block = _beginning(recording.alone(stream), stream)
     guess = _Guess(str(recording.path), _said(parts), block)
     for part in parts:
         part.wanted = guess.on(part.wanted)
-    return Settled(guess.found, guess.acc_bias)
+    parts[0].says += guess.doubts
+    columns = {k: why for part in parts for k, why in part.guessed.items()}
+    return Settled(columns | guess.found, guess.acc_bias)
 
 
 def _beginning(recording: Recording, stream: str) -> Block:
@@ -84,6 +95,7 @@ def _said(parts: Sequence[Recording]) -> ReadOptions:
             acc_unit=said.acc_unit or w.acc_unit,
             gyr_unit=said.gyr_unit or w.gyr_unit,
             time_unit=said.time_unit or w.time_unit,
+            named=said.named | w.named,
         )
     return said
 
@@ -96,22 +108,26 @@ class _Guess:
     found : what was guessed, by quantity
     said : what is said, with what was found
     acc_bias : as in `Settled`
+    doubts : what the user says and physics does not, a sentence each
 
     """
 
     def __init__(self, name: str, said: ReadOptions, block: Block) -> None:
         self.found: dict[str, str] = {}
         self.acc_bias: list[float] | None = None
+        self.doubts: list[str] = []
         self._name, self.said = name, said
         if not (said.time_unit or said.rate_hz):
             self._time(block.t)
         gravity = physics.gravity_in(block.acc)
+        t = block.t * (self.said.time_scale / said.time_scale)
+        block = replace(block, t=t)
         if gravity and not said.acc_unit and said.acc_lsb == 1:
             self._acceleration(gravity)
             self._offset(gravity)
         if not said.gyr_unit and said.gyr_lsb == 1:
-            t = block.t * (self.said.time_scale / said.time_scale)
-            self._rates(replace(block, t=t), gravity)
+            self._rates(block, gravity)
+        self._doubt(block, gravity)
         if not said.temp_unit:
             self._temperature(block.temperature)
 
@@ -133,7 +149,7 @@ class _Guess:
         steps = np.diff(t[np.isfinite(t)])
         step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
         if len(fits) == 1 and fits != ["s"]:
-            rate = physics.TIME_SIZES[fits[0]] / step
+            rate = physics.TIME_SIZES[fits[0]] / step if step else np.nan
             self.said = replace(self.said, time_unit=fits[0])
             self.found["time"] = f"{fits[0]}, which makes {rate:.4g} Hz"
         elif len(fits) > 1:
@@ -173,21 +189,22 @@ class _Guess:
         reads = gravity and physics.rate_in(block.t, block.acc, block.gyr, gravity)
         if reads is None or gravity is None:
             usual = float(np.median(np.abs(gyr).max(axis=1)))
-            if usual > FAST:
+            noise = float(np.nanmedian(np.abs(np.diff(gyr, axis=0)), axis=0).max())
+            if usual > FAST or noise > ROUGH:
+                shown = f"{usual:.4g}" if usual > FAST else f"a scatter of {noise:.2g}"
                 self._ask(
-                    f"nothing says the unit of its rates, and {usual:.4g} rad/s is no"
-                    " rest",
-                    _answers("gyr", [], "deg/s", 16.4),
+                    f"nothing says the unit of its rates, and {shown} rad/s is no rest",
+                    _unusual(gyr),
                 )
-            if gravity is not None:
-                self.found["angular_rate"] = (
-                    "rad/s: it is the usual one, and no turn tells"
-                )
-                self.said = replace(self.said, gyr_unit="rad/s")
+            self.found["angular_rate"] = "rad/s: it is the usual one, and no turn tells"
+            self.said = replace(self.said, gyr_unit="rad/s")
             return
         fits = physics.fitting(
             reads, physics.GYR_SCALES, physics.GYR_OUT[not gravity.round]
         )
+        if self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
+            # who writes one sensor's registers as they are, writes the other's so too
+            fits = counts
         shows = f"as gravity turns, 1 rad/s reads {reads:.4g}"
         if len(fits) != 1:
             self._ask(
@@ -198,18 +215,70 @@ class _Guess:
             self.found["angular_rate"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
 
+    def _doubt(self, block: Block, gravity: Gravity | None) -> None:
+        """Hold units that are said against physics."""
+        if gravity is None:
+            return
+        reads, option = gravity.size / G0, "--acc-unit"
+        if reads < NO_GRAVITY and self._said_of("a"):
+            raise InputError(
+                f"{self._name}: |a| at rest is {gravity.size:.3g} m/s^2: gravity was"
+                " taken out of these accelerations, and nothing can be calibrated by"
+                " them; log those with gravity in them"
+            )
+        if self._said_of("a") and abs(np.log(reads)) > FAR:
+            fits = [
+                s.unit
+                for s in physics.ACC_SCALES[:3]
+                if abs(np.log(gravity.size / self.said.acc_scale / s.size)) < FAR
+            ]
+            shows = f"|a| at rest is {gravity.size:.4g} m/s^2 then, not gravity"
+            self._contradict("a", self.said.acc_unit, shows, option, fits)
+        if not self._said_of("g"):
+            return
+        turned = physics.rate_in(block.t, block.acc, block.gyr, gravity)
+        if turned is not None and abs(np.log(turned)) > FAR:
+            scale = self.said.gyr_scale
+            fits = [
+                s.unit
+                for s in physics.GYR_SCALES[:3]
+                if abs(np.log(turned / scale / s.size)) < FAR
+            ]
+            shows = f"rates are {turned:.4g} times those at which gravity turns"
+            self._contradict("g", self.said.gyr_unit, shows, "--gyr-unit", fits)
+
+    def _said_of(self, kind: str) -> bool:
+        """Whether the user or the file says a unit that has a size."""
+        unit, what = {
+            "a": (self.said.acc_unit, "acceleration"),
+            "g": (self.said.gyr_unit, "angular_rate"),
+        }[kind]
+        return bool(unit) and what not in self.found and unit not in UNSCALED
+
+    def _contradict(
+        self, kind: str, unit: str, shows: str, option: str, fits: list[str]
+    ) -> None:
+        """Ask about a unit of the file's; of the user's only say what is odd."""
+        if kind not in self.said.named:
+            self.doubts.append(f"{unit} as you say, but {shows}")
+            return
+        answers = [f"{option} {one}" for one in fits if one != unit]
+        self._ask(
+            f"the names of its columns say {unit}, but {shows}",
+            [*answers, f"{option} {unit}, if it is so"],
+        )
+
     def _temperature(self, values: Array) -> None:
         fits = physics.temperature_fits(values)
         if "degC" in fits:
             return
-        low, high = np.nanmin(values), np.nanmax(values)
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
         if len(fits) != 1:
             self._ask(
                 f"its temperature reads {low:.6g} to {high:.6g}, which is no deg C",
                 [
                     *(f"--temp-unit {unit}" for unit in fits),
-                    "--temp-unit count --temp-lsb 256 --temp-zero 25 (counts in 1 K,"
-                    " deg C at count 0, as its data sheet says)",
+                    *physics.temperature_counts(low, high),
                     "--temp-unit none, which leaves it out",
                 ],
             )
@@ -219,6 +288,14 @@ class _Guess:
 
     def _ask(self, what: str, answers: list[str]) -> None:
         raise InputError(f"{self._name}: {what}: add {' or '.join(answers)}")
+
+
+def _unusual(gyr: Array) -> list[str]:
+    """Options for rates of which no turn tells: counts, if they are whole numbers."""
+    if (gyr == np.round(gyr)).all():
+        counts = [s for s in physics.GYR_SCALES if s.lsb != 1][1:5]
+        return _answers("gyr", counts, "deg/s", 16.4)
+    return ["--gyr-unit deg/s", "--gyr-unit rad/s, if it is so"]
 
 
 def _answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:

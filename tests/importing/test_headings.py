@@ -14,6 +14,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
+from fieldcal.importing.heading_words import meaning
 from fieldcal.importing.headings import Column, read
 from fieldcal.importing.recording import ReadOptions, Recording
 
@@ -57,19 +58,13 @@ def test_names_with_units_are_taken_and_said(tmp_path: Path, separator: str) -> 
     ]
 
 
-def test_what_is_offered_is_what_is_needed(tmp_path: Path) -> None:
+def test_units_that_no_name_says_are_left_open(tmp_path: Path) -> None:
     path = text(tmp_path / "log", BARE)
-    with pytest.raises(InputError) as caught:
-        taken(path)
-    offered = (
-        "give --columns t,ax,ay,az,gx,gy,gz --acc-unit 'm/s^2' --gyr-unit rad/s"
-        " --time-unit s, with its units in place of these"
-    )
-    assert offered in str(caught.value)
+    recording, block = taken(path)
+    np.testing.assert_allclose(block.acc, ROWS[:, 1:4])
+    assert "unit" not in recording.says[0]
     _, block = taken(path, ReadOptions(acc_unit="g", gyr_unit="deg/s", time_unit="ms"))
     check(block)
-    with pytest.raises(InputError, match="--columns t,ax,ay,az,gx,gy,gz --acc-unit g"):
-        taken(path, ReadOptions(acc_unit="g"))
 
 
 def test_columns_of_a_table_may_say_their_units_beside_their_names(
@@ -89,8 +84,8 @@ def test_columns_of_a_table_may_say_their_units_beside_their_names(
         ),
         tmp_path / "y.parquet",
     )
-    with pytest.raises(InputError, match="--columns t=t,ax=ax,ay=ay"):
-        taken(tmp_path / "y.parquet")
+    recording, _ = taken(tmp_path / "y.parquet")
+    assert "--columns t=t,ax=ax,ay=ay" in recording.says[0]
     with h5py.File(tmp_path / "x.h5", "w") as file:
         for name, columns, unit in (
             ("imu/time", ROWS[:, 0], "ms"),
@@ -118,16 +113,60 @@ def test_columns_of_a_table_may_say_their_units_beside_their_names(
 def test_names_that_are_not_those_of_one_imu_say_nothing(
     names: tuple[str, ...],
 ) -> None:
-    assert read([Column("", name) for name in names], "_") is None
+    assert read([Column("", name) for name in names], "_") == ()
 
 
-def test_units_that_differ_or_have_no_scale_are_none() -> None:
-    for third in ("az [mg]", "az", "az [LSB]"):
-        found = read([Column("", name) for name in ("ax [g]", "ay [g]", third)], "_")
-        assert found is not None and found.taken(ReadOptions()) is None
+def test_units_that_differ_say_nothing(tmp_path: Path) -> None:
+    for third in ("az [mg]", "az"):
+        names = ("ax [g]", "ay [g]", third)
+        assert read([Column("", name) for name in names], "_") == ()
+        with pytest.raises(InputError, match="say what its columns are"):
+            taken(text(tmp_path / "log", ("t", *names, *BARE[4:])))
 
 
 @given(st.lists(st.text(max_size=12), max_size=8))
 def test_any_names_are_understood_or_not(names: list[str]) -> None:
-    found = read([Column(name, name) for name in names])
-    assert found is None or len(found.columns) >= 3
+    for found in read([Column(name, name) for name in names]):
+        assert len(found.columns) >= 3
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("imu1.AccX", ("a", "x", None)), ("gyro_rad[2]", ("g", "z", None)),
+        ("accelerometer_m_s2[0]", ("a", "x", "m/s^2")), ("TimeUS", ("t", "", "us")),
+        ("y (°/s)", ("g", "y", "deg/s")),
+        ("field.angular_velocity.y", ("g", "y", None)),
+        ("Acceleration z (m/s^2)", ("a", "z", "m/s^2")), ("ms", ("t", "", "ms")),
+        ("seconds_elapsed", ("t", "", "s")), ("x_g", ("a", "x", "g")),
+        ("baro_temp [degC]", ("temperature", "", "deg C")), ("mag_x", ("m", "x", None)),
+        ("ax [LSB]", ("a", "x", None)), ("tx", None), ("x", None), ("", None),
+        ("gravity_x", None), ("quat_w", None),
+    ],
+)  # fmt: skip
+def test_what_a_name_says(name: str, says: tuple[str, str, str | None] | None) -> None:
+    found = meaning(name)
+    assert (found and (found.kind, found.axis, found.unit)) == says
+
+
+def test_a_means_column_is_no_sample() -> None:
+    names = [*BARE, "ax_std", "ay_std", "az_std"]
+    (found,) = read([Column("", name) for name in names], "_")
+    assert found.columns == (*BARE, "_", "_", "_")
+
+
+def test_several_imus_share_what_one_alone_has() -> None:
+    names = ["t", *(f"imu{k}_{c}" for k in (0, 1) for c in BARE[1:4]), "gx", "gy", "gz"]
+    names += ["imu1_temp", "baro_temp"]
+    found = read([Column("", name) for name in names])
+    assert [one.name for one in found] == ["0", "1"]
+    first, second = (read([Column(n, n) for n in names])[i].columns for i in (0, 1))
+    assert {"t=t", "ax=imu0_ax", "gx=gx", "temperature=imu1_temp"} - {*first} == set()
+    assert {"t=t", "ax=imu1_ax", "temperature=imu1_temp"} - {*second} == set()
+
+
+def test_a_barometer_is_the_last_thermometer_that_is_taken() -> None:
+    (found,) = read([Column("", n) for n in (*BARE, "baro_temp")], "_")
+    assert found.columns[-1] == "temperature" and "that of the baro" in found.says[0]
+    (found,) = read([Column("", n) for n in (*BARE, "baro_temp", "temp")], "_")
+    assert found.columns[-2:] == ("_", "temperature") and not found.says

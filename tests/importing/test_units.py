@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from laid_about import turned, write
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
@@ -16,7 +17,6 @@ from fieldcal.session.folder import Session
 
 G = 9.80665
 COLUMNS = "t,ax,ay,az,gx,gy,gz"
-SIDES = [(0, 0, 1), (0, 1, 0), (0, 0, -1), (1, 0, 0), (0, -1, 0), (-1, 0, 0), (0, 0, 1)]
 ACC = {"m/s^2": 1.0, "g": 1 / G, "mg": 1000 / G} | {
     f"{lsb} in g": lsb / G for lsb in (16384, 8192, 4096, 2048)
 }
@@ -30,31 +30,6 @@ def option(kind: str, unit: str) -> str:
     """What the user would add for it."""
     lsb, _, bare = unit.rpartition(" in ")
     return f"--{kind}-unit {bare}" + (f" --{kind}-lsb {float(lsb):g}" if lsb else "")
-
-
-def turned(seed: int, rate: float, hold: float = 3.0) -> Array:
-    """Rows t, a, w of a device that is laid on each of its sides in turn, SI."""
-    rng = np.random.default_rng(seed)
-    up, rows = np.array(SIDES[0], float), []
-    for side in SIDES:
-        axis, steps = np.cross(up, side), int(1.5 * rate)
-        angle = (1 - np.cos(np.pi * (np.arange(steps) + 0.5) / steps)) * np.pi / 4
-        speed = np.gradient(angle, 1 / rate)
-        for a, w in zip(angle, speed, strict=True) if axis.any() else ():
-            now = np.cos(a) * up + np.sin(a) * np.cross(axis, up)
-            rows.append([*G * now, *(-w * axis)])
-        up = np.array(side, float)
-        rows += [[*G * up, 0, 0, 0]] * int(hold * rate)
-    table = np.array(rows)
-    table[:, :3] += rng.normal(0, 0.02, (len(rows), 3)) + rng.uniform(-0.3, 0.3, 3)
-    table[:, 3:] += rng.normal(0, 0.002, (len(rows), 3)) + rng.uniform(-0.02, 0.02, 3)
-    return np.column_stack([np.arange(len(rows)) / rate, table])
-
-
-def write(folder: Path, rows: Array, name: str = "log.csv") -> Path:
-    path = folder / name
-    path.write_text("\n".join(",".join(f"{x:.10g}" for x in r) for r in rows) + "\n")
-    return path
 
 
 @settings(

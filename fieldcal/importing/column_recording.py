@@ -1,0 +1,215 @@
+"""A recording in columns: the user, names or physics say what each of them is."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
+from fieldcal.importing import column_physics, columns, headings
+from fieldcal.importing.headings import Column, HeadingMatch
+from fieldcal.importing.physical_units import gravity_in, rate_in
+from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
+
+SLOWEST = 5.0
+"""Lowest rate, Hz, that turns can be told by."""
+
+
+class Heading(NamedTuple):
+    """Columns of a file, as it names them.
+
+    Attributes
+    ----------
+    columns : in the order of the file
+    skip : what stands for a column that is not wanted; "" where columns have names
+
+    """
+
+    columns: Sequence[Column]
+    skip: str = ""
+
+
+class ColumnRecording(Recording):
+    """A file of columns, with one IMU in it or several side by side."""
+
+    asks_units = True
+    imus_found: dict[str, ReadOptions] | None = None
+    """Options of each IMU by its name, once they were looked for."""
+
+    @abstractmethod
+    def heading(self) -> list[Heading]:
+        """What may be read as names of its columns, the likeliest first."""
+
+    @abstractmethod
+    def beginning(self) -> Array:
+        """Numbers of the first rows, (n, k); nan where a cell is none. May be empty."""
+
+    @abstractmethod
+    def ask(self) -> str:
+        """What to do where nothing tells its columns."""
+
+    def rate_said(self) -> tuple[float, str] | None:
+        """Sampling rate, Hz, that the file says of itself, and where; or None."""
+        return None
+
+    def streams(self) -> list[ImuStream]:
+        """Return the IMUs in it."""
+        found = self.imus()
+        for wanted in found.values():
+            self._check_time(wanted)
+            columns.check(wanted)
+        return [
+            ImuStream(name, f"columns in {columns.units(wanted)}")
+            for name, wanted in found.items()
+        ]
+
+    def notes(self, stream: str) -> dict[str, Any]:
+        """Return the units."""
+        return columns.notes(self.wanted)
+
+    def alone(self, stream: str) -> Recording:
+        """The recording with the columns of one IMU."""
+        wanted = self.imus()[stream]
+        one = super().alone(stream)
+        one.wanted = wanted
+        if isinstance(one, ColumnRecording):
+            one.imus_found = {stream: wanted}
+        return one
+
+    def imus(self) -> dict[str, ReadOptions]:
+        """Options of each IMU by its name."""
+        if self.imus_found is None:
+            found = self._found()
+            self.imus_found = {name: self._rated(one) for name, one in found.items()}
+            if len(self.imus_found) == 1:
+                (self.wanted,) = self.imus_found.values()
+        if len(self.imus_found) == 1:
+            # units may have been found meanwhile
+            return dict.fromkeys(self.imus_found, self.wanted)
+        return self.imus_found
+
+    def _rated(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with the rate that the file says, where no column is the time."""
+        if wanted.rate_hz or _has_time(wanted) or (said := self.rate_said()) is None:
+            return wanted
+        rate, where = said
+        sentence = f"its top says the rate: {where!r}"
+        self.says += [sentence] if sentence not in self.says else []
+        return replace(wanted, rate_hz=rate)
+
+    def _found(self) -> dict[str, ReadOptions]:
+        if self.wanted.columns:
+            return {"0": self.wanted}
+        ways = [(headings.read(*way), way) for way in self.heading()]
+        named = max((found for found, _ in ways), key=_worth, default=())
+        way = next((w for found, w in ways if found and found is named), None)
+        if len(named) < 2 and not _whole(named):
+            told = self._told(named, way or next((w for _, w in ways), None))
+            if told is not None:
+                return {"0": told}
+        if not named:
+            raise InputError(self.ask())
+        taken = {one.name: one.taken(self.wanted) for one in named}
+        for one in named:
+            alone = [one.sentence(taken[one.name])] if len(named) == 1 else []
+            self.says += [s for s in (*alone, *one.says) if s not in self.says]
+        return taken
+
+    def _told(
+        self, named: Sequence[HeadingMatch], way: Heading | None
+    ) -> ReadOptions | None:
+        """Options by physics, where names do not say all."""
+        table = self.beginning()
+        k = table.shape[1]
+        names = [c.name for c in way.columns] if way else []
+        names = names if len(names) == k else [""] * k
+        known = _known(named, way)
+        told = column_physics.tell(table, names, known)
+        if told is None:
+            return None
+        places = [c.place for c in way.columns] if way and not way.skip else [""] * k
+        pairs = [(told.channels.get(i, columns.SKIP), places[i]) for i in range(k)]
+        chosen = tuple(
+            f"{name}={place}" if place else name
+            for name, place in pairs
+            if name != columns.SKIP or not place
+        )
+        self.guessed["columns"] = f"{','.join(chosen)}: {told.why}"
+        wanted = named[0].taken(self.wanted) if named else self.wanted
+        return replace(wanted, columns=chosen)
+
+    def _check_time(self, wanted: ReadOptions) -> None:
+        """Ask for the rate where no column is the time.
+
+        Raises
+        ------
+        InputError
+            With what the turns say of it.
+
+        """
+        if _has_time(wanted) or wanted.rate_hz or not wanted.columns:
+            return
+        turns = self._rate_of_turns(wanted)
+        unit, about = next(iter(turns.items()), ("", 100.0))
+        hint = f", which its turns say about, if rates are in {unit}" if unit else ""
+        raise InputError(
+            f"{self.path}: no column is t, the time: give the rate, e.g. --rate"
+            f" {about:.3g}{hint}"
+        )
+
+    def _rate_of_turns(self, wanted: ReadOptions) -> dict[str, float]:
+        """Rates, Hz, at which the turns are those that gravity shows, by unit."""
+        at = {c.partition("=")[0]: i for i, c in enumerate(wanted.columns)}
+        table = self.beginning()
+        if not {"ax", "ay", "az", "gx", "gy", "gz"} <= set(at) or (
+            table.shape[1] != len(wanted.columns)
+        ):
+            return {}
+        acc, gyr = (table[:, [at[kind + axis] for axis in "xyz"]] for kind in "ag")
+        gravity = gravity_in(acc)
+        if gravity is None:
+            return {}
+        reads = rate_in(np.arange(len(table)) / 100.0, acc, gyr, gravity)
+        if reads is None:
+            return {}
+        if wanted.gyr_unit:
+            fits = {wanted.gyr_unit: 1 / wanted.gyr_scale}
+        else:
+            fits = {"rad/s": 1.0, "deg/s": float(np.rad2deg(1.0))}
+        rates = {unit: 100 * reads / one for unit, one in fits.items()}
+        return {unit: rate for unit, rate in rates.items() if rate >= SLOWEST}
+
+
+def _has_time(wanted: ReadOptions) -> bool:
+    return any(c.partition("=")[0] == "t" for c in wanted.columns)
+
+
+def _worth(found: Sequence[HeadingMatch]) -> tuple[int, int]:
+    """How many channels are named, and of how many kinds the unit is."""
+    named = sum(len([c for c in one.columns if c != columns.SKIP]) for one in found)
+    return named, sum(bool(unit) for one in found for unit in one.units.values())
+
+
+def _whole(named: Sequence[HeadingMatch]) -> bool:
+    """Whether names say where specific force, rate and time are."""
+    if not named:
+        return False
+    known = {c.partition("=")[0] for c in named[0].columns}
+    return {"t", "ax", "gx"} <= known
+
+
+def _known(named: Sequence[HeadingMatch], way: Heading | None) -> dict[int, str]:
+    """Channels that names say, by the number of the column."""
+    if not named or way is None:
+        return {}
+    if way.skip:
+        pairs = enumerate(named[0].columns)
+        return {i: name for i, name in pairs if name != way.skip}
+    number = {c.place: i for i, c in enumerate(way.columns)}
+    parted = (c.partition("=") for c in named[0].columns)
+    return {number[place]: name for name, _, place in parted}

@@ -1,0 +1,210 @@
+"""What the name of one column says: sensor, axis, unit, and of which of several IMUs.
+
+``ax [m/s^2]``, ``gyro_x (deg/s)``, ``imu0.AccX``, ``angular_velocity.z``, ``TimeUS``,
+``accelerometer_m_s2[0]``: words, an axis, and a unit in brackets or behind a sign that
+parts words. What is neither tells one IMU from another. "Linear acceleration" is weak:
+some mean one without gravity by it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+SPELLINGS = {
+    "m/s^2": ("m/s^2", "m/s2", "m/s²", "m/s/s", "m/s**2", "mps2", "m s-2", "ms-2"),
+    "mg": ("mg", "milli g", "millig"),
+    "g": ("g", "g's", "gs"),
+    "deg/s": ("deg/s", "°/s", "dps", "degps", "deg s-1", "deg/sec", "°/sec"),
+    "mrad/s": ("mrad/s", "mradps"),
+    "rad/s": ("rad/s", "radps", "rad s-1", "rad/sec", "rps"),
+    "s": ("s", "sec", "secs", "seconds", "second"),
+    "ms": ("ms", "msec", "millis", "milliseconds"),
+    "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
+    "ns": ("ns", "nsec", "nanos", "nanoseconds"),
+    "deg C": ("c", "°c", "degc", "deg c", "celsius", "℃", "degrees c"),
+}
+"""How each unit is written."""
+
+UNITS = {
+    "a": ("m/s^2", "g", "mg"),
+    "g": ("rad/s", "deg/s", "mrad/s"),
+    "t": ("s", "ms", "us", "ns"),
+    "temperature": ("deg C",),
+    "m": (),
+    "seq": (),
+    "t_host": (),
+    "": ("m/s^2", "g", "mg", "rad/s", "deg/s", "mrad/s"),
+}
+"""Units that a kind of channel may have; of an axis alone, those that tell its kind."""
+
+AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
+
+_SENSORS = {
+    "a": ("a", "f", "acc", "accel", "accelerometer", "acceleration", "accs", "accl"),
+    "g": ("g", "w", "gyr", "gyro", "gyroscope", "gyros", "omega", "rate"),
+    "m": ("m", "mag", "magnetometer", "magnetic", "compass"),
+}
+_PHRASES = (
+    (("angular", "velocity"), "g"),
+    (("angular", "rate"), "g"),
+    (("rotation", "rate"), "g"),
+    (("specific", "force"), "a"),
+    (("rate", "of", "turn"), "g"),
+    (("linear", "acceleration"), "linear"),
+    (("linear", "accel"), "linear"),
+)
+_TIMES = ("t", "time", "timestamp", "stamp", "timestamps")
+_TEMPERATURES = ("temp", "temperature", "temps")
+_WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
+_FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
+"""Words that tell no IMU from another where all of one kind have them."""
+
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+")
+_BRACKETS = re.compile(r"(.*?)\s*[\[({](.*)[\])}]\s*")
+_INDEX = re.compile(r"(.+)\[([012])\]")
+_WRITTEN = {text: unit for unit, texts in SPELLINGS.items() for text in texts}
+
+
+class Meaning(NamedTuple):
+    """What a name says.
+
+    Attributes
+    ----------
+    kind : of `UNITS`; "" for an axis of which no sensor is said
+    axis : x, y or z, or nothing
+    unit : None where none is said
+    label : what else the name says, such as which IMU
+    weak : whether something else may be meant
+
+    """
+
+    kind: str
+    axis: str
+    unit: str | None
+    label: tuple[str, ...] = ()
+    weak: bool = False
+
+
+def unit_in(text: str) -> str | None:
+    """Return the unit that a text is, in brackets or bare; None if it is none.
+
+    >>> unit_in(" (°/s)"), unit_in("g"), unit_in("x")
+    ('deg/s', 'g', None)
+    """
+    return _WRITTEN.get(text.strip().strip("[]() ").lower())
+
+
+def meaning(name: str, unit: str = "") -> Meaning | None:
+    """Say what a name means; None if it names no channel.
+
+    Parameters
+    ----------
+    name : of a column
+    unit : what the file says of it elsewhere, or nothing
+
+    >>> meaning("imu1_GyroX (dps)")
+    Meaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), weak=False)
+    """
+    name = name.strip().strip('"').strip()
+    if (whole := _WHOLE.get(name.lower())) is not None:
+        return Meaning(whole, "", None)
+    for bare, said in _ways(name, unit):
+        found = _of_words([w.lower() for w in _WORD.findall(bare)], said)
+        if found is None or (said is not None and said not in UNITS[found.kind]):
+            continue
+        if found.kind or said is not None:
+            return found._replace(
+                kind=found.kind or _kind_of(said),
+                weak=found.weak or "user" in found.label,
+            )
+    return None
+
+
+def _kind_of(unit: str | None) -> str:
+    return next(kind for kind in "ag" if unit in UNITS[kind])
+
+
+def _ways(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
+    """Ways to part a name from its unit."""
+    if indexed := _INDEX.fullmatch(name):
+        name = f"{indexed.group(1)}_{'xyz'[int(indexed.group(2))]}"
+    elif bracketed := _BRACKETS.fullmatch(name):
+        yield bracketed.group(1), unit_in(bracketed.group(2))
+        return
+    cuts = [cut.span() for cut in re.finditer("[_ .]", name)]
+    for a, b in cuts:
+        axis = re.fullmatch(r"(.*)[_ .]([xyzXYZ])", name[b:])
+        inner = axis.group(1) if axis else name[b:]
+        bare = f"{name[:a]}_{axis.group(2)}" if axis else name[:a]
+        if (said := unit_in(inner.replace("_", "/"))) is not None:
+            yield bare, said
+    yield name, unit_in(unit)
+
+
+def _of_words(words: list[str], unit: str | None) -> Meaning | None:
+    if not words:
+        return None
+    for phrase, kind in _PHRASES:
+        if (at := _place(words, phrase)) is not None:
+            rest = words[:at] + words[at + len(phrase) :]
+            weak = kind == "linear"
+            return _with_axis("a" if weak else kind, rest, unit, weak)
+    for i, word in enumerate(words):
+        rest = words[:i] + words[i + 1 :]
+        kind = next((k for k, names in _SENSORS.items() if word[:-1] in names), "")
+        if kind and word[-1] in "xyz":
+            return Meaning(kind, word[-1], unit, tuple(rest))
+    for i, word in enumerate(words):
+        rest = words[:i] + words[i + 1 :]
+        kind = next((k for k, names in _SENSORS.items() if word in names), "")
+        # a letter stands before its axis: "x_g" is an axis in g
+        if kind and (len(word) > 1 or (rest[i:] and rest[i] in AXES)):
+            found = _with_axis(kind, rest, unit)
+            if found is not None:
+                return found
+    if (time := _time(words, unit)) is not None:
+        return time
+    for word in _TEMPERATURES:
+        if word in words:
+            label = tuple(w for w in words if w != word)
+            return Meaning("temperature", "", unit, label)
+    return Meaning("", words[0], unit) if words in (["x"], ["y"], ["z"]) else None
+
+
+def _place(words: Sequence[str], phrase: Sequence[str]) -> int | None:
+    n = len(phrase)
+    places = range(len(words) - n + 1)
+    return next((i for i in places if tuple(words[i : i + n]) == tuple(phrase)), None)
+
+
+def _with_axis(
+    kind: str, rest: list[str], unit: str | None, weak: bool = False
+) -> Meaning | None:
+    """The meaning with the last axis among its other words; None if there is none."""
+    letters = [i for i, word in enumerate(rest) if word in "xyz" and len(word) == 1]
+    if not letters:
+        return None
+    at = letters[-1]
+    return Meaning(kind, rest[at], unit, tuple(rest[:at] + rest[at + 1 :]), weak)
+
+
+def _time(words: list[str], unit: str | None) -> Meaning | None:
+    """The meaning of a time: by its name, or by a unit of time that is all of it."""
+    said = unit if unit in UNITS["t"] else None
+    named = [w for w in words if w in _TIMES]
+    rest = [w for w in words if w not in _TIMES]
+    inner = [w for w in rest if _WRITTEN.get(w) in UNITS["t"]]
+    if named or (len(inner) == len(rest) == 1 and len(rest[0]) > 1):
+        said = said or (_WRITTEN[inner[-1]] if inner else None)
+        label = tuple(w for w in rest if w not in inner)
+        return Meaning("t", "", said if unit is None or said else unit, label)
+    if inner and rest == [*inner, "elapsed"]:
+        return Meaning("t", "", _WRITTEN[inner[-1]], ("elapsed",))
+    return None
+
+
+def bare_label(words: tuple[str, ...]) -> tuple[str, ...]:
+    """Words of a label that can tell one IMU from another."""
+    return tuple(w for w in words if w not in _FILLERS)

@@ -1,0 +1,129 @@
+"""The top of a text file: where its numbers begin, what parts them, what names them.
+
+Names may stand in one line, with units in the line below, or in two lines of which the
+first says the sensor of several columns (``Accelerometer,,,Gyroscope,,``) and the
+second the axis. A line such as ``Fs,100`` or ``# Sample rate: 100 Hz`` says the rate.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.column_recording import Heading
+from fieldcal.importing.columns import SKIP
+from fieldcal.importing.heading_words import unit_in
+from fieldcal.importing.headings import Column
+
+SEPARATORS = (";", "\t", ",")
+"""Between columns; a comma in a line with one of the others is a decimal comma."""
+
+ABOVE = 4
+"""Lines above the numbers among which their names are looked for."""
+
+NUMBERS = 0.5
+"""Share of the cells of a line that are numbers, where names of columns are not."""
+
+_RATE = re.compile(
+    r"[#%/\s\"]*(?:fs|(?:sample|sampling|output|update|data|logging)[ _]*"
+    r"(?:rate|frequency|freq)|frequency|odr)\b[ _]*(?:\(?hz\)?)?\s*[:=,;\t ]\s*\"?"
+    r"([0-9]+(?:\.[0-9]+)?)\s*(?:hz)?\W*",
+    re.IGNORECASE,
+)
+
+
+def separator_of(line: str) -> str | None:
+    """Return what parts the columns of a line; None for spaces."""
+    return next((s for s in SEPARATORS if s in line), None)
+
+
+def is_number(cell: str, comma: bool) -> bool:
+    """Whether a cell is a number, where a comma is a decimal comma or no part of it."""
+    try:
+        float(cell.replace(",", ".") if comma else cell)
+    except ValueError:
+        return False
+    return True
+
+
+def cells(line: str, separator: str | None) -> list[str]:
+    """Cells of a line, without the spaces about them."""
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def first_numbers(lines: Sequence[str], separator: str | None) -> int:
+    """Which of the lines is the first of numbers; how many there are if none is."""
+    parted = [separator or separator_of(line) for line in lines]
+    rows = [cells(line, s) for line, s in zip(lines, parted, strict=True)]
+    width = max((len(row) for row in rows), default=0)
+    for i, (row, s) in enumerate(zip(rows, parted, strict=True)):
+        said = [cell for cell in row if cell]
+        if len(row) < min(3, width) or not said:
+            continue
+        many = sum(is_number(cell, s != ",") for cell in said)
+        wide = s is None or len(row) >= width - 1
+        if many > NUMBERS * len(said) and many >= min(3, width) and wide:
+            return i
+    return len(lines)
+
+
+def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]:
+    """What stands above the numbers, read as names in each of several ways."""
+    first = first_numbers(lines, separator)
+    tops = [line.lstrip("#%/ ") for line in lines[max(0, first - ABOVE) : first]]
+    rows = [cells(line, separator or separator_of(line)) for line in tops]
+    found = [Heading(way, SKIP) for way in _ways(rows)]
+    return [one for one in found if len(one.columns) > 2]
+
+
+def _ways(rows: Sequence[Sequence[str]]) -> Iterator[list[Column]]:
+    for i, row in enumerate(rows):
+        yield [Column("", name) for name in row]
+        if i + 1 == len(rows) or len(rows[i + 1]) != len(row):
+            continue
+        below = rows[i + 1]
+        units = [unit_in(cell) for cell in below]
+        if any(units):
+            pairs = zip(row, below, strict=True)
+            yield [Column("", name, unit) for name, unit in pairs]
+        above = ""
+        joined = []
+        for name, under in zip(row, below, strict=True):
+            above = name or above
+            joined.append(Column("", f"{above} {under}"))
+        yield joined
+
+
+def rate_above(lines: Sequence[str], separator: str | None) -> tuple[float, str] | None:
+    """Rate in Hz that a line above the numbers says, and that line."""
+    for line in lines[: first_numbers(lines, separator)]:
+        matched = _RATE.fullmatch(line.strip())
+        if matched and float(matched.group(1)) > 0:
+            return float(matched.group(1)), line.strip()
+    return None
+
+
+def numbers_of(lines: Sequence[str], separator: str | None) -> Array:
+    """Numbers of lines, (n, k) as wide as the first; nan where a cell is none."""
+    first = first_numbers(lines[:1000], separator)
+    if first >= len(lines):
+        return np.empty((0, 0))
+    parted = separator or separator_of(lines[first])
+    width = len(cells(lines[first], parted))
+    rows = []
+    for line in lines[first:]:
+        row = line.split(parted)
+        if len(row) == width:
+            text = [c.replace(",", ".") for c in row] if parted != "," else row
+            rows.append([_number(cell) for cell in text])
+    return np.array(rows, dtype=float).reshape(-1, width)
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return float("nan")

@@ -1,0 +1,158 @@
+"""Columns that nobody names: told by names, by physics, or asked about."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from laid_about import G, turned, write
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Array
+from fieldcal.session.folder import Session
+
+TRIADS = {"a": slice(1, 4), "g": slice(4, 7)}
+
+
+def imported(path: Path, *more: str) -> Session:
+    folder = path.parent / "out"
+    assert main(["import", str(path), "-o", str(folder), *more]) == 0
+    return Session.open(folder)
+
+
+def same(session: Session, rows: Array) -> None:
+    np.testing.assert_allclose(session.block.t, rows[:, 0], atol=1e-6)
+    np.testing.assert_allclose(session.block.acc, rows[:, 1:4], rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(session.block.gyr, rows[:, 4:], rtol=1e-5, atol=1e-6)
+
+
+@settings(
+    max_examples=12,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    st.integers(0, 2**20), st.permutations(["t", "a", "g", "m", "counter", "warm"]),
+    st.booleans(),
+)  # fmt: skip
+def test_columns_without_names_are_told_whatever_their_order(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, order: list[str], field: bool
+) -> None:
+    rows = turned(seed, 50.0)
+    rng = np.random.default_rng(seed)
+    # a magnetometer turns like gravity, but has not its length
+    across = np.roll(rows[:, 1:4], 1, axis=1) * 4.6 + rng.normal(0, 0.3, (len(rows), 3))
+    parts = {
+        "t": rows[:, :1], "a": rows[:, 1:4], "g": rows[:, 4:],
+        "counter": np.arange(len(rows))[:, None] % 100,
+        "warm": np.round(25 + np.arange(len(rows))[:, None] / 900, 1),
+    } | ({"m": across} if field else {})  # fmt: skip
+    log = np.column_stack([parts[name] for name in order if name in parts])
+    path = write(tmp_path_factory.mktemp("log"), log)
+    session = imported(path)
+    same(session, rows)
+    why = session.about.raw["guessed"]["columns"]
+    assert "gravity turns" in why and "t" in why.partition(":")[0].split(",")
+
+
+@pytest.mark.parametrize(
+    "heading",
+    ["t,tx,ty,tz,wx,wy,wz", "t (s),x (m/s^2),y (m/s^2),z (m/s^2),x (rad/s),y (rad/s),"
+     "z (rad/s)", "time,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\ns,m/s^2,m/s^2,m/s^2,"
+     "rad/s,rad/s,rad/s",
+     "Time [s],Accelerometer [m/s^2],,,Gyroscope [rad/s],,\n,X,Y,Z,X,Y,Z",
+     "%time,field.linear_acceleration.x,field.linear_acceleration.y,"
+     "field.linear_acceleration.z,field.angular_velocity.x,field.angular_velocity.y,"
+     "field.angular_velocity.z", "a,b,c,d,e,f,g"],
+)  # fmt: skip
+def test_headings_as_they_come_need_no_option(tmp_path: Path, heading: str) -> None:
+    rows = turned(2, 50.0)
+    same(imported(write(tmp_path, rows, heading=heading)), rows)
+
+
+def test_a_rate_above_the_numbers_is_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(3, 50.0)
+    top = "Fs,50\nLogging Type,0\nax,ay,az,gx,gy,gz"
+    same(imported(write(tmp_path, rows[:, 1:], heading=top)), rows)
+    assert "its top says the rate: 'Fs,50'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("heading", "unit", "says"),
+    [("", 1.0, "if rates are in rad/s"),
+     ("ax,ay,az,gx [deg/s],gy [deg/s],gz [deg/s]", 180 / np.pi, "if rates are in deg/s"
+      )],
+)  # fmt: skip
+def test_a_rate_that_nobody_says_is_asked_with_what_the_turns_say(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    heading: str,
+    unit: float,
+    says: str,
+) -> None:
+    rows = turned(4, 50.0)
+    log = np.column_stack([rows[:, 1:4], unit * rows[:, 4:]])
+    assert main(["import", str(write(tmp_path, log, heading=heading))]) == 2
+    said = capsys.readouterr().err
+    assert "give the rate, e.g. --rate 50, which its turns say" in said and says in said
+
+
+@pytest.mark.parametrize(
+    ("part", "factor", "answer"),
+    [(slice(1, 4), 1 / G, "--acc-unit g or"),
+     (slice(4, 7), 180 / np.pi, "--gyr-unit deg/s or")],
+)  # fmt: skip
+def test_a_heading_that_physics_contradicts_is_asked_about(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    part: slice,
+    factor: float,
+    answer: str,
+) -> None:
+    rows = turned(5, 50.0)
+    heading = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    log = rows.copy()
+    log[:, part] *= factor
+    path = write(tmp_path, log, heading=heading)
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert answer in said and said.count("\n") == 1
+    option, unit = answer.split()[:2]
+    same(imported(path, option, unit), rows)
+
+
+def test_accelerations_without_gravity_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(6, 50.0)
+    rows[:, 1:4] = np.random.default_rng(6).normal(0, 0.02, (len(rows), 3))
+    names = ",".join(f"linear_acceleration_{x} [m/s^2]" for x in "xyz")
+    path = write(tmp_path, rows, heading=f"t [s],{names},gx,gy,gz")
+    assert main(["import", str(path)]) == 2
+    assert "gravity was taken out" in capsys.readouterr().err
+
+
+def test_a_unit_of_the_users_that_physics_contradicts_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, turned(7, 50.0), heading="t,ax,ay,az,gx,gy,gz")
+    imported(path, "--acc-unit", "g")
+    said = capsys.readouterr().err
+    assert "g as you say, but |a| at rest is 96" in said
+
+
+def test_several_imus_go_into_folders_of_their_own(tmp_path: Path) -> None:
+    rows, other = turned(8, 50.0), turned(9, 50.0)
+    heading = "t," + ",".join(
+        f"imu{k}_{c}{x}" for k in (0, 1) for c in "ag" for x in "xyz"
+    )
+    n = min(len(rows), len(other))
+    path = write(tmp_path, np.hstack([rows[:n], other[:n, 1:]]), heading=heading)
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+    same(Session.open(tmp_path / "out" / "0"), rows[:n])
+    same(Session.open(tmp_path / "out" / "1"), np.c_[rows[:n, :1], other[:n, 1:]])

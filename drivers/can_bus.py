@@ -21,6 +21,7 @@ from fieldcal.drivers.can_frames import Packed
 from fieldcal.drivers.can_groups import CanHealth
 from fieldcal.drivers.lawicel import Lawicel
 from fieldcal.drivers.options import Options
+from fieldcal.drivers.reader import LinkDown
 from fieldcal.drivers.serial_imu import SerialPort, reason
 from fieldcal.drivers.tcp import POLL
 
@@ -117,8 +118,8 @@ ONLY: Mapping[Any, int] = defaultdict(int)
 class BusSource:
     """Frames of any bus that python-can knows."""
 
-    def __init__(self, bus: BusABC) -> None:
-        self._bus = bus
+    def __init__(self, bus: BusABC, interface: str) -> None:
+        self._bus, self._interface = bus, interface
         with suppress(NotImplementedError, OSError):  # a bus that is no socket
             with socket.fromfd(bus.fileno(), socket.AF_INET, socket.SOCK_DGRAM) as own:
                 own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WAITING)
@@ -129,7 +130,7 @@ class BusSource:
         Raises
         ------
         OSError
-            If the bus is gone.
+            If the bus is gone; LinkDown if it is there and down.
 
         """
         import can
@@ -137,8 +138,10 @@ class BusSource:
         packed = Packed(MOST)
         try:
             packed.fill(self._waiting(), ONLY)
-        except can.CanError as fault:
-            raise OSError(str(fault)) from fault
+        except (can.CanError, OSError) as fault:
+            said = open_error(self._interface, fault)
+            down = LinkDown if said in KERNEL.values() else OSError
+            raise down(said) from fault
         return packed.frames.tobytes()
 
     def _waiting(self) -> Iterator[Message]:
@@ -188,7 +191,7 @@ def open_source(
 ) -> BusSource | SlcanSource:
     """Open a bus for a reader; errors as in `connect`."""
     if told["interface"] != "slcan":
-        return BusSource(connect(channel, told))
+        return BusSource(connect(channel, told), told["interface"])
     # first of all: what python-can sends would close another program's channel
     SerialPort(channel, told.get("tty_baudrate", 115200)).close()
     return SlcanSource(connect(channel, told), health)

@@ -4,7 +4,8 @@ An operating system keeps about 4 KB of a serial port, 40 ms at 921600 baud, so 
 records or draws must not hold up the reading. What was read waits here, up to a limit;
 then the reading waits as well, so that a peer with flow control loses nothing.
 
-A source that fails is opened again until it works or patience ends; the first chunk
+A source that fails is opened again until bytes come or patience ends: one that opens
+and says nothing is not back, such as a CAN interface that is down. The first chunk
 after that says that the link was broken.
 """
 
@@ -31,6 +32,10 @@ class Chunk(NamedTuple):
     t_host: float
     data: bytes
     broken: bool = False
+
+
+class LinkDown(OSError):
+    """The link cannot carry anything now; the text says what to do."""
 
 
 class ByteSource(Protocol):
@@ -72,6 +77,7 @@ class Reader:
         self._delivered = 0.0
         self._closing = False
         self._fault: Exception | None = None
+        self._deadline: float | None = None
         self.reconnecting = False
         self._thread = Thread(target=self._run, name=f"read {name}", daemon=True)
         self._thread.start()
@@ -118,6 +124,8 @@ class Reader:
         return self._closing or self._fault is not None
 
     def _gone(self) -> str:
+        if isinstance(self._fault, LinkDown):
+            return f"{self._name}: {self._fault}"
         back = f" and was not back in {self._patience:g} s" if self._patience else ""
         return f"{self._name} hung up{back}: check cable and power"
 
@@ -137,6 +145,7 @@ class Reader:
                     broken = True
                     continue
                 if data:
+                    self._deadline = None
                     self._put(Chunk(host_clock(), data, broken))
                     broken = False
         finally:
@@ -154,10 +163,11 @@ class Reader:
     def _mend(self) -> bool:
         """Open the source again; False when patience or the driver ends."""
         self._source.close()
-        deadline = time.monotonic() + self._patience
+        if self._deadline is None:
+            self._deadline = time.monotonic() + self._patience
         self.reconnecting = self._patience > 0
         try:
-            while not self._closing and time.monotonic() < deadline:
+            while not self._closing and time.monotonic() < self._deadline:
                 with self._changed:
                     self._changed.wait_for(lambda: self._closing, RETRY)
                 try:

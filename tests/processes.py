@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -86,3 +87,11 @@ def recalibrate(folder: Path) -> Recalibrated:
     done = subprocess.run(call, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return Recalibrated(folder, json.loads(done.stdout), done.stderr)
+
+
+def script(folder: Path, body: str) -> list[str]:
+    """A command that is a small program of ours."""
+    path = folder / "turntable.py"
+    path.write_text(body)
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return [sys.executable, str(path), "{position}", "{alpha}", "{beta}", "{name}"]

@@ -185,6 +185,7 @@ def _record(
     from fieldcal.acceptance.site import gravity_unknown
     from fieldcal.commands.run_device import device
     from fieldcal.run.companions import record_companions
+    from fieldcal.run.patient_mover import PatientMover
     from fieldcal.run.session_run import SessionRun, recorded_averages
     from fieldcal.session.folder import Session
     from fieldcal.session.recorder import Recorder
@@ -199,8 +200,9 @@ def _record(
         recorder = stack.enter_context(
             record_companions(task.further, own, task.tables)
         )
-        operator = stack.enter_context(_operator(args, task, mover, folder))
-        recorder.tell = operator.tell
+        turns = PatientMover(mover, _patience(args))
+        operator = stack.enter_context(_operator(args, task, turns, folder))
+        turns.tell = recorder.tell = operator.tell
         for unseen in (level_unknown(task.about), gravity_unknown(task.about)):
             if unseen:
                 operator.tell(unseen)

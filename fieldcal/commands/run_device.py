@@ -24,6 +24,7 @@ def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
     from fieldcal.commands.virtual import address
     from fieldcal.drivers.driver import open_driver
     from fieldcal.run import movers
+    from fieldcal.run.command_mover import CommandMover
     from fieldcal.run.plan_file import TURN
 
     mover, url = task.mover, str(task.run.get("device", ""))
@@ -38,7 +39,7 @@ def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
             turns, url = made, address(options, made.port)
         elif mover["kind"] == "command":
             timeout = float(mover.get("timeout_s", TURN))
-            turns = stack.enter_context(movers.CommandMover(mover["command"], timeout))
+            turns = stack.enter_context(CommandMover(mover["command"], timeout))
         if not url:
             raise InputError(
                 'name the device: --device "serial:/dev/ttyUSB0?format=witmotion"'

@@ -9,6 +9,7 @@ FieldcalError                2
 |    +-- DeviceSilent        3  no sample came in time
 |    +-- LinkLost            3  the link broke during a run
 |    +-- MoverFailed         3  what turns the device did not do so
+|         +-- MoverGone      3  it may come back
 +-- Moved                    1  the device was not still during a window
 +-- WrongPosition            1  the device is not where the procedure needs it
 +-- CalibrationFailed        1  the procedure could not reach a result
@@ -72,6 +73,10 @@ class LinkLost(DeviceError):
 
 class MoverFailed(DeviceError):
     """The mover failed to turn the device."""
+
+
+class MoverGone(MoverFailed):
+    """The mover is not there now, or says that it could not; it may come back."""
 
 
 class Moved(FieldcalError):

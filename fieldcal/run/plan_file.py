@@ -203,7 +203,7 @@ def _check_further(about: Description, run: Mapping[str, Any], name: str) -> Non
 
 
 def _check_mover(made: Task, name: str) -> None:
-    from fieldcal.run.movers import CommandMover
+    from fieldcal.run.command_mover import CommandMover
 
     mover = made.mover
     try:

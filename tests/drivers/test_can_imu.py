@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import re
@@ -396,3 +397,30 @@ def test_nothing_is_left_behind(bus: tuple[BusLink, Driver]) -> None:
     assert name not in [thread.name for thread in threading.enumerate()]
     with pytest.raises(DeviceError, match="was closed"):
         imu.receive(0.1)
+
+
+class Down:
+    """An interface that is down: the kernel opens it, and refuses to receive."""
+
+    def fileno(self) -> int:
+        raise NotImplementedError
+
+    def recv(self, timeout: float) -> None:
+        down = OSError(errno.ENETDOWN, "Network is down")
+        raise can.CanOperationError("Error receiving") from down
+
+    def shutdown(self) -> None:
+        return
+
+
+def test_an_interface_that_is_down_is_said_and_ends_a_run_without_an_operator(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(can, "Bus", lambda *channel, **told: Down())
+    url = "can:can0?dbc=virtual&reconnect=0.3"
+    run = ["run", "two_position", "--headless", "--patience=0.3", "--device", url]
+    assert main([*run, "-o", str(tmp_path / "s")]) == 3
+    said = capsys.readouterr().err
+    assert "can0: it is down; `ip link set` it up with its bitrate" in said

@@ -5,9 +5,9 @@ import time
 
 import pytest
 
-from fieldcal.core.errors import DeviceError
+from fieldcal.core.errors import DeviceError, LinkLost
 from fieldcal.drivers.driver import host_clock
-from fieldcal.drivers.reader import Chunk, Reader
+from fieldcal.drivers.reader import Chunk, LinkDown, Reader
 
 
 class Counting:
@@ -96,3 +96,11 @@ def test_closing_does_not_wait_for_patience() -> None:
     before = threading.active_count()
     reader.close()
     assert threading.active_count() == before - 1
+
+
+def test_a_link_that_opens_and_cannot_be_read_is_given_up() -> None:
+    down = LinkDown("it is down; set it up")
+    reader = Reader("can0", lambda: Counting(0, down), 0.35)
+    with pytest.raises(LinkLost, match="can0: it is down; set it up"):
+        reader.take(60.0)
+    reader.close()

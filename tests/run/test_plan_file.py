@@ -5,11 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import re
-import stat
-import sys
 import tomllib
 from pathlib import Path
-from time import monotonic, sleep
 from typing import Any
 from xml.etree.ElementTree import parse
 
@@ -18,15 +15,15 @@ import tomlkit
 from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
+from processes import script
 
 from fieldcal import procedures
 from fieldcal.cli import main
 from fieldcal.commands.run import add_arguments
 from fieldcal.commands.run_task import make_task
-from fieldcal.core.errors import InputError, MoverFailed, PlanError
-from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.errors import InputError, PlanError
 from fieldcal.run import plan_file
-from fieldcal.run.movers import CommandMover, VirtualMover
+from fieldcal.run.movers import VirtualMover
 
 POSITIONS = [{"alpha_deg": 0.0, "beta_deg": 0.0}, {"alpha_deg": 45.0, "beta_deg": 5.0}]
 TABLE = {"alpha_deg": 0.0, "beta_deg": 0.0, "rate_deg_s": [20.0, 0.0, 0.0]}
@@ -149,55 +146,6 @@ def test_whatever_a_plan_says_it_is_taken_or_refused(tables: dict[str, Any]) -> 
             assert len(task.about.positions) >= 2
 
 
-def script(folder: Path, body: str) -> list[str]:
-    """A command that is a small program of ours."""
-    path = folder / "turntable.py"
-    path.write_text(body)
-    path.chmod(path.stat().st_mode | stat.S_IXUSR)
-    return [sys.executable, str(path), "{position}", "{alpha}", "{beta}", "{name}"]
-
-
-def wait(mover: CommandMover) -> None:
-    deadline = monotonic() + 20.0
-    while mover.busy():
-        assert monotonic() < deadline
-        sleep(0.01)
-
-
-def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
-    out = tmp_path / "said"
-    call = script(tmp_path, f"import sys; open({str(out)!r}, 'w').write(str(sys.argv))")
-    with CommandMover(call, 20.0) as mover:
-        assert not mover.busy()
-        mover.turn(FIVE[3], 3)
-        wait(mover)
-    assert "'4', '45', '2.5', 'α = 45°, β = 2.5°'" in out.read_text()
-
-
-@pytest.mark.parametrize(
-    ("body", "timeout", "says"),
-    [
-        ("import sys; sys.exit('axis 2 is stuck')", 20.0, "exit code 1: axis 2 is stu"),
-        ("import time; time.sleep(60)", 0.3, "was not done after 0.3 s"),
-    ],
-)
-def test_a_command_that_fails_is_said(
-    tmp_path: Path, body: str, timeout: float, says: str
-) -> None:
-    with CommandMover(script(tmp_path, body), timeout) as mover:
-        mover.turn(Position.deg(1.0, 0.0), 0)
-        with pytest.raises(MoverFailed, match=says):
-            wait(mover)
-
-
-def test_a_command_that_is_not_there_is_said() -> None:
-    with (
-        CommandMover(["/no/such/turntable"], 1.0) as mover,
-        pytest.raises(MoverFailed, match="cannot be called"),
-    ):
-        mover.turn(FIVE[0], 0)
-
-
 CALLER = """\
 import sys
 from fieldcal.sim_device.remote import Remote
@@ -208,7 +156,7 @@ if sys.argv[1] == {fails!r}:
 """
 
 
-def run(folder: Path, device: VirtualMover, fails: str, junit: Path) -> int:
+def run(folder: Path, device: VirtualMover, fails: str, junit: Path, *more: str) -> int:
     call = script(folder, CALLER.format(control=device.control, fails=fails))
     mover = {"kind": "command", "command": call, "timeout_s": 30.0}
     tables = {
@@ -230,7 +178,7 @@ def run(folder: Path, device: VirtualMover, fails: str, junit: Path) -> int:
     session = folder / "s"
     return main(
         ["run", str(path), "--headless", "--json", "-o", str(session)]
-        + ["--junit", str(junit)]
+        + ["--junit", str(junit), *more]
     )
 
 
@@ -259,7 +207,7 @@ def test_a_turntable_that_jams_ends_the_run_with_3(
 ) -> None:
     junit = tmp_path / "run.xml"
     with VirtualMover(["--serial", "witmotion", "--speed", "20"], False) as device:
-        assert run(tmp_path, device, "2", junit) == 3
+        assert run(tmp_path, device, "2", junit, "--patience=0") == 3
     said = capsys.readouterr().err
     assert "the table is jammed" in said and "--resume" in said
     suite = parse(junit).getroot()

@@ -19,7 +19,8 @@ from fieldcal.model.search.selection import Search
 from fieldcal.solve.shown import Shown, has_equation
 
 POINTS = 24
-"""Variants of one explanation that stand for all of them."""
+"""Variants of a certain explanation that stand for all of them; of one less likely so
+many fewer."""
 
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
 """Their square roots spread points evenly over the causes beyond the first."""
@@ -38,7 +39,7 @@ def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Show
     each = [_choices(search, (*known, *one.members), m) for m in one.members]
     each += [_perhaps(search, (*known, *one.members), m) for m in one.maybe]
     share: dict[tuple[Member, ...], float] = {}
-    points = spread(len(each))
+    points = spread(len(each), max(1, round(POINTS * one.probability)))
     for at in points:
         picked = [
             choices[int(np.searchsorted(np.cumsum(weight)[:-1], u))]
@@ -49,12 +50,12 @@ def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Show
     return [Shown(members, p) for members, p in share.items()]
 
 
-def spread(count: int) -> Array:
-    """Points spread evenly over a cube, (POINTS, count); in the middle of one line."""
+def spread(count: int, points: int = POINTS) -> Array:
+    """Points spread evenly over a cube, (points, count); in the middle of one line."""
     if not count:
         return np.full((1, 0), 0.5)
-    step = np.array([1 / POINTS, *np.sqrt(PRIMES[: count - 1])])
-    out: Array = (np.arange(POINTS)[:, None] * step + 0.5 / POINTS) % 1.0
+    step = np.array([1 / points, *np.sqrt(PRIMES[: count - 1])])
+    out: Array = (np.arange(points)[:, None] * step + 0.5 / points) % 1.0
     return out
 
 

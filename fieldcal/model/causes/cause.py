@@ -27,6 +27,9 @@ TRIADS = (("acc", (0, 1, 2)), ("gyr", (3, 4, 5)))
 BOTH = frozenset({"acc", "gyr"})
 """Accelerometers and gyroscopes."""
 
+OFFERED = 60
+"""Columns by which a group is offered: a course on three axes by twenty waves each."""
+
 Kind = Literal["effect", "random", "unknown", "position", "given"]
 
 
@@ -74,6 +77,17 @@ class Group:
     in_step: bool = False
     unsure: float = np.nan
     fixed: float | None = None
+
+    @property
+    def foremost(self) -> Index:
+        """The largest of its columns, by their place among them; all but of wide ones.
+
+        By these it is offered: what the quick waves of a course add decides no rank.
+        """
+        if len(self.columns) <= OFFERED:
+            return np.arange(len(self.columns))
+        order = np.argsort(-self.typical, kind="stable")
+        return np.sort(order[:OFFERED])
 
     def sizes(self, v: float) -> Array:
         """Standard deviation of each column before the rows are seen, (k,)."""

@@ -32,7 +32,7 @@ from fieldcal.physics.experience import Experience
 
 @dataclass(frozen=True, slots=True)
 class AlikeGroups:
-    """Groups of causes that are alike in width.
+    """Groups that are alike in width, by the columns that they are offered by.
 
     Attributes
     ----------
@@ -52,9 +52,9 @@ class AlikeGroups:
     @classmethod
     def of(cls, some: Sequence[tuple[int, int, Group]]) -> AlikeGroups:
         """Of groups with the numbers of their causes and variants."""
-        columns = np.array([g.columns for _, _, g in some])
+        columns = np.array([g.columns[g.foremost] for _, _, g in some])
         blocks, block = np.unique(columns, axis=0, return_inverse=True)
-        typical = np.array([g.typical for _, _, g in some])
+        typical = np.array([g.typical[g.foremost] for _, _, g in some])
         cause, variant = np.array([(i, j) for i, j, _ in some]).T
         return cls(blocks, block.ravel(), typical, cause, variant)
 
@@ -117,7 +117,7 @@ class Dictionary(ColumnTable):
         found: dict[int, list[tuple[int, int, Group]]] = {}
         for i, cause in enumerate(self.causes):
             for j, group in enumerate(cause.variants):
-                found.setdefault(len(group.columns), []).append((i, j, group))
+                found.setdefault(len(group.foremost), []).append((i, j, group))
         return [AlikeGroups.of(some) for some in found.values()]
 
     @cached_property

@@ -24,6 +24,9 @@ WAVES = 40
 SPANS = (1.5, 4.0, 9.0, 20.0)
 """Half waves of a smooth course over the session, from slow to fast."""
 
+FAINT = 1e-3
+"""Part of the slowest cosine's size below which one is left out of a course."""
+
 HARMONICS = 4
 SLOW = 4
 LONG_S = 1e4
@@ -65,9 +68,10 @@ class CourseSpan:
 
 
 def smooth(span: float) -> Array:
-    """Standard deviation of each cosine in a course of some half waves, (WAVES,)."""
+    """Standard deviation of each cosine in a course of some half waves, (k,)."""
     k = np.arange(1, WAVES + 1)
     sizes: Array = np.exp(-0.5 * (k / span) ** 2)
+    sizes = sizes[sizes > FAINT]
     even: Array = sizes / np.sqrt((sizes**2).sum() / 2)
     return even
 

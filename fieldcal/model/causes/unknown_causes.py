@@ -21,10 +21,8 @@ def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
     sizes = typical(table)
     for c in table.observed.tolist():
         groups = [
-            Group("time", CHANNELS[c], table.wave(c), sizes[c] * smooth.smooth(span),
-                  shape={"waves": span})
-            for span in smooth.SPANS
-        ]  # fmt: skip
+            _course(table, CHANNELS[c], [c], sizes, span) for span in smooth.SPANS
+        ]
         yield _cause("time", CHANNELS[c], groups)
         at = table.window(c)
         if len(table.held) > 3:
@@ -55,14 +53,18 @@ def _together(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
         some = [c for c in channels if c in table.observed]
         if len(some) < 2:
             continue
-        waves = np.concatenate([table.wave(c) for c in some])
-        groups = [
-            Group("time", part, waves,
-                  np.outer(sizes[some], smooth.smooth(span)).ravel(),
-                  shape={"waves": span})
-            for span in smooth.SPANS
-        ]  # fmt: skip
+        groups = [_course(table, part, some, sizes, span) for span in smooth.SPANS]
         yield _cause("time", part, groups)
+
+
+def _course(
+    table: ColumnTable, part: str, channels: Sequence[int], sizes: Array, span: float
+) -> Group:
+    """A smooth course in time on some channels."""
+    shape = smooth.smooth(span)
+    waves = np.concatenate([table.wave(c, len(shape)) for c in channels])
+    size = np.outer(sizes[channels], shape).ravel()
+    return Group("time", part, waves, size, shape={"waves": span})
 
 
 def _of_covariates(table: ColumnTable, sizes: Array) -> Iterator[Cause]:

@@ -27,12 +27,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.priors import SIZES
 
 ROUNDED = 1e-9
 """Part of a column's square that eliminating others leaves of it by rounding."""
+
+SMALL = 64
+"""Rows of a matrix up to which halving it saves nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,38 +92,53 @@ class Gram:
         local = [self.index[at] for at in columns]
         return [self.within[at[:, :, None], at[:, None, :]] for at in local]
 
+    def at(self, windows: NDArray[np.bool_], info: Array) -> Gram:
+        """Some windows, with other information on their means."""
+        parts = ("means", "off", "shared", "loose", "kind", "bent")
+        kept = {name: getattr(self, name)[windows] for name in parts}
+        return replace(self, info=info[windows], **kept)
+
     def weighed(self, tau: Array) -> Weighed:
-        """With instabilities by kind."""
-        spread = self.shared**2 + tau[self.kind] ** 2 + self.bent**2 @ tau[:6] ** 2
-        if self.loose.any():
-            return self._loosely(spread)
-        weight = self.info / (1 + self.info * spread)
-        log_det = float(np.log1p(self.info * spread).sum())
+        """With instabilities by kind, (7,)."""
         n, c, k = self.means.shape
+        if self.loose.any():
+            full, log_det = self.whitening(tau)
+            white = (full @ self.means).reshape(n * c, k)
+            off = (full @ self.off[:, :, None]).ravel()
+            weight = np.swapaxes(full, 1, 2) @ full
+            own = np.diagonal(weight, 0, 1, 2)
+            return Weighed(self, white, off, own, full, float(log_det))
+        spread = self._spread(tau)
+        weight = self.info / (1 + self.info * spread)
+        log_det = np.log1p(self.info * spread).sum()
         root = np.sqrt(weight).reshape(-1, 1)
         return Weighed(
             self, (root * self.means.reshape(n * c, k)),
-            root[:, 0] * self.off.ravel(), weight, np.zeros(0), log_det,
+            root[:, 0] * self.off.ravel(), weight, np.zeros(0), float(log_det),
         )  # fmt: skip
 
-    def _loosely(self, spread: Array) -> Weighed:
-        """The same where windows are turned freely: channels go together."""
+    def _spread(self, tau: Array) -> Array:
+        """Variance of the means beside white noise, by channel, (..., p, 6)."""
+        wide = tau**2
+        bent = np.einsum("pij,...j->...pi", self.bent**2, wide[..., :6])
+        out: Array = self.shared**2 + wide[..., self.kind] + bent
+        return out
+
+    def whitening(self, tau: Array) -> tuple[Array, Array]:
+        """W of the means at instabilities, (..., 7) -> (..., p, 6, 6), and ln |R|.
+
+        Channels of a window go together where it is turned freely.
+        """
         known = self.info > 0
-        cov = self.loose @ np.swapaxes(self.loose, 1, 2)
-        cov[:, range(6), range(6)] += spread
         both = known[:, :, None] & known[:, None, :]
         scale = np.sqrt(self.info)
-        inner = np.where(both, cov * scale[:, :, None] * scale[:, None, :], 0.0)
-        inner[:, range(6), range(6)] += 1.0
-        root = np.linalg.inv(np.linalg.cholesky(inner)) * scale[:, None, :]
-        log_det = -2 * float(
-            np.log(np.diagonal(root, 0, 1, 2)[known] / scale[known]).sum()
-        )
-        n, c, k = self.means.shape
-        white = (root @ self.means).reshape(n * c, k)
-        off = (root @ self.off[:, :, None]).ravel()
-        weight = np.swapaxes(root, 1, 2) @ root
-        return Weighed(self, white, off, np.diagonal(weight, 0, 1, 2), root, log_det)
+        cov = self.loose @ np.swapaxes(self.loose, 1, 2)
+        inner = cov + np.eye(6) * self._spread(tau)[..., None]
+        inner = np.where(both, inner * scale[:, :, None] * scale[:, None, :], 0.0)
+        inner[..., range(6), range(6)] += 1.0
+        lower = np.linalg.cholesky(inner)
+        log_det = 2 * np.log(np.diagonal(lower, 0, -2, -1)).sum(axis=(-2, -1))
+        return np.linalg.inv(lower) * scale[:, None, :], log_det
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,6 +220,7 @@ class Eliminated:
     rows : what was eliminated in
     columns : (a,) of the Gram matrix; one may stand there twice
     sizes : (a,) standard deviation of each before the rows are seen
+    half : (a, a) a root H of the covariance after, H^T H
     inverse : (a, a) S (I + S G S)^-1 S, the covariance after
     estimate : (a,) mean after
     score : ln Z, (2)
@@ -210,6 +230,7 @@ class Eliminated:
     rows: Weighed
     columns: Index
     sizes: Array
+    half: Array
     inverse: Array
     estimate: Array
     score: float
@@ -221,11 +242,11 @@ class Eliminated:
         scaled *= sizes[:, None]
         scaled.flat[:: len(columns) + 1] += 1.0
         root = np.linalg.cholesky(scaled)
-        half = np.linalg.inv(root) * sizes
+        half = inverse_of(root) * sizes
         seen = half @ rows.pull(columns)
         score = 0.5 * (float(seen @ seen) - rows.square - rows.log_det)
         score -= float(np.log(np.diag(root)).sum())  # (2)
-        return cls(rows, columns, sizes, half.T @ half, half.T @ seen, score)
+        return cls(rows, columns, sizes, half, half.T @ half, half.T @ seen, score)
 
     def rest(self, columns: Index, typical: Array) -> tuple[Array, Array]:
         """M and T b' of further columns, in units of what is typical."""
@@ -242,6 +263,21 @@ class Eliminated:
         shared = ours.T @ white
         inner = white.T @ white - shared.T @ self.inverse @ shared
         return inner, white.T @ self.rows.off - shared.T @ self.estimate
+
+
+def inverse_of(root: Array) -> Array:
+    """Inverse of a lower triangular matrix, in halves: a general one costs six times.
+
+    >>> (inverse_of(np.tri(200)) @ np.tri(200) == np.eye(200)).all()
+    np.True_
+    """
+    if len(root) <= SMALL:
+        out: Array = np.linalg.inv(root)
+        return out
+    k = len(root) // 2
+    first, last = inverse_of(root[:k, :k]), inverse_of(root[k:, k:])
+    corner = -last @ (root[k:, :k] @ first)
+    return np.block([[first, np.zeros((k, len(root) - k))], [corner, last]])
 
 
 def gains(inner: Array, pull: Array, own: Array | float) -> Array:

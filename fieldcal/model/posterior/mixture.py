@@ -14,7 +14,7 @@ Source: Bayesian model averaging; for windows, Cook and Weisberg 1982, 2.1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -24,6 +24,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, gains
+from fieldcal.model.evidence.levels import Levels, levels
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import DENSITY, TRIADS, Sizing, alike
 
@@ -35,6 +36,9 @@ UNSTEADY = np.log(priors.loosely())
 
 DEVICES = np.log(priors.density(priors.STEEP))
 """The same where everything else is a cause of its own."""
+
+NONE: Index = np.empty((0, 1), dtype=np.intp)
+"""Columns of no window."""
 
 SHOWS = 0.2
 """Part of a mean's noise from which what windows wander by beside it can be seen."""
@@ -160,30 +164,32 @@ class Mixing:
         first = Hypothesis(mode, -1, 0, 0.0, 0.0)
         if not self.unstable[list(triad)].any():
             return [first]
-        found: list[Hypothesis] = []
-        total: list[float] = []
-        bad: list[Array] = []
-        for state, sizes, known in self._shifted(triad):
-            found.append(Hypothesis(sizes, -1, 0, known, state.score + known))
-            total.append(found[-1].score)
-            if triad[0] == 0 and self.doubted:
-                some, score = self._with_bad(state, sizes, known)
-                found += some
-                bad.append(score)
-        if bad:
-            each = np.logaddexp.reduce(np.array(bad), axis=0)
-            every = np.logaddexp.reduce([*total, *each.tolist()])
-            self.bad = np.exp(each - every)
+        sizes, known = self._shifted(triad)
+        doubted = self._bad_columns() if triad[0] == 0 and self.doubted else NONE
+        taus = priors.SIZES[np.array(sizes)] * self.unstable
+        there = levels(self.gram, self.columns, self.wide, triad, taus, doubted)
+        alone = there.score + known
+        found = [
+            Hypothesis(s, -1, 0, k, v)
+            for s, k, v in zip(sizes, known.tolist(), alone.tolist(), strict=True)
+        ]
+        if len(doubted):
+            chance = known[:, None] + float(np.log(priors.BAD)) + DENSITY  # (n, v)
+            every = self._with_bad(there) + there.score[:, None, None] + chance[:, None]
+            each = np.logaddexp.reduce(every, axis=(0, 2))
+            self.bad = np.exp(each - np.logaddexp.reduce([*alone, *each]))
+            found += [
+                Hypothesis(sizes[n], i, v, float(chance[n, v]), float(every[n, i, v]))
+                for n, i, v in np.argwhere(every > alone.max() - KEPT).tolist()
+            ]
         best = max(h.score for h in found)
         return [h for h in found if h.score > best - KEPT]
 
-    def _shifted(
-        self, triad: Sequence[int]
-    ) -> Iterator[tuple[Eliminated, tuple[int, ...], float]]:
-        """The set at instabilities of a triad that are larger or smaller together.
+    def _shifted(self, triad: Sequence[int]) -> tuple[list[tuple[int, ...]], Array]:
+        """Instabilities of a triad that are larger or smaller together.
 
-        Those too small to show are one, the smallest that could; the chance of each is
-        that beside the likeliest.
+        Those too small to show are one, the smallest that could; the chance of
+        each, ln, is that beside the likeliest.
         """
         mode = self.there.sizes.instability
         middle = round(float(np.mean([mode[c] for c in triad])))
@@ -193,15 +199,11 @@ class Mixing:
                   for c, m in enumerate(mode))
             for s in range(-middle, top + 1 - middle)
         ]  # fmt: skip
-        chance = np.array(
-            [alike(sizes, self.unstable, self.density) for sizes in moved]
-        )
+        chance: Array = alike(np.array(moved), self.unstable, self.density)
         chance -= alike(mode, self.unstable, self.density)
         first = max(0, self._showing(triad) - 1)
         chance[first] = np.logaddexp.reduce(chance[: first + 1])
-        for sizes, known in zip(moved[first:], chance[first:].tolist(), strict=True):
-            state = self._at(sizes, self.columns, self.wide)
-            yield state, sizes, known
+        return moved[first:], chance[first:]
 
     def _showing(self, triad: Sequence[int]) -> int:
         """The smallest of `SIZES` at which what a triad wanders by can be seen."""
@@ -210,25 +212,16 @@ class Mixing:
         typical = float(self.unstable[list(triad)].max())
         return int(np.searchsorted(priors.SIZES * typical, SHOWS * noise))
 
-    def _with_bad(
-        self, state: Eliminated, sizes: tuple[int, ...], known: float
-    ) -> tuple[list[Hypothesis], Array]:
-        """The same with each window bad, by each size that counts; scores by window."""
-        alone = state.score + known
-        chance = known + float(np.log(priors.BAD)) + DENSITY
-        found, score = [], np.zeros(len(self.doubted))
-        for i, at in self.doubted:
-            typical = self._typical(at)
-            inner, pull = state.rest(at, typical)
-            own = np.diag(state.rows.matrix(at, at)).max() * typical.max() ** 2
-            every = state.score + chance
-            every += gains(inner[None], pull[None], np.array([own]))[0]
-            score[i] = np.logaddexp.reduce(every)
-            found += [
-                Hypothesis(sizes, i, v, float(chance[v]), float(every[v]))
-                for v in np.flatnonzero(every > alone - KEPT).tolist()
-            ]
-        return found, score
+    def _bad_columns(self) -> Index:
+        """Columns of the windows that may be bad, (w, k)."""
+        return np.array([at for _, at in self.doubted])
+
+    def _with_bad(self, there: Levels) -> Array:
+        """Gains of each window bad, by instability, window and size, (n, w, v)."""
+        typical = self._typical(self.doubted[0][1])
+        inner = there.inner * typical * typical[:, None]
+        own = (there.alone * typical**2).max(axis=-1)
+        return gains(inner, there.pull * typical, own)
 
     def _exactly(self, parts: Sequence[Hypothesis]) -> tuple[float, Eliminated, Array]:
         """Hypotheses of each triad together: their score, estimate, instabilities."""

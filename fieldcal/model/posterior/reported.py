@@ -28,6 +28,6 @@ def reported(search: Search, there: Set) -> Set:
         return opened  # a column of two groups has one estimate for each
     mixing = Mixing(search.dictionary, search.gram, opened, search.unstable, False)
     found = mixing.run()
-    return replace(
-        there, state=replace(state, inverse=found.covariance, estimate=found.mean)
-    )
+    half = np.linalg.cholesky(found.covariance).T
+    state = replace(state, half=half, inverse=found.covariance, estimate=found.mean)
+    return replace(there, state=state)

@@ -28,6 +28,10 @@ FALLING = ((0, 1, 2), (3, 4, 5, 6))
 Less = tuple[int, ...]
 """Indices of instabilities in `priors.SIZES`, (7,)."""
 
+Asked = tuple[tuple[tuple[str, int], ...], Less | None]
+"""A set by its key, and the instability beside which it is asked what it may be given,
+if only beside one."""
+
 WIDE = 30
 """Columns of a group from which its eigenvalues cost more than to look them up."""
 
@@ -97,31 +101,36 @@ class Offers(Sets):
 
     def __init__(self, dictionary: Dictionary, gram: Gram) -> None:
         super().__init__(dictionary, gram)
-        self._tables: dict[tuple[tuple[str, int], ...], list[OfferTable]] = {}
+        self._tables: dict[Asked, list[OfferTable]] = {}
         self._at: dict[Less, Seen] = {}
         self._known: dict[int, Array] = {}
 
-    def offers(self, there: Set) -> list[Offer]:
-        """Every cause that a set has not, at its best variant, the best one first."""
+    def offers(self, there: Set, beside: Less | None = None) -> list[Offer]:
+        """Every cause that a set has not, at its best variant, the best one first.
+
+        What takes the place of a cause that was left out stands `beside` the
+        instability that this one stood beside; other causes may need any.
+        """
         best: dict[str, Offer] = {}
-        for table in self.tables(there):
+        for table in self.tables(there, beside):
             for offer in table.offers:
                 name = offer.member[0].key
                 if name not in best or offer.score > best[name].score:
                     best[name] = offer
         return sorted(best.values(), key=lambda o: -o.score)
 
-    def tables(self, there: Set) -> list[OfferTable]:
+    def tables(self, there: Set, beside: Less | None = None) -> list[OfferTable]:
         """What a set may be given, beside each of some instabilities."""
         key = self.key(there.members)
-        if key not in self._tables:
-            self._tables[key] = [
+        asked = key, None if (key, None) in self._tables else beside
+        if asked not in self._tables:
+            self._tables[asked] = [
                 OfferTable(
                     less, state, score, self._at_level(there, state, score, less)
                 )
-                for less, state, score in self._levels(there)
+                for less, state, score in self._levels(there, beside)
             ]
-        return self._tables[key]
+        return self._tables[asked]
 
     def _at_level(
         self, there: Set, state: Eliminated, score: float, less: Less
@@ -154,19 +163,23 @@ class Offers(Sets):
                 out[i] += np.log(priors.AGAIN / cause.chance)
         return out
 
-    def _levels(self, there: Set) -> Iterator[tuple[Less, Eliminated, float]]:
-        """The set with its instability as it is and smaller, and its score then."""
+    def _levels(
+        self, there: Set, beside: Less | None
+    ) -> Iterator[tuple[Less, Eliminated, float]]:
+        """The set with its instability as it is and another, and its score then."""
         sizes = there.sizes
         base = there.score - there.state.score
         base -= self.alike(sizes.instability)
         columns, wide = there.state.columns, there.state.sizes
         ways = [(wide, 0.0), self.opened(there)]
-        for less in self._less(sizes.instability):
+        for less in self._less(sizes.instability, beside):
             fallen = less != sizes.instability
             rows = self._seen(less).rows
             for before, cost in ways if fallen and ways[1][1] else ways[:1]:
                 state = Eliminated.of(rows, columns, before)
                 yield less, state, base + cost + state.score + self.alike(less)
+        if beside is not None:
+            return
         first, rows = 0, self._seen(sizes.instability).rows
         for group, size in zip(
             self.dictionary.always, sizes.calibration, strict=True
@@ -181,8 +194,10 @@ class Offers(Sets):
                 score = there.score - there.state.score + state.score
                 yield sizes.instability, state, score + lost
 
-    def _less(self, instability: Less) -> list[Less]:
-        """Instabilities as they are, and smaller in one triad; each once."""
+    def _less(self, instability: Less, beside: Less | None) -> list[Less]:
+        """Instabilities as they are, and one other or some that are smaller."""
+        if beside is not None:
+            return list(dict.fromkeys([instability, beside]))
         found = [instability]
         for some in FALLING if self.unstable.any() else ():
             for down in LEVELS:
@@ -218,7 +233,7 @@ class Offers(Sets):
         """Gains over sizes of every variant of every cause, (m, sizes) by width."""
         there = self._seen(less)
         shared = there.rows.matrix(state.columns, None)
-        half = np.linalg.cholesky(state.inverse).T @ shared
+        half = state.half @ shared
         rest = there.pull - shared.T @ state.estimate
         for alike, own in zip(self.dictionary.by_width, there.blocks, strict=True):
             part = np.moveaxis(half[:, alike.blocks], 0, 1)  # (b, a, k)

@@ -11,7 +11,7 @@ import numpy as np
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.search.offers import Offer, Offers, OfferTable
+from fieldcal.model.search.offers import Less, Offer, Offers, OfferTable
 from fieldcal.model.search.pairs import pairs
 
 SETTLED = 0.02
@@ -53,7 +53,9 @@ class Search(Offers):
             best = self._paired(there, there.score)
         for i in range(len(best.members)):
             less = self.without(best, i)
-            best = max([best, less, self._followed(less, best.score)], key=_score)
+            beside = best.sizes.instability
+            other = self._followed(less, best.score, beside)
+            best = max([best, less, other], key=_score)
         if best is not there:
             return best
         return max(self._instead(best), self._wider(best), key=_score)
@@ -88,9 +90,9 @@ class Search(Offers):
         two = self._paired(less, there.score)
         return max([there, two, self._followed(two, there.score)], key=_score)
 
-    def _followed(self, there: Set, level: float) -> Set:
+    def _followed(self, there: Set, level: float, beside: Less | None = None) -> Set:
         """The best set with one more; the set itself if none comes near a level."""
-        offers = self.offers(there)
+        offers = self.offers(there, beside)
         found = [there]
         for offer in offers[:FOLLOWED]:
             if offer.score > level - SLACK and offer.score > offers[0].score - NEAR:

@@ -12,6 +12,7 @@ from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
+    from fieldcal.importing.means import Scatter
     from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 
 EXAMPLE = """\
@@ -51,6 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=1.0,
         metavar="S",
         help="shortest still stretch that counts as a position, s (default: 1)",
+    )
+    add(
+        "--sigma",
+        default="",
+        metavar="A,G",
+        help="of a table of means, how well they are known, m/s^2 and rad/s",
     )
     add_site(parser)
 
@@ -169,6 +176,9 @@ def _bring(
     if guessed:
         about["guessed"] = guessed
         stream = next(s for s in recording.streams() if s.name == stream.name)
+    if (scatter := recording.scatter()) is not None:
+        _bring_means(args, recording, stream, folder, about, scatter)
+        return
     imported = import_stream(recording, stream.name, folder, about, args.still)
     err = sys.stderr.write
     err(
@@ -194,6 +204,38 @@ def _bring(
             "no still stretch was found: write the positions into session.toml, or try"
             " --still with a shorter time\n"
         )
+    sys.stdout.write(f"{folder}\n")
+
+
+def _bring_means(
+    args: argparse.Namespace,
+    recording: Recording,
+    stream: ImuStream,
+    folder: Path,
+    about: dict[str, Any],
+    scatter: Scatter,
+) -> None:
+    """Make a session of a table of means."""
+    from fieldcal.core.gravity import G0
+    from fieldcal.importing.ingest import import_stream
+    from fieldcal.importing.means import tables_of_means
+
+    gravity = float(about["site"].get("gravity", G0))
+    tables = tables_of_means(recording, stream.name, scatter, gravity, args.sigma)
+    guessed = about.pop("guessed", {}) | tables.pop("guessed", {})
+    about |= {"guessed": guessed} if guessed else {}
+    never = float("inf")
+    imported = import_stream(recording, stream.name, folder, about | tables, never)
+    err = sys.stderr.write
+    err(
+        f"{folder}: {stream.name}, {stream.says}:"
+        f" {_many(imported.facts.rows, 'position', 's')}, means only: nothing that goes"
+        " on within a position or between two can be found\n"
+    )
+    for what, why in guessed.items():
+        err(f"{folder}: {what.replace('_', ' ')} taken as {why}\n")
+    for sentence in imported.says:
+        err(f"{folder}: {sentence}\n")
     sys.stdout.write(f"{folder}\n")
 
 

@@ -15,6 +15,7 @@ from fieldcal.diagnosis.signal.line import Remains, Tone
 from fieldcal.diagnosis.signal.spectrum import tones, without
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.hand_tremor import rows_of
+from fieldcal.model.rows.means import median_sigma, rows_of_means
 from fieldcal.model.rows.reduce import Rows, RowSource, spans
 from fieldcal.model.rows.rest_onset import arrivals
 from fieldcal.model.rows.thermometer import Thermometer
@@ -67,6 +68,8 @@ def prepare(block: Block, about: Description) -> Prepared:
         If no window holds enough samples.
 
     """
+    if about.means_only:
+        return _of_means(block, about.in_time())
     _refuse_empty(block, about)
     refuse_copies(block)
     about = about.in_time()
@@ -91,6 +94,26 @@ def prepare(block: Block, about: Description) -> Prepared:
             " clipped there; record them again"
         )
     return Prepared(checked, source, _warming(rows, warmth), known, found, left)
+
+
+def _of_means(block: Block, about: Description) -> Prepared:
+    """Means alone: nothing was sampled, so nothing of the chain can be checked."""
+    about.refuse_overlap()
+    sigma = about.mean_sigma
+    usable = np.isfinite(block.six)
+    checked = Checked(block, usable, (), median_sigma(sigma))
+    warmth = Thermometer.of(block)
+    rest = np.full(len(about.positions), -np.inf)
+    source = RowSource(block, about, usable, rest, warmth)
+    rows = rows_of_means(source, sigma)
+    if not rows.used.any():
+        raise InputError(
+            "session.toml says of no position how well its means are known: write"
+            " sigma = [ax, ay, az, gx, gy, gz] below each [[position]], m/s^2 and rad/s"
+        )
+    return Prepared(
+        checked, source, _warming(rows, warmth), known_terms(about.model), (), ()
+    )
 
 
 def _as_shaken(calm: Rows, shaken: Rows) -> Rows:

@@ -126,6 +126,8 @@ def rests(session: Session) -> Rests:
             " position was held, or let fieldcal import find the still stretches"
         )
     session.about.refuse_overlap()
+    if session.about.means_only:
+        return _of_means(session)
     block = session.block
     refuse_copies(block)
     taken: dict[int, Average] = {}
@@ -155,6 +157,36 @@ def rests(session: Session) -> Rests:
     rows = sorted(taken)
     averages, dead = _without_dead([taken[i] for i in rows])
     return Rests(tuple(rows), tuple(averages), (*warnings, *dead))
+
+
+def _of_means(session: Session) -> Rests:
+    """Return the means of a session that holds nothing else.
+
+    Raises
+    ------
+    SessionError
+        If no mean lies in any window.
+
+    """
+    block, sigma = session.block, session.about.mean_sigma
+    rows, averages = [], []
+    for i, window in enumerate(session.windows):
+        part = block.between(*window) if window else block[:0]
+        if not len(part):
+            continue
+        mean = part.six.mean(axis=0)
+        mean[~np.isfinite(sigma[i])] = np.nan
+        warmth = float(part.temperature.mean())
+        instant = float(part.t[0])
+        covariance = np.diag(sigma[i] ** 2)
+        averages.append(Average(mean, covariance, warmth, len(part), instant, instant))
+        rows.append(i)
+    if not rows:
+        raise SessionError(
+            f"{session.folder}: no mean lies in a window of session.toml: give each"
+            " [[position]] a start_s and end_s about its mean"
+        )
+    return Rests(tuple(rows), tuple(averages), session.warnings)
 
 
 def _beyond(session: Session) -> list[str]:

@@ -50,7 +50,7 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     known : channels that are named, by column
 
     """
-    if len(table) < physics.FEWEST:
+    if len(table) < physics.FEWEST_MEANS:
         return None
     channels = dict(known)
     times = [i for i in _growing(table) if i not in known]

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing import column_physics, columns, headings
 from fieldcal.importing.headings import Column, HeadingMatch
-from fieldcal.importing.physical_units import gravity_in, rate_in
+from fieldcal.importing.means import Scatter, scatter_columns
+from fieldcal.importing.physical_units import are_means, gravity_in, rate_in
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 
 SLOWEST = 5.0
@@ -93,10 +94,43 @@ class ColumnRecording(Recording):
             return dict.fromkeys(self.imus_found, self.wanted)
         return self.imus_found
 
+    def scatter(self) -> Scatter | None:
+        """What its columns say of the scatter, if its rows are means."""
+        table, wanted = self.beginning(), self.wanted
+        at = self._numbers_of(wanted)
+        if not {"ax", "ay", "az"} <= set(at) or not len(table):
+            return None
+        if not are_means(table[:, [at["a" + axis] for axis in "xyz"]]):
+            return None
+        fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
+        where = scatter_columns(next(fits, Heading([])).columns)
+        values = np.full((len(table), 6), np.nan)
+        for i, channel in enumerate(CHANNELS):
+            if channel in where:
+                values[:, i] = table[:, where[channel]]
+        count = table[:, where["n"]] if "n" in where else None
+        return Scatter(values, count, _has_time(wanted))
+
+    def _numbers_of(self, wanted: ReadOptions) -> dict[str, int]:
+        """Number of each channel's column among those of `beginning`."""
+        names = [c.partition("=") for c in wanted.columns]
+        if not any(place for _, _, place in names):
+            return {name: i for i, (name, _, _) in enumerate(names)}
+        places = [c.place for way in self.heading() for c in way.columns]
+        return {n: places.index(p) for n, _, p in names if p in places}
+
     def _rated(self, wanted: ReadOptions) -> ReadOptions:
         """Options with the rate that the file says, where no column is the time."""
-        if wanted.rate_hz or _has_time(wanted) or (said := self.rate_said()) is None:
+        if wanted.rate_hz or _has_time(wanted):
             return wanted
+        said = self.rate_said()
+        if said is None:
+            at = self._numbers_of(wanted)
+            three = [at[c] for c in ("ax", "ay", "az") if c in at]
+            table = self.beginning() if len(three) == len("xyz") else np.empty((0, 0))
+            means = len(table) and are_means(table[:, three])
+            # of means nobody knows when: they are counted
+            return replace(wanted, rate_hz=1.0) if means else wanted
         rate, where = said
         sentence = f"its top says the rate: {where!r}"
         self.says += [sentence] if sentence not in self.says else []

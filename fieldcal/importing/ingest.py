@@ -227,7 +227,7 @@ def _fill(
     repairs = [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
     # an empty list would be in the way of the tables that the user adds
-    tables = {"position": positions} if positions else {}
+    tables = {"position": positions} if positions and "position" not in about else {}
     text = tomlkit.dumps({**about, **tables})
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
     recording.says += [step.sentence() for step in clock.steps]

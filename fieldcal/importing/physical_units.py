@@ -22,6 +22,12 @@ from fieldcal.core.samples import Array
 FEWEST = 50
 """Rows that tell anything."""
 
+FEWEST_MEANS, MOST_MEANS = 3, 2000
+"""Rows of a table of means, one for each position."""
+
+APART = np.deg2rad(10.0)
+"""Angle between successive rows that samples do not have, rad."""
+
 _GROUP = 8
 """Rows of which the mean is taken for (1)."""
 
@@ -129,14 +135,34 @@ class Gravity(NamedTuple):
     round: bool
 
 
+def are_means(acc: Array) -> bool:
+    """Whether successive rows (n, 3) point so differently that they are no samples.
+
+    Samples that follow each other point nearly the same way; means of positions do not.
+    """
+    acc = acc[np.isfinite(acc).all(axis=1)]
+    length = np.linalg.norm(acc, axis=1)
+    if not FEWEST_MEANS <= len(acc) <= MOST_MEANS or not length.all():
+        return False
+    up = acc / length[:, None]
+    turned = np.arccos(np.clip((up[1:] * up[:-1]).sum(axis=1), -1, 1))
+    return bool(np.median(turned) > APART)
+
+
 def gravity_in(acc: Array) -> Gravity | None:
     """Size of gravity in numbers (n, 3) of a file, by (1); None of too few."""
     acc = acc[np.isfinite(acc).all(axis=1)]
+    if are_means(acc):
+        return _gravity_of(acc)
     if len(acc) < FEWEST:
         return None
     groups = acc[: len(acc) // _GROUP * _GROUP].reshape(-1, _GROUP, 3)
     means, spread = groups.mean(axis=1), groups.std(axis=1).max(axis=1)
-    quiet = means[spread <= np.quantile(spread, _QUIET)]
+    return _gravity_of(means[spread <= np.quantile(spread, _QUIET)])
+
+
+def _gravity_of(quiet: Array) -> Gravity | None:
+    """Size of gravity by means (m, 3) of rests."""
     center, radius = _sphere(quiet)
     if radius:
         return Gravity(radius, center, True)

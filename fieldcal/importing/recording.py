@@ -12,7 +12,7 @@ from copy import copy
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importing.gzip_stream import PIECE, pieces
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS
+
+if TYPE_CHECKING:
+    from fieldcal.importing.means import Scatter
 
 ROWS = 1 << 15
 """Rows that are looked at together."""
@@ -168,6 +171,13 @@ class Recording(ABC):
     def notes(self, stream: str) -> dict[str, Any]:
         """What the file says of the device: units, what it has installed."""
         return {}
+
+    def scatter(self) -> Scatter | None:
+        """What the file says of the scatter behind its rows; None if they are samples.
+
+        Rows that are means are one for each position.
+        """
+        return None
 
     def place(self, row: int) -> str:
         """Name a sample, counted from 0, as its file does."""

@@ -106,6 +106,24 @@ class Description:
         """Whether somebody said how strong gravity is, or where that is."""
         return bool({"latitude_deg", "gravity"} & set(self.raw.get("site", {})))
 
+    @property
+    def means_only(self) -> bool:
+        """Whether samples are means, one for each position."""
+        return "means" in self.raw
+
+    @property
+    def timed(self) -> bool:
+        """Whether anybody wrote down when means were taken; true of samples."""
+        return bool(self.raw.get("means", {}).get("timed", True))
+
+    @property
+    def mean_sigma(self) -> Array:
+        """Standard deviation of each position's means, (p, 6) SI; nan where unknown."""
+        tables = self.raw.get("position", ())
+        given = [tables[i].get("sigma", ()) for i in self.numbers]
+        rows = [[*row, *[np.nan] * (6 - len(row))] for row in given]
+        return np.array(rows, dtype=float).reshape(-1, 6)
+
     def in_time(self) -> Description:
         """The same with the positions in the order in which they were held."""
         begins = [w[0] for w in self.windows if w is not None]

@@ -1,0 +1,107 @@
+"""Tables of means: a session like any other, or a question about how well they hold."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laid_about import G, write
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Array
+from fieldcal.importing.means import spread
+from fieldcal.importing.physical_units import are_means
+from fieldcal.session.folder import Session
+
+BIAS, RATE = np.array([0.1, -0.05, 0.2]), np.array([0.01, -0.02, 0.005])
+SIX = "ax,ay,az,gx,gy,gz"
+STD = ",".join(f"{name}_std" for name in SIX.split(","))
+SIGMA, SCATTER, COUNT = 4e-4, 0.02, 2500
+
+
+def means(seed: int, n: int, coupling: float = 0.0) -> Array:
+    """Means of a device in n orientations (n, 6), m/s^2 and rad/s."""
+    rng = np.random.default_rng(seed)
+    up = rng.normal(size=(n, 3))
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    gain = np.diag([1.004, 0.997, 1.006])
+    gain[0, 1] = coupling
+    acc = G * up @ gain.T + BIAS + rng.normal(0, SIGMA, (n, 3))
+    return np.hstack([acc, RATE + rng.normal(0, 1e-4, (n, 3))])
+
+
+def session(
+    folder: Path, rows: Array, heading: str, *more: str
+) -> tuple[Path, Session]:
+    path = write(folder, rows, heading=heading)
+    out = folder / "out"
+    assert main(["import", str(path), "-o", str(out), "--gravity", str(G), *more]) == 0
+    return out, Session.open(out)
+
+
+@pytest.mark.parametrize(("coupling", "scattered"), [(0.0, True), (0.01, False)])
+def test_means_are_a_session_like_any_other(
+    coupling: float, scattered: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows, heading = means(1, 20, coupling), SIX
+    if scattered:
+        beside = np.full((20, 6), [SCATTER] * 3 + [5e-3] * 3)
+        rows = np.hstack([rows, beside, np.full((20, 1), COUNT)])
+        heading = f"{SIX},{STD},n"
+    out, made = session(tmp_path, rows, heading)
+    assert "20 positions, means only" in capsys.readouterr().err
+    assert ("sigma" in made.about.raw.get("guessed", {})) == (not scattered)
+    assert main(["solve", str(out), "--cross", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["parameters"]
+    for name, truth in (("acc_bias", BIAS), ("gyr_bias", RATE)):
+        off = np.abs(np.array(found[name]["value"]) - truth) / found[name]["sigma"]
+        assert off.max() < 4 and max(found[name]["sigma"]) < 1e-3
+    assert main(["diagnose", str(out), "--json"]) == (1 if coupling else 0)
+    said = json.loads(capsys.readouterr().out)
+    assert [e["id"] for e in said["effects"]] == ["cross_coupling"] * bool(coupling)
+    assert main(["report", str(out)]) == main(["verify", str(out)]) == 0
+
+
+def test_without_gyroscopes_names_or_unit(tmp_path: Path) -> None:
+    out, made = session(tmp_path, means(2, 20)[:, :3] / G, "")
+    assert {"columns", "acceleration", "sigma"} == set(made.about.raw["guessed"])
+    assert main(["solve", str(out)]) == main(["diagnose", str(out)]) == 0
+
+
+def test_times_that_are_written_are_kept(tmp_path: Path) -> None:
+    rows = np.column_stack([40.0 * np.arange(12), means(3, 12)])
+    _, made = session(tmp_path, rows, f"t [s],{SIX}")
+    assert made.about.timed
+    np.testing.assert_allclose(made.block.t, rows[:, 0])
+
+
+def test_too_few_positions_are_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, means(4, 6), heading=SIX)
+    assert main(["import", str(path), "-o", str(tmp_path / "s")]) == 2
+    assert "add --sigma 0.005,0.0005" in capsys.readouterr().err
+    call = ["import", str(path), "-o", str(tmp_path / "s"), "--sigma"]
+    assert main([*call, "-1"]) == 2
+    assert "cannot be" in capsys.readouterr().err
+    assert main([*call, "0.001,0.0001"]) == 0
+    sigma = Session.open(tmp_path / "s").about.mean_sigma
+    assert (sigma == [1e-3] * 3 + [1e-4] * 3).all()
+
+
+@pytest.mark.statistical
+def test_what_remains_of_gravity_is_the_error_of_the_means() -> None:
+    found = [
+        spread(means(seed, 24, 0.01), np.full((24, 6), np.nan), None, G).sigma[0, 0]
+        for seed in range(40)
+    ]
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_samples_are_no_means() -> None:
+    assert are_means(means(5, 12)[:, :3])
+    angle = np.deg2rad(np.arange(60.0))
+    slow = G * np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])
+    assert not are_means(slow) and not are_means(slow[:2]) and not are_means(0 * slow)

@@ -8,34 +8,90 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration, Comparison
 
 EXAMPLE = """\
   fieldcal compare bench-7/2026-03-01 bench-7/2026-06-01
   fieldcal compare before.json after.json --json
+  fieldcal compare --instances flight
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
-    what = "solved session folder, or its result.json"
-    add("first", type=Path, metavar="FIRST", help=what)
-    add("second", type=Path, metavar="SECOND", help=what)
+    what = "solved session folder, or its result.json; two, or with --instances more"
+    add("paths", type=Path, nargs="+", metavar="SESSION", help=what)
+    add(
+        "--instances",
+        action="store_true",
+        help="hold IMUs of one log against each other and g: their session folders, or"
+        " the folder that holds them; none need be solved",
+    )
     add("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command."""
+    """Carry out the command: 1 if one of several instances is out."""
     from fieldcal.calibration import compare
+    from fieldcal.core.errors import InputError
 
-    found = compare(read(args.first), read(args.second))
+    if args.instances:
+        return _instances(args)
+    if len(args.paths) != len(("first", "second")):
+        raise InputError("name two calibrations, or several sessions with --instances")
+    found = compare(*(read(path) for path in args.paths))
     if args.json:
         sys.stdout.write(json.dumps(document(found)) + "\n")
     else:
         sys.stdout.write(table(found))
     return 0
+
+
+def _instances(args: argparse.Namespace) -> int:
+    """Hold the IMUs of one log against each other and g."""
+    from fieldcal.evaluation.instances import compared
+    from fieldcal.evaluation.observations import rests
+    from fieldcal.session.folder import Session
+
+    sessions = {one.name: Session.open(one) for one in _folders(args.paths)}
+    means = {
+        name: np.array([a.mean[:3] for a in rests(one).averages])
+        for name, one in sessions.items()
+    }
+    found = compared(means, next(iter(sessions.values())).gravity)
+    if args.json:
+        sys.stdout.write(json.dumps([one.document() for one in found]) + "\n")
+    else:
+        sys.stdout.write("".join(f"{one.sentence()}\n" for one in found))
+    return int(any(one.out for one in found))
+
+
+def _folders(paths: list[Path]) -> list[Path]:
+    """Sessions among some folders and in them.
+
+    Raises
+    ------
+    InputError
+        If there are not two.
+
+    """
+    from fieldcal.core.errors import InputError
+    from fieldcal.session.folder import DESCRIPTION
+
+    found: list[Path] = []
+    for path in paths:
+        inner = sorted(p.parent for p in path.glob(f"*/{DESCRIPTION}"))
+        found += [path] if (path / DESCRIPTION).exists() else inner
+    if len(found) < len(("one", "other")):
+        raise InputError(
+            f"{' '.join(map(str, paths))}: holds {len(found)} sessions; name the folder"
+            " that fieldcal import wrote for a log of several IMUs, or its sessions"
+        )
+    return found
 
 
 def read(path: Path) -> Calibration:

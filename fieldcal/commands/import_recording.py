@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError
+from fieldcal.core.gravity import G0
 
 if TYPE_CHECKING:
+    from fieldcal.core.samples import Array
+    from fieldcal.importing.ingest import ImportedSession
     from fieldcal.importing.means import Scatter
     from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 
@@ -108,11 +111,16 @@ def run(args: argparse.Namespace) -> int:
         if args.output and len(opened) > 1:
             folder = args.output / name
         names = _chosen(recording, args.instance)
+        rests: dict[str, Array] = {}
         for stream in names:
             # what was said of one IMU of the file is no matter of another
             one = recording.alone(stream.name)
             inner = re.sub(r"[^\w.-]+", "_", stream.name).strip("_")
-            _bring(args, one, stream, folder / inner if len(names) > 1 else folder)
+            there = folder / inner if len(names) > 1 else folder
+            imported = _bring(args, one, stream, there)
+            rests[stream.name] = imported.rests
+        if len(names) > 1:
+            _say_instances(folder, rests, float(args.gravity or G0))
     return 0
 
 
@@ -158,7 +166,7 @@ def _chosen(recording: Recording, wanted: list[str]) -> list[ImuStream]:
 
 def _bring(
     args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
-) -> None:
+) -> ImportedSession:
     from fieldcal.importing.ingest import import_stream
     from fieldcal.importing.unit_guess import settle_units
     from fieldcal.session.description import UNSCALED
@@ -177,8 +185,7 @@ def _bring(
         about["guessed"] = guessed
         stream = next(s for s in recording.streams() if s.name == stream.name)
     if (scatter := recording.scatter()) is not None:
-        _bring_means(args, recording, stream, folder, about, scatter)
-        return
+        return _bring_means(args, recording, stream, folder, about, scatter)
     imported = import_stream(recording, stream.name, folder, about, args.still)
     err = sys.stderr.write
     err(
@@ -205,6 +212,7 @@ def _bring(
             " --still with a shorter time\n"
         )
     sys.stdout.write(f"{folder}\n")
+    return imported
 
 
 def _bring_means(
@@ -214,9 +222,8 @@ def _bring_means(
     folder: Path,
     about: dict[str, Any],
     scatter: Scatter,
-) -> None:
+) -> ImportedSession:
     """Make a session of a table of means."""
-    from fieldcal.core.gravity import G0
     from fieldcal.importing.ingest import import_stream
     from fieldcal.importing.means import tables_of_means
 
@@ -237,6 +244,16 @@ def _bring_means(
     for sentence in imported.says:
         err(f"{folder}: {sentence}\n")
     sys.stdout.write(f"{folder}\n")
+    return imported
+
+
+def _say_instances(folder: Path, rests: dict[str, Array], gravity: float) -> None:
+    """Say which of several IMUs in one log is out."""
+    from fieldcal.evaluation.instances import compared
+
+    found = compared(rests, gravity)
+    for one in found if any(one.out for one in found) else []:
+        sys.stderr.write(f"{folder}: {one.sentence()}\n")
 
 
 def _many(number: int, what: str, ending: str) -> str:

@@ -134,6 +134,7 @@ class ImportedSession:
     facts : what was found
     stretches : where the device was still, s of device time
     says : what the user must know, repairs first
+    rests : (m, 3) means of the accelerometers in these stretches, m/s^2
 
     """
 
@@ -141,6 +142,7 @@ class ImportedSession:
     facts: StreamFacts
     stretches: list[tuple[float, float]]
     says: list[str]
+    rests: Array
 
 
 def import_stream(
@@ -204,7 +206,7 @@ def _fill(
     stream: str,
     about: Mapping[str, Any],
     still: float,
-) -> tuple[StreamFacts, list[tuple[float, float]], list[str]]:
+) -> tuple[StreamFacts, list[tuple[float, float]], list[str], Array]:
     import tomlkit
 
     judge = RowValidator(str(recording.path), recording.place, recording.repair)
@@ -224,6 +226,7 @@ def _fill(
         rest = cells.table
         rows.add(summary(rest))
         stretches = still_stretches_of_file(rows, rest.origin, written.between, still)
+        rests = np.array([_mean_of(written.between(*span)) for span in stretches])
     repairs = [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
     # an empty list would be in the way of the tables that the user adds
@@ -233,7 +236,17 @@ def _fill(
     recording.says += [step.sentence() for step in clock.steps]
     marks = _marks(recording, stream, facts, repairs, clock.steps)
     (part / MARKS).write_text(marks, "utf-8")
-    return facts, stretches, [*repairs, *recording.says]
+    says = [*repairs, *recording.says]
+    return facts, stretches, says, rests.reshape(-1, 3)
+
+
+def _mean_of(blocks: Iterable[Block]) -> Array:
+    """Mean of the accelerometers over some blocks, (3,) m/s^2."""
+    total, many = np.zeros(3), 0
+    for block in blocks:
+        total, many = total + block.acc.sum(axis=0), many + len(block)
+    mean: Array = total / max(many, 1)
+    return mean
 
 
 def _steadied(clock: SteadyClock, blocks: Iterable[Block]) -> Iterator[Block]:

@@ -1,0 +1,127 @@
+"""Several IMUs that went through the same motion, held against each other and g.
+
+    |a_k| = R in every rest k                                                       (1)
+
+R is the radius of a sphere through the means of an IMU's rests where these point every
+way, so that its bias does not count; otherwise their median length. One whose R is far
+from that of the others is out; of two, the one that is farther from g.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+
+USUAL, BIASED = 0.01, 0.03
+"""Part of g by which a sensor as delivered may well be off: bias taken out, and not."""
+
+APART = 4.0
+"""Multiples of how much the others differ that one which is out is off by."""
+
+FEWEST = 6
+"""Rests through which a sphere is laid."""
+
+ROUND = 1e-2
+"""Least singular value, of the greatest, of rests that point every way."""
+
+
+class Instance(NamedTuple):
+    """What one IMU reads at rest.
+
+    Attributes
+    ----------
+    name : of the instance
+    length : R of (1), m/s^2
+    sigma : its standard uncertainty, m/s^2
+    every_way : whether the bias is taken out of it
+    rests : how many
+    of_g : R / g - 1
+    of_others : R over the median of the others, less 1; nan where there are none
+    out : whether it is the one that is out
+
+    """
+
+    name: str
+    length: float
+    sigma: float
+    every_way: bool
+    rests: int
+    of_g: float
+    of_others: float
+    out: bool
+
+    def document(self) -> dict[str, object]:
+        """As one JSON object; what is not known is null."""
+        known = {k: v for k, v in self._asdict().items() if v == v}
+        return dict.fromkeys(self._fields) | known
+
+    def sentence(self) -> str:
+        """Say it in a line."""
+        text = (
+            f"{self.name}: |a| at rest is {self.length:.4f} ± {self.sigma:.1g} m/s²"
+            f" in {self.rests} rests{'' if self.every_way else ', bias included'},"
+            f" {100 * self.of_g:+.2f} % of g"
+        )
+        if np.isfinite(self.of_others):
+            text += f", {100 * self.of_others:+.2f} % of the others"
+        if self.out:
+            text += ": it is out; calibrate it before it is used, or check its range"
+        return text
+
+
+def compared(rests: Mapping[str, Array], gravity: float) -> list[Instance]:
+    """Hold IMUs against each other and g; those without any rest are left out.
+
+    Parameters
+    ----------
+    rests : (m, 3) means of the accelerometers in each rest, m/s^2, by instance
+    gravity : m/s^2
+
+    """
+    known = {n: means[np.isfinite(means).all(axis=1)] for n, means in rests.items()}
+    found = {name: _length(means) for name, means in known.items() if len(means)}
+    sizes = {name: one[0] for name, one in found.items()}
+    out = []
+    for name, (size, sigma, every_way) in found.items():
+        others = np.array([s for n, s in sizes.items() if n != name])
+        of_others = size / float(np.median(others)) - 1 if len(others) else np.nan
+        usual = USUAL if every_way else BIASED
+        is_out = _is_out(size, others, gravity, usual)
+        of_g, many = size / gravity - 1, len(known[name])
+        out.append(
+            Instance(name, size, sigma, every_way, many, of_g, of_others, is_out)
+        )
+    return out
+
+
+def _is_out(size: float, others: Array, gravity: float, usual: float) -> bool:
+    """Whether one differs from others that agree; of two, the one farther from g."""
+    if not len(others):
+        return False
+    middle = float(np.median(others))
+    off = abs(size / middle - 1)
+    if off < usual or abs(size - gravity) < abs(middle - gravity):
+        return False
+    differ = float(np.median(np.abs(others / middle - 1)))
+    return len(others) == 1 or off > APART * differ
+
+
+def _length(means: Array) -> tuple[float, float, bool]:
+    """R of (1), its standard uncertainty, and whether it is a sphere's."""
+    lengths = np.linalg.norm(means, axis=1)
+    if len(means) >= FEWEST:
+        left = np.column_stack([2 * means, np.ones(len(means))])
+        scaled = left / np.linalg.norm(left, axis=0)
+        singular = np.linalg.svd(scaled, compute_uv=False)
+        if singular[-1] > ROUND * singular[0]:
+            center = np.linalg.lstsq(left, lengths**2, rcond=None)[0]
+            radius = float(np.sqrt(center[3] + center[:3] @ center[:3]))
+            away = np.linalg.norm(means - center[:3], axis=1) - radius
+            spare = len(means) - len(center)
+            return radius, float(np.sqrt((away @ away) / spare / len(means))), True
+    sigma = float(lengths.std(ddof=1)) if len(lengths) > 1 else 0.0
+    return float(np.median(lengths)), sigma / np.sqrt(len(lengths)), False

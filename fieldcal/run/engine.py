@@ -24,17 +24,18 @@ from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Hold, Note, Plan, Step
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import (
+    GAP,
+    THIN,
     RepeatPosition,
-    gap,
-    processed_anew,
+    SamplesLost,
+    WindowWatch,
     restart_notice,
-    restarted,
 )
 from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
 from fieldcal.run.operator.protocol import Display, Operator, Wish
 from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
-from fieldcal.run.waiting import GAP, PositionWait, force
+from fieldcal.run.waiting import PositionWait, force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window
@@ -63,6 +64,8 @@ class Engine:
         begins a window that was disturbed again for ever, as for a person
     taken : averages of positions taken before, by number; what is taken is added
     warm_up : judges whether the device is still warming up; None does not ask
+    lost_share : share of a window's samples that may be missing; with more it is taken
+        again, if that helps
 
     """
 
@@ -75,6 +78,7 @@ class Engine:
         give_up: float | None = None,
         taken: dict[int, Average] | None = None,
         warm_up: WarmUpWatch | None = None,
+        lost_share: float = np.inf,
     ) -> None:
         self._driver = driver
         self._operator = operator
@@ -83,6 +87,9 @@ class Engine:
         self._give_up = give_up
         self._taken = {} if taken is None else taken
         self._warm_up = warm_up
+        self._lost_share = lost_share
+        self._thin: dict[int, int] = {}
+        self._away, self._heard_s = 0, np.nan
         self._held: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
         self._noise: LearnedNoise | None = None
@@ -172,6 +179,8 @@ class Engine:
         for raw in driver.blocks():
             self._silence, self._heard = 0, replace(driver.health)
             block = self._recorder.append(raw)
+            self._away += bool(block.t[0] - self._heard_s > GAP)
+            self._heard_s = float(block.t[-1])
             self._link.take(block)
             self._display.heard(block)
             if self._warm_up:
@@ -203,7 +212,11 @@ class Engine:
         waiting = PositionWait(hold, self._about, self._held, left, self._units)
         asked = self._driver.host_time()
         insisted = warned = False
+        away = self._away
         for block in self._stream:
+            if self._away != away:  # who knows how it stands by now
+                away = self._away
+                self._operator.place(hold)
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before
             waiting.add(block, self._driver.host_time())
@@ -241,6 +254,8 @@ class Engine:
             text = reminder(waited) + waiting.problem
             self._recorder.mark("wrong", position=hold.index, text=text)
             self._operator.alarm(waiting.reason, waited)
+            if waited and self._give_up:
+                self._operator.place(hold)  # a mover can be told once more
         if waiting.arrived or not self._give_up:
             return
         if waiting.waited_enough(self._give_up):
@@ -280,18 +295,12 @@ class Engine:
 
     def _average(self, hold: Hold) -> Average | None:
         """Average a window; None if the operator wants to begin it again."""
-        window, last = Window(noise=self._noise, grain=self._driver.grain), np.nan
-        restarts = self._driver.health.restarts
-        changed = self._driver.readings.changed
+        window = Window(noise=self._noise, grain=self._driver.grain)
+        share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
+        watch = WindowWatch(self._driver, hold.seconds, share)
         try:
             for block in self._stream:
-                if block.t[0] - last > GAP:
-                    raise gap(last, float(block.t[0]))
-                if self._driver.health.restarts != restarts:
-                    raise restarted(float(block.t[0]))
-                if self._driver.readings.changed != changed:
-                    raise processed_anew(float(block.t[0]))
-                last = float(block.t[-1])
+                watch.check(block)
                 window.add(block)
                 if window.moved:
                     raise window.moved
@@ -302,9 +311,11 @@ class Engine:
                 if window.elapsed >= hold.seconds or window.done(hold.sigma):
                     break
             average = window.average()
-            self._confirm(changed)
+            self._confirm(watch)
         except Moved as moved:
             self._left = hold.index
+            if isinstance(moved, SamplesLost):
+                self._thin[hold.index] = self._thin.get(hold.index, 0) + 1
             what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
             self._recorder.mark("rejected", position=hold.index, **what)
             raise
@@ -316,23 +327,14 @@ class Engine:
         self._say_if_cold()
         return average
 
-    def _confirm(self, changed: int) -> None:
-        """Have the device say that it did the same to all samples of a window.
-
-        Raises
-        ------
-        Moved
-            If it did not.
-
-        """
+    def _confirm(self, watch: WindowWatch) -> None:
+        """Have the device say that it did the same to all samples of a window."""
         self._driver.read_again()
-        if not self._driver.readings.pending:
-            return
-        for block in self._stream:
-            if self._driver.readings.changed != changed:
-                raise processed_anew(float(block.t[-1]))
-            if not self._driver.readings.pending:
-                return
+        if self._driver.readings.pending:
+            for block in self._stream:
+                watch.check_same(float(block.t[-1]))
+                if not self._driver.readings.pending:
+                    return
 
     def _say_if_cold(self) -> None:
         if self._warm_up and (said := self._warm_up.says):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from fieldcal.core.errors import Moved
+from fieldcal.core.samples import Block
+from fieldcal.drivers.driver import Driver
 
 
 class RepeatPosition(Exception):
@@ -34,31 +36,95 @@ def restart_notice(moved: Moved, times: int) -> str:
     )
 
 
-def gap(last: float, now: float) -> Moved:
+GAP = 0.5
+"""Longest time without samples that a window may have, s."""
+
+THIN = 2
+"""Windows of a position that are begun again for samples missing: a link that loses
+some all the time loses them in the next window as well."""
+
+
+class SamplesLost(Moved):
+    """A window lacks samples that the link has lost."""
+
+
+class WindowWatch:
+    """What befalls a window beside motion: its link, or the device itself.
+
+    Parameters
+    ----------
+    driver : of the device
+    seconds : that the window is to take
+    lost_share : share of its samples that may be missing
+
+    """
+
+    def __init__(self, driver: Driver, seconds: float, lost_share: float) -> None:
+        self._driver, self._seconds, self._lost_share = driver, seconds, lost_share
+        health = driver.health
+        self._restarts, self._missing = health.restarts, health.missing
+        self._changed = driver.readings.changed
+        self._first = self._last = float("nan")
+        self._samples = 0
+
+    def check(self, block: Block) -> None:
+        """Look at samples that follow.
+
+        Raises
+        ------
+        Moved
+            If the window has to begin again.
+
+        """
+        now, health = float(block.t[0]), self._driver.health
+        if now - self._last > GAP:
+            raise _gap(self._last, now)
+        if health.restarts != self._restarts:
+            raise _restarted(now)
+        self.check_same(now)
+        if not self._samples:
+            self._first = now
+        self._samples, self._last = self._samples + len(block), float(block.t[-1])
+        missing = health.missing - self._missing
+        if missing > self._lost_share * self._expected(missing):
+            raise SamplesLost(
+                f"{missing} samples were lost before {now:.2f} s: check the cable if it"
+                " happens once more",
+                now,
+                "t",
+            )
+
+    def check_same(self, now: float) -> None:
+        """Raise Moved if the device has changed what it does to its samples."""
+        if self._driver.readings.changed != self._changed:
+            raise Moved(
+                f"the device changed its own calibration before {now:.2f} s, as"
+                " autopilots do when they start",
+                now,
+                "t",
+            )
+
+    def _expected(self, missing: int) -> float:
+        """How many samples the whole window would have."""
+        elapsed = max(self._last - self._first, 1e-9)
+        return (self._samples + missing) * max(1.0, self._seconds / elapsed)
+
+
+def _gap(last: float, now: float) -> Moved:
     """Samples are missing between two device times, s."""
     return Moved(
-        f"no samples came between {last:.2f} s and {now:.2f} s: the window starts"
-        " again; check the cable if it happens once more",
+        f"no samples came between {last:.2f} s and {now:.2f} s: check the cable if it"
+        " happens once more",
         last,
         "t",
     )
 
 
-def restarted(now: float) -> Moved:
+def _restarted(now: float) -> Moved:
     """The device's clock began anew at a device time, s."""
     return Moved(
-        f"the device started anew at {now:.2f} s: the window starts again; check its"
-        " power if it happens once more",
-        now,
-        "t",
-    )
-
-
-def processed_anew(now: float) -> Moved:
-    """The device has changed what it does to its samples, noticed at a time, s."""
-    return Moved(
-        f"the device changed its own calibration before {now:.2f} s, as autopilots do"
-        " when they start",
+        f"the device started anew at {now:.2f} s: check its power if it happens once"
+        " more",
         now,
         "t",
     )

@@ -75,6 +75,7 @@ class SessionRun:
         self._taken = {} if taken is None else taken
         self._lost: tuple[float, DeviceError] | None = None
         wait = float(task.run.get("warm_up_s", WARM_UP))
+        self._lost_share = limits.lost_share
         self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
 
     def run(self, driver: Driver) -> Calibration:
@@ -115,6 +116,7 @@ class SessionRun:
             self._give_up,
             self._taken,
             self._warm_up,
+            self._lost_share,
         )
         while True:
             try:

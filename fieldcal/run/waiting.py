@@ -14,6 +14,7 @@ from fieldcal.core.positions import Position, forces
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.planning.steps import Hold
 from fieldcal.run.gyro_unit import GyroUnitWatch
+from fieldcal.run.interruptions import GAP
 from fieldcal.run.mounting_check import mounted_otherwise
 from fieldcal.run.position_check import (
     NORM,
@@ -33,9 +34,6 @@ PATIENCE = 3.0
 
 REMIND = 60.0
 """Time at the same wrong place after which it is said again, s."""
-
-GAP = 0.5
-"""Longest time without samples that a rest may have, s."""
 
 LEAST = 10.0
 """Wait by the host's clock before a position is given up, s.

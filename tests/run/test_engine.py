@@ -107,9 +107,11 @@ def hold_all(
     return tuple(held.values())
 
 
-def make(recorder: Recorder, driver: InProcess) -> Bench:
+def make(recorder: Recorder, driver: InProcess, lost_share: float = np.inf) -> Bench:
     turner = Turner(driver)
-    engine = Engine(driver, turner, ABOUT, recorder, give_up=60.0)
+    engine = Engine(
+        driver, turner, ABOUT, recorder, give_up=60.0, lost_share=lost_share
+    )
     return Bench(recorder.folder, turner, engine, recorder)
 
 
@@ -162,7 +164,7 @@ def test_a_fast_device_gives_whoever_turns_it_some_time_by_the_clock(
     driver = Fast(VirtualDevice(seed=3))
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         bench = make(recorder, driver)
-        bench.turner.slips, bench.turner.corrects = [(30, 5)], False
+        bench.turner.slips, bench.turner.corrects = [(30, 5)] * 3, False
         with pytest.raises(WrongPosition, match="turn it by"):
             bench.engine.run(hold_all(TWO, 10.0))
     assert 10.0 < driver.host_time() < 10.5
@@ -216,6 +218,67 @@ def test_samples_missing_inside_a_window_reject_it(tmp_path: Path) -> None:
         bench.engine.run(hold_all(TWO[:1], 20.0))
     assert "no samples came between" in bench.turner.told[0]
     assert events(bench).count("window") == 1
+
+
+class Pulled(InProcess):
+    """A link that is pulled for 0.1 s, and then comes back, in each of some windows."""
+
+    def __init__(self, device: VirtualDevice, times: Sequence[float]) -> None:
+        super().__init__(device)
+        self.left = list(times)
+
+    def receive(self, timeout: float) -> Block | None:
+        if self.left and self.device.time > self.left[0]:
+            self.left.pop(0)
+            self.device.take(10)
+            self.health.gaps, self.health.missing = 1, self.health.missing + 10
+        return super().receive(timeout)
+
+
+@pytest.mark.parametrize(("pulls", "rejected"), [([14.0], 1), (range(8, 200), 2)])
+def test_a_link_pulled_for_a_moment_costs_a_window_and_no_more(
+    tmp_path: Path, pulls: Sequence[float], rejected: int
+) -> None:
+    """One that loses some all the time is taken as it is; it is judged in the end."""
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        bench = make(recorder, Pulled(VirtualDevice(seed=1), pulls), lost_share=1e-3)
+        bench.engine.run(hold_all(TWO[:1], 20.0))
+    assert "10 samples were lost before 14." in " ".join(bench.turner.told) or pulls[0]
+    assert events(bench).count("rejected") == rejected
+
+
+class Returning(InProcess):
+    """A vehicle that loses its link and comes back as it was put down meanwhile."""
+
+    def receive(self, timeout: float) -> Block | None:
+        if self.put_down_at < self.device.time:
+            self.put_down_at = np.inf
+            self.device.turn(0.3, -0.2, seconds=1.0)
+            self.device.take(300)
+        return super().receive(timeout)
+
+    put_down_at = np.inf
+
+
+@pytest.mark.parametrize("later", [0.5, 12.0])
+def test_a_vehicle_that_comes_back_at_another_attitude_is_turned_again(
+    tmp_path: Path, later: float
+) -> None:
+    driver = Returning(VirtualDevice(seed=1))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        bench = make(recorder, driver)
+        bench.engine.run(hold_all(TWO[:1], 10.0))
+        driver.put_down_at = driver.device.time + later  # on the way, and at rest
+        bench.engine.run(hold_all(TWO, 10.0))
+    assert events(bench).count("window") == 2
+
+
+def test_a_mover_is_told_once_more_where_the_device_stands_wrong(bench: Bench) -> None:
+    bench.turner.slips, bench.turner.corrects = [(0, 0), (30, 5)], False
+    turner = bench.turner
+    engine = Engine(turner.driver, turner, ABOUT, bench.recorder, give_up=90.0)
+    engine.run(hold_all(TWO, 10.0))
+    assert events(bench) == ["asked", "window", "asked", "wrong", "wrong", "window"]
 
 
 class Dead(Driver):

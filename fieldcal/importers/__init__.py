@@ -22,6 +22,9 @@ from fieldcal.importing.recording import ReadOptions, Recording
 LAST = ("csv_like", "wire")
 """Formats without a mark of their own, tried last, in this order."""
 
+MANY = 1 << 16
+"""Bytes by which formats without a mark of their own are told."""
+
 
 @cache
 def formats() -> tuple[str, ...]:
@@ -59,6 +62,9 @@ def open_recording(
         raise InputError(f"{path}: is empty; copy it again from where it came")
     for some in [name] if name else formats():
         module = import_module(f"{__name__}.{some}")
+        if some == LAST[0]:
+            # what a device says while it starts may stand before the first frame
+            first = head(path, MANY)
         if name or module.recognises(first, path):
             opened = class_in(module.__name__, Recording)  # type: ignore[type-abstract]
             return opened(path, wanted, repair)

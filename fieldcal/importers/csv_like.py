@@ -11,6 +11,7 @@ again one by one, so that each that is none can be named.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -53,6 +54,8 @@ BEGINNING = 1 << 16
 PLAIN = bytes([*range(32, 127), *b"\t\r\n"])
 """Characters of a text."""
 
+_CHECKED = re.compile(rb"\$.*\*[0-9A-Fa-f]{2}\s*$")
+
 TEXT = 0.95
 """Share of them that a text has among its first bytes."""
 
@@ -61,8 +64,16 @@ def recognises(head: bytes, path: Path) -> bool:
     """Whether these are the first bytes of a text."""
     if b"\0" in head:
         return _is_wide(head)
+    lines = head.split(b"\n")[1:-1]
+    if lines and sum(map(_is_checked, lines)) > len(lines) / 2:
+        return False
     strange = head.translate(None, delete=PLAIN)
     return len(strange) <= (1 - TEXT) * len(head)
+
+
+def _is_checked(line: bytes) -> bool:
+    """Whether a line ends with a checksum, as those of a port do."""
+    return _CHECKED.search(line) is not None
 
 
 def _is_wide(head: bytes) -> bool:

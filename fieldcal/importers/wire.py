@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fieldcal.core.errors import FieldcalError, InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.codec import Codec, open_codec, recognise
@@ -20,6 +22,12 @@ WHAT = "bytes of a serial port"
 
 CUT = 1 << 20
 """Bytes decoded at once."""
+
+RANGES = {"witmotion": ("acc_range", "gyr_range")}
+"""Options of formats that do not send their full scales."""
+
+USUAL = ((2.0, 4.0, 8.0, 16.0), (125.0, 250.0, 500.0, 1000.0, 2000.0))
+"""Usual full scales, g and deg/s; the last is what formats take."""
 
 SECONDS = 1.0
 """Time that the first bytes are taken for, where the format asks."""
@@ -44,6 +52,21 @@ class WireStream(Recording):
     def notes(self, stream: str) -> dict[str, Any]:
         """Return the format."""
         return {"format": self._name}
+
+    def rescaled(self, acc: float, gyr: float) -> str:
+        """Full scales, where the format leaves them to the user."""
+        if self._name not in RANGES:
+            return ""
+        given = Options("options", self.wanted.options)
+        given.text("format")
+        says = []
+        for name, usual, many in zip(
+            RANGES[self._name], USUAL, (acc, gyr), strict=True
+        ):
+            full = given.number(name, usual[-1], 0.0, 1e6) / many
+            near = min(usual, key=lambda one: abs(np.log(one / full)))
+            says.append(f"{name}={near:g}")
+        return f'--options "{"&".join(says)}"'
 
     def _opened(self) -> Codec:
         options = Options("options", self.wanted.options)

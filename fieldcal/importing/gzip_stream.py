@@ -143,9 +143,9 @@ def pieces(path: Path, size: int = PIECE, cut: Cut | None = None) -> Iterator[by
             yield data
 
 
-def head(path: Path) -> bytes:
+def head(path: Path, many: int = HEAD) -> bytes:
     """First bytes of a file, unpacked, as far as they are there."""
-    return next(pieces(path, HEAD, lambda where, what: None), b"")
+    return next(pieces(path, many, lambda where, what: None), b"")
 
 
 @contextmanager

@@ -179,6 +179,10 @@ class Recording(ABC):
         """
         return None
 
+    def rescaled(self, acc: float, gyr: float) -> str:
+        """Options under which outputs read so many times less; "" if there are none."""
+        return ""
+
     def place(self, row: int) -> str:
         """Name a sample, counted from 0, as its file does."""
         return f"row {row + 1}"

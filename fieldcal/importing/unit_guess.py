@@ -64,15 +64,38 @@ def settle_units(recording: Recording, stream: str) -> Settled:
 
     """
     parts = recording.parts if isinstance(recording, MergedFiles) else [recording]
-    if not all(part.asks_units for part in parts):
-        return Settled({})
     block = _beginning(recording.alone(stream), stream)
+    if not all(part.asks_units for part in parts):
+        _hold_against_physics(recording, block)
+        return Settled({})
     guess = _Guess(str(recording.path), _said(parts), block)
     for part in parts:
         part.wanted = guess.on(part.wanted)
     parts[0].says += guess.doubts
     columns = {k: why for part in parts for k, why in part.guessed.items()}
     return Settled(columns | guess.found, guess.acc_bias)
+
+
+def _hold_against_physics(recording: Recording, block: Block) -> None:
+    """Ask or say where a format's own units cannot be.
+
+    Raises
+    ------
+    InputError
+        If the format has an option that would make them right.
+
+    """
+    gravity = physics.gravity_in(block.acc)
+    if gravity is None or abs(np.log(gravity.size / G0)) < FAR:
+        return
+    turned = physics.rate_in(block.t, block.acc, block.gyr, gravity)
+    odd = (
+        f"|a| at rest is {gravity.size:.4g} m/s^2, {gravity.size / G0:.3g} times"
+        " gravity: its full scale or unit is another"
+    )
+    if answer := recording.rescaled(gravity.size / G0, turned or 1.0):
+        raise InputError(f"{recording.path}: {odd}: add {answer}")
+    recording.says.append(odd)
 
 
 def _beginning(recording: Recording, stream: str) -> Block:

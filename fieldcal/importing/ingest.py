@@ -15,11 +15,11 @@ import numpy as np
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.clock import ClockStep, SteadyClock
 from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.spool import SpooledRows
 from fieldcal.importing.validation import RowValidator, SampleWriter, digest
+from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
 from fieldcal.windows.cells import Cells
 from fieldcal.windows.stretches import still_stretches_of_file, summary

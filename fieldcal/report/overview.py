@@ -122,7 +122,8 @@ def _rate(t: Array) -> str:
 def _in_a_second(t: Array) -> float:
     """Samples in a usual second, Hz; of a slow device, in the time of some samples."""
     width = max(1.0, 20 * float(np.median(np.diff(t))))
-    counts = np.bincount(((t - t[0]) / width).astype(int))
+    # seconds of a pause, of which there may be years, hold none and are not counted
+    _, counts = np.unique(((t - t[0]) // width), return_counts=True)
     return float(np.median(counts[:-1] if len(counts) > 1 else counts)) / width
 
 

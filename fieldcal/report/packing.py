@@ -88,7 +88,10 @@ def _chosen(
             taken[first:last] = True
             left -= new
     edges = np.flatnonzero(np.diff(taken.astype(int), prepend=0))
-    pairs = edges.reshape(-1, 2)
+    # a pause may be longer than times from a start can tell
+    paused = np.flatnonzero(np.diff(columns.t) > LONGEST / 2) + 1
+    inside = paused[taken[paused - 1] & taken[paused]]
+    pairs = np.sort(np.concatenate([edges, inside, inside])).reshape(-1, 2)
     return [Columns(columns.t[a:b], columns.values[a:b]) for a, b in pairs if b - a > 1]
 
 

@@ -28,6 +28,7 @@ from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block
 from fieldcal.session import description, sample_files
+from fieldcal.session.clock import steadied
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS, Description
 from fieldcal.session.installed import in_one_calibration
 
@@ -117,6 +118,8 @@ class Session:
         """All samples, in SI units; volts and counts by the nominal scale factors.
 
         Where the device changed its own calibration meanwhile, as under the last one.
+        Where its clock was set meanwhile, times and windows go on as if it had not
+        been, and `warnings` says so.
         """
         raw, cut = sample_files.read(sample_files.find(self.folder))
         self.warnings += cut
@@ -129,7 +132,18 @@ class Session:
                 np.multiply(triad, unit, out=triad)
         whole, changed = in_one_calibration(raw, self.marks())
         self.warnings += changed
-        return whole
+        return self._steadied(whole)
+
+    def _steadied(self, raw: Block) -> Block:
+        """Samples and windows without steps of the device's clock."""
+        steady = steadied(raw)
+        if steady is None:
+            return raw
+        self.warnings += tuple(step.sentence() for step in steady.steps)
+        windows = [w and (steady.moved(w[0]), steady.moved(w[1]))
+                   for w in self.about.windows]  # fmt: skip
+        self.about = replace(self.about, windows=tuple(windows))
+        return steady.block
 
     def marks(self) -> Iterator[dict[str, Any]]:
         """Marks in order."""

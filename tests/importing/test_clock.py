@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.clock import SteadyClock
 from fieldcal.importing.ingest import StreamFacts
+from fieldcal.session.clock import SteadyClock
 from fieldcal.session.folder import Session
 
 FIX = 1.7e9

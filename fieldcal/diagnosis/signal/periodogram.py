@@ -62,6 +62,11 @@ COHERENT = 1 << 18
 """Samples up to which windows are put together with one phase."""
 
 
+GRID = 1 << 20
+"""Periods from the first sample to the last up to which that is done: over longer
+pauses no clock keeps the phase of a line."""
+
+
 @dataclass(frozen=True, slots=True)
 class Pieces:
     """Samples of each window about their mean, and where the device was in it."""
@@ -186,7 +191,9 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
     power, count, hz = _power(pieces)
     used = np.flatnonzero(power.any(axis=1)).tolist()
     out = [Spectrum(power, count, hz, tuple((c,) for c in used))]
-    if sum(map(len, pieces.samples)) > COHERENT:
+    lasts = pieces.times[-1][-1] - pieces.times[0][0]
+    long = lasts * pieces.rate > GRID
+    if long or sum(map(len, pieces.samples)) > COHERENT:
         return out
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():

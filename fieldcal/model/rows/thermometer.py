@@ -36,6 +36,9 @@ LEAST = 1e-9
 
 STEPS = 3600
 
+PAUSE_S = 60.0
+"""What of a pause without samples counts for the width of these steps, s."""
+
 
 @dataclass(frozen=True, slots=True)
 class Thermometer:
@@ -108,7 +111,7 @@ def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:
 
 
 def _means(t: Array, values: Array) -> tuple[Array, Array, Array]:
-    width = max(1.0, (t[-1] - t[0]) / STEPS)
+    width = max(1.0, float(np.minimum(np.diff(t), PAUSE_S).sum()) / STEPS)
     bins = ((t - t[0]) / width).astype(np.intp)
     first = np.concatenate([[0], np.flatnonzero(np.diff(bins)) + 1])
     count = np.diff(np.append(first, len(t))).astype(float)

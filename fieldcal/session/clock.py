@@ -116,3 +116,40 @@ class SteadyClock:
         at = self._last + self._offset + self._period
         self.steps.append(ClockStep(at, began - self._last))
         self._offset = at - began
+
+
+class SteadyTimes(NamedTuple):
+    """Times of a recording whose clock was set while it ran.
+
+    Attributes
+    ----------
+    block : the samples, without the steps of the clock
+    steps : those found
+    pieces : first and last time as recorded between steps, and what was added, (k, 3) s
+
+    """
+
+    block: Block
+    steps: list[ClockStep]
+    pieces: Array
+
+    def moved(self, t: float) -> float:
+        """What became of an instant as recorded, s."""
+        first, last, added = self.pieces.T
+        away = np.maximum(np.maximum(first - t, t - last), 0.0)
+        return t + float(added[int(np.argmin(away))])
+
+
+def steadied(block: Block) -> SteadyTimes | None:
+    """Take the steps of the clock out of a whole recording; None if there are none."""
+    if not (np.abs(np.diff(block.t)) > STEP).any():
+        return None
+    clock = SteadyClock()
+    whole = concat([clock.add(block), clock.rest()])
+    if not clock.steps:
+        return None
+    added = whole.t - block.t
+    edges = np.flatnonzero(np.abs(np.diff(added)) > STEP / 2) + 1
+    first, last = np.r_[0, edges], np.r_[edges, len(added)] - 1
+    pieces = np.column_stack([block.t[first], block.t[last], added[first]])
+    return SteadyTimes(whole, clock.steps, pieces)

@@ -1,0 +1,58 @@
+"""Sessions recorded while the device's clock was set, and pauses of days."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laid_about import turned
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Block
+from fieldcal.importing.validation import SampleWriter
+from fieldcal.session.folder import Session
+
+JUMP = 1.7e9
+RATE = 50.0
+
+
+def recorded(folder: Path, jump: float, windows: bool = True) -> np.ndarray:
+    """A session as another program wrote it, its clock set in the middle."""
+    rows = turned(3, RATE)
+    n, t = len(rows), rows[:, 0]
+    later = np.where(np.arange(n) < n // 2, 0.0, jump)
+    with SampleWriter(folder / "samples.parquet") as file:
+        file.add(Block.of(t + later, rows[:, 1:4], rows[:, 4:], np.full(n, 25.0)))
+        file.close()
+    text = "format = 1\n"
+    for k in range(7 if windows else 0):
+        start = 4.5 * k + 0.3
+        a, b = (x + (jump if x >= t[n // 2] else 0.0) for x in (start, start + 2.4))
+        text += f"[[position]]\nstart_s = {a!r}\nend_s = {b!r}\n"
+    (folder / "session.toml").write_text(text)
+    return rows
+
+
+def test_times_and_windows_go_on(tmp_path: Path) -> None:
+    rows = recorded(tmp_path, JUMP)
+    session = Session.open(tmp_path)
+    np.testing.assert_allclose(session.block.t, rows[:, 0], atol=1e-6)
+    truth = np.array([(4.5 * k + 0.3, 4.5 * k + 2.7) for k in range(7)])
+    np.testing.assert_allclose(np.array(session.windows), truth, atol=1e-6)
+    assert "to 2023-11-14" in session.warnings[-1]
+
+
+@pytest.mark.parametrize(("jump", "windows"), [(86400.0, True), (JUMP, False)])
+def test_memory_is_that_of_the_rows_whatever_the_clock_says(
+    tmp_path: Path, jump: float, windows: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorded(tmp_path, jump, windows)
+    tracemalloc.start()
+    for command in ["diagnose", "report"] if windows else ["report"]:
+        assert main([command, str(tmp_path)]) in (0, 1)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    capsys.readouterr()
+    assert most < 200e6

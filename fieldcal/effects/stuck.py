@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
-from fieldcal.physics.recording import CheckedSamples, Fault, runs
+from fieldcal.physics.recording import CheckedSamples, Fault, grids_of, runs
 from fieldcal.physics.shape import Shape
 
 ODDS = 1e-6
@@ -74,14 +74,16 @@ class Stuck(Chain):
         """Runs of equal values in each channel."""
         t, out = recording.block.t, []
         step = float(np.median(np.diff(t)))
-        still = recording.still
+        still, steps = recording.still, grids_of(recording.block)
         for c, name in enumerate(CHANNELS):
             values_of = recording.channel(c)
-            step_of = float(recording.steps[c]) / max(float(recording.noise[c]), 1e-300)
+            step_of = float(steps[c]) / max(float(recording.noise[c]), 1e-300)
             for first, last in repeats(values_of):
                 if step_of > 2 and still[first:last].all():
                     continue
-                if step_of > 1 and _usual(recording, c, int(first), int(last)):
+                if step_of > 1 and _usual(
+                    recording, c, float(steps[c]), int(first), int(last)
+                ):
                     continue
                 values: dict[str, float | str] = {
                     "channel": name,
@@ -102,7 +104,9 @@ class Stuck(Chain):
         return out
 
 
-def _usual(recording: CheckedSamples, c: int, first: int, last: int) -> bool:
+def _usual(
+    recording: CheckedSamples, c: int, step: float, first: int, last: int
+) -> bool:
     """Whether a run is no wonder where steps are as coarse as the noise.
 
     In a window whose mean is amid a step it is none; nor is it between windows as long
@@ -117,7 +121,7 @@ def _usual(recording: CheckedSamples, c: int, first: int, last: int) -> bool:
         beside = [values[i] for i in (first - 1, last) if 0 <= i < len(values)]
         jump = np.abs(np.array(beside) - values[first]).max(initial=0.0)
         turned = max(move) > TURNED * recording.noise[axes].max()
-        return not (turned and jump > JUMP * recording.steps[c])
+        return not (turned and jump > JUMP * step)
     start, end = recording.windows[at]
     equal = np.diff(values[start:end]) == 0
     equal = np.delete(equal, slice(first - start, last - 1 - start))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.calibration import Calibration, Nominal, limits
 from fieldcal.calibration.gauge import SI
@@ -17,6 +18,7 @@ from fieldcal.core.errors import FieldcalError, SessionError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Grain
 from fieldcal.core.version import __version__
 from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
+from fieldcal.physics.recording import grids_of
 from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
@@ -133,7 +135,7 @@ def rests(session: Session) -> Rests:
     taken: dict[int, Average] = {}
     warnings = [*session.warnings, *_beyond(session)]
     noise: LearnedNoise | None = None
-    grain = grain_of(session)
+    grain = _grain_shown(session)
     # each tells the noise for the next
     held = session.about.in_time()
     for i, window in zip(held.numbers, held.windows, strict=True):
@@ -250,6 +252,30 @@ def _worth(about: Description) -> str:
     if not missing:
         return ""
     return f"; session.toml must say in [nominal] {' and '.join(missing)}"
+
+
+def _grain_shown(session: Session) -> Grain:
+    """The rounding reported, or that seen on the way where a window shows none.
+
+    An output that repeats one value all through a window hides its noise and its step.
+    """
+    told, block = grain_of(session), session.block
+    if told.step.all():
+        return told
+    steps = np.where(_constant(session), grids_of(block), 0.0)
+    acc, gyr = float(steps[ACC].max()), float(steps[GYR].max())
+    return Grain(told.acc or acc, told.gyr or gyr, told.cut)
+
+
+def _constant(session: Session) -> NDArray[np.bool_]:
+    """Which outputs repeat one value all through some window, (6,)."""
+    found = np.zeros(6, dtype=bool)
+    for window in filter(None, session.about.windows):
+        held = session.block.between(*window)
+        if len(held):
+            low, high = held.six.min(axis=0), held.six.max(axis=0)
+            found |= low == high
+    return found
 
 
 def grain_of(session: Session) -> Grain:

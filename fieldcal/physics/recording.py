@@ -154,3 +154,27 @@ def lsb_of(values: Array) -> float:
         step = float(gaps.sum() / whole.sum())
     off = np.abs(gaps / step - np.round(gaps / step))
     return step if off.max() < 0.05 else 0.0
+
+
+FEW = 4
+"""Values of an output below which they show no grid by themselves."""
+
+
+def grids_of(block: Block) -> Array:
+    """Step of the grid of each output, (6,), 0 where values lie on none.
+
+    An output that shows but one or two values all through has that of its sensor's
+    other axes; where none of them shows more, the least change among them.
+    """
+    return np.concatenate([_grids(triad) for triad in (block.acc, block.gyr)])
+
+
+def _grids(triad: Array) -> Array:
+    some = triad[:: max(1, len(triad) // ENOUGH)]
+    steps = np.array([lsb_of(axis) for axis in some.T])
+    shown = [np.unique(axis[np.isfinite(axis)]) for axis in some.T]
+    few = np.array([0 < len(values) < FEW for values in shown])
+    known = steps[steps > 0]
+    if not len(known):
+        known = np.concatenate([np.diff(v) for v in shown if len(v) < FEW] or [known])
+    return np.where(few & (steps == 0), min(known, default=0.0), steps)

@@ -278,7 +278,8 @@ def _info(
     if observations.has_gyr:
         gyr = found.gyr
         out["gyroscopes"] = {
-            "chi2": gyr.chi2, "dof": gyr.dof, "rms": gyr.rms, "unit": "rad/s",
+            "chi2": gyr.chi2, "dof": gyr.dof, "unit": "rad/s",
+            "rms": gyr.rms if np.isfinite(gyr.rms) else None,
             "extra_scatter": scatter_of(found.found, (3, 4, 5)),
         }  # fmt: skip
     if found.causes:

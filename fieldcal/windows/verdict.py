@@ -13,6 +13,7 @@ from fieldcal.windows.cells import CELL, CellTable
 from fieldcal.windows.disturbance import Kind, Statistic, pushes, repeats, shakes, steps
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.quiet import QuietNoise, quiet
+from fieldcal.windows.rounding import of_mean
 from fieldcal.windows.trend import line
 
 THRESHOLD = 5.8
@@ -23,6 +24,9 @@ EARLY = 8.0
 
 FEWEST = 30
 """Cells whose own noise is known well enough to judge them."""
+
+ROUNDED = 1e-6
+"""Relative error of a mean of equal values, of which a jump of one step consists."""
 
 _PRESENT = 10
 """Cells that are the present."""
@@ -109,7 +113,8 @@ def judge(
     allowed = THRESHOLD * (1 + (EARLY / (CELL * noise.cells)) ** 2)
     jumps = cells.rounding if shows is None else np.maximum(cells.rounding, shows)
     laid = line(means)
-    tests = _tests(cells, means, laid, noise, jumps / allowed)
+    least = np.maximum((1 + ROUNDED) * jumps / allowed, _rounding_noise(cells))
+    tests = _tests(cells, means, laid, noise, least)
     worst = [_worst(cells, test, allowed) for test in tests] + _stuck(cells)
     worst.append(_beyond_drift(cells, laid, noise, limits))
     worst.append(_beyond_noise(cells, noise.spread[0], limits))
@@ -130,6 +135,11 @@ def _tests(
         *steps(means, noise, least),
         *shakes(np.nan_to_num(cells.short[:m]), cells.steps[:m], least),
     ]
+
+
+def _rounding_noise(cells: CellTable) -> Array:
+    """What rounding leaves in a mean of values whose noise does not hide it, (6,)."""
+    return np.sqrt(of_mean(cells.resolution, np.nan_to_num(cells.noise)))
 
 
 def _stuck(cells: CellTable) -> list[Departure]:

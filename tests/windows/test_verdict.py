@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.core.samples import Array, Block
-from fieldcal.windows import StillnessLimits
+from fieldcal.core.samples import Array, Block, Grain
+from fieldcal.windows import StillnessLimits, average
 from fieldcal.windows.cells import Cells, CellTable
 from fieldcal.windows.disturbance import pushes, shakes, steps
 from fieldcal.windows.quiet import QuietNoise, quiet
@@ -249,3 +249,26 @@ def test_the_operator_is_told_what_when_where_and_by_how_much(
     departure: Departure, text: str
 ) -> None:
     assert said(departure) == text
+
+
+MG = 9.80665e-3
+
+
+@pytest.mark.parametrize("cut", [False, True])
+@pytest.mark.parametrize("declared", [False, True])
+def test_a_stream_of_whole_steps_without_noise_is_at_rest(
+    cut: bool, declared: bool
+) -> None:
+    """Behind a filter a value goes from one step to the next, and stays there."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        creeps = 1e-3 * np.cumsum(rng.normal(0, 0.02, (1500, 3)), axis=0)
+        acc = np.array([0.02, -9.8, 0.3]) + rng.uniform(-MG, MG, 3) + creeps
+        whole = np.trunc(acc / MG) if cut else np.round(acc / MG)
+        sent = (whole + 0.5 * np.sign(whole) * cut) * MG
+        block = Block.of(np.arange(1500) / 50, sent, np.full((1500, 3), 0.01))
+        found = average(block, grain=Grain(MG, 1e-3, cut) if declared else None)
+        if declared:
+            assert (
+                np.abs(found.mean[:3] - acc.mean(axis=0)) < 4 * found.sigma[:3]
+            ).all()

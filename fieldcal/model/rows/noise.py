@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.physics.recording import grids_of
 from fieldcal.windows import noise
 from fieldcal.windows.noise import SHOWN, ChannelNoise, short_lag, steps_of
 from fieldcal.windows.rounding import least, of_few, of_mean
@@ -23,18 +24,26 @@ def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Channel
 
 def grain_of(block: Block, windows: NDArray[np.intp]) -> Array:
     """Deviation that rounding alone makes, from the least change, (6,)."""
-    return least(np.concatenate([steps_of(p) for p in _pieces(block, windows)]))
+    return least(np.concatenate(_steps(block, windows)))
 
 
 def rounding(block: Block, windows: NDArray[np.intp]) -> Array:
     """How far off the mean of each window may be for outputs rounded, (w, 6)."""
     off = []
-    for pieces in _pieces(block, windows):
-        step = steps_of(pieces)
+    steps = _steps(block, windows)
+    for step, pieces in zip(steps, _pieces(block, windows), strict=True):
         differences = np.nan_to_num([short_lag(piece[:SHOWN]) for piece in pieces])
         off.append(np.maximum(of_mean(step, differences), of_few(step, differences)))
     deviation: Array = np.sqrt(np.concatenate(off, axis=1))
     return deviation
+
+
+def _steps(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Steps of both triads; where nothing changes in any window, those on the way."""
+    held = np.concatenate([steps_of(p) for p in _pieces(block, windows)])
+    if not (held > 0).all():
+        held = np.where(held > 0, held, grids_of(block))
+    return held[:3], held[3:]
 
 
 def _pieces(block: Block, windows: NDArray[np.intp]) -> Iterator[list[Array]]:

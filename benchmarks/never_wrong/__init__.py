@@ -1,9 +1,12 @@
 """Sessions with one or two mistakes drawn at random: GO is never to be wrong.
 
-    python -m benchmarks never_wrong [SESSIONS] [--seed=N] [--only=MISTAKE] [--diagnose]
+    python -m benchmarks never_wrong [SESSIONS] [--seed=N] [--limit=S] [--only=MISTAKE]
+        [--diagnose] [--each]
 
 A third of the sessions is sound. Of the others, each has one mistake, and one in four a
-second. GO with a parameter more than five of its standard uncertainties off is wrong.
+second. GO with a parameter more than five of its standard uncertainties off is wrong,
+and so is a session that takes longer than `--limit` seconds of processor time. Session
+k of seed N is session 0 of seed N + k, so a campaign can be run in slices.
 """
 
 from __future__ import annotations
@@ -11,6 +14,8 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +24,49 @@ from benchmarks.never_wrong.bench import drawn
 from benchmarks.never_wrong.judging import WRONG, Judged, judged, write
 from benchmarks.never_wrong.mistakes import AFTER, BEFORE, session
 
-USUAL, SEED = 150, 84_000_000
+USUAL, SEED, LONGEST = 150, 84_000_000, 60.0
 SOUND = "none"
 """Name of the row of sound sessions."""
 
 
+@dataclass(frozen=True)
+class Options:
+    """What is to be run.
+
+    Attributes
+    ----------
+    count, seed : sessions, and the number of the first
+    limit : s of processor time, for each
+    only : mistake, empty for all
+    diagnose, each : whether `diagnose` is asked as well; whether all are printed
+
+    """
+
+    count: int = USUAL
+    seed: int = SEED
+    limit: float = LONGEST
+    only: str = ""
+    diagnose: bool = False
+    each: bool = False
+
+    @classmethod
+    def of(cls, words: Sequence[str]) -> Options:
+        """Read the command line."""
+        count = next((int(w) for w in words if w.isdigit()), USUAL)
+        named = (w[2:].partition("=") for w in words if w[:2] == "--")
+        given = {key: value for key, _, value in named}
+        return cls(
+            count,
+            int(given.get("seed", SEED)),
+            float(given.get("limit", LONGEST)),
+            given.get("only", ""),
+            "diagnose" in given,
+            "each" in given,
+        )
+
+
 def mistakes(number: int, rng: np.random.Generator, only: str) -> tuple[str, ...]:
-    """Mistakes of a session by its number; none in every third."""
+    """Mistakes of a session by its seed; none in every third."""
     names = [*BEFORE, *AFTER]
     if only:
         return () if only == SOUND else (only,)
@@ -38,25 +79,22 @@ def mistakes(number: int, rng: np.random.Generator, only: str) -> tuple[str, ...
 
 def main() -> None:
     """Print what became of each mistake, and by which check it was caught."""
-    words = sys.argv[2:]
-    count = next((int(w) for w in words if w.isdigit()), USUAL)
-    given = {k: v for k, _, v in (w[2:].partition("=") for w in words if w[:2] == "--")}
-    seed = int(given.get("seed", SEED))
+    options = Options.of(sys.argv[2:])
     rows: dict[str, list[Judged]] = defaultdict(list)
-    for k in range(count):
-        rng = np.random.default_rng(seed + k)
+    for seed in range(options.seed, options.seed + options.count):
+        rng = np.random.default_rng(seed)
         bench = drawn(rng)
-        names = mistakes(k, rng, given.get("only", ""))
+        names = mistakes(seed, rng, options.only)
         with tempfile.TemporaryDirectory() as where:
             folder = Path(where) / "session"
             write(folder, session(bench, names, rng))
-            one = judged(folder, bench.truth, "diagnose" in given)
-        rows[" + ".join(names[:1]) or SOUND].append(one)
+            one = judged(folder, bench.truth, options.diagnose, options.limit)
+        rows[names[0] if names else SOUND].append(one)
         wrong = one.off > WRONG if one.go else not names
-        if wrong or "each" in given:
+        if wrong or one.late or options.each:
             what = "GO" if one.go else f"NO-GO ({one.caught}: {one.says})"
             print(
-                f"seed {seed + k} {bench.places}, {', '.join(names) or SOUND}: {what},"
+                f"seed {seed} {bench.places}, {', '.join(names) or SOUND}: {what},"
                 f" {one.off:.1f} σ ({one.worst}) {one.verdict}",
                 flush=True,
             )

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import signal
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,6 +38,7 @@ class Judged:
     says : its sentence
     verdict : of `diagnose`, or its exit code
     leaked : warnings of libraries that came through
+    late : whether it took longer than allowed, and has no answer
 
     """
 
@@ -46,6 +49,7 @@ class Judged:
     says: str
     verdict: str
     leaked: int
+    late: bool = False
 
 
 def write(folder: Path, written: Written) -> None:
@@ -77,8 +81,39 @@ def said(words: list[str]) -> tuple[int, dict[str, Any], str, int]:
     return code, document, err.getvalue(), len(leaked)
 
 
-def judged(folder: Path, truth: dict[str, float], diagnose: bool) -> Judged:
-    """Solve a session, and hold what comes against the truth."""
+class Late(BaseException):
+    """It takes too long; no error of the command's own, which it would report."""
+
+
+@contextlib.contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """Raise `Late` when what is done within takes more processor time."""
+
+    def over(*_: object) -> None:
+        raise Late
+
+    before = signal.signal(signal.SIGPROF, over)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def judged(
+    folder: Path, truth: dict[str, float], diagnose: bool, limit: float
+) -> Judged:
+    """Solve a session within `limit` s of processor time, and hold it to the truth."""
+    try:
+        with at_most(limit):
+            return _judged(folder, truth, diagnose)
+    except Late:
+        says = f"no answer within {limit:g} s of processor time"
+        return Judged(False, 0.0, "", "late", says, "", 0, True)
+
+
+def _judged(folder: Path, truth: dict[str, float], diagnose: bool) -> Judged:
     history = str(folder.parent / f"{folder.name}.db")
     code, found, err, leaked = said(
         ["solve", str(folder), "--json", "--history", history]

@@ -17,6 +17,7 @@ import numpy as np
 
 from fieldcal.acceptance.centred import biases_taken_out
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
+from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.verification import Verification, planned, verify
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
@@ -57,8 +58,7 @@ def assess(
             earlier = [run.calibration for run in family(runs)]
         except FieldcalError as error:
             warnings.append(str(error))
-    held = still.at_rest(session).averages
-    taken_out = biases_taken_out(held, session.block, limits.fit_chance)
+    taken_out = _taken_out(session, still, limits)
     circumstances = Circumstances(
         temperatures=[a.temperature for a in still.averages],
         link=_link(session.block, still.averages, marks),
@@ -72,6 +72,29 @@ def assess(
     site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
     info = {**found.info, "site": site, "taken_at": start_time(marks)}
     return with_decision(replace(found, warnings=tuple(warnings), info=info), made)
+
+
+def unassessed(
+    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+) -> Calibration:
+    """The calibration of a session that nobody is to fly with, with what is wrong.
+
+    There is no GO: a recording from elsewhere need not meet limits. What cannot be
+    known of it is said, and facts that are wrong make it bad.
+    """
+    about, of_acc = session.about, "acc_scale" in found.groups
+    unknown = [gravity_unknown(about)] if of_acc else []
+    wrong = [gravity_contradicted(about)] if of_acc else []
+    wrong += _taken_out(session, still, limits)
+    wrong = [w for w in wrong if w]
+    warnings = (*wrong, *found.warnings, *filter(None, unknown))
+    return replace(found, warnings=warnings, good=found.good and not wrong)
+
+
+def _taken_out(session: Session, still: Rests, limits: GradeLimits) -> list[str]:
+    held = still.at_rest(session).averages
+    repeat = limits.gyr_bias_repeat
+    return biases_taken_out(held, session.block, repeat, limits.fit_chance)
 
 
 def store_in_history(history: History, session: Session, found: Calibration) -> str:

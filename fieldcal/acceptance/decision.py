@@ -16,7 +16,7 @@ import numpy as np
 from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.harmless import harmless
 from fieldcal.acceptance.level import level_missing, tilt_is_found
-from fieldcal.acceptance.site import gravity_unknown
+from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.verification import Verification
 from fieldcal.acceptance.witnesses import has_witnesses, left_out, witnesses
 from fieldcal.calibration import COMPONENTS, Calibration
@@ -209,8 +209,10 @@ def _by_angles(found: Calibration, limits: GradeLimits) -> str:
 
 def _site(found: Calibration, about: Description) -> list[Check]:
     """Whether gravity is known, which every accelerometer's scale is measured by."""
-    unknown = gravity_unknown(about) if "acc_scale" in found.groups else ""
-    return [Check("site", False, unknown)] if unknown else []
+    if "acc_scale" not in found.groups:
+        return []
+    wrong = gravity_unknown(about) or gravity_contradicted(about)
+    return [Check("site", False, wrong)] if wrong else []
 
 
 def _level(found: Calibration, about: Description) -> list[Check]:

@@ -113,14 +113,12 @@ def _decided(
     args: argparse.Namespace, found: Calibration, session: Session, still: Rests
 ) -> Calibration:
     """GO or NO-GO, where the session was a recalibration or limits are given."""
-    from fieldcal.acceptance.assessment import assess, limits_path
-    from fieldcal.acceptance.site import gravity_unknown
+    from fieldcal.acceptance.assessment import assess, limits_path, unassessed
     from fieldcal.calibration import limits
     from fieldcal.history.store import History, default_path
 
-    if args.limits is None and "run" not in session.about.raw:
-        unsaid = gravity_unknown(session.about) if "acc_scale" in found.groups else ""
-        return replace(found, warnings=(*found.warnings, *filter(None, [unsaid])))
     bounds = limits.read(session.grade, limits_path(session, args.limits))
+    if args.limits is None and "run" not in session.about.raw:
+        return unassessed(found, session, still, bounds)
     history = History(args.history or default_path())
     return assess(found, session, still, bounds, history)

@@ -91,14 +91,14 @@ def _odds(measured: Array, f: Array) -> tuple[float, float]:
     return total - 0.5 * squares, squares
 
 
-def rate_unit(recording: CheckedSamples, held: Sequence[int]) -> str:
+def rate_unit(recording: CheckedSamples, held: Sequence[int], f: Array) -> str:
     """Unit of the gyroscopes, if it is not the declared one; empty if it is.
 
-    Of the turns between windows by number; those that are too small say nothing.
+    Of the turns between windows by number, where the force is f (n, 3); those that are
+    too small say nothing.
     """
     block, ratios = recording.block, []
-    for p, q in pairwise(held):
-        one, two = recording.x.f[p], recording.x.f[q]
+    for (p, one), (q, two) in pairwise(zip(held, f, strict=True)):
         cosine = one @ two / np.linalg.norm(one) / np.linalg.norm(two)
         angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
         gap = slice(recording.windows[p, 1], recording.windows[q, 0])
@@ -154,9 +154,10 @@ class Mounting(Chain):
         unit = self._unit(acc, recording.x.gravity)
         if unit:
             return [self._fault(recording, {"unit": unit}, UNITS[unit], np.eye(3))]
-        if rate := rate_unit(recording, held):
-            return [_of_rates(recording, rate)]
         oriented = recording.x.oriented[held]
+        force = np.where(oriented[:, None], recording.x.f[held], acc)
+        if rate := rate_unit(recording, held, force):
+            return [_of_rates(recording, rate)]
         if oriented.sum() < 2:
             return []
         axes, odds = turned_axes(acc[oriented], recording.x.f[held][oriented])

@@ -156,7 +156,9 @@ def solved(
     found = solve(laid.observations, recorded=recorded, **asked)
     if turns == "yes":
         _insist(found, session, still)
-    found = replace(found, warnings=(*still.warnings, *notes, *found.warnings))
+    # why it is bad comes first
+    ahead, behind = ((), found.warnings) if found.good else (found.warnings, ())
+    found = replace(found, warnings=(*ahead, *still.warnings, *notes, *behind))
     found = _listed(with_provenance(found, about), laid.order)
     if shown is None:
         return found

@@ -31,6 +31,11 @@ from fieldcal.solve.observations import Mask
 from fieldcal.solve.shown import Shown
 from fieldcal.solve.variants import variants
 
+FOLLOWED, NEAR = 6, 0.01
+"""Times that turns are followed at most, and the change of a scale factor from which
+once more: they are followed again in the end, and what is linear in a change leaves its
+square, 1e-4 and then 1e-8."""
+
 OPEN = 0.25
 """Part of a variance before the rows from which they determined nothing."""
 
@@ -81,6 +86,8 @@ class Estimated:
     moved : by how many sigmas what is carried moves each parameter, (k,)
     acc, gyr : how well the windows agree
     turns : rows of the turns
+    contradicted : windows that count, between which the gyroscopes say that the device
+        went elsewhere
 
     """
 
@@ -94,6 +101,7 @@ class Estimated:
     acc: Fit
     gyr: Fit
     turns: tuple[TurnRows, ...]
+    contradicted: tuple[tuple[int, int], ...] = ()
 
     def mixed_with(self, one: Estimated, other: Estimated, weight: float) -> Estimated:
         """The same, with what another model of the tilt differs by in the uncertainty.
@@ -197,11 +205,14 @@ def estimated(
     found = replace(found, bad=np.where(bad, 1.0, found.bad))
     parameters = _parameters(given, gram, found, nominal, averaged)
     names, values, covariance, moved, missing = _determined(given, parameters)
+    elsewhere = turning.contradicted if turning else ()
+    counts = set(given.held[found.bad <= CERTAIN].tolist())
     return Estimated(
         given, names, values, covariance, missing, found, moved,
         agreement(gram, given, found, (0, 1, 2)),
         agreement(gram, given, found, (3, 4, 5)),
         tuple(inference.turned),
+        tuple(pair for pair in elsewhere if counts.issuperset(pair)),
     )  # fmt: skip
 
 
@@ -215,9 +226,19 @@ def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
     """The state where the set has settled, and the columns' values in it."""
     start: Array = np.zeros(given.width)
     state, values, _ = inference.settled(inference.nominal, start, given.members)
-    if inference.turns is not None:
+    if inference.turns is None:
+        return state, values
+    # windows see no rate but the Earth's, too little to follow turns by
+    gyr = np.s_[given.scale + 3 : given.scale + 6]
+    values[gyr] = 0.0
+    nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
+    state = replace(state, scale=nominal)
+    for _ in range(FOLLOWED):
         inference.gram(state, values, None)
+        before = state.scale
         state, values, _ = inference.settled(state, values, given.members)
+        if np.abs(state.scale / before - 1).max() < NEAR:
+            break
     return state, values
 
 

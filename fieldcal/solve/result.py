@@ -35,6 +35,9 @@ WRONG = 9.0
 OF_TURNS = frozenset({"gyr_scale", "gyro_cross_coupling"})
 """Groups that turns determine."""
 
+MENTIONED = 3
+"""Turns that are named one by one."""
+
 TURNED = 5
 """Degrees of freedom of the turns from which their residual says something."""
 
@@ -70,7 +73,10 @@ def calibration(
             "these positions determine nothing: " + "; ".join(filter(None, sentences))
         )
     sigma = np.sqrt(np.diag(covariance))
-    odd = senseless(names, values, sigma, observations.nominal)
+    odd = [
+        *senseless(names, values, sigma, observations.nominal),
+        *_contradicted(found, observations),
+    ]
     acc = found.acc if any(map(_is_acc, names)) else found.gyr
     good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < WRONG)
     doubt = DoubtfulPosition.of(observations, found.bad)
@@ -228,6 +234,24 @@ def _scattered(found: Estimated) -> list[str]:
             words.excess("turns", chi2, dof, turns_scatter(found.found), "rad")
         )
     return sentences
+
+
+def _contradicted(found: Estimated, observations: Observations) -> list[str]:
+    """Turns of which the gyroscopes say that they led elsewhere."""
+    if not found.contradicted:
+        return []
+    listed = words.join([
+        f"{observations.positions[p].name} to {observations.positions[q].name}"
+        for p, q in found.contradicted[:MENTIONED]
+    ])  # fmt: skip
+    count, more = len(found.contradicted), len(found.contradicted) - MENTIONED
+    return [
+        f"in {count} turn{'s' if count > 1 else ''} the gyroscopes lead to another"
+        f" attitude than the accelerometers or the stated angles (from {listed}"
+        f"{f', and {more} more' if more > 0 else ''}): an axis, a sign, a unit or an"
+        " angle is another than session.toml says, or the gyroscopes were clipped;"
+        " mend it, or turn more slowly"
+    ]
 
 
 def _turns(found: Estimated) -> tuple[float, int]:

@@ -8,45 +8,69 @@ from fieldcal.acceptance.centred import biases_taken_out, centred, tracked
 from fieldcal.core.samples import Block
 from fieldcal.windows import Average
 
-SIGMA = 1e-5
-COUNT = 3000
+NOISE, RATE = 5e-4, 100.0
+COUNT, HELD = 3000, 30.0
+REPEAT, LEAST = 1e-3, 1e-4
+EARTH = 7.292e-5
 
 
-def windows(rng: np.random.Generator, size: float, bias: float = 0.0) -> list[Average]:
-    """Six windows whose gyroscopes are off by some part of their standard error."""
-    return [
-        Average(
-            np.concatenate([np.zeros(3), bias + size * SIGMA * rng.standard_normal(3)]),
-            np.eye(6) * SIGMA**2,
-            21.0,
-            COUNT,
-            0.0,
-            30.0,
-        )
-        for _ in range(6)
+def at_rest(
+    rng: np.random.Generator, bias: float, tracks_s: float = 0.0, earth: float = 0.0
+) -> tuple[list[Average], Block]:
+    """Six windows of white noise about a bias, with the Earth's rate along an axis.
+
+    Where the device tracks its bias it takes out a running mean over some seconds,
+    which a turn before each window has put out.
+    """
+    gyr = []
+    for k in range(6):
+        one = bias + NOISE * rng.standard_normal((COUNT, 3))
+        one[:, k % 3] += earth * (-1) ** (k // 3)
+        keep = np.exp(-1 / RATE / tracks_s) if tracks_s else 0.0
+        mean = np.full(3, bias + NOISE)
+        for i in range(COUNT if tracks_s else 0):
+            mean = keep * mean + (1 - keep) * one[i]
+            one[i] -= mean
+        gyr.append(one)
+    block = Block.of(
+        np.arange(6 * COUNT) / RATE, np.zeros((6 * COUNT, 3)), np.concatenate(gyr)
+    )
+    windows = [
+        Average(np.zeros(6), np.eye(6), 21.0, COUNT, HELD * k, HELD * (k + 1))
+        for k in range(6)
     ]
+    return windows, block
 
 
 def recording(rng: np.random.Generator, mean: float) -> Block:
     acc = mean + rng.standard_normal((COUNT, 3))
-    return Block.of(np.arange(COUNT) / 100.0, acc, np.zeros((COUNT, 3)))
+    return Block.of(np.arange(COUNT) / RATE, acc, np.zeros((COUNT, 3)))
 
 
-def test_a_bias_that_is_exactly_zero_is_no_bias_taken_out() -> None:
+def test_a_bias_or_the_earths_rate_stands_out() -> None:
     rng = np.random.default_rng(1)
-    chances = [tracked(windows(rng, 1.0))[0] for _ in range(400)]
-    # uniform, as a probability of what chance makes is
-    assert 0.4 < np.mean(chances) < 0.6 and min(chances) > 1e-4
-    assert 0.02 < np.mean(np.array(chances) < 0.1) < 0.2
-    assert tracked(windows(rng, 1.0, bias=1e-3))[0] > 0.999
+    for bias, earth in ((1e-3, 0.0), (-1e-4, 0.0), (0.0, EARTH)):
+        found = [
+            tracked(*at_rest(rng, bias, earth=earth), REPEAT, LEAST)[0]
+            for _ in range(20)
+        ]
+        assert min(found) == 1.0
 
 
-def test_a_bias_that_is_tracked_leaves_less_than_noise() -> None:
+def test_so_noisy_a_device_may_be_at_zero_by_chance() -> None:
+    rng = np.random.default_rng(5)
+    windows, block = at_rest(rng, 0.0)
+    block.gyr[:] *= 100.0
+    assert tracked(windows, block, REPEAT, LEAST)[0] > LEAST
+
+
+def test_a_bias_that_is_tracked_leaves_nothing() -> None:
     rng = np.random.default_rng(2)
-    found = [tracked(windows(rng, 0.2)) for _ in range(50)]
-    assert max(chance for chance, _ in found) < 1e-4
-    assert "18 means" in found[0][1]
-    assert tracked(windows(rng, 0.2)[:2]) == (1.0, "")
+    for seconds in (0.5, 1.0, 3.0):
+        windows, block = at_rest(rng, -7e-3, seconds)
+        chance, what = tracked(windows, block, REPEAT, LEAST)
+        assert chance < LEAST and "18 means" in what
+    assert tracked(windows[:1], block, REPEAT, LEAST) == (1.0, "")
 
 
 def test_a_recording_without_its_mean() -> None:
@@ -61,10 +85,13 @@ def test_a_recording_without_its_mean() -> None:
 
 def test_both_are_told_apart_and_said() -> None:
     rng = np.random.default_rng(4)
-    sound, block = windows(rng, 1.0, bias=1e-3), recording(rng, 5.0)
-    assert biases_taken_out(sound, block, 1e-4) == []
-    (said,) = biases_taken_out(windows(rng, 0.1), block, 1e-4)
+    windows, block = at_rest(rng, 1e-3)
+    block.acc[:] = 5.0 + rng.standard_normal(block.acc.shape)
+    assert biases_taken_out(windows, block, REPEAT, LEAST) == []
+    block.gyr[:] -= 1e-3
+    (said,) = biases_taken_out(windows, block, REPEAT, LEAST)
     assert "takes its bias out while it rests" in said
+    block.gyr[:] += 1e-3
     block.acc[:, 1] -= block.acc[:, 1].mean()
-    (said,) = biases_taken_out(sound, block, 1e-4)
+    (said,) = biases_taken_out(windows, block, REPEAT, LEAST)
     assert "is zero in ay, closer" in said

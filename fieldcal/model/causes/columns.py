@@ -187,6 +187,17 @@ def earth_sides(plain: Experience, state: State) -> Iterator[Pair]:
 earth = _of_sides(earth_sides)
 
 
+def earth_anyhow(view: RowView) -> Array:
+    """A rate in device axes wherever nobody knows the orientation, rad/s.
+
+    Turned about one level axis by hand, a device has the Earth's rate along it in every
+    position and on the way.
+    """
+    free = ~view.plain.oriented[:, None, None]
+    out: Array = np.eye(6)[:, 3:] * view.state.scale[:, None] * free
+    return out
+
+
 def small_rotation_sides(plain: Experience, state: State) -> Iterator[Pair]:
     """Two small turns of each position, rad, those of a position together."""
     here = state.experienced(plain)

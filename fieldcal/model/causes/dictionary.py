@@ -87,7 +87,7 @@ class Dictionary(ColumnTable):
         super().__init__(x, used, since, unit, wander)
         self.common, self.turns = common, turns
         self.earth = -1
-        self.always: list[Group] = list(self._calibration())
+        self.always: list[Group] = [*self._calibration(), *self._earth_anyhow()]
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
         if len(self.held) < FEW < len(x):
@@ -167,6 +167,18 @@ class Dictionary(ColumnTable):
             size = np.full(3, EARTH_RATE)
             at = self.earth + np.arange(3)
             yield Group("earth", "", at, size, fixed=1.0, in_state=True)
+
+    def _earth_anyhow(self) -> Iterator[Group]:
+        """What the Earth may add alike wherever nobody knows the orientation.
+
+        One position alone has it in its bias.
+        """
+        if not np.isin(self.observed, (3, 4, 5)).any() or len(self.held) < 2:
+            return
+        if not self.x.oriented.all():
+            at = self.add(General("earth anyhow", columns.earth_anyhow), 3)
+            size = np.full(3, EARTH_RATE / 3**0.5)
+            yield Group("earth anyhow", "gyr", at + np.arange(3), size, fixed=1.0)
 
     def _is_free(self, p: int) -> bool:
         """Whether nobody knows the orientation of a position that shows a force."""

@@ -131,11 +131,18 @@ class Turning:
     source, rows : samples, and the windows' rows
     since : (o, n) s since the turn in each row, by origin
 
+    Attributes
+    ----------
+    legs : the windows at both ends, and the bounds of the motion in samples
+    contradicted : the windows between which the gyroscopes say otherwise than the
+        positions, by the state that turns were followed with last
+
     """
 
     def __init__(self, source: RowSource, rows: Rows, since: Array) -> None:
         self.source, self.rows, self.since = source, rows, since
         self.legs = list(self._found())
+        self.contradicted: list[tuple[int, int]] = []
 
     def _found(self) -> Iterator[tuple[tuple[int, int], int, int]]:
         rows, x = self.rows, self.rows.x
@@ -156,6 +163,7 @@ class Turning:
     def turns(self, state: State) -> Iterator[Turn]:
         """Every turn that the gyroscopes have followed, by a state."""
         ends = state.experienced(self.rows.x)
+        self.contradicted = []
         for pair, first, last in self.legs:
             if (turn := self._turn(state, ends, pair, first, last)) is not None:
                 yield turn
@@ -177,9 +185,10 @@ class Turning:
             if np.abs(rid - before).max() * float(np.ptp(steps.at)) < 1e-6:
                 break
         end = way.attitude[-1]
-        if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < LEAST:
-            return None
         if astray(ends, pair, end):
+            self.contradicted.append(pair)
+            return None
+        if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < LEAST:
             return None
         noise = self.rows.noise[3:] / np.abs(state.scale[3:])
         unsure = blur(steps.t, way.rate - way.earth, steps.each, noise)

@@ -60,6 +60,12 @@ FEW, RECENT = 16, 256
 """Least and most samples that the rate is told from."""
 
 
+BAROMETER_SAYS = (
+    "the temperature in HIGHRES_IMU is that of this autopilot's barometer, so it is"
+    " left out; message=RAW_IMU has that of the sensor"
+)
+
+
 class MavlinkImu(Driver):
     """A link to an autopilot, or a log of one, and the samples of one of its sensors.
 
@@ -129,7 +135,8 @@ class MavlinkImu(Driver):
         heard = [f"asked for {self._asked:g} Hz, got {self.rate:.4g} Hz"]
         slow = self._log is None and self._asked > 0 and self.rate > 0
         remark = [self.installed.remark] if self.installed else []
-        return [*self._talk.says, *filter(None, remark), *heard * slow]
+        warm = [BAROMETER_SAYS] if self._decoder.thermometer == "barometer" else []
+        return [*self._talk.says, *filter(None, remark), *warm, *heard * slow]
 
     @property
     def installed(self) -> Installed | None:
@@ -156,6 +163,7 @@ class MavlinkImu(Driver):
             "vehicle": decoder.vehicle,
             "acc_unit": decoder.acc_unit,
             "gyr_unit": decoder.gyr_unit,
+            "thermometer": decoder.thermometer,
             "rate_hz": round(self.rate, 3),
             "installed": installed.as_table() if installed else None,
             "says": self.says,

@@ -3,6 +3,10 @@
 Bytes in, blocks out, no I/O and no clock. A vehicle is a system and a component; of
 those that send the message, the first is taken unless one was chosen. Units are told
 from the first samples, which wait until they are, see `mavlink_units`.
+
+The temperature of RAW_IMU and SCALED_IMU is the sensor's. That of HIGHRES_IMU is the
+barometer's in the programs of `BAROMETER`, and says nothing of the sensor. Source:
+GCS_Common.cpp of ArduPilot, HIGHRES_IMU.hpp of PX4.
 """
 
 from __future__ import annotations
@@ -22,6 +26,7 @@ from fieldcal.drivers.mavlink_frames import (
     packets,
     payloads,
 )
+from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
 from fieldcal.drivers.mavlink_units import (
     ACCELERATIONS,
     RATES,
@@ -73,6 +78,9 @@ MOST_ASIDE = 1000
 FEW, ENOUGH = 16, 160
 """Samples that tell the unit, and after which it is given up."""
 
+BAROMETER = (ARDUPILOT, PX4)
+"""Programs whose HIGHRES_IMU has the temperature of the barometer."""
+
 ACC_UPDATED, GYR_UPDATED, TEMPERATURE_UPDATED = 0o7, 0o70, 1 << 12
 """Bits of HIGHRES_IMU's fields_updated."""
 
@@ -86,6 +94,7 @@ class Decoder(Codec):
     sources : system and component of all that send the message
     heard : names of the IMU messages that came, chosen or not
     acc_unit : unit of acceleration in the message; empty until it is known
+    autopilots : numbers of the programs that sent a heartbeat, by system and component
 
     """
 
@@ -109,6 +118,7 @@ class Decoder(Codec):
         self.aside: list[Any] = []
         self.sources: set[tuple[int, int]] = set()
         self.heard: set[str] = set()
+        self.autopilots: dict[tuple[int, int], int] = {}
         self._vehicle: tuple[int, int] | None = None
         self._waiting: list[tuple[Fields, Array]] = []
         span = 2.0**32 * self.kind.tick if self.kind.tick > 1e-6 else float("inf")
@@ -131,6 +141,14 @@ class Decoder(Codec):
     def vehicle(self) -> tuple[int, int] | None:
         """System and component whose samples are taken, once that is known."""
         return self._vehicle
+
+    @property
+    def thermometer(self) -> str:
+        """Whose temperature the message has: ``imu``, ``barometer``, or empty."""
+        if self.kind.whole:
+            return "imu"
+        program = self.autopilots.get(self._vehicle or (0, 0))
+        return "barometer" if program in BAROMETER else ""
 
     def wants(self, system: int, component: int) -> bool:
         """Whether the options allow this one."""
@@ -169,9 +187,14 @@ class Decoder(Codec):
         for i in np.flatnonzero(np.isin(whole.identifiers, ASIDE)).tolist():
             text = bytearray(data[whole.starts[i] : whole.ends[i]].tobytes())
             try:
-                self.aside.append(self._parser.decode(text))
+                message = self._parser.decode(text)
             except self._broken:
                 self.health.bad += 1
+                continue
+            self.aside.append(message)
+            if message.get_type() == "HEARTBEAT":
+                who = (message.get_srcSystem(), message.get_srcComponent())
+                self.autopilots[who] = int(message.autopilot)
         del self.aside[:-MOST_ASIDE]
 
     def _chosen(self, some: Packets) -> NDArray[np.bool_]:
@@ -234,8 +257,10 @@ class Decoder(Codec):
         return concat(cuts) if cuts else None
 
     def _temperature(self, fields: Fields) -> Array:
-        """Temperature in deg C; nan where the message has none."""
+        """Temperature of the sensor in deg C; nan where the message has none."""
         degrees = as_doubles(fields["temperature"])
+        if self.thermometer == "barometer":
+            return np.full(len(degrees), np.nan)
         if self.kind.whole:
             return np.where(degrees == 0, np.nan, degrees / 100)
         said = fields["updated"]

@@ -1,7 +1,7 @@
 """What an autopilot makes of samples: MAVLink's IMU messages, with their rounding.
 
     RAW_IMU, SCALED_IMU, 2, 3   int16 in mg and mrad/s, cut toward zero; 0.01 deg C
-    HIGHRES_IMU                 float32 in m/s^2, rad/s and deg C
+    HIGHRES_IMU                 float32 in m/s^2, rad/s and deg C, of the barometer
 
 Source: MAVLink common messages; the cut is what a cast in C does.
 """
@@ -21,6 +21,9 @@ FULL = 2**15
 
 ACC_UNITS = {"mg": 1e3 / STANDARD_GRAVITY, "mm/s^2": 1e3}
 """Whole numbers to 1 m/s^2: most programs send the first, some the other."""
+
+BAROMETER_K = 9.0
+"""By how much the barometer is warmer, K."""
 
 ALL_BUT_PRESSURE = 0x11FF
 """Fields of HIGHRES_IMU that are new: three triads, and the temperature."""
@@ -54,7 +57,7 @@ def messages(
     make = dialect.mavlink_map[number]
     if number == HIGHRES:
         us, no_field = np.rint(block.t * 1e6).astype(int).tolist(), (0.0,) * 6
-        degrees = np.nan_to_num(block.temperature).tolist()
+        degrees = np.nan_to_num(block.temperature + BAROMETER_K).tolist()
         for t, six, warm in zip(us, block.six.tolist(), degrees, strict=True):
             yield make(t, *six, *no_field, warm, ALL_BUT_PRESSURE, instance)
         return

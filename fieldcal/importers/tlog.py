@@ -81,6 +81,7 @@ class TelemetryLog(Recording):
         if decoder is not None:
             told["acc_unit"] = decoder.acc_unit
             told["gyr_unit"] = decoder.gyr_unit
+            told["thermometer"] = decoder.thermometer
             told["grain"] = asdict(decoder.grain)
         autopilot = self._autopilots.get((system, component), -1)
         wanted = [n for some in names(autopilot, sensor).values() for n in some]
@@ -126,6 +127,7 @@ class TelemetryLog(Recording):
             fixed["instance"] = str(sensor)
         options = Options("options", self.wanted.options).fixed(**fixed)
         decoder = Decoder(options)
+        decoder.autopilots |= self._autopilots
         options.finish()
         return decoder
 

@@ -149,14 +149,21 @@ def _verification(
 def _link(
     block: Block, windows: Sequence[Average], marks: Sequence[Mapping[str, Any]]
 ) -> dict[str, int]:
-    """Samples in the windows, those missing there, and frames refused in all."""
+    """Samples in the windows, those missing there, and frames refused in all.
+
+    What is missing between the pieces of a window is no part of it.
+    """
     samples = missing = 0
+    gaps = [g for m in marks if m["event"] == "window" for g in m.get("without_s", ())]
     period = float(np.median(np.diff(block.t))) if len(block) > 1 else np.nan
     for window in windows:
         t = block.between(window.start, np.nextafter(window.end, np.inf)).t
         samples += len(t)
         if len(t) > 1 and period > 0:
-            missing += int(np.maximum(np.rint(np.diff(t) / period) - 1, 0).sum())
+            lost = np.maximum(np.rint(np.diff(t) / period) - 1, 0)
+            for start, end in gaps:
+                lost[(t[:-1] >= np.nextafter(start, -np.inf)) & (t[1:] <= end)] = 0
+            missing += int(lost.sum())
     bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "link")
     return {"samples": samples, "missing": missing, "bad": bad}
 

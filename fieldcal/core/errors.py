@@ -86,15 +86,17 @@ class Moved(FieldcalError):
     ----------
     at : device time of the disturbance, s
     axis : name of the channel that shows it, e.g. ``"ax"``
+    seconds : how long it lasts as it shows; so long before `at` it may have begun
 
     """
 
     exit_code = 1
 
-    def __init__(self, text: str, at: float, axis: str) -> None:
+    def __init__(self, text: str, at: float, axis: str, seconds: float = 0.0) -> None:
         super().__init__(text)
         self.at = at
         self.axis = axis
+        self.seconds = seconds
 
 
 class WrongPosition(FieldcalError):

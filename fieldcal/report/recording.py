@@ -25,6 +25,7 @@ MOST_MARKS = 30
 
 EVENTS = {
     "rejected": "window rejected",
+    "kept": "disturbed",
     "wrong": "wrong place",
     "failed": "failed",
     "interrupted": "interrupted",

@@ -34,6 +34,10 @@ BATCHES = 1 << 17
 """Batches whose times are kept: more than an hour."""
 
 
+Span = tuple[float, float]
+"""Start and end, s."""
+
+
 class Times:
     """Host arrival times of the samples."""
 
@@ -89,13 +93,15 @@ class Companion:
         with self._lock:
             self._recorder.mark(event, **what)
 
-    def window(self, position: int, start: float, end: float) -> None:
-        """Mark a window between two host times, s."""
+    def window(self, position: int, span: Span, without: Sequence[Span] = ()) -> None:
+        """Mark a window between two host times, less some stretches, s."""
         with self._lock:
-            first, last = self._times.device(start), self._times.device(end)
+            first, last = (self._times.device(t) for t in span)
+            gaps = [[self._times.device(t) for t in gap] for gap in without]
         if last > first:
             end_s = float(np.nextafter(last, np.inf))
-            self.mark("window", position=position, start_s=first, end_s=end_s)
+            more = {"without_s": gaps} if gaps else {}
+            self.mark("window", position=position, start_s=first, end_s=end_s, **more)
             self._driver.read_again()
 
     def end(self) -> None:
@@ -165,8 +171,10 @@ class LeadRecorder:
             if event in ("asked", "insisted"):
                 other.mark(event, **what)
             elif event == "window":
-                span = (self._times.host(what[end]) for end in ("start_s", "end_s"))
-                other.window(what["position"], *span)
+                host = self._times.host
+                gaps = [(host(a), host(b)) for a, b in what.get("without_s", ())]
+                span = (host(what["start_s"]), host(what["end_s"]))
+                other.window(what["position"], span, gaps)
         self._recorder.mark(event, **what)
 
 

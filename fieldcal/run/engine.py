@@ -5,7 +5,8 @@ device time, so a virtual device may run faster than the wall clock and nothing 
 
 A hold goes through three phases. *Turning*: until the device has come to rest where it
 was asked to be; a wrong place is said, and nothing is averaged there. *Averaging*:
-until the window is long enough; a disturbance rejects it. *Taken*: the window is marked
+until the window is long enough; what was calm before a disturbance is kept if the
+device lies as before, otherwise the window begins again. *Taken*: the window is marked
 and its average goes back to the plan. What was taken before, by an engine whose link
 broke or whose process was killed, is handed back at once and not asked for again.
 """
@@ -26,9 +27,12 @@ from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import (
     GAP,
     THIN,
+    Disturbed,
     RepeatPosition,
     SamplesLost,
+    Unlike,
     WindowWatch,
+    kept_notice,
     restart_notice,
 )
 from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
@@ -38,7 +42,7 @@ from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait, force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import Description
-from fieldcal.windows import Average, LearnedNoise, Window
+from fieldcal.windows import Average, LearnedNoise, Pieces
 
 R = TypeVar("R")
 
@@ -155,9 +159,8 @@ class Engine:
             name = hold.position.name
             self._recorder.mark("asked", position=hold.index, name=name)
             self._operator.place(hold)
-            self._arrive(hold)
             try:
-                average = self._average(hold)
+                average = self._in_pieces(hold)
             except Moved as moved:
                 if self._give_up is not None:
                     raise
@@ -166,6 +169,30 @@ class Engine:
                 continue
             if average is not None:
                 return average
+
+    def _in_pieces(self, hold: Hold) -> Average | None:
+        """Average a window, what was calm before a disturbance included.
+
+        None if the operator wants to begin it again.
+        """
+        pieces, same = Pieces(self._noise, self._driver.grain), self._same
+        while True:
+            self._arrive(hold)
+            if self._same != same:  # what it sends now is not what it sent before
+                pieces, same = Pieces(self._noise, self._driver.grain), self._same
+            away = self._away
+            try:
+                return self._average(hold, pieces)
+            except Disturbed as disturbed:
+                moved, kept = disturbed.moved, disturbed.kept
+                self._tell(kept_notice(moved, kept, hold.seconds, pieces.dropped))
+            if self._away != away:  # who knows how it stands by now
+                self._operator.place(hold)
+
+    @property
+    def _same(self) -> tuple[int, int]:
+        """What changes when samples are no longer like those before."""
+        return self._driver.health.restarts, self._driver.readings.changed
 
     def _tell(self, text: str) -> None:
         self._recorder.mark("told", text=text)
@@ -293,39 +320,54 @@ class Engine:
             self._operator.tell("nothing was taken yet that could be repeated")
         return wish
 
-    def _average(self, hold: Hold) -> Average | None:
-        """Average a window; None if the operator wants to begin it again."""
-        window = Window(noise=self._noise, grain=self._driver.grain)
-        share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
-        watch = WindowWatch(self._driver, hold.seconds, share)
+    def _average(self, hold: Hold, pieces: Pieces) -> Average | None:
+        """Fill a window; None if the operator wants to begin it again."""
         try:
-            for block in self._stream:
-                watch.check(block)
-                window.add(block)
-                if window.moved:
-                    raise window.moved
-                if self._wish(hold, averaging=True) == "repeat":
-                    self._recorder.mark("repeated", position=hold.index)
+            while True:
+                if not self._fill(hold, pieces):
                     return None
-                self._display.averaging(hold, window)
-                if window.elapsed >= hold.seconds or window.done(hold.sigma):
+                average = pieces.average()
+                if average is not None:
                     break
-            average = window.average()
-            self._confirm(watch)
+                self._tell(kept_notice(None, 0.0, hold.seconds, pieces.dropped))
         except Moved as moved:
             self._left = hold.index
             if isinstance(moved, SamplesLost):
                 self._thin[hold.index] = self._thin.get(hold.index, 0) + 1
             what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
+            kept = 0.0 if isinstance(moved, Unlike) else pieces.keep(moved)
+            if kept:
+                self._recorder.mark("kept", position=hold.index, kept_s=kept, **what)
+                raise Disturbed(moved, kept) from moved
             self._recorder.mark("rejected", position=hold.index, **what)
             raise
         end = float(np.nextafter(average.end, np.inf))
-        where = {"start_s": average.start, "end_s": end}
+        where: dict[str, object] = {"start_s": average.start, "end_s": end}
+        if pieces.without:
+            where["without_s"] = pieces.without
         self._recorder.mark("window", position=hold.index, **where)
-        self._noise = window.noise and window.noise.spectrum
-        self._display.taken(hold, window)
+        self._noise = pieces.noise and pieces.noise.spectrum
+        self._display.taken(hold, pieces)
         self._say_if_cold()
         return average
+
+    def _fill(self, hold: Hold, pieces: Pieces) -> bool:
+        """Take samples until a window is long enough; False if it is to begin again."""
+        share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
+        watch = WindowWatch(self._driver, hold.seconds, share)
+        for block in self._stream:
+            watch.check(block)
+            pieces.add(block)
+            if moved := pieces.moved:
+                raise moved
+            if self._wish(hold, averaging=True) == "repeat":
+                self._recorder.mark("repeated", position=hold.index)
+                return False
+            self._display.averaging(hold, pieces)
+            if pieces.elapsed >= hold.seconds or pieces.done(hold.sigma):
+                break
+        self._confirm(watch)
+        return True
 
     def _confirm(self, watch: WindowWatch) -> None:
         """Have the device say that it did the same to all samples of a window."""

@@ -21,6 +21,37 @@ class RepeatPosition(Exception):
         self.index = index
 
 
+class Unlike(Moved):
+    """What came before is not like what comes now, however still the device lay."""
+
+
+class Disturbed(Exception):
+    """A window was disturbed, and what was calm before is kept.
+
+    Attributes
+    ----------
+    moved : the disturbance
+    kept : seconds there are, s
+
+    """
+
+    def __init__(self, moved: Moved, kept: float) -> None:
+        super().__init__(str(moved))
+        self.moved, self.kept = moved, kept
+
+
+def kept_notice(
+    moved: Moved | None, kept: float, seconds: float, dropped: float
+) -> str:
+    """Sentence about a window that goes on behind a disturbance, s."""
+    said = f"{moved}; " if moved else ""
+    if dropped:
+        said += f"it lies otherwise than before: those {dropped:.0f} s do not count; "
+    if kept:
+        said += f"{kept:.0f} of {seconds:.0f} s are kept; "
+    return f"{said}hold still, it goes on by itself"
+
+
 OFTEN = 3
 """Disturbed windows in one position from which the remedy is said as well."""
 
@@ -97,7 +128,7 @@ class WindowWatch:
     def check_same(self, now: float) -> None:
         """Raise Moved if the device has changed what it does to its samples."""
         if self._driver.readings.changed != self._changed:
-            raise Moved(
+            raise Unlike(
                 f"the device changed its own calibration before {now:.2f} s, as"
                 " autopilots do when they start",
                 now,
@@ -120,9 +151,9 @@ def _gap(last: float, now: float) -> Moved:
     )
 
 
-def _restarted(now: float) -> Moved:
+def _restarted(now: float) -> Unlike:
     """The device's clock began anew at a device time, s."""
-    return Moved(
+    return Unlike(
         f"the device started anew at {now:.2f} s: check its power if it happens once"
         " more",
         now,

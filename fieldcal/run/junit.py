@@ -14,6 +14,9 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 from fieldcal.core.positions import Position
 from fieldcal.session.folder import write_whole
 
+TROUBLE = ("wrong", "rejected", "kept")
+"""Marks of what went wrong in a position."""
+
 
 def write(
     path: Path,
@@ -76,9 +79,9 @@ def _position(
     elif "skipped" in events:
         SubElement(case, "skipped", message="left out by the operator")
     else:
-        said = [str(m["text"]) for m in mine if m["event"] in ("wrong", "rejected")]
+        said = [str(m["text"]) for m in mine if m["event"] in TROUBLE]
         message = said[-1] if said else "it was not taken"
         SubElement(case, "failure", message=message)
-    trouble = [str(m["text"]) for m in mine if m["event"] in ("wrong", "rejected")]
+    trouble = [str(m["text"]) for m in mine if m["event"] in TROUBLE]
     if trouble:
         SubElement(case, "system-out").text = "\n".join(trouble)

@@ -16,7 +16,7 @@ import json
 import os
 import tempfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -119,7 +119,8 @@ class Session:
 
         Where the device changed its own calibration meanwhile, as under the last one.
         Where its clock was set meanwhile, times and windows go on as if it had not
-        been, and `warnings` says so.
+        been, and `warnings` says so. It is nan
+        in the disturbances that windows were taken around.
         """
         raw, cut = sample_files.read(sample_files.find(self.folder))
         self.warnings += cut
@@ -132,7 +133,7 @@ class Session:
                 np.multiply(triad, unit, out=triad)
         whole, changed = in_one_calibration(raw, self.marks())
         self.warnings += changed
-        return self._steadied(whole)
+        return self._steadied(_left_out(whole, self.marks()))
 
     def _steadied(self, raw: Block) -> Block:
         """Samples and windows without steps of the device's clock."""
@@ -163,6 +164,22 @@ def _unconfirmed(raw: Mapping[str, Any]) -> list[str]:
         f" under [guessed] in {DESCRIPTION}, or import again with its unit"
         for what, why in raw.get("guessed", {}).items()
     ]
+
+
+def _left_out(block: Block, marks: Iterable[Mapping[str, Any]]) -> Block:
+    """A block with nan between the pieces of windows that were disturbed."""
+    gaps = [
+        slice(*np.searchsorted(block.t, gap).tolist())
+        for mark in marks
+        if mark.get("event") == "window"
+        for gap in mark.get("without_s", ())
+    ]
+    if not gaps:
+        return block
+    acc, gyr = block.acc.copy(), block.gyr.copy()
+    for gap in gaps:
+        acc[gap] = gyr[gap] = np.nan
+    return replace(block, acc=acc, gyr=gyr)
 
 
 def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:

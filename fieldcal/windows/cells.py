@@ -56,6 +56,14 @@ class CellTable:
         return len(self.times)
 
     @property
+    def heard(self) -> CellTable:
+        """Those that hold a value: samples that were left out are no part of a mean."""
+        some = self.counts.any(axis=1)
+        if some.all():
+            return self
+        return CellTable(self.times[some], self.sums[some], self.origin)
+
+    @property
     def counts(self) -> Array:
         """Values in each cell, (m, 6)."""
         return self.sums[:, 0:6]
@@ -185,6 +193,15 @@ class Cells:
         self._size -= done
         return taken
 
+    def cut(self, at: float) -> None:
+        """Forget what is not wholly before an instant, s of device time."""
+        edges = self.start + CELL * (self._index[: self._size] + 1)
+        self._size = int(np.count_nonzero(edges <= at + _GRACE * CELL))
+        kept = self._sums[: self._size]
+        self.n = int(kept[:, :6].max(axis=1, initial=0.0).sum())
+        self.end = float(-kept[-1, 33]) if self._size else self.start
+        self._last = np.full(6, np.nan)
+
     def add(self, block: Block) -> None:
         """Take in the samples of a block that follows the last one."""
         for first in range(0, len(block), _CHUNK):
@@ -245,6 +262,16 @@ class Cells:
     def _table(self, size: int) -> CellTable:
         times = self.start + CELL * self._index[:size]
         return CellTable(times, self._sums[:size], self._origin)
+
+
+def joined(first: CellTable, later: CellTable) -> CellTable:
+    """Cells of two pieces of one recording as one table, about the first's origin."""
+    origin = np.where(np.isfinite(first.origin), first.origin, later.origin)
+    sums = [first.sums.copy(), later.sums.copy()]
+    for part, own in zip(sums, (first.origin, later.origin), strict=True):
+        part[:, 6:12] += part[:, :6] * np.nan_to_num(own - origin)
+    times = np.concatenate([first.times, later.times])
+    return CellTable(times, np.vstack(sums), origin)
 
 
 def resolution(finest: Array) -> Array:

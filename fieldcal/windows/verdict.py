@@ -74,7 +74,7 @@ class Departure:
             "stuck": f"{axis} repeats one value for {self.seconds:.1f} s from "
             f"{self.at - start:.1f} s into the window: its sensor is stuck",
         }
-        return Moved(says[self.kind], self.at, axis)
+        return Moved(says[self.kind], self.at, axis, self.seconds)
 
 
 @dataclass(frozen=True, slots=True)

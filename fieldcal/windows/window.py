@@ -12,13 +12,15 @@ with v the variance of the mean of n . f by the spectrum of n . f; then n^T C' n
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
 from fieldcal.core.errors import InputError, Moved
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.windows.cells import CELL, Cells
+from fieldcal.windows.cells import CELL, Cells, CellTable, joined
 from fieldcal.windows.grain import variance, visible_step
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.longrun import MeanError, error_of_mean
@@ -61,7 +63,8 @@ class Window:
 
     Feed it with `add`; every property holds for the samples so far, and none depends
     on how they were cut into blocks. `noise` of a window that was good sharpens the
-    next one of the same device; `grain` is what the device rounds to, where it says so.
+    next one of the same device; `grain` is what the device rounds to, where it says so;
+    `pieces` are windows that it goes on from, with what was between them left out.
 
     >>> import numpy as np
     >>> rng = np.random.default_rng(0)
@@ -79,11 +82,13 @@ class Window:
         limits: StillnessLimits | None = None,
         noise: LearnedNoise | None = None,
         grain: Grain | None = None,
+        pieces: Sequence[Window] = (),
     ) -> None:
         self._limits = limits or StillnessLimits()
         self._before, self._grain = noise, grain or Grain()
+        self._pieces = tuple(pieces)
         self._sum = Cells()
-        self._cells = self._sum.table
+        self._cells = reduce(joined, (*(p.cells for p in pieces), self._sum.table))
         self._error: MeanError | None = None
         self._verdict: Verdict | None = None
         self._covariance: Array | None = None
@@ -91,18 +96,48 @@ class Window:
     def add(self, block: Block) -> None:
         """Take in the block that follows; costs as much as the block is long."""
         self._sum.add(block)
-        self._cells = self._sum.table
+        self._changed()
+
+    def _changed(self) -> None:
+        own = self._sum.table.heard
+        self._cells = reduce(joined, (*(p.cells for p in self._pieces), own))
         self._error = self._verdict = self._covariance = None
+
+    @property
+    def cells(self) -> CellTable:
+        """The cells so far that hold a value."""
+        return self._cells
+
+    def cut(self, at: float) -> None:
+        """Forget what is not wholly before an instant, s of device time."""
+        self._sum.cut(at)
+        self._changed()
+
+    @property
+    def start(self) -> float:
+        """First instant, s of device time."""
+        return self._pieces[0].start if self._pieces else self._sum.start
+
+    @property
+    def end(self) -> float:
+        """Last instant, s of device time."""
+        own = self._sum.n or not self._pieces
+        return self._sum.end if own else self._pieces[-1].end
+
+    @property
+    def seconds(self) -> float:
+        """Device time of which there are samples, s."""
+        return CELL * len(self._cells)
 
     @property
     def n(self) -> int:
         """Samples so far."""
-        return self._sum.n
+        return self._sum.n + sum(piece.n for piece in self._pieces)
 
     @property
     def elapsed(self) -> float:
         """Device time so far, s."""
-        return self._sum.end - self._sum.start if self.n else 0.0
+        return self.end - self.start if self.n else 0.0
 
     @property
     def mean(self) -> Array:
@@ -152,7 +187,7 @@ class Window:
     def moved(self) -> Moved | None:
         """The disturbance, if there was one; None while the window is good."""
         worst = self._judged().worst
-        return worst.error(self._sum.start) if worst.ratio > 1 else None
+        return worst.error(self.start) if worst.ratio > 1 else None
 
     @property
     def noise(self) -> LearnedNoise | None:
@@ -201,7 +236,7 @@ class Window:
             )
         if moved := self.moved:
             raise moved
-        start, end = self._sum.start, self._sum.end
+        start, end = self.start, self.end
         return Average(self.mean, self.covariance, self.temperature, self.n, start, end)
 
     def _judged(self) -> Verdict:

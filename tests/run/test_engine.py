@@ -20,7 +20,9 @@ from fieldcal.core.errors import (
 from fieldcal.core.frames import turn
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.core.samples import Array, Block, pieces
+from fieldcal.diagnosis import diagnose
 from fieldcal.drivers.driver import Driver, Health, open_driver
+from fieldcal.evaluation.observations import rests
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, hold
 from fieldcal.run.engine import Engine
@@ -171,7 +173,7 @@ def test_a_fast_device_gives_whoever_turns_it_some_time_by_the_clock(
 
 
 def test_a_bump_rejects_the_window_and_it_is_taken_again(bench: Bench) -> None:
-    bench.turner.bump_at = [8.0]
+    bench.turner.bump_at = [2.5]  # too early for anything to be kept
     average = bench.engine.run(hold_all(TWO[:1], 20.0))[0]
     assert events(bench) == ["asked", "rejected", "told", "asked", "window"]
     mark = [m for m in Session.open(bench.folder).marks() if m["event"] == "rejected"]
@@ -180,18 +182,34 @@ def test_a_bump_rejects_the_window_and_it_is_taken_again(bench: Bench) -> None:
 
 
 def test_who_never_holds_still_is_told_so_in_the_end(bench: Bench) -> None:
-    bench.turner.bump_at = [10.0] * 9
+    _restless(bench)
     with pytest.raises(CalibrationFailed, match="without a disturbance in 5 tries"):
         bench.engine.run(hold_all(TWO[:1], 30.0))
 
 
 def test_a_person_in_the_wind_is_told_what_to_do_and_may_go_on(bench: Bench) -> None:
-    bench.turner.bump_at = [10.0] * 7
-    driver, turner = bench.turner.driver, bench.turner
-    Engine(driver, turner, ABOUT, bench.recorder).run(hold_all(TWO[:1], 15.0))
+    turner = _restless(bench, times=7)
+    Engine(turner.driver, turner, ABOUT, bench.recorder).run(hold_all(TWO[:1], 15.0))
     assert len(turner.told) == 7 and events(bench).count("window") == 1
     assert "times now" not in turner.told[1]
     assert "disturbed 7 times now: fix the device better" in turner.told[6]
+
+
+def _restless(bench: Bench, times: int = 99) -> Turner:
+    """Bump the device two seconds into each window, too early to keep anything."""
+
+    class Restless(Turner):
+        def show(self, view: OperatorView) -> None:
+            before = self.views[-1].elapsed if self.views else 0.0
+            super().show(view)
+            if before <= 2.0 < view.elapsed and len(self.bumped) < times:
+                self.bumped.append(self.driver.device.time)
+                self.driver.device.bump()
+
+    turner = Restless(bench.turner.driver)
+    bench.turner = turner
+    bench.engine = Engine(turner.driver, turner, ABOUT, bench.recorder, give_up=60.0)
+    return turner
 
 
 def test_a_hold_ends_early_once_the_sigma_asked_for_is_reached(bench: Bench) -> None:
@@ -244,7 +262,8 @@ def test_a_link_pulled_for_a_moment_costs_a_window_and_no_more(
         bench = make(recorder, Pulled(VirtualDevice(seed=1), pulls), lost_share=1e-3)
         bench.engine.run(hold_all(TWO[:1], 20.0))
     assert "10 samples were lost before 14." in " ".join(bench.turner.told) or pulls[0]
-    assert events(bench).count("rejected") == rejected
+    ended = events(bench)
+    assert ended.count("rejected") + ended.count("kept") == rejected
 
 
 class Returning(InProcess):
@@ -495,8 +514,13 @@ def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
                 device.bump(push=0.0, tilt_deg=0.1, seconds=20.0)
 
     leaning = Leaning(turner.driver)
-    Engine(turner.driver, leaning, ABOUT, bench.recorder).run(hold_all(TWO[:1], 20.0))
-    assert "hold still, the window starts again" in leaning.told[0]
+    engine = Engine(turner.driver, leaning, ABOUT, bench.recorder)
+    (found,) = engine.run(hold_all(TWO[:1], 20.0))
+    assert "a lasting change" in leaning.told[0] and "hold still" in leaning.told[0]
+    bench.recorder.close()
+    before = Session.open(bench.folder).block.between(2.0, 9.0)
+    off = np.abs(found.mean - np.nanmean(before.six, axis=0)) / found.sigma
+    assert off[:3].max() < 6.0, "what leant is no part of the mean"
 
 
 class InDegrees(InProcess):
@@ -578,3 +602,40 @@ def test_a_turn_that_was_not_made_is_no_mounting() -> None:
         acc = [0.0, -9.81, 0.0] + 0.01 * rng.standard_normal((10, 3))
         waiting.add(Block.of(t, acc, 1e-3 * rng.standard_normal((10, 3))), t[0])
     assert waiting.problem and "mounting" not in waiting.problem
+
+
+def test_a_gust_costs_what_it_spoils(tmp_path: Path) -> None:
+    """Every 12 s a push of 1.5 s; windows of 30 s are taken within 50 s."""
+
+    class Windy(Turner):
+        gust = 10.0
+
+        def show(self, view: OperatorView) -> None:
+            super().show(view)
+            while self.driver.device.time >= self.gust:
+                self.gust += 12.0
+                self.driver.device.bump(push=0.3, tilt_deg=0.0, seconds=1.5)
+
+    tables = {
+        "format": 1,
+        "site": {"latitude_deg": 50.45},
+        "position": [{"alpha_deg": 0, "beta_deg": 0}],
+    }
+    with Recorder(tmp_path / "s", tables) as recorder:
+        turner = Windy(InProcess(VirtualDevice(seed=3)))
+        engine = Engine(turner.driver, turner, ABOUT, recorder, give_up=60.0)
+        taken = engine.run(hold_all(TWO[:1], 30.0))
+    session = Session.open(tmp_path / "s")
+    windows = [m for m in session.marks() if m["event"] == "window"]
+    for window in windows:
+        assert 30.0 < window["end_s"] - window["start_s"] < 50.0
+        assert 2 <= len(window["without_s"]) <= 4
+    assert any("of 30 s are kept; hold still" in text for text in turner.told)
+    assert max(v.elapsed for v in turner.views) > 29.0
+    again = rests(session)
+    assert not again.warnings
+    for live, recorded in zip(taken, again.averages, strict=True):
+        np.testing.assert_allclose(live.mean, recorded.mean, atol=1e-6)
+        np.testing.assert_allclose(live.sigma, recorded.sigma, rtol=0.1)
+    found = diagnose(session.block, session.about)
+    assert not {e.id for e in found.effects} & {"dropped", "bump", "stuck"}

@@ -1,0 +1,160 @@
+"""A window in pieces: what was calm before a disturbance is kept.
+
+A gust, a step beside the fixture or a moment without samples costs what it spoilt and
+no more, if the device lies afterwards as it lay before. Pieces agree if their means do,
+
+    |u_k - v_k| <= AGREES sqrt(s_k^2 + t_k^2)      on each channel k                (1)
+
+with the standard errors s and t of the pieces. Then they are one window, whose mean and
+error are those of all cells. If they do not, what was before is given up: no mean of
+two attitudes is the mean of either.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.errors import Moved
+from fieldcal.core.samples import Array, Block, Grain
+from fieldcal.windows.mean import Average
+from fieldcal.windows.window import LearnedNoise, Window
+
+SHORTEST = 3.0
+"""Length of a piece whose calm can be judged, s."""
+
+MARGIN = 0.5
+"""What a disturbance may have spoilt at least before it showed, s."""
+
+AGREES = 4.0
+"""Standard errors within which means agree; those of short pieces are known roughly."""
+
+
+class Pieces:
+    """The pieces of one window, the last of which fills.
+
+    Parameters
+    ----------
+    noise : learned in windows before
+    grain : what the device rounds to
+
+    Attributes
+    ----------
+    dropped : seconds that were given up because the device lay otherwise afterwards
+
+    """
+
+    def __init__(self, noise: LearnedNoise | None, grain: Grain) -> None:
+        self._noise, self._grain = noise, grain
+        self._kept: Window | None = None
+        self._gaps: list[tuple[float, float]] = []
+        self._now = Window(noise=noise, grain=grain)
+        self.dropped = 0.0
+
+    def add(self, block: Block) -> None:
+        """Take in the block that follows."""
+        self._now.add(block)
+
+    @property
+    def moved(self) -> Moved | None:
+        """The disturbance of the piece that fills, if there was one."""
+        return self._now.moved
+
+    @property
+    def meter(self) -> float:
+        """Motion in the last second as part of what is allowed: above 1 it moves."""
+        return self._now.meter
+
+    @property
+    def elapsed(self) -> float:
+        """Device time of all pieces so far, s."""
+        return (self._kept.seconds if self._kept else 0.0) + self._now.elapsed
+
+    @property
+    def sigma(self) -> Array:
+        """Standard error of the mean so far, (6,); nan in the first second."""
+        now = self._now.sigma
+        if self._kept is None:
+            return now
+        before = self._kept.sigma
+        both = 1 / np.sqrt(1 / before**2 + 1 / now**2)
+        return np.where(np.isfinite(both), both, before)
+
+    @property
+    def noise(self) -> LearnedNoise | None:
+        """What is known of the noise for the window after this one, if anything."""
+        return self._now.noise
+
+    @property
+    def without(self) -> list[tuple[float, float]]:
+        """Stretches between the pieces, s of device time."""
+        return list(self._gaps)
+
+    def done(self, target: float | None = None) -> str | None:
+        """As `Window.done`, of all pieces."""
+        if self._kept is None:
+            return self._now.done(target)
+        if target is None or not np.nanmax(self.sigma[:3]) <= target:
+            return None
+        return self._whole(self._kept, self._now).done(target)
+
+    def keep(self, moved: Moved) -> float:
+        """Keep what was calm before a disturbance; the seconds there are now.
+
+        Another piece begins with the next block.
+        """
+        piece, end = self._now, _before(moved)
+        self.dropped = 0.0
+        while piece.seconds > 0:
+            piece.cut(end)
+            again = piece.moved if piece.seconds >= SHORTEST else None
+            if again is None:
+                break
+            end = min(_before(again), end - MARGIN)
+        learned = piece.noise if piece.seconds >= SHORTEST else self._noise
+        if piece.seconds >= SHORTEST:
+            self._join(piece)
+        self._now = Window(noise=learned, grain=self._grain)
+        return self._kept.seconds if self._kept else 0.0
+
+    def average(self) -> Average | None:
+        """Mean of all pieces; None if those before lie otherwise and are given up.
+
+        Raises
+        ------
+        Moved
+            If the pieces are no window together.
+
+        """
+        self.dropped = 0.0
+        if self._kept is None:
+            return self._now.average()
+        self._join(self._now)
+        if not self.dropped:
+            return self._kept.average()
+        self._kept, self._gaps = None, []
+        return None
+
+    def _join(self, piece: Window) -> None:
+        """Add a piece; what was before it is given up if it does not agree."""
+        before = self._kept
+        if before is not None and self._agree(before, piece):
+            self._gaps.append((float(np.nextafter(before.end, np.inf)), piece.start))
+            self._kept = self._whole(before, piece)
+            return
+        self.dropped = before.seconds if before else 0.0
+        self._kept, self._gaps = piece, []
+
+    def _whole(self, before: Window, after: Window) -> Window:
+        return Window(noise=self._noise, grain=self._grain, pieces=(before, after))
+
+    @staticmethod
+    def _agree(before: Window, after: Window) -> bool:
+        spread = np.hypot(before.sigma, after.sigma)
+        off = np.abs(before.mean - after.mean)
+        known = np.isfinite(off) & np.isfinite(spread)
+        return bool((off[known] <= AGREES * spread[known]).all())  # (1)
+
+
+def _before(moved: Moved) -> float:
+    """Instant up to which a disturbance has spoilt nothing, s."""
+    return moved.at - max(MARGIN, moved.seconds)

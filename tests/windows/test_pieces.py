@@ -1,0 +1,100 @@
+"""Windows in pieces: what was calm counts, what lay otherwise does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block, Grain
+from fieldcal.windows import Pieces
+
+NOISE = np.array([0.02] * 3 + [2e-3] * 3)
+AT_REST = np.array([0.1, -9.8, 0.2, 1e-3, -2e-3, 3e-3])
+
+
+def rest(rng: np.random.Generator, start: float, seconds: float, off: Array) -> Block:
+    """White noise about where the device lies, 100 Hz."""
+    t = start + np.arange(round(100 * seconds)) / 100
+    six = AT_REST + off + NOISE * rng.standard_normal((len(t), 6))
+    return Block.of(t, six[:, :3], six[:, 3:])
+
+
+def fed(pieces: Pieces, block: Block) -> None:
+    for first in range(0, len(block), 40):
+        pieces.add(block[first : first + 40])
+        if pieces.moved:
+            return
+
+
+def gust(rng: np.random.Generator, start: float, seconds: float, push: float) -> Block:
+    """Rest, and then a push of 0.8 s."""
+    block = rest(rng, start, seconds + 0.8, np.zeros(6))
+    block.acc[-80:, 2] += push * np.sin(np.linspace(0, np.pi, 80))
+    return block
+
+
+def in_gusts(seed: int, off: Array | None = None) -> Pieces:
+    """Three pieces of 9, 9 and 12 s, the last one off by so much."""
+    rng = np.random.default_rng(seed)
+    pieces = Pieces(None, Grain())
+    for start in (0.0, 12.0):
+        fed(pieces, gust(rng, start, 9.0, 0.4))
+        moved = pieces.moved
+        assert moved is not None and start + 8.5 < moved.at < start + 9.9
+        pieces.keep(moved)
+    fed(pieces, rest(rng, 24.0, 12.0, np.zeros(6) if off is None else off))
+    return pieces
+
+
+def test_pieces_add_up_and_the_error_of_their_mean_holds() -> None:
+    pulls = []
+    for seed in range(16):
+        pieces = in_gusts(seed)
+        found = pieces.average()
+        if found is not None:
+            assert len(pieces.without) == 2
+            pulls.append((found.mean - AT_REST) / found.sigma)
+    assert len(pulls) >= 15, "chance alone gives up what was before"
+    spread = float(np.sqrt(np.mean(np.square(pulls))))
+    assert 0.85 < spread < 1.15, spread
+
+
+def test_what_is_left_out_is_between_the_pieces() -> None:
+    pieces = in_gusts(3)
+    found = pieces.average()
+    assert found is not None
+    (first, second) = pieces.without
+    assert 8.0 < first[0] < 9.4 and first[1] == pytest.approx(12.0)
+    assert 20.0 < second[0] < 21.4 and second[1] == pytest.approx(24.0)
+    assert found.start == 0.0 and found.end == pytest.approx(35.99)
+    clean = sum(b - a for a, b in ((0.0, first[0]), (12.0, second[0]), (24.0, 36.0)))
+    assert found.n == pytest.approx(100 * clean, abs=3)
+    white = NOISE / np.sqrt(found.n)
+    assert (0.6 * white < found.sigma).all() and (found.sigma < 1.8 * white).all()
+
+
+@pytest.mark.parametrize("channel", [1, 3])
+def test_a_device_that_lies_otherwise_afterwards_begins_again(channel: int) -> None:
+    """A tilt of a fortieth of a degree, or a bias that jumped: no mean of both."""
+    off = np.zeros(6)
+    off[channel] = 6 * NOISE[channel] / np.sqrt(900)
+    pieces = in_gusts(5, off)
+    assert pieces.average() is None and pieces.dropped > 15.0
+    assert not pieces.without
+    found = pieces.average()
+    assert found is not None and found.start == pytest.approx(24.0)
+
+
+def test_what_is_too_short_to_be_judged_is_not_kept() -> None:
+    rng = np.random.default_rng(1)
+    pieces = Pieces(None, Grain())
+    fed(pieces, gust(rng, 0.0, 2.0, 2.0))
+    moved = pieces.moved
+    if moved is None:  # so short a piece may not even show it
+        fed(pieces, gust(rng, 2.8, 1.0, 2.0))
+        moved = pieces.moved
+    assert moved is not None and pieces.keep(moved) == 0.0
+    fed(pieces, rest(rng, 10.0, 8.0, np.zeros(6)))
+    found = pieces.average()
+    assert found is not None and found.start == pytest.approx(10.0)
+    assert not pieces.without

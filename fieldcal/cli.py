@@ -17,6 +17,7 @@ from importlib import import_module
 from typing import Protocol, cast
 
 from fieldcal.commands import found
+from fieldcal.commands.spelling import spell_out
 
 COMMANDS = found()
 """Name, what it does, module."""
@@ -79,6 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
     # small matrices by the thousand: threads would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    spell_out()
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] not in COMMANDS:
         from fieldcal.core.version import __version__

@@ -24,6 +24,11 @@ class Remote:
 
     def __init__(self, path: Path | str) -> None:
         self._path = str(path)
+        if not hasattr(socket, "AF_UNIX"):
+            raise DeviceError(
+                "a virtual device needs a system with pseudo-terminals and unix"
+                " sockets, which this one lacks: use a device, or replay: a recording"
+            )
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._socket.settimeout(PATIENCE_S)
         try:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import importlib.util
 import json
 import math
+import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -139,6 +141,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command: run until told to stop, or interrupted."""
+    _check_system()
     from fieldcal.commands.signals import interruptible
     from fieldcal.sim_device.control import Control
     from fieldcal.sim_device.device import VirtualDevice
@@ -169,6 +172,15 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     return 0
+
+
+def _check_system() -> None:
+    """Refuse where a virtual device has nowhere to be."""
+    if importlib.util.find_spec("termios") is None or not hasattr(socket, "AF_UNIX"):
+        raise InputError(
+            "a virtual device needs a system with pseudo-terminals and unix sockets,"
+            " which this one lacks: use a device, or replay: a recording"
+        )
 
 
 def _link(args: argparse.Namespace, faults: LineFaults, rate: float) -> Link:

@@ -35,6 +35,9 @@ PATIENCE = 3.0
 REMIND = 60.0
 """Time at the same wrong place after which it is said again, s."""
 
+UNTURNED = 20.0
+"""Time that a person has to begin to turn before the operator is called, s."""
+
 LEAST = 10.0
 """Wait by the host's clock before a position is given up, s.
 
@@ -77,6 +80,7 @@ class PositionWait:
         self._units = units
         self._others = _others(hold, about)
         self._began: float | None = None
+        self._rested = self._turned = False
         self._start()
         self._last = self._last_host = np.nan
         self.waited = self.waited_host = 0.0
@@ -116,6 +120,8 @@ class PositionWait:
         self.waited = self._last - self._began
         self._stillness.add(block)
         self._resting.add(block, self._stillness.since)
+        self._turned |= self._rested and self._stillness.since is None
+        self._rested |= self._stillness.since is not None
         if self._resting.seconds > 0:
             self.f = force(self._resting.block.acc, self._about)
             self.where = self.arrival = self._judged(self.f)
@@ -191,6 +197,8 @@ class PositionWait:
         """
         since = self._last - self._told
         if self.reason.state is not WaitState.MISPLACED or since < REMIND:
+            return None
+        if not self._turned and self.waited < UNTURNED:
             return None
         again = np.isfinite(self._told)
         self._told = self._last

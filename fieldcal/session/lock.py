@@ -71,7 +71,7 @@ class SessionLock:
 def _user() -> str:
     try:
         return getuser()
-    except (KeyError, OSError):
+    except (KeyError, OSError, ImportError):
         return "?"
 
 
@@ -81,6 +81,6 @@ def _holder(owner: Path) -> str:
         held = json.loads(owner.read_text("utf-8"))
         minutes = max(0.0, time() - float(held["host_s"])) / 60
         who = f"process {held['pid']} of {held['user']} on {held['host']}"
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, ImportError):
         return "another process"
     return f"{who}, for {minutes:.0f} min,"

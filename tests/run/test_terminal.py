@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +14,11 @@ from fieldcal.drivers.driver import Health
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator.banner import drawable, large
-from fieldcal.run.operator.protocol import OperatorView, Phase
+from fieldcal.run.operator.box import FIRST, picture, pictures
+from fieldcal.run.operator.keyboard import Keyboard
+from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
+from fieldcal.run.operator.widgets import HALF, RULER, inclinometer
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
@@ -38,9 +42,37 @@ def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> OperatorView:
     return OperatorView(**(known | changes))  # type: ignore[arg-type]
 
 
-def screen(operator: ConsoleOperator, width: int = 80) -> str:
+SCREENS = Path(__file__).parent / "screens"
+
+
+class Keys(Keyboard):
+    """A keyboard at which nobody sits but a test."""
+
+    def __init__(self, *wishes: Wish) -> None:
+        self.wishes = list(wishes)
+
+    there = True
+
+    def pressed(self) -> Wish | None:
+        return self.wishes.pop(0) if self.wishes else None
+
+    def forget(self) -> None: ...
+
+
+def sized(width: int, height: int, *wishes: Wish) -> ConsoleOperator:
+    """A console of that size, at the second position of five."""
+    file = io.StringIO()
+    console = Console(file=file, width=width, height=height, force_terminal=True)
+    made = ConsoleOperator(
+        "fieldcal · five_position", FIVE, ManualMover(), console, keyboard=Keys(*wishes)
+    )
+    made.place(HOLD)
+    return made
+
+
+def screen(operator: ConsoleOperator, width: int = 80, height: int = 24) -> str:
     out = io.StringIO()
-    Console(file=out, width=width, height=24, color_system=None).print(
+    Console(file=out, width=width, height=height, color_system=None).print(
         operator.screen()
     )
     return out.getvalue()
@@ -174,3 +206,82 @@ def test_plain_lines_for_a_log() -> None:
     assert lines[0].startswith("position 2: turn to α = 22.5°")
     assert lines[1] == "! bumped" and lines[-1].startswith("position 2: taken, ± 3.00")
     assert len(lines) == 6
+
+
+@pytest.mark.parametrize("size", [(80, 24), (60, 20), (40, 15), (110, 40)])
+@pytest.mark.parametrize("phase", ["turning", "averaging"])
+def test_the_screen_is_as_kept(size: tuple[int, int], phase: Phase) -> None:
+    operator = sized(*size)
+    said = WaitReason() if phase == "averaging" else MISPLACED
+    operator.show(view(phase, 12.0, reason=said))
+    shown = [line.rstrip() for line in screen(operator, *size).splitlines()]
+    kept = SCREENS / f"{phase}-{size[0]}x{size[1]}.txt"
+    assert "\n".join(shown).rstrip() + "\n" == kept.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("size", [(80, 24), (76, 22), (60, 20), (40, 15)])
+@pytest.mark.parametrize("phase", ["turning", "averaging", "silent"])
+def test_on_any_screen_instruction_reason_and_keys_are_seen(
+    size: tuple[int, int], phase: Phase
+) -> None:
+    """However much is said: what to do stands first, the keys stand last."""
+    operator = sized(*size)
+    long = WaitReason(
+        WaitState.MISPLACED,
+        "α is turned the wrong way: the device is at α = -22.3°, β = 0.1°, asked for"
+        " is α = 22.5°, β = 0°",
+    )
+    operator.tell("disturbed 12.3 s into the window on ay: a 0.1 s push of +0.13 m/s²")
+    operator.show(view(phase, 10.0, reason=long))
+    lines = screen(operator, *size).splitlines()
+    text = " ".join(line.strip("│ ").rstrip() for line in lines)
+    assert len(lines) <= size[1] and max(map(len, lines)) <= size[0]
+    words = {"turning": "TURN TO", "averaging": "HOLD STILL", "silent": "NO SAMPLES"}
+    assert words[phase].replace(" ", "") in lines[0 if size[0] < 76 else 1].replace(
+        " ", ""
+    )
+    assert "α is turned the wrong way: the device" in " ".join(text.split())
+    keys = [i for i, line in enumerate(lines) if "q stop" in line]
+    assert keys and keys[-1] >= len(lines) - 2
+
+
+def test_the_scale_is_always_the_same() -> None:
+    """35 degrees off is drawn farther than 22, and a tick is where its label says."""
+    places = []
+    for off in (0.0, 2.0, 5.0, 15.0, 22.0, 35.0, 45.0, 90.0, 180.0):
+        drawn = inclinometer(0.0, off, 1.0, ok=False).plain
+        places.append(drawn.index("|") - drawn.index("o") if off else 0)
+    assert places == sorted(places) and len(set(places[3:7])) >= 2
+    assert places[-1] == HALF
+    bar = inclinometer(-45.0, 0.0, 1.0, ok=False).plain
+    assert RULER[bar.index("o") - 1 : bar.index("o") + 2] == "-45"
+    assert RULER.index("0") == bar.index("|")
+
+
+def test_leaving_out_is_asked_back() -> None:
+    operator = sized(80, 24, "skip", "skip")
+    assert operator.wish() is None
+    assert "press s once more to leave α = 22.5°, β = 0° out" in screen(operator)
+    assert operator.wish() == "skip"
+
+
+@pytest.mark.parametrize(
+    ("angle", "right_lower", "left_lower"), [(45.0, True, False), (-45.0, False, True)]
+)
+def test_the_box_is_drawn_turned_clockwise(
+    angle: float, right_lower: bool, left_lower: bool
+) -> None:
+    lowest = picture(angle)[-1]
+    dots = [i for i, letter in enumerate(lowest) if letter != chr(FIRST)]
+    middle = (len(lowest) - 1) / 2
+    assert (np.mean(dots) > middle) == right_lower
+    assert (np.mean(dots) < middle) == left_lower
+    assert "facing N" in pictures(FIVE[1])[-1]
+
+
+def test_a_terminal_without_the_letters_gets_no_drawing() -> None:
+    out = io.TextIOWrapper(io.BytesIO(), encoding="cp1252")
+    console = Console(file=out, width=80, height=24, force_terminal=True)
+    made = ConsoleOperator("t", FIVE, ManualMover(), console)
+    made.place(HOLD)
+    assert "facing N" not in screen(made)

@@ -190,6 +190,8 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     take(console, 2, 22.5, 0.0)
     asked(console, 3)
     console.child.send("s")
+    console.wait("press s once more")
+    console.child.send("s")
     asked(console, 4)
     console.child.send("q")
     assert console.finish() == 130

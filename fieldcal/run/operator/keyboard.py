@@ -8,10 +8,12 @@ stays what it is. What is no terminal has no keys.
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import os
 import select
 import sys
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from fieldcal.run.operator.protocol import Wish
 
@@ -24,7 +26,10 @@ KEYS: dict[str, Wish] = {
     "q": "stop",
 }
 
-HELP = "Enter confirm · r repeat · s skip · q stop"
+HELP = "keys: Enter confirm · r repeat · s skip · q stop"
+
+SHORT_HELP = "Enter ok · r again · s skip · q stop"
+"""The same for a screen of 40 characters."""
 
 
 class Keyboard:
@@ -33,40 +38,101 @@ class Keyboard:
     def __init__(self) -> None:
         terminal = sys.stdin  # None where there is no console at all
         usable = terminal is not None and not terminal.closed and terminal.isatty()
-        self._file = terminal.fileno() if usable else -1
-        self._before: list[Any] = []
+        self._keys: Keys | None = None
+        if usable:
+            windows = importlib.util.find_spec("termios") is None
+            self._keys = WindowsKeys() if windows else PosixKeys(terminal.fileno())
 
     @property
     def there(self) -> bool:
         """Whether anybody can press a key."""
-        return self._file >= 0
+        return self._keys is not None
 
     def __enter__(self) -> Self:
-        if self.there:
-            import termios
-            import tty
-
-            self._before = termios.tcgetattr(self._file)
-            tty.setcbreak(self._file)
+        if self._keys:
+            self._keys.open()
         return self
 
     def __exit__(self, *exc: object) -> None:
-        if self._before:
-            import termios
-
-            termios.tcsetattr(self._file, termios.TCSADRAIN, self._before)
+        if self._keys:
+            self._keys.close()
 
     def pressed(self) -> Wish | None:
         """What was asked for by the keys pressed since the last call: the last one."""
         wish: Wish | None = None
-        while self.there and select.select([self._file], [], [], 0)[0]:
-            data = os.read(self._file, 64)
-            if not data:
-                self._file = -1  # the terminal is gone
-            for character in data.decode(errors="replace").lower():
-                wish = KEYS.get(character, wish)
+        text = self._keys.read() if self._keys else ""
+        if text is None:
+            self._keys = None  # the terminal is gone
+        for character in (text or "").lower():
+            wish = KEYS.get(character, wish)
         return wish
 
     def forget(self) -> None:
         """Forget keys pressed by now: they were meant for what is over."""
         self.pressed()
+
+
+class Keys(Protocol):
+    """A terminal's keys, one by one."""
+
+    def open(self) -> None:
+        """Have keys passed on at once."""
+
+    def close(self) -> None:
+        """Set the terminal back."""
+
+    def read(self) -> str | None:
+        """What was pressed by now; None if the terminal is gone."""
+
+
+class PosixKeys:
+    """Keys of a file descriptor."""
+
+    def __init__(self, file: int) -> None:
+        self._file = file
+        self._before: list[Any] = []
+
+    def open(self) -> None:
+        """Have keys passed on at once."""
+        import termios
+        import tty
+
+        self._before = termios.tcgetattr(self._file)
+        tty.setcbreak(self._file)
+
+    def close(self) -> None:
+        """Set the terminal back."""
+        import termios
+
+        if self._before:
+            termios.tcsetattr(self._file, termios.TCSADRAIN, self._before)
+
+    def read(self) -> str | None:
+        """What was pressed by now; None if the terminal is gone."""
+        text = ""
+        while select.select([self._file], [], [], 0)[0]:
+            data = os.read(self._file, 64)
+            if not data:
+                return None
+            text += data.decode(errors="replace")
+        return text
+
+
+class WindowsKeys:
+    """Keys of the console that the process has."""
+
+    def __init__(self) -> None:
+        self._console = importlib.import_module("msvcrt")
+
+    def open(self) -> None:
+        """Its keys come at once anyway."""
+
+    def close(self) -> None:
+        """Nothing was changed."""
+
+    def read(self) -> str | None:
+        """What was pressed by now."""
+        text = ""
+        while self._console.kbhit():
+            text += self._console.getwch()
+        return text

@@ -12,8 +12,10 @@ from time import monotonic
 
 import numpy as np
 from rich.console import Console, Group, RenderableType
+from rich.layout import Layout
 from rich.live import Live
 from rich.panel import Panel
+from rich.table import Table
 from rich.text import Text
 
 from fieldcal.core.positions import Position
@@ -21,7 +23,8 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import Mover
 from fieldcal.run.operator import widgets
 from fieldcal.run.operator.banner import drawable, large
-from fieldcal.run.operator.keyboard import HELP, Keyboard
+from fieldcal.run.operator.box import pictures
+from fieldcal.run.operator.keyboard import HELP, SHORT_HELP, Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.widgets import alert
 from fieldcal.run.wait_reason import WaitReason, reminder
@@ -32,10 +35,16 @@ FRAMES = 8.0
 TALL = 32
 """Lines from which there is room for letters three lines tall."""
 
+SMALL = (76, 22)
+"""Columns and lines below which only what to do, why, how long and keys are shown."""
+
 TURN = "TURN TO"
 
 FEWEST = 3
 """Positions that are listed however little room there is."""
+
+ASKED_AGAIN = 5.0
+"""How long a second press of a key that gives something up is waited for, s."""
 
 
 class ConsoleOperator:
@@ -74,13 +83,15 @@ class ConsoleOperator:
         self._said_before: list[str] = []
         self._reminder = ""
         self._view: OperatorView | None = None
+        self._skips = -ASKED_AGAIN
         self._hold: Hold | None = None
         self._drawn = 0.0
         self._lines: set[str] = set()
         self._live: Live | None = None
         screen = self._console.is_terminal and not self._console.is_dumb_terminal
         if screen and not plain:
-            self._live = Live(console=self._console, auto_refresh=False)
+            # a screen of its own: what is resized leaves nothing of the last one behind
+            self._live = Live(console=self._console, auto_refresh=False, screen=True)
 
     def __enter__(self) -> ConsoleOperator:
         if self._keyboard:
@@ -130,6 +141,10 @@ class ConsoleOperator:
     def wish(self) -> Wish | None:
         """The key that was pressed, or the wish to wait for the mover."""
         pressed = self._keyboard.pressed() if self._keyboard else None
+        if pressed == "skip" and monotonic() - self._skips >= ASKED_AGAIN:
+            self._skips, pressed = monotonic(), None
+            name = self._hold.position.name if self._hold else "this position"
+            self.tell(f"press s once more to leave {name} out of the result")
         return pressed or ("wait" if self._mover.busy() else None)
 
     def show(self, view: OperatorView) -> None:
@@ -183,26 +198,67 @@ class ConsoleOperator:
             self._live.update(self.screen(), refresh=True)
 
     def screen(self) -> RenderableType:
-        """What is shown now."""
+        """What is shown now; as high as the terminal, so that nothing jumps."""
+        columns, rows = SMALL
+        if self._console.width < columns or self._console.height < rows:
+            return self._small()
         view, now = self._view, self._hold.index if self._hold else -1
         above: list[RenderableType] = [*self._instruction(), Text()]
         if view and self._hold is view.hold:
             above.append(widgets.gauges(view))
-        why = alert(view) if view else ""
-        said = [*self._said, self._reminder + why]
-        above += [Text(f"! {text}", style="bold yellow") for text in said if text]
-        above.append(Text())
+        above += [*self._sentences(), Text()]
         below: list[RenderableType] = []
         if view:
             below.append(widgets.link(view))
         if self._keyboard and self._keyboard.there:
-            below.append(Text(f"keys: {HELP}"))
+            below.append(Text(HELP))
         rows = max(FEWEST, self._console.height - 2 - self._lines_of(*above, *below))
         listed = widgets.listing(
             self._positions, self._taken, now, rows, self._verification
         )
-        whole = Group(*above, listed, *below)
-        return Panel(whole, title=Text(self._title), title_align="left")
+        drawn = self._drawing() if rows > FEWEST else []
+        beside = Table.grid(padding=(0, 3))
+        beside.add_row(listed, Text("\n".join(drawn[:rows])))
+        parts = Layout()
+        foot = self._lines_of(*below) if below else 0
+        parts.split_column(
+            Layout(Group(*above, beside), ratio=1),
+            Layout(Group(*below), size=max(1, foot), visible=bool(below)),
+        )
+        title, height = Text(self._title), self._console.height
+        return Panel(parts, title=title, title_align="left", height=height)
+
+    def _small(self) -> RenderableType:
+        """Instruction, reason, seconds and keys, and nothing else."""
+        view, hold = self._view, self._hold
+        words, detail, colour = self._words()
+        number = f"  {hold.index + 1}/{len(self._positions)}" if hold else ""
+        style = f"bold reverse {colour}".strip()
+        width = self._console.width
+        lines: list[RenderableType] = [Text(f" {words}{number}".ljust(width), style)]
+        name = hold.position.name if hold and words == TURN else detail
+        lines.append(Text(f" {name}".ljust(width), style))
+        if view and hold is view.hold:
+            lines += [Text(line) for line in widgets.short(view)]
+        lines += self._sentences()
+        now = hold.index if hold else -1
+        lines.append(Text(widgets.progress(self._taken, now, len(self._positions))))
+        parts = Layout()
+        parts.split_column(
+            Layout(Group(*lines), ratio=1), Layout(Text(SHORT_HELP), size=1)
+        )
+        return parts
+
+    def _sentences(self) -> list[RenderableType]:
+        """What must not be missed, and why it waits."""
+        why = alert(self._view) if self._view else ""
+        said = [*self._said, self._reminder + why]
+        return [Text(f"! {text}", style="bold yellow") for text in said if text]
+
+    def _drawing(self) -> list[str]:
+        """The box as it should stand, where the terminal has the letters."""
+        known = self._console.encoding.lower().startswith("utf")
+        return pictures(self._hold.position) if known and self._hold else []
 
     def _lines_of(self, *parts: RenderableType) -> int:
         """Count the lines that parts of the screen take within its frame."""

@@ -22,11 +22,14 @@ METER = 20
 BAR = 30
 """Width of the bar that fills while averaging, characters."""
 
-SCALE = 19
-"""Width of the inclinometer, characters; odd, as the middle is where it should be."""
+TICKS = (0.0, 2.0, 5.0, 15.0, 45.0, 180.0)
+"""How far off each second character of half the inclinometer is, deg: always alike."""
 
-SPANS = (2.0, 5.0, 10.0, 30.0, 90.0, 180.0)
-"""What half the inclinometer spans, deg: the narrowest that shows where it is."""
+HALF = 2 * (len(TICKS) - 1)
+"""Characters to either side of the middle, which is where it should be."""
+
+RULER = "  -45  -5  0   5  45  "
+"""What stands above the inclinometers, deg."""
 
 NEAR = 1.0
 """Off by less than this, deg, an angle is not asked to be turned."""
@@ -60,11 +63,10 @@ def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
 
     """
     off = round_to_tenth(wanted - seen)
-    span = next((s for s in SPANS if s >= abs(off)), SPANS[-1])
-    middle = SCALE // 2
-    place = int(np.clip(round(middle - off / span * middle), 0, SCALE - 1))
-    cells = ["·"] * SCALE
-    cells[middle], cells[place] = "|", "o"
+    away = 2 * float(np.interp(abs(off), TICKS, range(len(TICKS))))
+    place = HALF - int(np.copysign(np.ceil(away - 1e-9), off)) if off else HALF
+    cells = ["·"] * (2 * HALF + 1)
+    cells[HALF], cells[place] = "|", "o"
     within = f" ± {limit:.1f}°" if np.isfinite(limit) else ""
     there = ok or abs(off) < NEAR
     way = "→" if off > 0 else "←"
@@ -113,7 +115,10 @@ def gauges(view: OperatorView) -> Table:
     grid.add_column(width=9)
     grid.add_column()
     if view.phase in ("turning", "silent"):
-        for name, scale in angles(view):
+        scales = angles(view)
+        if scales:
+            grid.add_row("off, °", RULER)
+        for name, scale in scales:
             grid.add_row(name, scale)
         grid.add_row("status", "see below" if alert(view) else view.reason.text)
     else:
@@ -160,6 +165,39 @@ def listing(
         name = positions[i].name + (" (verification)" if i == verification else "")
         table.add_row(f"{i + 1}", name, state, style=style)
     return table
+
+
+def progress(taken: Mapping[int, float], now: int, number: int) -> str:
+    """Which positions are taken and which are left, in one line.
+
+    >>> progress({0: 1e-3, 1: 1e-3}, 2, 5)
+    'taken 1 2 · now 3 · left 4 5'
+    """
+    left = [i for i in range(number) if i not in taken and i != now]
+    parts = [f"taken {' '.join(str(i + 1) for i in sorted(taken))}"] if taken else []
+    parts += [f"now {now + 1}"] if now >= 0 else []
+    parts += [f"left {' '.join(str(i + 1) for i in left)}"] if left else []
+    return " · ".join(parts)
+
+
+def short(view: OperatorView) -> list[str]:
+    """What is measured now in a few short lines, for a small screen."""
+    if view.phase in ("averaging", "taken"):
+        left = max(0.0, view.hold.seconds - view.elapsed)
+        reached = f", ± {known}" if (known := sigma(view)) else ""
+        return [f"{left:.0f} s of {view.hold.seconds:.0f} s left{reached}"]
+    wanted, now = view.hold.position.degrees, view.arrival
+    lines = []
+    if now is not None and wanted is not None:
+        seen = (now.alpha_deg, now.beta_deg)
+        for name, there, asked in zip("αβ", seen, wanted, strict=True):
+            off = round_to_tenth(asked - there)
+            near = now.ok or abs(off) < NEAR
+            order = "ok" if near else f"turn {off:+.1f}°"
+            lines.append(
+                f"{name} {round_to_tenth(there):+.1f}° to {asked:+.1f}°  {order}"
+            )
+    return lines if alert(view) else [*lines, view.reason.text]
 
 
 def link(view: OperatorView) -> Text:

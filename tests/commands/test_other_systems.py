@@ -1,0 +1,125 @@
+"""Systems that lack what POSIX has, and terminals that lack letters."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from bench import five_positions
+
+from fieldcal.commands import spelling
+from fieldcal.run.operator.keyboard import WindowsKeys
+
+BARE = """
+import sys, signal, socket, os
+for name in ("termios", "tty", "pty", "fcntl", "resource", "grp", "pwd"):
+    sys.modules[name] = None
+for module, names in ((signal, ("SIGHUP",)), (socket, ("AF_UNIX",)),
+                      (os, ("openpty", "fork", "geteuid", "getuid", "setsid"))):
+    for name in names:
+        if hasattr(module, name):
+            delattr(module, name)
+import importlib.util
+found = importlib.util.find_spec
+def bare(name, package=None):
+    return None if sys.modules.get(name, 0) is None else found(name, package)
+importlib.util.find_spec = bare
+from fieldcal.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+"""A Python that has nothing of POSIX that Windows does not have."""
+
+
+def without_posix(*arguments: str, encoding: str = "cp1252") -> tuple[int, str, str]:
+    done = subprocess.run(
+        [sys.executable, "-c", BARE, *arguments],
+        capture_output=True,
+        env={
+            **os.environ,
+            "PYTHONIOENCODING": encoding,
+            "OPENBLAS_NUM_THREADS": "1",
+            "COLUMNS": "120",
+        },
+        check=False,
+    )
+    out, err = (s.decode(encoding) for s in (done.stdout, done.stderr))
+    return done.returncode, out, err
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return five_positions(tmp_path_factory.mktemp("bare") / "s")
+
+
+def test_what_needs_no_terminal_runs_without_posix(session: Path) -> None:
+    code, out, err = without_posix("solve", str(session))
+    assert code in (0, 1) and "Traceback" not in err and "broke" not in err
+    assert "acc bias x" in out and "m/s" in out
+    code, out, err = without_posix("diagnose", str(session))
+    assert code in (0, 1) and "broke" not in err and "probability" in out
+    code, out, err = without_posix("report", str(session))
+    assert code == 0 and "broke" not in err, err
+
+
+def test_a_run_starts_without_posix_and_plays_a_recording(
+    session: Path, tmp_path: Path
+) -> None:
+    url = f"replay:{session}/samples.parquet?speed=max"
+    code, _, err = without_posix(
+        "run", "two_position", "--device", url, "--headless",
+        "--patience", "0", "-o", str(tmp_path / "r"),
+    )  # fmt: skip
+    assert "broke" not in err and "Traceback" not in err, err
+    assert code in (0, 1, 3)
+    assert '"event": "place"' in err
+
+
+def test_a_virtual_device_says_what_it_lacks() -> None:
+    code, _, err = without_posix("sim", "--serial", "witmotion")
+    assert code == 2 and "pseudo-terminals and unix sockets" in err
+    code, _, err = without_posix("run", "two_position", "--virtual", "--headless")
+    assert code == 3 and "which this one lacks" in err
+
+
+class Console:
+    """What msvcrt is of a console on which some keys were pressed."""
+
+    def __init__(self, keys: str) -> None:
+        self.keys = list(keys)
+
+    def kbhit(self) -> bool:
+        return bool(self.keys)
+
+    def getwch(self) -> str:
+        return self.keys.pop(0)
+
+
+def test_keys_of_a_windows_console(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "msvcrt", Console("xr"))
+    keys = WindowsKeys()
+    keys.open()
+    assert keys.read() == "xr" and keys.read() == ""
+    keys.close()
+
+
+def test_letters_that_a_terminal_lacks_are_spelled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out = io.TextIOWrapper(io.BytesIO(), encoding="cp1252")
+    plain = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setattr(sys, "stderr", plain)
+    spelling.spell_out()
+    for stream in (out, plain):
+        stream.write("α = 22.5° ± 0.1° → β, χ² ≤ 3 σ ╭─┐ █")
+        stream.flush()
+    assert out.buffer.getvalue().decode("cp1252") == (
+        "alpha = 22.5° ± 0.1° -> beta, chi² <= 3 sigma +-+ #"
+    )
+    assert plain.buffer.getvalue() == (
+        b"alpha = 22.5 deg +- 0.1 deg -> beta, chi^2 <= 3 sigma +-+ #"
+    )

@@ -364,7 +364,7 @@ class Engine:
                 self._recorder.mark("repeated", position=hold.index)
                 return False
             self._display.averaging(hold, pieces)
-            if pieces.elapsed >= hold.seconds or pieces.done(hold.sigma):
+            if pieces.full(hold.seconds) or pieces.done(hold.sigma):
                 break
         self._confirm(watch)
         return True

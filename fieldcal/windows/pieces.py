@@ -116,33 +116,47 @@ class Pieces:
         self._now = Window(noise=learned, grain=self._grain)
         return self._kept.seconds if self._kept else 0.0
 
+    def full(self, seconds: float) -> bool:
+        """Whether there are so many s, the last piece long enough to be judged."""
+        short = self._kept is not None and self._now.elapsed < SHORTEST
+        return self.elapsed >= seconds and not short
+
     def average(self) -> Average | None:
         """Mean of all pieces; None if those before lie otherwise and are given up.
 
         Raises
         ------
         Moved
-            If the pieces are no window together.
+            If the only piece was disturbed.
 
         """
         self.dropped = 0.0
         if self._kept is None:
             return self._now.average()
-        self._join(self._now)
-        if not self.dropped:
-            return self._kept.average()
+        before = self._kept
+        whole = self._together(before, self._now)
+        if whole is not None:
+            self._gaps.append(_between(before, self._now))
+            return whole.average()
+        self.dropped = before.seconds
         self._kept, self._gaps = None, []
         return None
 
     def _join(self, piece: Window) -> None:
         """Add a piece; what was before it is given up if it does not agree."""
         before = self._kept
-        if before is not None and self._agree(before, piece):
-            self._gaps.append((float(np.nextafter(before.end, np.inf)), piece.start))
-            self._kept = self._whole(before, piece)
+        whole = self._together(before, piece) if before else None
+        if before is not None and whole is not None:
+            self._gaps.append(_between(before, piece))
+            self._kept = whole
             return
         self.dropped = before.seconds if before else 0.0
         self._kept, self._gaps = piece, []
+
+    def _together(self, before: Window, after: Window) -> Window | None:
+        """Two pieces as one window; None if they are none."""
+        whole = self._whole(before, after)
+        return whole if self._agree(before, after) and whole.moved is None else None
 
     def _whole(self, before: Window, after: Window) -> Window:
         return Window(noise=self._noise, grain=self._grain, pieces=(before, after))
@@ -153,6 +167,11 @@ class Pieces:
         off = np.abs(before.mean - after.mean)
         known = np.isfinite(off) & np.isfinite(spread)
         return bool((off[known] <= AGREES * spread[known]).all())  # (1)
+
+
+def _between(before: Window, after: Window) -> tuple[float, float]:
+    """From behind the last sample of a piece to the first of the next, s."""
+    return float(np.nextafter(before.end, np.inf)), after.start
 
 
 def _before(moved: Moved) -> float:

@@ -98,3 +98,16 @@ def test_what_is_too_short_to_be_judged_is_not_kept() -> None:
     found = pieces.average()
     assert found is not None and found.start == pytest.approx(10.0)
     assert not pieces.without
+
+
+def test_what_is_no_window_together_is_given_up_and_ends() -> None:
+    """The last piece counts once, however often the mean is asked for."""
+    off = np.zeros(6)
+    off[1] = 40 * NOISE[1] / np.sqrt(900)
+    pieces = in_gusts(7, off)
+    before = pieces.elapsed
+    assert pieces.average() is None
+    assert pieces.elapsed < before and pieces.elapsed == pytest.approx(12.0, abs=0.1)
+    assert not pieces.full(30.0) and pieces.full(11.0)
+    found = pieces.average()
+    assert found is not None and found.n == pytest.approx(1200, abs=2)

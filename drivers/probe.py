@@ -9,6 +9,7 @@ from typing import NamedTuple
 from fieldcal.core.errors import DeviceError
 from fieldcal.drivers.codec import codec_class, formats, recognise
 from fieldcal.drivers.mavlink_heard import detect_autopilot
+from fieldcal.drivers.reader import ByteSource
 from fieldcal.drivers.serial_imu import open_port
 
 SILENT = 2
@@ -22,6 +23,11 @@ OPEN = (
 
 ENOUGH = 4000
 """Bytes after which a format shows."""
+
+
+AT_ONCE, OLD = 0.003, 0.3
+"""Bytes that are there within the first time, s, had come before we listened; they are
+read for at most the second time, s: a quick device always has some."""
 
 
 class DetectedDevice(NamedTuple):
@@ -79,8 +85,15 @@ def probe(
     return DetectedDevice(port, "", "", 0, 0.0, says)
 
 
-def _told(port: str, baud: int, data: bytes, took: float) -> DetectedDevice | None:
-    """Say whose bytes these are; None if that is not known."""
+def _told(
+    port: str, baud: int, data: bytes, took: float, old: int = 0
+) -> DetectedDevice | None:
+    """Say whose bytes these are; None if that is not known.
+
+    The first `old` of them had waited in the port, so they tell nothing of the rate;
+    the others came in `took` s.
+    """
+    took *= len(data) / max(1, len(data) - old)
     if known := recognise(data, took):
         name, like = known
         query = f"&{like.query}" if like.query else ""
@@ -107,11 +120,21 @@ def _answer(
     """Bytes of a port, and whose they are; it stays open until that is known."""
     link = open_port(port, baud)
     try:
-        data, begin = bytearray(), monotonic()
-        took = 0.0
-        while took < seconds and not (len(data) > ENOUGH and took > seconds / 4):
+        data = _waiting(link)
+        old, took, begin = len(data), 0.0, monotonic()
+        while took < seconds and not (len(data) > old + ENOUGH and took > seconds / 4):
             data += link.read()
             took = monotonic() - begin
-        return bytes(data), _told(port, baud, bytes(data), took)
+        return bytes(data), _told(port, baud, bytes(data), took, old)
     finally:
         link.close()
+
+
+def _waiting(link: ByteSource) -> bytearray:
+    """What had come before we listened, such as all that a pty keeps for nobody."""
+    data, begin = bytearray(), monotonic()
+    while (asked := monotonic()) - begin < OLD:
+        data += link.read()
+        if monotonic() - asked > AT_ONCE:
+            break
+    return data

@@ -40,6 +40,32 @@ def test_the_rate_is_that_of_the_samples_in_the_time_it_listened() -> None:
     )
 
 
+def test_what_had_waited_in_the_port_is_no_rate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A pty keeps what was said before anybody listened, and says it all at once."""
+    pieces = iter(STREAMS["mip"](1000, np.random.default_rng(1)).pieces)
+    now = [0.0]
+
+    class Backlog:
+        waits = 40
+
+        def read(self) -> bytes:
+            if self.waits:
+                self.waits -= 1
+            else:
+                now[0] += 1 / 48
+            return next(pieces)
+
+        def close(self) -> None:
+            return
+
+    monkeypatch.setattr(module, "monotonic", lambda: now[0])
+    monkeypatch.setattr(module, "open_port", lambda port, baud: Backlog())
+    found = probe("/dev/x", 1.0, [115200])
+    assert found.rate_hz == pytest.approx(48, rel=0.05)
+
+
 def packets(*names: str) -> Say:
     """An autopilot's heartbeats, every tenth of what it says, and these messages."""
     dialect = pytest.importorskip("pymavlink.dialects.v20.all")

@@ -49,6 +49,21 @@ def sums(data: Bytes, starts: Index, ends: Index) -> Bytes:
     return total
 
 
+def sums16(data: Bytes, starts: Index, ends: Index) -> Words:
+    """Sum of the bytes of each stretch modulo 65536, (m,), (1).
+
+    >>> sums16(np.array([1, 2, 255, 3], np.uint8), np.array([0, 1]), np.array([3, 4]))
+    array([258, 260], dtype=uint16)
+    """
+    if not len(starts):
+        return np.empty(0, np.uint16)
+    edges = np.column_stack([starts, ends]).ravel()
+    padded = np.append(data, np.uint8(0)).astype(np.uint16)
+    total: Words = np.add.reduceat(padded, edges, dtype=np.uint16)[::2]  # (1)
+    total[starts == ends] = 0
+    return total
+
+
 def fletcher(data: Bytes, starts: Index, ends: Index) -> tuple[Bytes, Bytes]:
     """Fletcher's two sums of each stretch modulo 256, (m,) each, (1), (2).
 

@@ -217,7 +217,39 @@ def ubx(n: int, rng: np.random.Generator) -> Stream:
     return Stream("", pieces, Block.of(np.arange(n) / 100, acc, gyr, degrees / 100))
 
 
+ILABS_G = 9.8106
+ILABS = {0x01: "<I", 0x3C: "<H", 0x23: "<3i", 0x21: "<3i", 0x26: "<7b", 0x52: "<h"}
+
+
+def ilabs(*values: tuple[int, tuple[int, ...]]) -> bytes:
+    """An InertialLabs packet of (identifier, numbers)."""
+    names = bytes([len(values), *(name for name, _ in values)])
+    data = names + b"".join(struct.pack(ILABS[n], *v) for n, v in values)
+    body = bytes([0x01, 0x95]) + struct.pack("<H", len(data) + 6) + data
+    return b"\xaa\x55" + body + struct.pack("<H", sum(body) % 65536)
+
+
+def inertiallabs(n: int, rng: np.random.Generator) -> Stream:
+    """InertialLabs packets at 100 Hz across the end of a week."""
+    raw, degrees = rng.integers(-(2**24), 2**24, (n, 6)), rng.integers(-400, 900, n)
+    pieces = [
+        ilabs(
+            (0x01, ((604_799_500 + 10 * i) % 604_800_000,)),
+            (0x3C, (2300,)),
+            (0x23, tuple(raw[i, :3].tolist())),
+            (0x21, tuple(raw[i, 3:].tolist())),
+            (0x26, (1, -2, 3, 0, 0, 0, 0)),
+            (0x52, (int(degrees[i]),)),
+        )
+        for i in range(n)
+    ]
+    acc, gyr = raw[:, :3] * 1e-6 * ILABS_G, np.deg2rad(raw[:, 3:] * 1e-5)
+    t = 604_799.5 + np.arange(n) / 100
+    return Stream("", pieces, Block.of(t, acc, gyr, degrees / 10))
+
+
 STREAMS: dict[str, Callable[[int, np.random.Generator], Stream]] = {
+    "inertiallabs": inertiallabs,
     "mip": mip,
     "text": text,
     "ubx": ubx,

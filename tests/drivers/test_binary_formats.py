@@ -11,6 +11,7 @@ from wires import (
     G,
     crc16_xmodem,
     fletcher,
+    ilabs,
     mip_packet,
     mtdata2,
     ubx_message,
@@ -265,3 +266,21 @@ def test_a_signalling_nan_is_a_missing_value_and_no_warning() -> None:
     block = open_codec("xsens", Options("serial")).feed(message, 0.0)
     assert block is not None
     np.testing.assert_array_equal(block.acc, [[np.nan, 1.0, 2.0]])
+
+
+def test_inertiallabs_reads_up_to_a_value_that_it_does_not_know() -> None:
+    acc = (0x23, (0, -1_000_000, 0))
+    whole = ilabs((0x01, (5,)), acc, (0x21, (100_000, 0, 0)))
+    # an identifier nobody knows in place of the rates: as long, and of unknown length
+    data = bytearray(whole)
+    data[9] = 0xEE
+    data[-2:] = struct.pack("<H", sum(data[2:-2]) % 65536)
+    for packet, known in ((whole, True), (bytes(data), False)):
+        block = fed(codec("inertiallabs"), packet)
+        np.testing.assert_allclose(block.acc, [[0.0, -9.8106, 0.0]])
+        assert np.isfinite(block.gyr).all() == known
+    assert open_codec("inertiallabs", Options("serial")).feed(whole[:-1], 0.0) is None
+    broken = whole[:-1] + bytes([whole[-1] ^ 1])
+    decoder = codec("inertiallabs")
+    decoder.feed(broken + whole[:8], 0.0)
+    assert decoder.health.samples == 0 and decoder.health.bad == 1

@@ -34,6 +34,7 @@ from fieldcal.solve import solve
 from fieldcal.windows import average
 
 LINES = {
+    "inertiallabs": ("--serial inertiallabs", "serial:{}?format=inertiallabs"),
     "mip": ("--serial mip", "serial:{}?format=mip"),
     "text": ("--serial text?checksum=xor", "serial:{}?format=text&checksum=xor"),
     "ubx": ("--serial ubx", "serial:{}?format=ubx"),

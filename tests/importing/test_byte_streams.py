@@ -13,7 +13,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.wire import open_wire
 
-BINARY = ("witmotion", "vectornav", "mip", "xsens", "ubx")
+BINARY = ("witmotion", "vectornav", "mip", "xsens", "ubx", "inertiallabs")
 RATE = 50.0
 SAYING = b"booting, please wait\r\n" * 400
 

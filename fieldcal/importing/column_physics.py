@@ -23,6 +23,12 @@ GROWS = 0.999
 
 EACH = "xyz"
 
+NOISY = 0.1
+"""Part of gravity that its own noise is not."""
+
+LEAST_COUNTS = 1000.0
+"""Counts in a g by which an accelerometer is told without turns."""
+
 Three = tuple[int, int, int]
 
 
@@ -56,7 +62,8 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     times = [i for i in _growing(table) if i not in known]
     if "t" not in channels.values():
         clocks = [i for i in times if not _counts(table[:, i])]
-        if len(clocks) == 1:
+        if clocks:
+            # a thermometer may only grow as well, but the time stands first
             channels[clocks[0]] = "t"
     t = next((i for i, name in channels.items() if name == "t"), None)
     clock: Array = np.arange(len(table), dtype=float) if t is None else table[:, t]
@@ -114,7 +121,7 @@ def _threes(free: Sequence[int], names: Sequence[str]) -> list[Three]:
             stem = f"{matched.group(1)}|{matched.group(3)}"
             stems.setdefault(stem, {})[matched.group(2)] = i
     whole = [(s["x"], s["y"], s["z"]) for s in stems.values() if len(s) == len(EACH)]
-    if whole:
+    if whole and len({names[i] for i in free}) == len(free):
         return whole
     beside = zip(free, free[1:], free[2:], strict=False)
     side = [(a, b, c) for a, b, c in beside if c == a + 2]
@@ -143,6 +150,8 @@ def _pair(
         return turning[0], "gravity turns in the first three as the other three say"
     if turning:
         return None
+    # of counts, any length is one: without a turn they are asked about
+    usual = [three for three in usual if _plain(sizes[three])]
     if len(usual) == 1:
         pairs = [p for p in permutations({*forces, *rates}, 2) if p[0] == usual[0]]
         apart = [rate for _, rate in pairs if not set(rate) & set(usual[0])]
@@ -152,8 +161,23 @@ def _pair(
     return None
 
 
+def _scattered(values: Array, size: float) -> bool:
+    """Whether values (n, 3) differ from row to row by much of a length: noise alone."""
+    if physics.are_means(values):
+        return False
+    differ = np.abs(np.diff(values, axis=0))
+    return bool(np.nanmedian(differ, axis=0).max() > NOISY * size)
+
+
 def _is_round(gravity: physics.Gravity | None) -> bool:
     return gravity is not None and gravity.round
+
+
+def _plain(gravity: physics.Gravity | None) -> bool:
+    """Whether a length is gravity in a unit, or in counts of an 16-bit sensor."""
+    within = physics.ACC_OUT[0]
+    fits = physics.fitting(gravity.size, physics.ACC_SCALES, within) if gravity else []
+    return any(fit.lsb == 1 or fit.lsb >= LEAST_COUNTS for fit in fits)
 
 
 def _even(clock: Array) -> Array:
@@ -166,8 +190,9 @@ def _even(clock: Array) -> Array:
 
 def _gravity(table: Array, three: Three) -> physics.Gravity | None:
     """What three columns read at rest, if it is gravity in a usual unit."""
-    found = physics.gravity_in(table[:, list(three)])
-    if found is None:
+    values = table[:, list(three)]
+    found = physics.gravity_in(values)
+    if found is None or _scattered(values, found.size):
         return None
     within = physics.ACC_OUT[not found.round]
     return found if physics.fitting(found.size, physics.ACC_SCALES, within) else None

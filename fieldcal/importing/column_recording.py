@@ -17,8 +17,8 @@ from fieldcal.importing.means import Scatter, scatter_columns
 from fieldcal.importing.physical_units import are_means, gravity_in, rate_in
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 
-SLOWEST = 5.0
-"""Lowest rate, Hz, that turns can be told by."""
+SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
+"""Rates of logs, Hz."""
 
 
 class Heading(NamedTuple):
@@ -211,12 +211,12 @@ class ColumnRecording(Recording):
         reads = rate_in(np.arange(len(table)) / 100.0, acc, gyr, gravity)
         if reads is None:
             return {}
+        fits = {"rad/s": 1.0, "deg/s": float(np.rad2deg(1.0)), "mrad/s": 1e3}
         if wanted.gyr_unit:
             fits = {wanted.gyr_unit: 1 / wanted.gyr_scale}
-        else:
-            fits = {"rad/s": 1.0, "deg/s": float(np.rad2deg(1.0))}
         rates = {unit: 100 * reads / one for unit, one in fits.items()}
-        return {unit: rate for unit, rate in rates.items() if rate >= SLOWEST}
+        sane = {u: rate for u, rate in rates.items() if SLOWEST <= rate <= FASTEST}
+        return dict(sorted(sane.items(), key=lambda one: abs(np.log(one[1] / USUAL))))
 
 
 def _has_time(wanted: ReadOptions) -> bool:

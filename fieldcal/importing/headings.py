@@ -81,9 +81,9 @@ class HeadingMatch:
         return replace(
             wanted,
             columns=self.columns,
-            acc_unit=units.get("a") or "",
-            gyr_unit=units.get("g") or "",
-            time_unit=units.get("t") or "",
+            acc_unit=units.get("a") or wanted.acc_unit,
+            gyr_unit=units.get("g") or wanted.gyr_unit,
+            time_unit=units.get("t") or wanted.time_unit,
             temp_unit=wanted.temp_unit or ("degC" if units.get("temperature") else ""),
             named=frozenset(by_name),
         )

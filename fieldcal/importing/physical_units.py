@@ -22,11 +22,14 @@ from fieldcal.core.samples import Array
 FEWEST = 50
 """Rows that tell anything."""
 
-FEWEST_MEANS, MOST_MEANS = 3, 2000
+FEWEST_MEANS, MOST_MEANS = 3, 200
 """Rows of a table of means, one for each position."""
 
 APART = np.deg2rad(10.0)
 """Angle between successive rows that samples do not have, rad."""
+
+_ALIKE = 0.15
+"""Part by which lengths of means in a table of them differ."""
 
 _GROUP = 8
 """Rows of which the mean is taken for (1)."""
@@ -36,6 +39,9 @@ _QUIET = 0.3
 
 _ROUND = 0.03
 """Departure from a sphere, over its radius, of means that lie on one."""
+
+_STEPS = 30
+"""Steps to the middle of a sphere of a known radius."""
 
 _WIDE = 0.05
 """Least share of the directions' variance along any axis, for a sphere."""
@@ -144,6 +150,9 @@ def are_means(acc: Array) -> bool:
     length = np.linalg.norm(acc, axis=1)
     if not FEWEST_MEANS <= len(acc) <= MOST_MEANS or not length.all():
         return False
+    usual = float(np.median(length))
+    if np.quantile(np.abs(length / usual - 1), 0.8) > _ALIKE:
+        return False
     up = acc / length[:, None]
     turned = np.arccos(np.clip((up[1:] * up[:-1]).sum(axis=1), -1, 1))
     return bool(np.median(turned) > APART)
@@ -156,9 +165,15 @@ def gravity_in(acc: Array) -> Gravity | None:
         return _gravity_of(acc)
     if len(acc) < FEWEST:
         return None
+    return _gravity_of(_quiet_means(acc))
+
+
+def _quiet_means(acc: Array) -> Array:
+    """Means (m, 3) of the quietest groups of rows."""
     groups = acc[: len(acc) // _GROUP * _GROUP].reshape(-1, _GROUP, 3)
     means, spread = groups.mean(axis=1), groups.std(axis=1).max(axis=1)
-    return _gravity_of(means[spread <= np.quantile(spread, _QUIET)])
+    quiet: Array = means[spread <= np.quantile(spread, _QUIET)]
+    return quiet
 
 
 def _gravity_of(quiet: Array) -> Gravity | None:
@@ -168,6 +183,28 @@ def _gravity_of(quiet: Array) -> Gravity | None:
         return Gravity(radius, center, True)
     size = float(np.median(np.linalg.norm(quiet, axis=1)))
     return Gravity(size, np.zeros(3), False) if size else None
+
+
+def with_length(acc: Array, size: float) -> Gravity | None:
+    """Gravity of a known length, with the offset that rests show; None if they do not.
+
+    Rests in few directions lie on many spheres, but on one of a known radius.
+    """
+    acc = acc[np.isfinite(acc).all(axis=1)]
+    if len(acc) < FEWEST:
+        return None
+    x = _quiet_means(acc)
+    center = x.mean(axis=0)
+    for _ in range(_STEPS):
+        away = x - center
+        length = np.maximum(np.linalg.norm(away, axis=1), 1e-12)
+        out = away / length[:, None]
+        center = center + np.linalg.lstsq(out, length - size, rcond=1e-3)[0]
+    length = np.linalg.norm(x - center, axis=1)
+    spread = float(np.linalg.norm(x.std(axis=0)))
+    if spread < size / 2 or np.quantile(np.abs(length / size - 1), 0.9) > _ROUND:
+        return None
+    return Gravity(size, center, True)
 
 
 def _sphere(points: Array) -> tuple[Array, float]:

@@ -139,14 +139,17 @@ class _Guess:
         self.found: dict[str, str] = {}
         self.acc_bias: list[float] | None = None
         self.doubts: list[str] = []
-        self._name, self.said = name, said
+        self._name, self.said, self._read = name, said, said
         if not (said.time_unit or said.rate_hz):
             self._time(block.t)
         gravity = physics.gravity_in(block.acc)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
         if gravity and not said.acc_unit and said.acc_lsb == 1:
-            self._acceleration(gravity)
+            self._acceleration(gravity, block.acc)
+        elif gravity and said.acc_lsb != 1:
+            gravity = physics.with_length(block.acc, G0) or gravity
+        if gravity and self.said.acc_lsb != 1:
             self._offset(gravity)
         if not said.gyr_unit and said.gyr_lsb == 1:
             self._rates(block, gravity)
@@ -182,10 +185,11 @@ class _Guess:
                 [f"--time-unit {u}" for u in fits],
             )
 
-    def _acceleration(self, gravity: Gravity) -> None:
+    def _acceleration(self, gravity: Gravity, acc: Array) -> None:
         fits = physics.fitting(
             gravity.size, physics.ACC_SCALES, physics.ACC_OUT[not gravity.round]
         )
+        fits = _as_written(fits, acc)
         shows = f"|a| at rest is {gravity.size:.4g}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
@@ -201,8 +205,9 @@ class _Guess:
 
     def _offset(self, gravity: Gravity) -> None:
         if (np.abs(gravity.offset) > OFFSET * gravity.size).any():
-            reads = " ".join(f"{number:.5g}" for number in gravity.offset)
-            self.acc_bias = [round(b * self.said.acc_scale, 4) for b in gravity.offset]
+            counts = gravity.offset / self._read.acc_scale
+            reads = " ".join(f"{number:.5g}" for number in counts)
+            self.acc_bias = [round(b * self.said.acc_scale, 4) for b in counts]
             self.found["acc_bias"] = f"{reads} counts: the sphere lies about it"
 
     def _rates(self, block: Block, gravity: Gravity | None) -> None:
@@ -225,6 +230,7 @@ class _Guess:
         fits = physics.fitting(
             reads, physics.GYR_SCALES, physics.GYR_OUT[not gravity.round]
         )
+        fits = _as_written(fits, block.gyr)
         if self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
             # who writes one sensor's registers as they are, writes the other's so too
             fits = counts
@@ -311,6 +317,13 @@ class _Guess:
 
     def _ask(self, what: str, answers: list[str]) -> None:
         raise InputError(f"{self._name}: {what}: add {' or '.join(answers)}")
+
+
+def _as_written(fits: list[Scale], values: Array) -> list[Scale]:
+    """Scales without counts, where values are no whole numbers and others do."""
+    known = values[np.isfinite(values)]
+    plain = [fit for fit in fits if fit.lsb == 1]
+    return plain if plain and (known != np.round(known)).any() else fits
 
 
 def _unusual(gyr: Array) -> list[str]:

@@ -117,7 +117,8 @@ def judge(log: Log, got: Outcome) -> str:
     if got.code == 2:
         return "refused"
     if got.wrong:
-        return "wrong, guessed" if got.guessed else "wrong in silence"
+        said = got.guessed or "as you say, but" in got.text
+        return "wrong, and said" if said else "wrong in silence"
     return "right"
 
 

@@ -22,6 +22,8 @@ from fieldcal.importing.validation import RowValidator, SampleWriter, digest
 from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
 from fieldcal.windows.cells import Cells
+from fieldcal.windows.spikes import without_spikes
+from fieldcal.windows.stretch_ends import reasons
 from fieldcal.windows.stretches import still_stretches_of_file, summary
 
 LONG = 5.0
@@ -216,7 +218,7 @@ def _fill(
             good = judge.good(block)
             if len(good):
                 facts.add(good)
-                cells.add(good)
+                cells.add(without_spikes(good))
                 rows.add(summary(cells.take_complete()))
                 written.add(good)
         if not facts.rows:
@@ -226,6 +228,7 @@ def _fill(
         rest = cells.table
         rows.add(summary(rest))
         stretches = still_stretches_of_file(rows, rest.origin, written.between, still)
+        ends = reasons(rows, rest.origin, stretches)
         rests = np.array([_mean_of(written.between(*span)) for span in stretches])
     repairs = [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
@@ -235,6 +238,12 @@ def _fill(
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
     recording.says += [step.sentence() for step in clock.steps]
     marks = _marks(recording, stream, facts, repairs, clock.steps)
+    marks += "".join(
+        mark_line(
+            {"event": "still", "start_s": s, "end_s": e, "began": began, "ended": ended}
+        )
+        for (s, e), (began, ended) in zip(stretches, ends, strict=True)
+    )
     (part / MARKS).write_text(marks, "utf-8")
     says = [*repairs, *recording.says]
     return facts, stretches, says, rests.reshape(-1, 3)

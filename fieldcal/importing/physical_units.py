@@ -306,7 +306,7 @@ def time_units(t: Array) -> list[str]:
     if both := [u for u in usual if u in day]:
         return both
     span = float(steps.sum())
-    return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST]
+    return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST] or usual
 
 
 def temperature_fits(values: Array) -> Mapping[str, float]:

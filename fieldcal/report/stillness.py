@@ -7,6 +7,9 @@ y are means over 0.1 s. At rest r is about 1; a turn takes it to hundreds.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Block
@@ -54,7 +57,26 @@ def stillness(material: Material) -> Section | None:
     parts: list[blocks.Block] = [Figure(chart, caption)]
     if material.still is not None:
         parts.append(_windows(material, material.still))
+    found = [mark for mark in material.marks if mark.get("event") == "still"]
+    if found:
+        parts.append(_found(material, found))
     return Section("stillness", "Stillness", tuple(parts))
+
+
+def _found(material: Material, marks: Sequence[Mapping[str, Any]]) -> blocks.Table:
+    """Still stretches that an import found, and why they begin and end there."""
+    rows: list[list[str | Cell]] = [
+        [
+            str(i),
+            f"{float(mark['start_s']) - material.epoch:.1f}",
+            f"{float(mark['end_s']) - material.epoch:.1f}",
+            str(mark["began"]),
+            str(mark["ended"]),
+        ]
+        for i, mark in enumerate(marks, 1)
+    ]
+    columns = ("", ">from, s", ">to, s", "before it", "behind it")
+    return table("Still stretches that the import found", columns, rows)
 
 
 def motion_by_second(cells: CellTable) -> tuple[Array, Array]:

@@ -19,6 +19,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows.cells import CELL, Cells, CellTable, hold_last
 from fieldcal.windows.limits import StillnessLimits
+from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.verdict import judge
 
 _SPAN = 10
@@ -87,7 +88,7 @@ def still_stretches(
     def between(start: float, end: float) -> list[Block]:
         return [block.between(start, end)]
 
-    cells = Cells()
+    block, cells = without_spikes(block), Cells()
     cells.add(block)
     table = cells.table
     return still_stretches_of_file(summary(table), table.origin, between, min_seconds)
@@ -279,7 +280,7 @@ def _passing(
     sums, times = Cells(), [np.nan, np.nan]
     for block in between(start, end):
         if len(block):
-            sums.add(block)
+            sums.add(without_spikes(block))
             times = [np.fmin(times[0], block.t[0]), block.t[-1]]
     first, last = float(times[0]), float(times[1])
     if not last - first >= shortest:

@@ -1,0 +1,152 @@
+"""Recordings that others published, from the file to the verdict, as a new user would.
+
+    python -m benchmarks recordings [--only=FOLDER]
+
+Each is imported with nothing else; a question is answered with what its PROVENANCE.md
+says, and the options that took are counted. Then `fieldcal diagnose`. The right answer
+is what was found independently (the README.md beside them): effects that must be named,
+or that nothing is.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import sys
+import tempfile
+from pathlib import Path
+from time import process_time
+from typing import NamedTuple
+
+from benchmarks._real import REAL
+from fieldcal.cli import main as command
+
+JOINED = "set-2__full-sphere__"
+
+
+class Published(NamedTuple):
+    """A recording and what is known of it.
+
+    Attributes
+    ----------
+    folder, files : beside the project; several files hold channels of one IMU
+    options : that answer what is asked, as PROVENANCE.md says them
+    right : effects of which one must be named; empty if none may be, "?" if unknown
+    stream : which of several IMUs is looked at, "" for the only one
+
+    """
+
+    folder: str
+    files: tuple[str, ...]
+    options: tuple[str, ...]
+    right: str
+    stream: str = ""
+
+
+HAND = "cross_coupling"
+
+PUBLISHED = (
+    *(Published("mikoff_mpu9150_x5", (f"imu{i}.log.gz",), ("--rate 100",), HAND)
+      for i in range(5)),
+    Published("imucal_ferraris", ("example_ferraris_session.csv.gz",),
+              ("--rate 204.8", "--gyr-unit deg/s"), HAND),
+    Published("mpu9150_array", ("exp2_imu1.csv.gz",), (), HAND),
+    Published("mpu9150_array", ("exp6_imu5.csv.gz",), (), f"{HAND} warm_up bias_drift"),
+    Published("tomisuarez_mpu6050", ("example_data_calibration.csv.gz",), (), "?"),
+    Published("tomisuarez_mpu6050", ("example_data_tinit_calc.csv.gz",),
+              ("--gyr-unit deg/s --gyr-lsb 131",), "?"),
+    Published("pyulog_samples", ("sample.ulg.gz",), (), "warm_up bias_drift",
+              "sensor_combined.0"),
+    Published("psim_cold", ("TVCtest3_7_20.csv.gz",),
+              ("--temp-unit count --temp-lsb 256 --temp-zero -231",),
+              "temperature_bias"),
+    Published("sunsided_mpu6050_temp",
+              tuple(f"{JOINED}{part}.mat"
+                    for part in ("accelerometer", "gyroscope", "temperature")),
+              ("--gyr-unit deg/s",), "?"),
+    Published("autopilot_streams", ("autopilot_12_positions.tlog.gz",), (), "",
+              "HIGHRES_IMU.0"),
+    Published("autopilot_streams", ("autopilot_12_positions.tlog.gz",), (),
+              "quantisation", "RAW_IMU.0"),
+    Published("autopilot_streams", ("vectornav.bin.gz",), (), "?"),
+    Published("autopilot_streams", ("microstrain_mip.bin.gz",), ("--rate 25",), "?"),
+    Published("comma_rav4_can", ("phone_imu.npz",), (), "?"),
+)  # fmt: skip
+
+
+class Verdict(NamedTuple):
+    """What became of one: options, still stretches, verdict and effects, s of CPU."""
+
+    options: int
+    positions: int
+    verdict: str
+    effects: tuple[str, ...]
+    seconds: float
+
+
+def main() -> None:
+    """Print the table."""
+    if not REAL.is_dir():
+        print(f"the recordings are not here: {REAL}")
+        return
+    only = [w.removeprefix("--only=") for w in sys.argv if w.startswith("--only=")]
+    print(
+        "| recording | options | still stretches | verdict | seconds | right answer |"
+    )
+    print("|---|---|---|---|---|---|")
+    for one in PUBLISHED:
+        if not only or one.folder in only:
+            print(row(one, of(one)), flush=True)
+
+
+def row(one: Published, found: Verdict) -> str:
+    """One line of the table."""
+    named = f"{found.verdict.replace('_', ' ')}: {', '.join(found.effects)}".strip(": ")
+    right = {"?": "not known", "": "nothing"}.get(one.right, one.right)
+    held = {"?": "", "": " ✓" if not found.effects else " ✗"}.get(
+        one.right, " ✓" if set(one.right.split()) & set(found.effects) else " ✗"
+    )
+    file = one.files[0].removesuffix(".gz")
+    name = f"{one.folder}: {file}{' ' + one.stream if one.stream else ''}"
+    said = right.replace(" ", " or ") if one.right not in ("?", "") else right
+    return (
+        f"| {name} | {found.options} | {found.positions} | {named} |"
+        f" {found.seconds:.1f} | {said}{held} |"
+    )
+
+
+def of(one: Published) -> Verdict:
+    """Import a recording and diagnose it."""
+    paths = [str(REAL / one.folder / name) for name in one.files]
+    call = ["import", *paths, *(["--join"] if len(paths) > 1 else [])]
+    began, asked = process_time(), 0
+    with tempfile.TemporaryDirectory() as name:
+        out = Path(name) / "session"
+        given: list[str] = []
+        code, _ = _run([*call, "-o", str(out)])
+        for answer in one.options:
+            if code == 0:
+                break
+            given += answer.split()
+            asked += 1
+            code, _ = _run([*call, *given, "-o", str(out)])
+        if code:
+            return Verdict(asked, 0, "not imported", (), process_time() - began)
+        folder = out / one.stream if one.stream and (out / one.stream).exists() else out
+        code, text = _run(["diagnose", str(folder), "--json"])
+        seconds = process_time() - began
+        marks = (folder / "session.toml").read_text().count("[[position]]")
+        if code not in (0, 1):
+            return Verdict(asked, marks, f"exit code {code}", (), seconds)
+        said = json.loads(text)
+        effects = tuple(effect["id"] for effect in said["effects"])
+        return Verdict(asked, marks, said["verdict"], effects, seconds)
+
+
+def _run(words: list[str]) -> tuple[int, str]:
+    """Exit code of a command, and what it printed."""
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
+        code = command(words)
+    return code, out.getvalue()

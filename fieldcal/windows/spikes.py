@@ -1,0 +1,58 @@
+"""Single samples that jump away and back: a byte decoded wrongly, a knock on a wire.
+
+    |x_i - x_(i-1)| and |x_(i+1) - x_i| > 12 s,   |x_(i+1) - x_(i-1)| < 0.3 of both   (1)
+
+s is the usual difference of successive samples. The device has not moved by such a
+jump, so who looks for rests passes over it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+
+WILD = 12.0
+"""Usual differences that no noise jumps by."""
+
+BACK = 0.3
+"""Part of the jump that samples before and after it differ by at most."""
+
+DEVIATION = 1.4826
+"""Standard deviation in a median of absolute values."""
+
+
+def without_spikes(block: Block) -> Block:
+    """Samples with nan in place of single ones that jump by (1); else the block."""
+    acc, gyr = _calmed(block.acc), _calmed(block.gyr)
+    if acc is block.acc and gyr is block.gyr:
+        return block
+    return replace(block, acc=acc, gyr=gyr)
+
+
+def _calmed(triad: Array) -> Array:
+    if len(triad) < len("abc"):
+        return triad
+    step = np.abs(np.diff(triad, axis=0))
+    usual = DEVIATION * _median(step)
+    # of outputs that are coarse most differences are 0
+    least = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
+    usual = np.where(usual > 0, usual, least)
+    first, second = step[:-1], step[1:]
+    lower = np.minimum(first, second)
+    with np.errstate(invalid="ignore"):
+        back = np.abs(triad[2:] - triad[:-2]) < BACK * lower
+        wild = (lower > WILD * usual) & back  # (1)
+    if not wild.any():
+        return triad
+    calmed = triad.copy()
+    calmed[1:-1][wild] = np.nan
+    return calmed
+
+
+def _median(step: Array) -> Array:
+    """Median of each column (n, 3) over what is known; 0 where nothing is."""
+    known = [column[np.isfinite(column)] for column in step.T]
+    return np.array([np.median(one) if len(one) else 0.0 for one in known])

@@ -1,0 +1,101 @@
+"""Why a still stretch begins and ends where it does, in words.
+
+What lies within a second beyond its end tells: nothing, a pause, a rotation, an
+acceleration that changes, or but a disturbance after which it is as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.core.samples import CHANNELS, UNITS, Array
+from fieldcal.windows.cells import CELL, CellTable
+from fieldcal.windows.stretches import CellRows
+
+BEYOND = 1.0
+"""Time beyond a stretch that is looked at, s."""
+
+PAUSE = 1.0
+"""Time without a cell that is a pause, s."""
+
+TURNS = 0.02
+"""Difference of a rate that is a rotation, rad/s."""
+
+APART = 4.0
+"""Spreads of a stretch's own means that are a departure."""
+
+
+def reasons(
+    rows: CellRows, origin: Array, spans: Sequence[tuple[float, float]]
+) -> list[tuple[str, str]]:
+    """Say before what each stretch begins, and by what it ends.
+
+    Parameters
+    ----------
+    rows, origin : cells of the recording, as `still_stretches_of_file` has them
+    spans : start and end of each stretch, s of device time, in order
+
+    """
+    out = []
+    for start, end in spans:
+        first, last = _at(rows, start), _at(rows, end - 1e-9)
+        inside = CellTable(rows[first : last + 1][:, 0], rows[first : last + 1][:, 1:],
+                           origin)  # fmt: skip
+        k = round(BEYOND / CELL)
+        before, after = rows[max(0, first - k) : first], rows[last + 1 : last + 1 + k]
+        out.append(
+            (_why(before[::-1], inside, origin, -1), _why(after, inside, origin, 1))
+        )
+    return out
+
+
+def _at(rows: CellRows, t: float) -> int:
+    """Which cell an instant lies in: the last that begins no later."""
+    low, high = 0, len(rows) - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if rows[middle : middle + 1][0, 0] <= t + CELL * 1e-3:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+def _why(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:
+    """What lies beyond one end; cells of it come nearest first."""
+    edge = inside.times[-1 if side > 0 else 0]
+    steps = np.abs(np.diff(beyond[:, 0], prepend=edge)) - CELL
+    paused = np.flatnonzero(steps > PAUSE)
+    near = beyond[: paused[0]] if len(paused) else beyond
+    if said := _motion(near, inside, origin):
+        return said
+    if len(paused):
+        return f"a pause of {steps[paused[0]]:.3g} s"
+    if len(beyond) < round(BEYOND / CELL):
+        return "the recording ends" if side > 0 else "the recording begins"
+    return "it is cut, for it changes slowly or an hour is over"
+
+
+def _motion(near: Array, inside: CellTable, origin: Array) -> str:
+    """What moves in some cells beside a stretch; "" if nothing does."""
+    if not len(near):
+        return ""
+    cells = CellTable(near[:, 0], near[:, 1:], origin)
+    means = np.nan_to_num(inside.means)
+    level, own = np.median(means, axis=0), means.std(axis=0)
+    off = np.nan_to_num(cells.means - level)
+    rate = np.abs(off[:, 3:])
+    if rate.max() > TURNS:
+        axis = int(np.argmax(rate.max(axis=0)))
+        text = f"{CHANNELS[3 + axis]} reaches {rate[:, axis].max():.2g} {UNITS[3]}"
+        return f"it is turned: {text}"
+    ratio = np.abs(off) / np.maximum(own, 1e-12)
+    if ratio.max() < APART:
+        return ""
+    channel = int(np.argmax(ratio.max(axis=0)))
+    size = float(np.abs(off[:, channel]).max())
+    text = f"{CHANNELS[channel]} by {size:.2g} {UNITS[channel]}"
+    lasts = np.abs(off[-1, channel]) > size / 2
+    return f"it moves: {text}" if lasts else f"a disturbance: {text}"

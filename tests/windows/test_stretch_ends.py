@@ -1,0 +1,49 @@
+"""Why stretches begin and end, as a person would say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.windows.cells import Cells
+from fieldcal.windows.stretch_ends import reasons
+from fieldcal.windows.stretches import still_stretches, summary
+
+RATE = 50.0
+
+
+def recorded(change: str) -> Block:
+    """Two rests of 8 s with something between them."""
+    rng = np.random.default_rng(1)
+    n = round(18 * RATE)
+    t = np.arange(n) / RATE
+    acc = [0.0, 0.0, 9.8] + rng.normal(0, 0.01, (n, 3))
+    gyr: Array = rng.normal(0, 1e-3, (n, 3))
+    between = (t >= 8) & (t < 10)
+    if change == "turn":
+        gyr[between, 1] += 0.6
+        acc[between] += np.linspace(0, 1, between.sum())[:, None] * [5, 0, -2]
+        acc[t >= 10] += [5, 0, -2]
+    elif change == "push":
+        acc[between, 0] += 2 * np.sin(20 * t[between])
+    elif change == "pause":
+        t = t + np.where(t >= 9, 300.0, 0.0)
+    return Block.of(t, acc, gyr)
+
+
+@pytest.mark.parametrize(
+    ("change", "ended"),
+    [("turn", "it is turned: gy reaches 0.6 rad/s"), ("pause", "a pause of 300 s"),
+     ("push", "ax by")],
+)  # fmt: skip
+def test_what_ends_a_stretch_is_said(change: str, ended: str) -> None:
+    block = recorded(change)
+    spans = still_stretches(block)
+    assert len(spans) == 2
+    cells = Cells()
+    cells.add(block)
+    table = cells.table
+    (first, second) = reasons(summary(table), table.origin, spans)
+    assert first[0] == "the recording begins" and second[1] == "the recording ends"
+    assert ended in first[1] and ended in second[0]

@@ -65,6 +65,7 @@ def assess(
         verification=_verification(found, session, marks, limits),
         family=earlier,
         doubts=[*_doubts(marks), *taken_out],
+        windows=still.at_rest(session).averages,
     )
     warnings += [w for w in _restarts(marks) if w not in warnings]
     made = decide(found, session.about, limits, circumstances)

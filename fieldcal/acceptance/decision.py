@@ -16,6 +16,7 @@ import numpy as np
 from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.harmless import harmless
 from fieldcal.acceptance.level import level_missing, tilt_is_found
+from fieldcal.acceptance.remedy import Remedy, cheapest
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.verification import Verification
 from fieldcal.acceptance.witnesses import has_witnesses, left_out, witnesses
@@ -26,6 +27,10 @@ from fieldcal.core.chances import chi2_tail
 from fieldcal.history.family import expected
 from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
+from fieldcal.windows import Average
+
+UNCERTAINTY = " uncertainty"
+"""Behind the name of a group, of the check that its parameters are well known."""
 
 REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
 """Groups whose uncertainty must be known and small; a sensor not read is excused."""
@@ -59,6 +64,7 @@ class Decision:
 
     checks: tuple[Check, ...]
     growth: tuple[Growth, ...]
+    remedy: Remedy | None = None
 
     @property
     def go(self) -> bool:
@@ -82,6 +88,7 @@ class Circumstances:
     verification : of a position that was not fitted, if one was held
     family : earlier calibrations of the device, oldest first; None without a history
     doubts : sentences about what happened on the way that make it NO-GO
+    windows : that it was made of
 
     """
 
@@ -90,6 +97,7 @@ class Circumstances:
     verification: Verification | None = None
     family: Sequence[Calibration] | None = None
     doubts: Sequence[str] = ()
+    windows: Sequence[Average] = ()
 
 
 def decide(
@@ -114,16 +122,47 @@ def decide(
     ]
     g, mounting = about.gravity, about.mounting
     grown = tuple(growth(found, g, mounting, seconds) for seconds in TIMES)
-    return Decision(tuple(checks), grown)
+    made = Decision(tuple(checks), grown)
+    return (
+        made
+        if made.go
+        else replace(made, remedy=_remedy(found, about, limits, circumstances, checks))
+    )
+
+
+def _remedy(
+    found: Calibration,
+    about: Description,
+    limits: GradeLimits,
+    circumstances: Circumstances,
+    checks: Sequence[Check],
+) -> Remedy | None:
+    """The cheapest remedy, where windows tell what one is worth."""
+    windows = circumstances.windows
+    if not windows:
+        return None
+    known = [w.sigma[:3][np.isfinite(w.sigma[:3])] for w in windows]
+    sigma = float(np.median([s.max() for s in known if len(s)] or [np.nan]))
+    seconds = float(np.median([w.end - w.start for w in windows]))
+    if not (np.isfinite(sigma) and sigma > 0):
+        return None
+    failed = [
+        check.name.removesuffix(UNCERTAINTY)
+        for check in checks
+        if check.ok is False and check.name.endswith(UNCERTAINTY)
+    ]
+    return cheapest(found, about, limits, failed, sigma, float(np.ceil(seconds)))
 
 
 def with_decision(found: Calibration, made: Decision) -> Calibration:
     """The calibration with the decision among its information."""
-    decision = {
+    decision: dict[str, Any] = {
         "go": made.go,
         "reasons": list(made.reasons),
         "checks": [_document(check) for check in made.checks],
     }
+    if made.remedy is not None:
+        decision["remedy"] = made.remedy.to_json()
     expectation = [each.to_json() for each in made.growth]
     more = {"decision": decision, "expectation": expectation}
     return replace(found, info={**found.info, **more})
@@ -181,19 +220,32 @@ def _uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
         lacking = [a for a, s in zip("xyz", sigma, strict=True) if not np.isfinite(s)]
         if lacking and group in REQUIRED:
             says = f"{group} {' '.join(lacking)} was not determined by these positions"
-            checks.append(Check(f"{group} uncertainty", False, says))
+            checks.append(Check(group + UNCERTAINTY, False, says))
         elif not lacking:
             worst = int(np.argmax(sigma))
             ok = bool(sigma[worst] <= limit)
             says = (
-                f"{group} {'xyz'[worst]} is known to ± {sigma[worst]:.2g}"
+                f"{group} {'xyz'[worst]} is known to ± {_apart(sigma[worst], limit)}"
                 f"{_of(unit)}, {'within' if ok else 'more than'} {limit:.2g}{_of(unit)}"
             )
             if not ok and sensor_of(group) == "acc":
                 says += _by_angles(found, limits)
             value = float(sigma[worst])
-            checks.append(Check(f"{group} uncertainty", ok, says, value, limit, unit))
+            checks.append(Check(group + UNCERTAINTY, ok, says, value, limit, unit))
     return checks
+
+
+def _apart(value: float, limit: float) -> str:
+    """A value with as many digits as tell it from its limit.
+
+    >>> _apart(0.02041, 0.02), _apart(0.03123, 0.02)
+    ('0.0204', '0.031')
+    """
+    for digits in range(2, 7):
+        text = f"{value:.{digits}g}"
+        if float(text) != float(f"{limit:.{digits}g}"):
+            break
+    return text
 
 
 def _by_angles(found: Calibration, limits: GradeLimits) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from pathlib import Path
 from typing import Any
 
 from fieldcal.calibration import Calibration
@@ -12,11 +14,12 @@ NO_GO = "NO-GO: do not launch on this, for the reasons marked NO"
 MARKS = {True: "ok  ", False: "NO  ", None: "?   "}
 
 
-def show_decision(found: Calibration) -> None:
+def show_decision(found: Calibration, folder: Path | None = None) -> None:
     """Print what is left for a navigator, checks and decision; nothing without one.
 
     The decision comes last, with its reasons just above it: what is on the screen when
-    all is over.
+    all is over; behind a NO-GO the cheapest remedy. `folder` is the session of a run,
+    in which it can be taken.
     """
     from rich.console import Console
 
@@ -33,6 +36,11 @@ def show_decision(found: Calibration) -> None:
         say(console, MARKS[check["ok"]], check["says"])
     word, style = (GO, "green") if decision["go"] else (NO_GO, "red")
     console.print(f" {word} ", style=f"bold reverse {style}", markup=False)
+    if remedy := decision.get("remedy"):
+        say(console, "to GO: ", remedy["says"])
+        if folder is not None:
+            call = f"fieldcal run --resume {shlex.quote(str(folder))}"
+            say(console, "       ", f"{call} takes it")
 
 
 def _growth(growth: dict[str, Any]) -> str:

@@ -146,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
             if page and not args.json:
                 sys.stdout.write(f"report:   {page}\n")
     if not args.json:
-        run_view.show_decisions(found, further)
+        run_view.show_decisions(found, further, folder)
     check_heard(others)
     return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
 
@@ -193,7 +193,8 @@ def _record(
     with device(task) as (opened, mover), contextlib.ExitStack() as stack:
         driver = opened()
         stack.callback(driver.close)
-        taken = recorded_averages(Session.open(folder), task) if args.resume else {}
+        known = Session.open(folder) if args.resume else None
+        taken = recorded_averages(known, task) if known else {}
         own = stack.enter_context(
             Recorder(folder, None if args.resume else task.tables)
         )
@@ -206,7 +207,8 @@ def _record(
         for unseen in (level_unknown(task.about), gravity_unknown(task.about)):
             if unseen:
                 operator.tell(unseen)
-        if args.resume:
+        if known:
+            _take_besides(recorder, task, len(known.positions), args.again, taken)
             recorder.mark("resumed", taken=sorted(taken))
         how_long = (_patience(args), _give_up(args, task))
         running = SessionRun(task, operator, recorder, opened, bounds, *how_long, taken)
@@ -218,6 +220,21 @@ def _record(
         recorder.mark("finished", verdict="good" if found.good else "bad")
         truth = getattr(mover, "truth", None)
         return found, dict(truth) if truth else None, recorder.others
+
+
+def _take_besides(
+    recorder: Any, task: Task, known: int, again: Sequence[int], taken: dict[int, Any]
+) -> None:
+    """Note the positions that a remedy adds, and those that it takes once more."""
+    from fieldcal.session.folder import ADDED
+
+    for number in again:
+        recorder.mark("repeated", position=number)
+        taken.pop(number, None)
+    for number, position in enumerate(task.about.positions[known:], known):
+        alpha, beta = position.degrees or (0.0, 0.0)
+        angles = {"alpha_deg": alpha, "beta_deg": beta}
+        recorder.mark(ADDED, position=number, name=position.name, **angles)
 
 
 def _patience(args: argparse.Namespace) -> float:

@@ -62,7 +62,7 @@ def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
             "--resume goes on with the device and place its session.toml names:"
             " leave those options out"
         )
-    session, tables = resume(args.resume)
+    session, tables, args.again = resume(args.resume)
     tables["run"] = {**tables["run"], **_given(args)}
     tables = overlay(tables, _site(args))
     return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder

@@ -43,7 +43,9 @@ def show_results(
     sys.stdout.write(f"recorded: {folder}\nwritten:  {folder / RESULT}\n")
 
 
-def show_decisions(found: Calibration, further: Mapping[str, Calibration]) -> None:
+def show_decisions(
+    found: Calibration, further: Mapping[str, Calibration], folder: Path
+) -> None:
     """That of the first device last, but for a line on each that is NO-GO."""
     from fieldcal.commands.decision_view import show_decision
 
@@ -52,7 +54,7 @@ def show_decisions(found: Calibration, further: Mapping[str, Calibration]) -> No
         show_decision(each)
     if further:
         sys.stdout.write("\nthe first device\n")
-    show_decision(found)
+    show_decision(found, folder)
     for name, each in further.items():
         sys.stdout.write(f"{name}: {'GO' if is_go(each) else 'NO-GO, see above'}\n")
 

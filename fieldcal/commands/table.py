@@ -64,8 +64,10 @@ def _tell(console: Console, calibration: Calibration) -> None:
         say(console, "", told)
     for warning in calibration.warnings:
         say(console, "! ", warning)
-    good = "good" if calibration.good else "BAD: do not use these numbers"
-    say(console, "", f"verdict: {good}")
+    if not calibration.good:
+        say(console, "", "verdict: BAD, do not use these numbers")
+    elif "decision" not in calibration.info:  # which says more, below
+        say(console, "", "verdict: good")
 
 
 def say(console: Console, mark: str, text: str) -> None:

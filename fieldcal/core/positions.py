@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -66,6 +67,20 @@ def angles(positions: Sequence[Position]) -> tuple[Array, Array]:
 def forces(positions: Sequence[Position], gravity: float) -> Array:
     """Specific force at rest in procedure axes, (n, 3) m/s^2, nan where unknown."""
     return force(*angles(positions), gravity)
+
+
+def ladder(positions: Sequence[Position]) -> list[tuple[float, float]]:
+    """Angles that a session's ladder can be set to, deg: each it had, to either side.
+
+    >>> ladder([Position.deg(0, 0), Position.deg(45, 5)])[:4]
+    [(0.0, 0.0), (0.0, -5.0), (0.0, 5.0), (-45.0, 0.0)]
+    """
+    had = [p.degrees for p in positions if p.degrees]
+    joints = []
+    for angles in zip(*had, strict=True) if had else ():
+        sizes = {round(abs(a), 6) for a in angles} | {0.0}
+        joints.append(sorted({s * a for a in sizes for s in (-1.0, 1.0)}, key=abs))
+    return [(a + 0.0, b + 0.0) for a, b in product(*joints)] if joints else []
 
 
 def _set(*pairs: tuple[float, float]) -> tuple[Position, ...]:

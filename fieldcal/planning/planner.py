@@ -110,14 +110,14 @@ def expected(
     """
     names = required_parameters(len(positions))
     jacobian = design(names, positions, gravity).reshape(-1, len(names))
-    sigma = grade.acc(seconds) * _sigma(jacobian)
+    sigma = grade.acc(seconds) * sigma_of(jacobian)
     found = {n: float(s) for n, s in zip(names, sigma, strict=True)}
     gyr = grade.gyr(seconds) / np.sqrt(len(positions))
     found |= {f"gyr_bias.{axis}": float(gyr) for axis in "xyz"}
     return {name: s for name, s in found.items() if np.isfinite(s)}
 
 
-def _sigma(jacobian: Array) -> Array:
+def sigma_of(jacobian: Array) -> Array:
     """Sigma of each parameter for unit noise, (p,); infinite where not determined."""
     size = np.linalg.norm(jacobian, axis=0)
     scaled = jacobian / np.where(size > 0, size, 1.0)

@@ -7,13 +7,15 @@ to it at once. So there is one way to go on, whether after a second or after a r
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
 from fieldcal import procedures
+from fieldcal.acceptance.verification import planned
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import (
@@ -35,7 +37,7 @@ from fieldcal.run.interruptions import RepeatPosition
 from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, Task
 from fieldcal.run.warm_up import WarmUpWatch
-from fieldcal.session.folder import RESULT, Session
+from fieldcal.session.folder import ADDED, RESULT, Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average, average
 
@@ -188,13 +190,16 @@ def _stands(marks: list[dict[str, Any]], number: int) -> bool:
     return bool(said) and said[-1] == "window"
 
 
-def resume(folder: Path) -> tuple[Session, dict[str, Any]]:
-    """A session to go on with, and its tables.
+def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
+    """A session to go on with, its tables, and positions to take once more.
+
+    What is finished and NO-GO is gone on with by its remedy: positions besides, or one
+    that was taken already.
 
     Raises
     ------
     SessionError
-        If it is none, is finished already, or was not recorded by a run.
+        If it is none, has nothing left to take, or was not recorded by a run.
 
     """
     session = Session.open(folder)
@@ -204,9 +209,53 @@ def resume(folder: Path) -> tuple[Session, dict[str, Any]]:
             f"{folder}: was not recorded by fieldcal run: begin a new one, or solve it"
             " as it stands by fieldcal solve"
         )
-    finished = any(mark.get("event") == "finished" for mark in session.marks())
-    if finished and (folder / RESULT).exists():
+    marks, again = list(session.marks()), tuple[int, ...]()
+    run = dict(tables["run"])
+    if _finished(marks) and (folder / RESULT).exists():
+        remedy = _remedy(folder, session)
+        again = tuple(int(i) for i in remedy["again"])
+        tables["position"] = [*tables.get("position", ()), *remedy["positions"]]
+        run["seconds"] = float(remedy["seconds"])
+    if len(tables.get("position", ())) > _planned(marks, session):
+        run["procedure"] = "positions"  # whatever set it was, it has more now
+    return session, {**tables, "run": run}, again
+
+
+def _planned(marks: Sequence[Mapping[str, Any]], session: Session) -> int:
+    """How many positions a session was begun with."""
+    added = sum(bool(mark.get("event") == ADDED) for mark in marks)
+    return len(session.about.positions) - added
+
+
+def _finished(marks: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether nothing was asked for since a run had its result."""
+    told = [m.get("event") for m in marks]
+    ends = [i for i, event in enumerate(told) if event == "finished"]
+    return bool(ends) and not {ADDED, "repeated", "asked"} & set(told[ends[-1] :])
+
+
+def _remedy(folder: Path, session: Session) -> Mapping[str, Any]:
+    """What would make a finished session GO.
+
+    Raises
+    ------
+    SessionError
+        If it is GO, or no position would.
+
+    """
+    try:
+        result = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+        decision = result.get("decision", {})
+    except (OSError, ValueError, AttributeError):
+        decision = {}
+    remedy = decision.get("remedy")
+    if isinstance(remedy, Mapping) and planned(session.about) is None:
+        return remedy
+    if decision.get("go") is False:
         raise SessionError(
-            f"{folder}: is finished, nothing is left to take: see fieldcal solve"
+            f"{folder}: is finished and NO-GO, and no position taken besides would"
+            " change that: see fieldcal solve for the reasons, and begin a new run"
         )
-    return session, tables
+    raise SessionError(
+        f"{folder}: is finished, nothing is left to take: see fieldcal solve"
+    )

@@ -36,6 +36,9 @@ DESCRIPTION = "session.toml"
 MARKS = "marks.jsonl"
 RESULT = "result.json"
 
+ADDED = "added"
+"""Mark of a position that was added to the planned ones, with its angles."""
+
 
 @dataclass
 class Session:
@@ -68,7 +71,7 @@ class Session:
         says: list[str] = []
         marks = list(read_marks(folder / MARKS, says))
         says += _unconfirmed(about.raw)
-        return cls(folder, _with_windows(about, marks), tuple(says))
+        return cls(folder, _with_windows(_with_added(about, marks), marks), tuple(says))
 
     @property
     def positions(self) -> tuple[Position, ...]:
@@ -180,6 +183,17 @@ def _left_out(block: Block, marks: Iterable[Mapping[str, Any]]) -> Block:
     for gap in gaps:
         acc[gap] = gyr[gap] = np.nan
     return replace(block, acc=acc, gyr=gyr)
+
+
+def _with_added(about: Description, marks: list[dict[str, Any]]) -> Description:
+    """With the positions that were added while it was recorded, behind the planned."""
+    added = [mark for mark in marks if mark.get("event") == ADDED]
+    if not added:
+        return about
+    keys = ("name", "alpha_deg", "beta_deg")
+    tables = [{k: m[k] for k in keys if k in m} for m in added]
+    planned = about.raw.get("position", ())
+    return description.parse({**about.raw, "position": [*planned, *tables]})
 
 
 def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:

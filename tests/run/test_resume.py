@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from pathlib import Path
 from time import sleep
@@ -88,12 +89,12 @@ def test_what_was_taken_is_known_and_what_was_wanted_again_is_not(
     tmp_path: Path,
 ) -> None:
     recorded(tmp_path / "s")
-    session, tables = resume(tmp_path / "s")
+    session, tables, _ = resume(tmp_path / "s")
     taken = recorded_averages(session, plan_file.task(tables, "s"))
     assert list(taken) == [0] and taken[0].n == 1000
     with Recorder(tmp_path / "s", None) as recorder:
         recorder.mark("repeated", position=0)
-    session, tables = resume(tmp_path / "s")
+    session, tables, _ = resume(tmp_path / "s")
     assert recorded_averages(session, plan_file.task(tables, "s")) == {}
     assert session.windows == (None, None)
 
@@ -111,6 +112,39 @@ def test_what_cannot_be_gone_on_with_is_said(tmp_path: Path) -> None:
     (tmp_path / "s" / "result.json").write_text("{}")
     with pytest.raises(SessionError, match="is finished"):
         resume(tmp_path / "s")
+
+
+def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
+    """Positions besides are added, those in doubt taken once more, and only once."""
+    folder = tmp_path / "s"
+    recorded(folder)
+    with Recorder(folder, None) as recorder:
+        recorder.mark("finished")
+    besides = {"alpha_deg": 45.0, "beta_deg": -5.0}
+    remedy = {"says": "", "again": [0], "positions": [besides], "seconds": 20.0}
+    decision = {"go": False, "remedy": remedy}
+    (folder / "result.json").write_text(json.dumps({"decision": decision}))
+    session, tables, again = resume(folder)
+    task = plan_file.task(tables, "s")
+    assert again == (0,) and len(task.about.positions) == len(session.positions) + 1
+    assert task.about.positions[-1].degrees == (45.0, -5.0)
+    assert task.procedure == "positions" and task.seconds == 20.0
+    number = len(session.positions)
+    with Recorder(folder, None) as recorder:
+        recorder.mark("repeated", position=0)
+        recorder.mark("added", position=number, name="besides", **besides)
+    # broken off here: what was asked for stands, and nothing is added twice
+    session, tables, again = resume(folder)
+    assert again == () and len(session.positions) == number + 1
+    assert session.positions[-1].name == "besides" and session.windows[0] is None
+    assert len(plan_file.task(tables, "s").about.positions) == number + 1
+    with Recorder(folder, None) as recorder:
+        recorder.mark("window", position=number, start_s=1.0, end_s=2.0)
+        recorder.mark("finished")
+    assert Session.open(folder).windows[-1] == (1.0, 2.0)
+    (folder / "result.json").write_text(json.dumps({"decision": {"go": False}}))
+    with pytest.raises(SessionError, match="no position taken besides would"):
+        resume(folder)
 
 
 def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ def forgets_a_position(console: Console) -> None:
 def bump(console: Console) -> None:
     take(console, 3, 22.5, 2.5)
     console.device.ask(bump={})
-    console.wait("hold still, the window starts again")
+    console.wait("hold still,")  # what was calm before is kept, or it starts again
 
 
 def wrong_direction(console: Console) -> None:
@@ -170,7 +170,8 @@ def test_every_error_of_the_operator_is_said_and_the_result_is_right(
         pull = np.subtract(found["value"], truth[group]) / np.array(found["sigma"])
         assert np.abs(pull).max() < 4.5, group
     events = [m["event"] for m in read_marks(tmp_path / "s" / "marks.jsonl")]
-    assert events.count("rejected") >= 2 and events.count("window") == 6
+    assert events.count("rejected") + events.count("kept") >= 2
+    assert events.count("window") == 6
 
 
 def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
@@ -184,7 +185,7 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     take(console, 2, 22.5, 0.0)
     device.ask(fault={"hangup_s": 2.5 * SPEED})
     console.wait("no samples come from", "goes on by itself")
-    console.wait("the window starts again")
+    console.wait("hold still,")
     asked(console, 3)
     console.child.send("r")
     take(console, 2, 22.5, 0.0)
@@ -203,7 +204,7 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     for number, angles in ((3, (22.5, 2.5)), (4, (45.0, 2.5)), (5, (45.0, 5.0))):
         child.expect(f"position {number}: turn to")
         device.ask(turn=dict(zip(("alpha_deg", "beta_deg"), angles, strict=True)))
-    child.expect("verdict: good")
+    child.expect("GO: within all limits")
     child.expect(pexpect.EOF)
     child.close()
     assert child.exitstatus == 0

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from fieldcal.core.positions import ladder
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
@@ -13,7 +14,6 @@ from fieldcal.diagnosis.wording.deciding_position import (
     decided_by,
     deciding_position,
     extent,
-    ladder,
 )
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain, Scatter

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from fieldcal.core.frames import turn
-from fieldcal.core.positions import Position
+from fieldcal.core.positions import Position, ladder
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.effects import catalogue
@@ -49,20 +48,6 @@ class DecidingPosition:
         if self.number:
             return f"take position {self.number} ({angles}) once more at the end"
         return f"take the position α = {self.alpha_deg:g}°, β = {self.beta_deg:g}° too"
-
-
-def ladder(positions: Sequence[Position]) -> list[tuple[float, float]]:
-    """Angles that a session's ladder can be set to, deg: each it had, to either side.
-
-    >>> ladder([Position.deg(0, 0), Position.deg(45, 5)])[:4]
-    [(0.0, 0.0), (0.0, -5.0), (0.0, 5.0), (-45.0, 0.0)]
-    """
-    had = [p.degrees for p in positions if p.degrees]
-    joints = []
-    for angles in zip(*had, strict=True) if had else ():
-        sizes = {round(abs(a), 6) for a in angles} | {0.0}
-        joints.append(sorted({s * a for a in sizes for s in (-1.0, 1.0)}, key=abs))
-    return [(a + 0.0, b + 0.0) for a, b in product(*joints)] if joints else []
 
 
 def extent(positions: Sequence[Position]) -> str:

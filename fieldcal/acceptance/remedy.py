@@ -1,0 +1,230 @@
+"""What would make a NO-GO a GO, as cheaply as the ladder of the session allows.
+
+Of an uncertainty that is too large: positions held besides. What n positions tell is
+
+    C = (sum J_p^T R_p^-1 J_p)^-1,  R_p = s^2 I + a^2 (t_1 t_1^T + t_2 t_2^T)        (1)
+
+with J_p how the means there move with the parameters, s the error of a mean, a how well
+angles are set and t_1, t_2 how the force moves with them. What a calibration has beyond
+that (a drift, a walk) it keeps: each sigma falls in the proportion that (1) says. Of a
+position that disagrees with the others: the same once more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import group_of, sensor_of
+from fieldcal.calibration.wording import title
+from fieldcal.core.positions import Position, forces, ladder
+from fieldcal.core.samples import Array
+from fieldcal.model.causes.planned import design, parameters
+from fieldcal.planning.planner import sigma_of
+from fieldcal.session.description import Description
+from fieldcal.solve.doubt import DoubtfulPosition
+
+MOST = 3
+"""Positions that are asked for besides, at most: more is another run."""
+
+SURE = 0.9
+"""Part of a limit that is aimed at: what is expected is not what comes."""
+
+LONGEST = 600.0
+"""Longest time that is asked for at one position, s."""
+
+STEP = 1e-4
+"""Change of an angle by which (1) has its t, rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remedy:
+    """What to hold, and what that would decide.
+
+    Attributes
+    ----------
+    says : one sentence
+    again : numbers of positions to take once more, from 0
+    positions : alpha and beta of those to hold besides, deg
+    seconds : how long each
+
+    """
+
+    says: str
+    again: tuple[int, ...] = ()
+    positions: tuple[tuple[float, float], ...] = ()
+    seconds: float = 30.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of result.json."""
+        return {
+            "says": self.says,
+            "again": list(self.again),
+            "positions": [{"alpha_deg": a, "beta_deg": b} for a, b in self.positions],
+            "seconds": self.seconds,
+        }
+
+
+def cheapest(
+    found: Calibration,
+    about: Description,
+    limits: GradeLimits,
+    failed: Collection[str],
+    sigma: float,
+    seconds: float,
+) -> Remedy | None:
+    """The cheapest remedy that a person at the ladder can do; None if there is none.
+
+    Parameters
+    ----------
+    found : calibration that is NO-GO
+    about : its positions and where it was
+    limits : of its grade
+    failed : groups whose uncertainty is more than its limit
+    sigma : error of the mean of a window, m/s^2
+    seconds : that a window took
+
+    """
+    doubt = DoubtfulPosition.from_json(found.info.get("doubtful_position"))
+    names = [p.name for p in about.positions]
+    if doubt and doubt.name in names:
+        number = names.index(doubt.name)
+        which = f"position {number + 1} ({doubt.name})"
+        says = f"take {which} again: it disagrees with the others"
+        return Remedy(says, again=(number,), seconds=seconds)
+    over = _over(found, limits, failed)
+    if not over or not all(p.oriented for p in about.positions):
+        return None
+    if all(sensor_of(group_of(name)) == "gyr" for name in over):
+        return _longer(about, over, seconds)
+    return _besides(found, about, limits, over, sigma, seconds)
+
+
+def _over(
+    found: Calibration, limits: GradeLimits, failed: Collection[str]
+) -> dict[str, float]:
+    """Uncertainty over its limit, by full name; infinite where not determined."""
+    out = {}
+    for group in failed:
+        limit = limits.sigma(group)
+        for axis in "xyz" if limit is not None else "":
+            name = f"{group}.{axis}"
+            sigma = found.uncertainty(name) if name in found.names else np.inf
+            if limit and not sigma <= limit:
+                out[name] = float(sigma / limit)
+    return out
+
+
+def _longer(
+    about: Description, over: dict[str, float], seconds: float
+) -> Remedy | None:
+    """Gyroscopes average out wherever they rest: longer where the device stands."""
+    whole = seconds * len(about.positions)
+    more = float(np.ceil(whole * ((max(over.values()) / SURE) ** 2 - 1) / 5) * 5)
+    last = about.positions[-1].degrees
+    if more > LONGEST or last is None:
+        return None
+    number = len(about.positions)
+    says = f"{more:.0f} s more at position {number}, as it stands: then GO is expected"
+    return Remedy(says, positions=(last,), seconds=max(more, seconds))
+
+
+def _besides(
+    found: Calibration,
+    about: Description,
+    limits: GradeLimits,
+    over: dict[str, float],
+    sigma: float,
+    seconds: float,
+) -> Remedy | None:
+    """Further positions of the ladder, the best one after the other."""
+    tilts = [g for g in ("angle_offset", "base_tilt") if g in found.groups]
+    names = parameters(*(tilts or ["angle_offset"]))
+    held, angle = list(about.positions), _angle(found)
+    before = _expected(names, held, about, sigma, angle)
+    allowed = [limits.sigma(group_of(name)) or np.inf for name in names]
+    chosen: list[Position] = []
+    for _ in range(MOST):
+        ratios = []
+        candidates = [Position.deg(a, b) for a, b in ladder(about.positions)]
+        for one in candidates:
+            then = _expected(names, [*held, *chosen, one], about, sigma, angle)
+            ratios.append(_worst(names, over, before, then, allowed))
+        best = int(np.argmin(ratios))
+        chosen.append(candidates[best])
+        if ratios[best] <= SURE:
+            return _told(chosen, over, seconds)
+    return None
+
+
+def _told(chosen: Sequence[Position], over: dict[str, float], seconds: float) -> Remedy:
+    word = "one position" if len(chosen) == 1 else f"{len(chosen)} positions"
+    where = " and ".join(p.name for p in chosen)
+    worst = max(over, key=lambda name: over[name])
+    now = f"{over[worst]:.2g} times its limit now"
+    if not np.isfinite(over[worst]):
+        now = "not determined yet"
+    says = (
+        f"{word} more for {seconds:.0f} s, {where}: then GO is expected ({title(worst)}"
+        f" is {now})"
+    )
+    angles = tuple(p.degrees or (0.0, 0.0) for p in chosen)
+    return Remedy(says, positions=angles, seconds=seconds)
+
+
+def _worst(
+    names: Sequence[str],
+    over: dict[str, float],
+    before: Array,
+    then: Array,
+    allowed: Sequence[float],
+) -> float:
+    """Largest part of its limit that a parameter then has."""
+    parts = [0.0]
+    for name, part in over.items():
+        if name in names:
+            i = names.index(name)
+            known = np.isfinite(part) and np.isfinite(before[i])
+            expected = part * then[i] / before[i] if known else then[i] / allowed[i]
+            parts.append(float(expected))
+    return max(parts)
+
+
+def _angle(found: Calibration) -> float:
+    """How well angles are set, rad."""
+    return float(np.deg2rad(float(found.info.get("angle_sigma_deg") or 0.0)))
+
+
+def _expected(
+    names: Sequence[str],
+    positions: Sequence[Position],
+    about: Description,
+    sigma: float,
+    angle: float,
+) -> Array:
+    """Sigma of each parameter, (k,), by (1); infinite where not determined."""
+    j = design(names, positions, about.gravity, about.mounting)
+    t = np.stack(
+        [_moved(positions, about, a, b) for a, b in ((STEP, 0.0), (0.0, STEP))], axis=2
+    )
+    r = sigma**2 * np.eye(3) + angle**2 * t @ t.transpose(0, 2, 1)
+    whitened = np.linalg.solve(np.linalg.cholesky(r), j)
+    return sigma_of(whitened.reshape(-1, len(names)))  # (1)
+
+
+def _moved(
+    positions: Sequence[Position], about: Description, alpha: float, beta: float
+) -> Array:
+    """How the forces, device axes, move with an angle, (n, 3) m/s^2/rad."""
+    off = [
+        Position(p.name, (p.alpha or 0.0) + alpha, (p.beta or 0.0) + beta)
+        for p in positions
+    ]
+    change = forces(off, about.gravity) - forces(positions, about.gravity)
+    moved: Array = change @ about.mounting / STEP
+    return moved

@@ -1,0 +1,111 @@
+"""What makes a NO-GO a GO: asked for, held, and then it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomlkit
+from session_folders import recorded, write_session
+
+from fieldcal.acceptance.assessment import assess
+from fieldcal.acceptance.remedy import cheapest
+from fieldcal.calibration import Calibration, limits
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.core.positions import FIVE, TWO, ladder
+from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.solution import solved
+from fieldcal.session.folder import Session
+from fieldcal.sim_device.profile import NoiseFigures, Profile
+
+LIMITS = limits.read("tactical")
+QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
+
+
+def decided(
+    folder: Path, angles: list[tuple[float, float]], bounds: GradeLimits
+) -> Calibration:
+    """A session of a virtual device in these positions, solved and decided about."""
+    positions = [
+        {"alpha_deg": a, "beta_deg": b, "start_s": 3 + 20.0 * i, "end_s": 15 + 20.0 * i}
+        for i, (a, b) in enumerate(angles)
+    ]
+    block = recorded(Profile(noise=QUIET), positions)
+    site = {"latitude_deg": 50.45, "height_m": 170.0, "angle_setting_deg": 0.05}
+    session = Session.open(write_session(folder, block, positions, site=site))
+    still = rests(session)
+    return assess(solved(session, still), session, still, bounds, None)
+
+
+def test_the_position_that_is_asked_for_makes_it_go(tmp_path: Path) -> None:
+    five = [p.degrees or (0.0, 0.0) for p in FIVE]
+    loose = replace(LIMITS, acc_bias_sigma=1.0, acc_scale_sigma=1.0)
+    first = decided(tmp_path / "first", five, loose)
+    assert first.info["decision"]["go"] and "remedy" not in first.info["decision"]
+    worst = float(np.nanmax(first.vector("acc_bias")[1]))
+    tight = replace(loose, acc_bias_sigma=0.7 * worst)
+    then = decided(tmp_path / "tight", five, tight)
+    remedy = then.info["decision"]["remedy"]
+    assert not then.info["decision"]["go"] and "then GO is expected" in remedy["says"]
+    besides = [(p["alpha_deg"], p["beta_deg"]) for p in remedy["positions"]]
+    assert 1 <= len(besides) <= 3 and set(besides) <= set(ladder(FIVE))
+    mended = decided(tmp_path / "mended", [*five, *besides], tight)
+    assert mended.info["decision"]["go"], mended.info["decision"]["reasons"]
+
+
+def found_with(names: tuple[str, ...], sigma: list[float]) -> Calibration:
+    """A calibration of which only the uncertainties matter."""
+    groups = [name.partition(".")[0] for name in names]
+    units = tuple(
+        {"gyr_bias": "rad/s", "acc_bias": "m/s^2"}.get(g, "1") for g in groups
+    )
+    return Calibration(
+        names=names, values=np.ones(len(names)),
+        covariance=np.diag(np.square(sigma)), units=units,
+        method="joint", chi2=1.0, dof=1, rms=1.0,
+    )  # fmt: skip
+
+
+def about(tmp_path: Path, angles: list[tuple[float, float]]) -> Session:
+    positions = [{"alpha_deg": a, "beta_deg": b} for a, b in angles]
+    tmp_path.mkdir(parents=True)
+    text = tomlkit.dumps({"format": 1, "position": positions})
+    (tmp_path / "session.toml").write_text(text)
+    return Session.open(tmp_path)
+
+
+def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:
+    five = [p.degrees or (0.0, 0.0) for p in FIVE]
+    names = tuple(f"gyr_bias.{a}" for a in "xyz")
+    found = found_with(names, [1e-4, 1e-4, 1.1 * LIMITS.gyr_bias_sigma])
+    session = about(tmp_path / "s", five)
+    remedy = cheapest(found, session.about, LIMITS, ["gyr_bias"], 1e-3, 30.0)
+    assert remedy is not None and "more at position 5, as it stands" in remedy.says
+    assert remedy.positions == (five[-1],)
+    # white noise: 150 s gave 1.1 of the limit, 0.9 of it take 1.49 times as long
+    assert remedy.seconds == pytest.approx(150 * ((1.1 / 0.9) ** 2 - 1), abs=5.0)
+
+
+def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
+    two = [p.degrees or (0.0, 0.0) for p in TWO]
+    names = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xy")
+    session = about(tmp_path / "s", two)
+    found = found_with(names, [1e-3] * 4)
+    remedy = cheapest(found, session.about, LIMITS, ["acc_scale"], 1e-4, 30.0)
+    assert remedy is not None and "not determined yet" in remedy.says
+    assert set(remedy.positions) <= set(ladder(TWO)) - set(two)
+    hopeless = replace(LIMITS, acc_scale_sigma=1e-9)
+    assert cheapest(found, session.about, hopeless, ["acc_scale"], 1e-4, 30.0) is None
+
+
+def test_a_position_that_disagrees_is_taken_again(tmp_path: Path) -> None:
+    session = about(tmp_path / "s", [p.degrees or (0.0, 0.0) for p in FIVE])
+    doubtful = {"name": session.positions[2].name, "probability": 0.99}
+    found = replace(
+        found_with(("acc_bias.x",), [1e-3]), info={"doubtful_position": doubtful}
+    )
+    remedy = cheapest(found, session.about, LIMITS, [], 1e-3, 30.0)
+    assert remedy is not None and remedy.again == (2,)
+    assert remedy.says.startswith("take position 3 (α = 22.5°, β = 2.5°) again")

@@ -1,6 +1,6 @@
 """Single samples that jump away and back: a byte decoded wrongly, a knock on a wire.
 
-    |x_i - x_(i-1)| and |x_(i+1) - x_i| > 12 s,   |x_(i+1) - x_(i-1)| < 0.3 of both   (1)
+    |x_i - x_(i-1)|, |x_(i+1) - x_i| > 12 s,   |x_(i+1) - x_(i-1)| < 0.3 of both    (1)
 
 s is the usual difference of successive samples. The device has not moved by such a
 jump, so who looks for rests passes over it.

@@ -9,12 +9,13 @@ standard error.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
-from typing import Protocol, cast
+from typing import Protocol, TextIO, cast
 
 from fieldcal.commands import found
 from fieldcal.commands.spelling import spell_out
@@ -81,6 +82,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     # small matrices by the thousand: threads would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     spell_out()
+    with _nothing_carried_out():
+        return _named(argv)
+
+
+@contextlib.contextmanager
+def _nothing_carried_out() -> Iterator[None]:
+    """Show what is in the text of others on both streams instead of doing it."""
+    from fieldcal.core.shown import ShownStream
+
+    before = sys.stdout, sys.stderr
+    if all(before):  # a program without a console has none
+        sys.stdout, sys.stderr = (cast(TextIO, ShownStream(s)) for s in before)
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = before
+
+
+def _named(argv: Sequence[str] | None) -> int:
+    """Run the command that the arguments name."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] not in COMMANDS:
         from fieldcal.core.version import __version__
@@ -92,12 +113,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _guarded(name: str, arguments: list[str]) -> int:
     """Turn errors into one sentence and an exit code."""
     from fieldcal.core.errors import FieldcalError
+    from fieldcal.core.shown import one_line
 
     command = _load(name)
     try:
         return command.run(_command_parser(name, command).parse_args(arguments))
     except FieldcalError as error:
-        sys.stderr.write(f"fieldcal {name}: {error}\n")
+        sys.stderr.write(f"fieldcal {name}: {one_line(str(error))}\n")
         return error.exit_code
     except KeyboardInterrupt:
         sys.stderr.write(f"fieldcal {name}: interrupted\n")

@@ -21,14 +21,13 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
     all is over; behind a NO-GO the cheapest remedy. `folder` is the session of a run,
     in which it can be taken.
     """
-    from rich.console import Console
-
+    from fieldcal.commands.console import ShownConsole
     from fieldcal.commands.table import say
 
     decision = found.info.get("decision")
     if not decision:
         return
-    console = Console(highlight=False)
+    console = ShownConsole()
     for growth in found.info.get("expectation", []):
         say(console, "", _growth(growth))
     order = {True: 0, None: 1, False: 2}

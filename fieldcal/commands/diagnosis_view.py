@@ -55,9 +55,9 @@ def show(
 
     `width` is that of the terminal unless it is said.
     """
-    from rich.console import Console
+    from fieldcal.commands.console import ShownConsole
 
-    console = Console(file=out, highlight=False, width=width)
+    console = ShownConsole(file=out, width=width)
     _verdict(console, diagnosis)
     steps = diagnosis.next if details else diagnosis.next[:STEPS]
     for step in steps or ("Nothing: the simulation has all that this can show.",):
@@ -117,7 +117,7 @@ def _picture(console: Console, diagnosis: Diagnosis) -> None:
     names = [n for n in before if before[n] > 0 and after.get(n, 0.0) > 0]
     if not names:
         return
-    console.print("held-out rms  ░ before  █ after", style="bold", highlight=False)
+    console.print("held-out rms  ░ before  █ after", style="bold")
     grid = Table.grid(padding=(0, 1))
     for name in names:
         alike = [n for n in names if n[0] == name[0]]

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.core.shown import one_line
+
 if TYPE_CHECKING:
     from fieldcal.calibration.limits import GradeLimits
     from fieldcal.history.store import History, HistoryRun
@@ -92,7 +94,9 @@ def _devices(args: argparse.Namespace, history: History) -> int:
             f"{history.path}: no calibration yet; fieldcal run --serial keeps them\n"
         )
     for serial, count, last in devices:
-        sys.stdout.write(f"{serial}: {count} calibrations, the last {last}\n")
+        sys.stdout.write(
+            f"{one_line(serial)}: {count} calibrations, the last {one_line(last)}\n"
+        )
     return 0
 
 
@@ -182,7 +186,7 @@ def _show(
     bounds: GradeLimits,
 ) -> None:
     say = sys.stdout.write
-    say(f"{serial}: {len(runs)} calibrations\n")
+    say(f"{one_line(serial)}: {len(runs)} calibrations\n")
     for name, points in trends.items():
         unit = points[-1].unit if points else ""
         say(f"\n{name}, {unit}\n")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
+from fieldcal.core.shown import one_line
 
 if TYPE_CHECKING:
     from fieldcal.core.samples import Array
@@ -149,7 +150,8 @@ def _wanted(args: argparse.Namespace, i: int) -> ReadOptions:
 def _list(opened: list[Recording]) -> int:
     for recording in opened:
         for stream in recording.streams():
-            sys.stdout.write(f"{recording.path}\t{stream.name}\t{stream.says}\n")
+            named = (recording.path, stream.name, stream.says)
+            sys.stdout.write("\t".join(one_line(str(part)) for part in named) + "\n")
     return 0
 
 

@@ -147,10 +147,11 @@ def _show(
     paper: Mapping[str, float],
     with_it: Mapping[str, float],
 ) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False)
+    from fieldcal.commands.console import ShownConsole
+
+    console = ShownConsole()
     console.print(f"{len(chosen)} positions, {seconds:g} s each:")
     for i, position in enumerate(chosen, start=1):
         console.print(f"  {i}  {position.name}")

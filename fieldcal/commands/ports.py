@@ -70,10 +70,11 @@ def _described(port: Any) -> dict[str, Any]:
 
 
 def _show(ports: list[dict[str, Any]], probed: bool) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False, soft_wrap=True)
+    from fieldcal.commands.console import ShownConsole
+
+    console = ShownConsole(soft_wrap=True)
     table = Table("port", "what it is", "serial number")
     if probed:
         table.add_column("what it says")

@@ -264,8 +264,7 @@ def _operator(
 
         yield ScriptOperator(mover)
         return
-    from rich.console import Console
-
+    from fieldcal.commands.console import ShownConsole
     from fieldcal.run.operator.keyboard import Keyboard
     from fieldcal.run.operator.terminal import ConsoleOperator
 
@@ -273,7 +272,7 @@ def _operator(
         f"fieldcal · {task.procedure} · {folder}",
         task.positions,
         mover,
-        Console(stderr=args.json),
+        ShownConsole(stderr=args.json),
         args.plain,
         Keyboard(),
         len(task.about.positions) if task.verification else None,

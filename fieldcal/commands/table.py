@@ -30,11 +30,12 @@ def show(
     out : standard output, unless given
 
     """
-    from rich.console import Console
     from rich.table import Table
 
+    from fieldcal.commands.console import ShownConsole
+
     calibration = in_sample_units(calibration)
-    console = Console(file=out, highlight=False)
+    console = ShownConsole(file=out)
     table = Table(title="Calibration", title_justify="left")
     columns = ["parameter", "value", "± 1σ", "unit"]
     columns += ["concealed", "off by"] if truth else []

@@ -12,6 +12,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fieldcal.core.positions import Position
+from fieldcal.core.shown import shown
 from fieldcal.session.folder import write_whole
 
 TROUBLE = ("wrong", "rejected", "kept")
@@ -62,6 +63,10 @@ def write(
     ):
         suite.set(key, str(len(suite.findall(f"testcase/{kind}"))))
     suite.set("tests", str(len(suite)))
+    for element in suite.iter():
+        element.text = element.text and shown(element.text)
+        for key, value in element.items():
+            element.set(key, shown(value))
     write_whole(path, tostring(suite, encoding="utf-8", xml_declaration=True))
 
 

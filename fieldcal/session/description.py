@@ -23,6 +23,7 @@ from fieldcal.core.frames import mounting_matrix
 from fieldcal.core.gravity import G0, gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
+from fieldcal.core.shown import one_line
 from fieldcal.session.schemas import refusal, validator
 
 FORMAT = 1
@@ -280,7 +281,7 @@ def _positions(
 
 
 def _position(number: int, table: Mapping[str, Any]) -> Position:
-    label = str(table.get("name", ""))
+    label = one_line(str(table.get("name", "")))
     if "alpha_deg" in table:
         position = Position.deg(table["alpha_deg"], table["beta_deg"], label)
     else:

@@ -1,0 +1,33 @@
+"""A console that shows what is in names and sentences, and carries out none of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from typing import IO, Any
+
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+
+from fieldcal.core.shown import shown
+
+
+class ShownConsole(Console):
+    """A console without markup or highlighting; takes what rich's takes."""
+
+    def __init__(
+        self, file: IO[str] | None = None, stderr: bool = False, **options: Any
+    ) -> None:
+        stream = file or (sys.stderr if stderr else sys.stdout)
+        below = getattr(stream, "rich_proxied_file", stream)
+        super().__init__(file=below, markup=False, highlight=False, **options)
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """Render, with the text of each segment as `shown`."""
+        for segment in super().render(renderable, options):
+            if segment.control:
+                yield segment
+            else:
+                yield Segment(shown(segment.text), segment.style)

@@ -2,14 +2,15 @@
 
 Exit codes: 0 good, 1 the calibration or the verdict is bad, 2 wrong usage or input,
 3 the device failed, 70 fieldcal itself broke, 130 interrupted. What a command has to
-say goes to standard output, with --json exactly one JSON object; messages go to
-standard error.
+say goes to standard output, with --json exactly one JSON object, which has "error" and
+"exit_code" where the command failed; messages go to standard error.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import shlex
 import sys
@@ -117,19 +118,33 @@ def _guarded(name: str, arguments: list[str]) -> int:
 
     command = _load(name)
     try:
-        return command.run(_command_parser(name, command).parse_args(arguments))
+        code = command.run(_command_parser(name, command).parse_args(arguments))
+        return _flushed(code)
     except FieldcalError as error:
-        sys.stderr.write(f"fieldcal {name}: {one_line(str(error))}\n")
-        return error.exit_code
+        said, code = one_line(str(error)), error.exit_code
     except KeyboardInterrupt:
-        sys.stderr.write(f"fieldcal {name}: interrupted\n")
-        return INTERRUPTED
+        said, code = "interrupted", INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
         return 0
     except Exception as error:  # the operator gets a sentence whatever it is
-        sys.stderr.write(f"fieldcal {name}: {_broken(name, arguments, error)}\n")
-        return BROKEN
+        said, code = _broken(name, arguments, error), BROKEN
+    sys.stderr.write(f"fieldcal {name}: {said}\n")
+    if "--json" in arguments:
+        failed = {"error": said, "exit_code": code}
+        sys.stdout.write(json.dumps(failed, ensure_ascii=False) + "\n")
+    return code
+
+
+def _flushed(code: int) -> int:
+    """An exit code, once all is printed or its reader has gone."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        from fieldcal.commands.console import unread
+
+        unread()
+    return code
 
 
 def _broken(name: str, arguments: list[str], error: Exception) -> str:

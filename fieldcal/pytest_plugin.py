@@ -131,23 +131,21 @@ class VirtualImu:
 
         Parameters
         ----------
-        found : a `Calibration`, or the object of result.json
+        found : a `Calibration`, the object of result.json, or what a procedure of
+            one's own has: by group, as ``{"acc_bias": {"value": [x, y, z], "sigma":
+            [x, y, z]}}``, in m/s^2 and rad/s
         sigmas : how many standard uncertainties a value may be off
         within : largest standard uncertainty by group, as in ``{"acc_bias": 0.02}``
 
         """
         __tracebackhide__ = True
-        from fieldcal.calibration import Calibration
         from fieldcal.calibration.names import group_of
         from fieldcal.commands.table import concealed_values
 
-        if not isinstance(found, Calibration):
-            found = Calibration.from_json(dict(found))
+        parameters = _parameters(found)
         truth = concealed_values(self.truth)
         wrong, compared = [], 0
-        for name, value, sigma in zip(
-            found.names, found.values, found.sigma, strict=True
-        ):
+        for name, (value, sigma) in parameters.items():
             limit = (within or {}).get(group_of(name), float("inf"))
             if sigma > limit:
                 wrong.append(f"{name} is known to ± {sigma:.3g}, wanted {limit:.3g}")
@@ -161,10 +159,34 @@ class VirtualImu:
                     )
         if not compared:
             wrong.append("it has no parameter that the device conceals")
-        lacking = set(within or {}) - set(found.groups)
+        lacking = set(within or {}) - {group_of(name) for name in parameters}
         wrong += [f"{group} was not determined" for group in sorted(lacking)]
         if wrong:
             pytest.fail("the calibration is wrong: " + "; ".join(wrong))
+
+
+def _parameters(
+    found: Calibration | Mapping[str, Any],
+) -> dict[str, tuple[float, float]]:
+    """Value and sigma by full name, of ours or of any procedure's result."""
+    from fieldcal.calibration import Calibration
+
+    if isinstance(found, Mapping) and "parameters" in found:
+        found = Calibration.from_json(dict(found))
+    if isinstance(found, Calibration):
+        pairs = zip(found.values.tolist(), found.sigma.tolist(), strict=True)
+        return dict(zip(found.names, pairs, strict=True))
+    out: dict[str, tuple[float, float]] = {}
+    for group, told in found.items():
+        try:
+            rows = zip("xyz", told["value"], told["sigma"], strict=True)
+            out |= {f"{group}.{a}": (float(v), float(s)) for a, v, s in rows}
+        except (KeyError, TypeError, ValueError):
+            raise TypeError(
+                f"{group} = {told!r} is no group of a calibration: write"
+                ' {"value": [x, y, z], "sigma": [x, y, z]}'
+            ) from None
+    return out
 
 
 Factory = Callable[..., VirtualImu]

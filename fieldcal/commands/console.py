@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable
 from typing import IO, Any
@@ -31,3 +32,15 @@ class ShownConsole(Console):
                 yield segment
             else:
                 yield Segment(shown(segment.text), segment.style)
+
+    def on_broken_pipe(self) -> None:
+        """Go on for nobody: whoever read the first line only has the exit code too."""
+        self.quiet = True
+        unread()
+
+
+def unread() -> None:
+    """Have standard output go nowhere from here on: its reader is gone."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)

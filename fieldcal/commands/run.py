@@ -35,6 +35,9 @@ EXAMPLE = """\
 GIVE_UP, GIVE_UP_UNTURNED = 90.0, 600.0
 """Device time after which a script gives a position up, s: with and without a mover."""
 
+INTERRUPTED = 130
+"""Exit code of a run that was stopped."""
+
 PATIENCE, PATIENCE_HEADLESS = 120.0, 20.0
 """How long a device that is gone is waited for, s."""
 
@@ -113,7 +116,25 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command."""
+    """Carry out the command; a script is told of its end, whatever that is."""
+    from fieldcal.run.operator.script import report
+
+    code, said = 0, None
+    try:
+        code = _carried_out(args)
+    except FieldcalError as error:
+        code, said = error.exit_code, str(error)
+        raise
+    except KeyboardInterrupt:
+        code, said = INTERRUPTED, "interrupted"
+        raise
+    finally:
+        if args.headless:
+            report("end", exit_code=code, error=said)
+    return code
+
+
+def _carried_out(args: argparse.Namespace) -> int:
     from fieldcal.calibration import limits
     from fieldcal.commands import run_view
     from fieldcal.commands.run_results import (

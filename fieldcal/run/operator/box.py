@@ -32,7 +32,7 @@ def picture(angle_deg: float) -> list[str]:
     """A box turned clockwise by an angle, four lines.
 
     >>> picture(0.0)[0].strip("⠀")
-    '⢀⢿⡀'
+    '⢀⣤⣄'
     """
     a = np.deg2rad(angle_deg)
     turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])  # y is down

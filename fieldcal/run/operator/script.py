@@ -1,4 +1,7 @@
-"""No operator: progress as JSON lines on standard error, the mover turns the device."""
+"""No operator: progress as JSON lines on standard error, the mover turns the device.
+
+Each line has its event and the host's time; the last one is "end", with the exit code.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from fieldcal.drivers.driver import host_clock
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import Mover
 from fieldcal.run.operator.protocol import OperatorView, Wish
@@ -66,8 +70,15 @@ class ScriptOperator:
         )
 
     def _say(self, event: str, **what: Any) -> None:
-        self._out.write(json.dumps({"event": event, **what}) + "\n")
-        self._out.flush()
+        report(event, self._out, **what)
+
+
+def report(event: str, out: IO[str] | None = None, **what: Any) -> None:
+    """Write one event as a line, to standard error if not told where else."""
+    out = out or sys.stderr
+    line = {"event": event, "host_s": round(host_clock(), 3), **what}
+    out.write(json.dumps(line) + "\n")
+    out.flush()
 
 
 def _number(value: float) -> float | None:

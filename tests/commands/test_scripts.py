@@ -1,0 +1,96 @@
+"""What a script has of a command: exit codes, one object, events with time and end."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from bench import five_positions
+
+from fieldcal.cli import COMMANDS, main
+
+FIELDCAL = [sys.executable, "-m", "fieldcal"]
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return five_positions(tmp_path_factory.mktemp("scripts") / "s")
+
+
+def test_a_reader_that_goes_changes_no_exit_code(session: Path) -> None:
+    whole = subprocess.run([*FIELDCAL, "solve", str(session)], capture_output=True)
+    with subprocess.Popen(
+        [*FIELDCAL, "solve", str(session)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as solving:
+        assert solving.stdout and solving.stderr
+        solving.stdout.close()  # as head -0 does
+        said = solving.stderr.read().decode()
+        code = solving.wait()
+    assert code == whole.returncode and "BrokenPipe" not in said
+
+
+@pytest.mark.parametrize("command", ["solve", "diagnose"])
+def test_a_failure_is_an_object_too(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, str(tmp_path), "--json"]) == 2
+    told = capsys.readouterr()
+    failed = json.loads(told.out)
+    assert failed["exit_code"] == 2 and "is no session" in failed["error"]
+    assert failed["error"] in told.err
+    assert main([command, str(tmp_path)]) == 2
+    assert not capsys.readouterr().out
+
+
+def test_events_have_a_time_and_an_end(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    url = f"replay:{session}/samples.parquet?speed=max"
+    call = ["run", "two_position", "--device", url, "--headless", "--patience", "0"]
+    code = main([*call, "-o", str(tmp_path / "r"), "--no-report"])
+    told = capsys.readouterr().err.splitlines()
+    events = [json.loads(line) for line in told if line.startswith("{")]
+    times = [event["host_s"] for event in events]
+    assert len(events) > 3 and times == sorted(times) and times[0] > 1.6e9
+    assert events[-1]["event"] == "end" and events[-1]["exit_code"] == code
+    assert [e["event"] for e in events].count("end") == 1
+    error = events[-1]["error"]
+    assert code not in (0, 1) or error is None or f"fieldcal run: {error}" in told
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
+def test_a_shell_completes_every_command(
+    shell: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    for name in COMMANDS:
+        assert name in script
+    assert "--resume" in script and "--details" in script
+
+
+def test_a_result_of_ones_own_procedure_is_compared() -> None:
+    from fieldcal.pytest_plugin import VirtualImu
+
+    class Known(VirtualImu):
+        def __init__(self) -> None:
+            pass
+
+        truth = {"acc_bias": [0.1, -0.2, 0.3]}  # type: ignore[assignment]
+
+    device = Known()
+    own = {"acc_bias": {"value": [0.101, -0.2, 0.3], "sigma": [1e-3] * 3}}
+    device.assert_calibration(own)
+    device.assert_calibration(own, within={"acc_bias": 0.002})
+    with pytest.raises(pytest.fail.Exception, match="wanted 0.0005"):
+        device.assert_calibration(own, within={"acc_bias": 5e-4})
+    off = {"acc_bias": {"value": [0.2, -0.2, 0.3], "sigma": [1e-3] * 3}}
+    with pytest.raises(pytest.fail.Exception, match="acc_bias.x = 0.2"):
+        device.assert_calibration(off)
+    with pytest.raises(TypeError, match="is no group of a calibration: write"):
+        device.assert_calibration({"acc_bias": [1.0, 2.0, 3.0]})

@@ -81,7 +81,7 @@ def test_a_result_of_ones_own_procedure_is_compared() -> None:
         def __init__(self) -> None:
             pass
 
-        truth = {"acc_bias": [0.1, -0.2, 0.3]}  # type: ignore[assignment]
+        truth = {"acc_bias": [0.1, -0.2, 0.3]}
 
     device = Known()
     own = {"acc_bias": {"value": [0.101, -0.2, 0.3], "sigma": [1e-3] * 3}}

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from bags import bag
 from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
 
 from fieldcal.core.samples import Block, concat
@@ -47,11 +48,18 @@ def _parquet(path: Path, block: Block) -> None:
     pyarrow.parquet.write_table(pa.table(columns), path)
 
 
+def _rosbag(path: Path, block: Block) -> None:
+    made = path.parent / "bags"
+    made.mkdir()
+    bag(made, table(block), first=False).rename(path)
+
+
 SMALL: dict[str, Callable[[Path, Block], object]] = {
     "ulog": lambda path, block: path.write_bytes(ulog({0: block}, {})),
     "dataflash": lambda path, block: path.write_bytes(dataflash({0: block}, {})),
     "tlog": lambda path, block: path.write_bytes(tlog({0: block}, {})),
     "mcap": _mcap,
+    "rosbag": _rosbag,
     "arrays": _hdf5,
     "can_log": _candump,
     "parquet": _parquet,
@@ -69,7 +77,7 @@ class Small:
         options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
         options = options if name == "can_log" else ""
         self.wanted = ReadOptions(COLUMNS, options=options)
-        if name == "mcap":
+        if name in ("mcap", "rosbag"):
             self.wanted = ReadOptions()
         self.content = path.read_bytes()
         self.expected = whole(path, self.wanted)

@@ -2,8 +2,7 @@
 
 A stream is a topic. Units are those of the message, m/s^2 and rad/s; the time is the
 stamp in its header. A temperature comes along from the topic of
-sensor_msgs/msg/Temperature that has the same frame, where there is one. Other programs'
-bags (sqlite3) become MCAP with ``ros2 bag convert``.
+sensor_msgs/msg/Temperature that has the same frame, where there is one.
 """
 
 from __future__ import annotations
@@ -17,27 +16,19 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.gzip_stream import head, on_disk
+from fieldcal.importing.gzip_stream import on_disk
 from fieldcal.importing.mcap_messages import Decoders, messages
 from fieldcal.importing.recording import ImuStream, Recording
+from fieldcal.importing.ros_messages import IMU, MANY, TEMPERATURE, block_of, row_of
 
 WHAT = "MCAP with sensor_msgs/Imu"
 
 MAGIC = b"\x89MCAP0\r\n"
-SQLITE = b"SQLite format 3\0"
-
-IMU, TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
-
-MANY = 4096
-"""Samples handed on together."""
-
-NOT_MEASURED = -1.0
-"""First element of a covariance where the message has no such measurement."""
 
 
 def recognises(head: bytes, path: Path) -> bool:
-    """Whether a file begins like one, or like the other kind of ROS 2 bag."""
-    return head.startswith((MAGIC, SQLITE))
+    """Whether a file begins like one."""
+    return head.startswith(MAGIC)
 
 
 class McapLog(Recording):
@@ -60,11 +51,6 @@ class McapLog(Recording):
 
     def _topics(self) -> dict[str, str]:
         """Kind of the messages of each topic."""
-        if head(self.path).startswith(SQLITE):
-            raise InputError(
-                f"{self.path}: is a bag of the sqlite3 kind; make an MCAP file of it"
-                " with ros2 bag convert"
-            )
         with on_disk(self.path, self.cut_off) as path:
             if self.repair:
                 said = messages(path, self.damaged, self.cut_off)
@@ -103,12 +89,12 @@ class McapLog(Recording):
                     warm[said.header.frame_id] = said.temperature
                     continue
                 degrees_now = warm.get(said.header.frame_id, np.nan)
-                rows.append(_row(said, degrees_now, logged))
+                rows.append(row_of(said, degrees_now, logged))
                 if len(rows) == MANY:
-                    yield _block(rows)
+                    yield block_of(rows)
                     rows = []
         if rows:
-            yield _block(rows)
+            yield block_of(rows)
 
     def _indexed(
         self, path: Path, stream: str, degrees: set[str]
@@ -170,20 +156,3 @@ def _whole(path: Path) -> str:
         return "no message of an IMU in it is whole"
     many = ", ".join(f"{n} messages of {topic}" for topic, n in sorted(found.items()))
     return f"{many} are whole: take them with --repair"
-
-
-def _row(said: Any, degrees: float, logged: int) -> tuple[float, ...]:
-    stamp, f, w = said.header.stamp, said.linear_acceleration, said.angular_velocity
-    acc = (f.x, f.y, f.z)
-    if said.linear_acceleration_covariance[0] == NOT_MEASURED:
-        acc = (np.nan,) * 3
-    gyr = (w.x, w.y, w.z)
-    if said.angular_velocity_covariance[0] == NOT_MEASURED:
-        gyr = (np.nan,) * 3
-    return (stamp.sec + 1e-9 * stamp.nanosec, *acc, *gyr, degrees, 1e-9 * logged)
-
-
-def _block(rows: list[tuple[float, ...]]) -> Block:
-    table = np.array(rows)
-    t, acc, gyr = table[:, 0], table[:, 1:4], table[:, 4:7]
-    return Block.of(t, acc, gyr, table[:, 7], None, table[:, 8])

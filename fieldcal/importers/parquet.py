@@ -41,7 +41,7 @@ class ParquetFile(ColumnRecording):
         """Numbers of its first batch; columns of other things are unknown."""
         import pyarrow as pa
 
-        with self._batches() as (schema, batches):
+        with self._batches(every=True) as (schema, batches):
             first = next(batches, None)
             if first is None:
                 return np.empty((0, len(schema)))
@@ -76,8 +76,8 @@ class ParquetFile(ColumnRecording):
                 yield samples.block(table, batch.num_rows)
 
     @contextmanager
-    def _batches(self) -> Iterator[tuple[Any, Iterator[Any]]]:
-        """Schema of its columns, and its batches."""
+    def _batches(self, every: bool = False) -> Iterator[tuple[Any, Iterator[Any]]]:
+        """Schema of its columns, and its batches: of `every` column or those wanted."""
         import pyarrow as pa
         import pyarrow.parquet
 
@@ -88,10 +88,9 @@ class ParquetFile(ColumnRecording):
                 if magic.startswith(PARQUET):
                     opened = pyarrow.parquet.ParquetFile(file)
                     schema = opened.schema_arrow
-                    wanted = (
-                        [*self._named(schema).values()] if self.wanted.columns else None
-                    )
-                    one = {"columns": wanted, "use_threads": False}
+                    one: dict[str, Any] = {"use_threads": False}
+                    if self.wanted.columns and not every:
+                        one["columns"] = [*self._named(schema).values()]
                     yield schema, opened.iter_batches(ROWS, **one)
                 elif magic == FEATHER:
                     feather = pa.ipc.open_file(file)

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    ports = _named(args.port) if args.port else _plugged_in()
+    ports = _named(args.port) if args.port else plugged_in()
     if args.probe:
         from fieldcal.drivers.probe import probe
 
@@ -50,14 +50,15 @@ def run(args: argparse.Namespace) -> int:
     return 3 if asked and not all(port["answer"]["url"] for port in ports) else 0
 
 
-def _plugged_in() -> list[dict[str, Any]]:
+def plugged_in() -> list[dict[str, Any]]:
+    """What the system knows of each serial port that is plugged in."""
     from serial.tools.list_ports import comports
 
     return [_described(port) for port in sorted(comports())]
 
 
 def _named(names: list[str]) -> list[dict[str, Any]]:
-    known = {port["port"]: port for port in _plugged_in()}
+    known = {port["port"]: port for port in plugged_in()}
     return [known.get(name, {"port": name, "what": "", "serial": ""}) for name in names]
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.introduce import introduce
 from fieldcal.commands.run_task import make_task
 from fieldcal.commands.several import StoreSeveral
 from fieldcal.commands.site import add_site
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import Task
 
 EXAMPLE = """\
+  fieldcal run five_position --latitude 50.45
   fieldcal run five_position --device "serial:/dev/ttyUSB0?format=witmotion"
   fieldcal run five_position --virtual --speed 20
   fieldcal run plan.toml --headless --json --junit run.xml > result.json
@@ -144,6 +146,8 @@ def _carried_out(args: argparse.Namespace) -> int:
     )
     from fieldcal.history.store import History, default_path
 
+    if _names_none(args):
+        introduce(args)
     task, folder = make_task(args)
     file = args.limits or task.run.get("limits")
     bounds = limits.read(task.about.grade, Path(file) if file else None)
@@ -170,6 +174,14 @@ def _carried_out(args: argparse.Namespace) -> int:
         run_view.show_decisions(found, further, folder)
     check_heard(others)
     return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
+
+
+def _names_none(args: argparse.Namespace) -> bool:
+    """Whether a run by the name of a procedure says no device at all."""
+    from fieldcal import procedures
+
+    said = args.device or args.virtual is not None or args.resume
+    return not said and args.procedure in procedures.names()
 
 
 def _broken_off(

@@ -45,6 +45,7 @@ class GyroUnitWatch:
     Attributes
     ----------
     says : what a turn has shown, one sentence; empty while nothing is wrong
+    unit : what the rates are in by a turn; empty until one was made
 
     """
 
@@ -56,7 +57,7 @@ class GyroUnitWatch:
         self._felt, self._whole = Stillness(), Stillness()
         self._last = self._moves = np.nan
         self._proved = False
-        self.says = ""
+        self.says = self.unit = ""
 
     def add(self, block: Block) -> None:
         """Take in the block that follows."""
@@ -82,6 +83,7 @@ class GyroUnitWatch:
         if reads is None:
             return ""
         fits = fitting(reads, GYR_SCALES, GYR_OUT[1])
+        self.unit = fits[0].unit if fits and fits[0].lsb == 1 else ""
         self._proved = bool(fits) and fits[0].unit == "rad/s"
         if not fits or self._proved:
             return ""

@@ -53,9 +53,17 @@ def mounted_otherwise(device: Array, wanted: Array, declared: tuple[str, ...]) -
     axes = other_mounting(device, wanted, declared)
     if axes is None or axes == declared:
         return ""
-    i = int(np.argmax(np.abs(device)))
-    up = f"{'+' if device[i] > 0 else '-'}{'xyz'[i]}"
     return (
-        f"{up} of the device is up, by the mounting {','.join(declared)} it is not: if"
-        f" it is mounted so, begin again with --mounting={','.join(axes)}"
+        f"{up_axis(device)} of the device is up, by the mounting {','.join(declared)}"
+        f" it is not: if it is mounted so, begin again with --mounting={','.join(axes)}"
     )
+
+
+def up_axis(device: Array) -> str:
+    """Name of the device axis that is nearest to up, by the force (3,) at rest.
+
+    >>> up_axis(np.array([0.1, -0.2, 9.8]))
+    '+z'
+    """
+    i = int(np.argmax(np.abs(device)))
+    return f"{'+' if device[i] > 0 else '-'}{'xyz'[i]}"

@@ -1,0 +1,119 @@
+"""The device introduces itself: up, what it sends, the line to use next time."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+
+from fieldcal.commands import ports
+from fieldcal.commands.introduce import introduce
+from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.samples import Array, Block, pieces
+from fieldcal.run.introduction import introduced, unit_by_a_turn
+from fieldcal.run.movers import VirtualMover
+
+N = 200
+
+
+def at_rest(f: Array, bias: Array, seed: int = 0) -> Block:
+    """Two seconds of a device that lies still, 100 Hz."""
+    rng = np.random.default_rng(seed)
+    acc = f + 0.02 * rng.standard_normal((N, 3))
+    gyr = bias + 2e-3 * rng.standard_normal((N, 3))
+    return Block.of(np.arange(N) / 100, acc, gyr)
+
+
+@pytest.mark.parametrize(
+    ("f", "up", "mounting"),
+    [
+        ((0.1, -9.79, 0.1), "-y", ("+x", "+y", "+z")),
+        ((0.2, 0.1, 9.75), "+z", ("+x", "-z", "+y")),
+        ((9.9, 0.1, 0.3), "+x", None),
+        ((5.0, 5.0, 6.8), "", ("+x", "+y", "+z")),
+    ],
+)
+def test_gravity_says_which_way_is_up(
+    f: tuple[float, ...], up: str, mounting: tuple[str, ...] | None
+) -> None:
+    known = introduced(at_rest(np.array(f), np.array([0.01, -0.02, 0.03])), 9.81)
+    assert known.up == up and not known.centred
+    assert mounting is None or known.mounting == mounting
+    assert (f"{up} is up" if up else "it stands askew") in known.says
+
+
+def test_units_that_are_not_g_are_said() -> None:
+    known = introduced(at_rest(np.array([0.0, -1.0, 0.0]), np.full(3, 0.01)), 9.81)
+    assert not known.up and "m/s² at rest, and gravity is 9.81 m/s²" in known.says
+
+
+def test_a_device_that_takes_its_bias_out_is_seen() -> None:
+    f = np.array([0.0, -9.81, 0.0])
+    centred = at_rest(f, np.zeros(3))
+    centred = Block.of(centred.t, centred.acc, centred.gyr - centred.gyr.mean(axis=0))
+    assert "takes their bias out itself" in introduced(centred, 9.81).says
+    assert "bias out" not in introduced(at_rest(f, np.full(3, 0.01)), 9.81).says
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "rad/s"), (180 / np.pi, "deg/s")])
+def test_one_turn_by_hand_tells_the_unit(scale: float, unit: str) -> None:
+    rng = np.random.default_rng(3)
+    t = np.arange(1500) / 100
+    rate = np.deg2rad(30.0) * (((t > 4) & (t < 6)) * 1.0 - ((t > 7) & (t < 9)) * 1.0)
+    angle = np.cumsum(rate) / 100
+    acc = 9.81 * np.column_stack([0 * t, -np.cos(angle), np.sin(angle)])
+    gyr = scale * np.column_stack([rate, 0 * t, 0 * t])
+    noise = rng.standard_normal((2, len(t), 3)) * [[[0.02]], [[2e-3 * scale]]]
+    block = Block.of(t, acc + noise[0], gyr + noise[1])
+    assert unit_by_a_turn(pieces(block, 0.1), 9.81, 60.0) == unit
+    assert unit_by_a_turn(pieces(block[:300], 0.1), 9.81, 2.0) is None
+
+
+@pytest.fixture
+def devices(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Ports that are plugged in; a z-up unit on the first."""
+    sim = ["--serial", "witmotion", "--speed", "10", "--mounting=+x,-z,+y"]
+    with ExitStack() as stack:
+        device = VirtualMover(sim, once=False)
+        stack.callback(device.close)
+        there = [device.port]
+        named = lambda: [{"port": p, "what": "", "serial": ""} for p in there]  # noqa: E731
+        monkeypatch.setattr(ports, "plugged_in", named)
+        yield there
+
+
+def options(**given: object) -> Namespace:
+    known: dict[str, object] = {
+        "device": None, "headless": True, "mounting": None, "gravity": None,
+    }  # fmt: skip
+    return Namespace(**(known | given))
+
+
+def test_the_one_that_answers_is_taken_and_said(
+    devices: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    args = options()
+    introduce(args)
+    assert args.device.startswith(f"serial:{devices[0]}?format=witmotion&baud=")
+    assert args.mounting == "+x,-z,+y"
+    said = capsys.readouterr().err
+    assert "+z is up" in said and "witmotion at" in said
+    assert f'the next time: --device "{args.device}" --mounting=+x,-z,+y' in said
+
+
+def test_none_and_too_many_are_questions(
+    devices: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fieldcal.commands.introduce.LISTEN", 0.3)
+    devices.append(devices[0])
+    with pytest.raises(InputError, match='2 devices answer, say which: --device "ser'):
+        introduce(options())
+    devices[:] = ["/dev/nowhere"]
+    with pytest.raises(DeviceError, match="no device answers: /dev/nowhere: "):
+        introduce(options())
+    devices.clear()
+    with pytest.raises(InputError, match="no serial port is plugged in: plug"):
+        introduce(options())

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from fieldcal.core.errors import DeviceError, InputError, Stopped
+from fieldcal.core.errors import InputError, Stopped
 
 if TYPE_CHECKING:
     from fieldcal.core.samples import Block
@@ -87,7 +87,10 @@ def _the_one() -> DetectedDevice:
         listed = "; ".join(f'--device "{one.url}"' for one in known)
         raise InputError(f"{len(known)} devices answer, say which: {listed}")
     said = "; ".join(f"{one.port}: {one.says}" for one in answers)
-    raise DeviceError(f"no device answers: {said}")
+    raise InputError(
+        f"no device answers ({said}): name one (--device"
+        ' "serial:/dev/ttyUSB0?format=witmotion"), or try without one (--virtual)'
+    )
 
 
 def _opened(url: str) -> Driver:

@@ -11,7 +11,7 @@ import pytest
 
 from fieldcal.commands import ports
 from fieldcal.commands.introduce import introduce
-from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, pieces
 from fieldcal.run.introduction import introduced, unit_by_a_turn
 from fieldcal.run.movers import VirtualMover
@@ -112,7 +112,7 @@ def test_none_and_too_many_are_questions(
     with pytest.raises(InputError, match='2 devices answer, say which: --device "ser'):
         introduce(options())
     devices[:] = ["/dev/nowhere"]
-    with pytest.raises(DeviceError, match="no device answers: /dev/nowhere: "):
+    with pytest.raises(InputError, match="no device answers ./dev/nowhere: "):
         introduce(options())
     devices.clear()
     with pytest.raises(InputError, match="no serial port is plugged in: plug"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -54,12 +55,26 @@ def _rosbag(path: Path, block: Block) -> None:
     bag(made, table(block), first=False).rename(path)
 
 
+def _phone(path: Path, block: Block) -> None:
+    columns, files = table(block), {}
+    for name, kind, own in (("Accelerometer", "m/s^2", slice(1, 4)),
+                            ("Gyroscope", "rad/s", slice(4, 7))):  # fmt: skip
+        rows = np.column_stack([columns[:, 0], columns[:, own]])
+        heading = ",".join(["Time (s)", *(f"{axis} ({kind})" for axis in "XYZ")])
+        lines = [",".join(f"{x:.17g}" for x in row) for row in rows]
+        files[f"{name}.csv"] = "\n".join([heading, *lines]) + "\n"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+
+
 SMALL: dict[str, Callable[[Path, Block], object]] = {
     "ulog": lambda path, block: path.write_bytes(ulog({0: block}, {})),
     "dataflash": lambda path, block: path.write_bytes(dataflash({0: block}, {})),
     "tlog": lambda path, block: path.write_bytes(tlog({0: block}, {})),
     "mcap": _mcap,
     "rosbag": _rosbag,
+    "phone_zip": _phone,
     "arrays": _hdf5,
     "can_log": _candump,
     "parquet": _parquet,
@@ -77,7 +92,7 @@ class Small:
         options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
         options = options if name == "can_log" else ""
         self.wanted = ReadOptions(COLUMNS, options=options)
-        if name in ("mcap", "rosbag"):
+        if name in ("mcap", "rosbag", "phone_zip"):
             self.wanted = ReadOptions()
         self.content = path.read_bytes()
         self.expected = whole(path, self.wanted)

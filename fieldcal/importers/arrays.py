@@ -45,7 +45,8 @@ NPZ, NPY = b"PK\x03\x04", b"\x93NUMPY"
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether a file begins like one of them; HDF5 may have 512 bytes before it."""
-    return _is_hdf5(head) or head.startswith((MATLAB, NPZ, NPY))
+    arrays = head.startswith(NPZ) and b".npy" in head
+    return arrays or _is_hdf5(head) or head.startswith((MATLAB, NPY))
 
 
 def _is_hdf5(head: bytes) -> bool:

@@ -12,11 +12,13 @@ again one by one, so that each that is none can be named.
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
@@ -24,7 +26,8 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.column_recording import ColumnRecording, Heading
-from fieldcal.importing.gzip_stream import HEAD
+from fieldcal.importing.gzip_stream import HEAD, PIECE
+from fieldcal.importing.headings import Column
 from fieldcal.importing.text_top import (
     headings_above,
     is_number,
@@ -44,6 +47,8 @@ WIDE = (b"\xff\xfe", b"\xfe\xff")
 
 TOP = 1000
 """Lines at the top among which the first of numbers is looked for."""
+
+AXES = ("x", "y", "z")
 
 NAMED = 50
 """Lines at the top by which their width is judged."""
@@ -82,17 +87,51 @@ def _is_wide(head: bytes) -> bool:
 
 
 class TextColumns(ColumnRecording):
-    """A text file, with one IMU in it or several side by side."""
+    """A text file, with one IMU in it or several side by side.
 
+    Attributes
+    ----------
+    from_first : whether times count from the first line
+    member : the file of a .zip that is the text; "" if it is the file itself
+    sensor : what bare axes are of, as the name of the file says it; "" if it does not
+
+    """
+
+    from_first = True
+    member = sensor = ""
     _skip = 0
 
     def place(self, row: int) -> str:
         """Name a line; empty ones are not counted."""
         return f"line {self._skip + row + 1}"
 
+    def pieces(self, size: int = PIECE) -> Iterator[bytes]:
+        """Bytes of the text, unpacked."""
+        if not self.member:
+            yield from super().pieces(size)
+            return
+        try:
+            with ZipFile(self.path) as archive, archive.open(self.member) as file:
+                while data := file.read(size):
+                    yield data
+        except (BadZipFile, OSError, RuntimeError, zlib.error, EOFError) as error:
+            raise InputError(
+                f"{self.path}: {self.member} cannot be read: {error}; copy it again"
+                " from where it came"
+            ) from error
+
     def heading(self) -> list[Heading]:
         """What stands above its numbers."""
-        return headings_above(self._lines, self.wanted.separator)
+        found = headings_above(self._lines, self.wanted.separator)
+        if not self.sensor:
+            return found
+        return [Heading([self._of(c) for c in way.columns], way.skip) for way in found]
+
+    def _of(self, column: Column) -> Column:
+        """Column of which a bare axis is one of the sensor's."""
+        bare = column.name.strip().strip('"').strip()
+        axis = bare[:1].lower() in AXES and not bare[1:2].isalpha()
+        return column._replace(name=f"{self.sensor} {bare}" if axis else bare)
 
     def beginning(self) -> Array:
         """Numbers of the first lines."""
@@ -152,7 +191,7 @@ class TextColumns(ColumnRecording):
             if not n:
                 continue
             t0 = block.t[0] if t0 is None else t0
-            yield replace(block, t=block.t - t0)
+            yield replace(block, t=block.t - t0) if self.from_first else block
         if not seen:
             number, line = list(enumerate(top[:2], 1))[-1]
             raise InputError(

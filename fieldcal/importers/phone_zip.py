@@ -1,0 +1,134 @@
+"""Archives of telephones: a .zip with a text file for each sensor.
+
+phyphox and the Sensor Logger of Android and iOS write ``Accelerometer.csv``,
+``Gyroscope.csv`` and others, with one clock for all. The name of the file says the
+sensor, its columns the axes; each sample of the accelerometer goes with the nearest of
+the gyroscope. ``TotalAcceleration`` goes before ``Accelerometer``, from which some
+programs take gravity out.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
+from fieldcal.importers.csv_like import TextColumns
+from fieldcal.importing import columns
+from fieldcal.importing.alignment import AlignedPair
+from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
+
+WHAT = "archives of telephones: phyphox, Sensor Logger"
+
+ACC = (
+    "totalacceleration",
+    "accelerometeruncalibrated",
+    "accelerometer",
+    "acceleration",
+)
+GYR = ("gyroscope", "gyroscopeuncalibrated", "rotationrate", "gyro")
+"""Names of files, those that are taken first first."""
+
+SENSOR = {"a": "acc", "g": "gyr"}
+
+
+def recognises(head: bytes, path: Path) -> bool:
+    """Whether a file begins like an archive, but not of arrays."""
+    return head.startswith(b"PK\x03\x04") and b".npy" not in head
+
+
+class PhoneArchive(Recording):
+    """An archive with the IMU of a telephone."""
+
+    asks_units = True
+    _texts: tuple[TextColumns, ...] = ()
+
+    def streams(self) -> list[ImuStream]:
+        """Return the one IMU."""
+        for text in self._opened():
+            text.streams()
+        return [ImuStream("0", f"columns in {columns.units(self.wanted)}")]
+
+    def notes(self, stream: str) -> dict[str, Any]:
+        """Return the units."""
+        return columns.notes(self.wanted)
+
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """Samples of both sensors, those of the accelerometer with the nearest."""
+        pair, flows = AlignedPair(), []
+        for text in self._opened():
+            one = text.alone("0")
+            one.wanted = replace(
+                one.wanted,
+                acc_unit=self.wanted.acc_unit, acc_lsb=self.wanted.acc_lsb,
+                gyr_unit=self.wanted.gyr_unit, gyr_lsb=self.wanted.gyr_lsb,
+                time_unit=self.wanted.time_unit,
+            )  # fmt: skip
+            flows.append(one.blocks("0"))
+        while True:
+            acc, gyr = ([*(next(flow, None) for flow in flows), None])[:2]
+            if acc is None and gyr is None:
+                break
+            yield pair.feed(acc, gyr)
+        yield pair.rest()
+
+    def _opened(self) -> tuple[TextColumns, ...]:
+        """The texts of accelerometer and gyroscope, as they are in it."""
+        if self._texts:
+            return self._texts
+        texts = []
+        for kind, member in self._members().items():
+            text = TextColumns(self.path, self.wanted, self.repair)
+            text.member, text.sensor, text.from_first = member, SENSOR[kind], False
+            texts.append(text)
+        self._texts = tuple(texts)
+        self.wanted = self._said()
+        return self._texts
+
+    def _said(self) -> ReadOptions:
+        """What the texts' headings say of all units."""
+        said = self.wanted
+        for text in self._texts:
+            one = next(iter(text.imus().values()))
+            self.says += [s for s in text.says if s not in self.says]
+            said = replace(
+                said,
+                columns=tuple(dict.fromkeys((*said.columns, *one.columns))),
+                acc_unit=said.acc_unit or one.acc_unit,
+                gyr_unit=said.gyr_unit or one.gyr_unit,
+                time_unit=said.time_unit or one.time_unit,
+                named=said.named | one.named,
+            )
+        return said
+
+    def _members(self) -> dict[str, str]:
+        """Names of the files of each sensor.
+
+        Raises
+        ------
+        InputError
+            If there is no accelerometer among them.
+
+        """
+        try:
+            with zipfile.ZipFile(self.path) as archive:
+                names = [n for n in archive.namelist() if n.lower().endswith(".csv")]
+        except (zipfile.BadZipFile, OSError) as error:
+            raise InputError(
+                f"{self.path}: cannot be read: {error}; copy it again from where it"
+                " came"
+            ) from error
+        stems = {Path(n).stem.lower().replace(" ", ""): n for n in reversed(names)}
+        acc = next((stems[n] for n in ACC if n in stems), None)
+        gyr = next((stems[n] for n in GYR if n in stems), None)
+        if acc is None:
+            raise InputError(
+                f"{self.path}: has no file of an accelerometer, such as"
+                f" Accelerometer.csv; unpack it and import the one that is: there are"
+                f" {', '.join(names[:12]) or 'no .csv files'}"
+            )
+        return {"a": acc} | ({"g": gyr} if gyr else {})

@@ -1,0 +1,102 @@
+"""Archives of telephones, as phyphox and the Sensor Logger write them."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laid_about import turned
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Array
+from fieldcal.session.folder import Session
+
+RATE = 50.0
+LATE = 3e-3
+"""What the gyroscope's samples lie behind the accelerometer's, s."""
+
+
+def text(heading: str, rows: Array) -> str:
+    lines = [",".join(f"{x:.17g}" for x in row) for row in rows]
+    return "\n".join([heading, *lines]) + "\n"
+
+
+def phyphox(rows: Array) -> dict[str, str]:
+    axes = [f'"{{}} {axis} ({{}})"' for axis in "xyz"]
+    acc = ",".join(one.format("Acceleration", "m/s^2") for one in axes)
+    gyr = ",".join(one.format("Gyroscope", "rad/s") for one in axes)
+    t = rows[:, :1]
+    return {
+        "Accelerometer.csv": text(f'"Time (s)",{acc}', np.hstack([t, rows[:, 1:4]])),
+        "Gyroscope.csv": text(f'"Time (s)",{gyr}', np.hstack([t + LATE, rows[:, 4:]])),
+        "meta/device.csv": "property,value\nmodel,x\n",
+    }
+
+
+def sensor_logger(rows: Array) -> dict[str, str]:
+    t = rows[:, :1]
+    heading = "time,seconds_elapsed,z,y,x"
+
+    def of(three: Array, late: float) -> str:
+        stamp = 1.7e18 + 1e9 * (t + late)
+        return text(heading, np.hstack([stamp, t + late, three[:, ::-1]]))
+
+    free = rows[:, 1:4] * 0.0
+    return {
+        "Accelerometer.csv": of(free, 0.0),
+        "TotalAcceleration.csv": of(rows[:, 1:4], 0.0),
+        "Gyroscope.csv": of(rows[:, 4:], LATE),
+        "Metadata.csv": "version,device\n3,x\n",
+    }
+
+
+def packed(folder: Path, files: dict[str, str]) -> Path:
+    path = folder / "log.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return path
+
+
+@pytest.mark.parametrize("writes", [phyphox, sensor_logger])
+def test_an_archive_needs_no_option(
+    writes: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert callable(writes)
+    rows = turned(1, RATE)
+    path = packed(tmp_path, writes(rows))
+    assert main(["import", str(path), "-o", str(tmp_path / "s")]) == 0
+    session = Session.open(tmp_path / "s")
+    block = session.block
+    np.testing.assert_allclose(block.t - block.t[0], rows[:, 0], atol=1e-6)
+    np.testing.assert_allclose(block.acc, rows[:, 1:4])
+    np.testing.assert_allclose(block.gyr[:-1], rows[:-1, 4:])
+    assert len(session.windows) >= 7
+
+
+@pytest.mark.parametrize(
+    ("files", "says"),
+    [({"notes.csv": "a,b\n1,2\n"}, "has no file of an accelerometer"),
+     ({"readme.txt": "x"}, "no .csv files")],
+)  # fmt: skip
+def test_other_archives_are_refused(
+    files: dict[str, str],
+    says: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = packed(tmp_path, files)
+    assert main(["import", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert says in said and said.count("\n") == 1
+
+
+def test_an_archive_that_was_cut_off_is_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = packed(tmp_path, phyphox(turned(2, RATE)))
+    path.write_bytes(path.read_bytes()[:-200])
+    assert main(["import", str(path)]) == 2
+    assert "cannot be read" in capsys.readouterr().err

@@ -1,8 +1,10 @@
 """Parameters of an autopilot, read and set over any MAVLink link, and not believed.
 
 PARAM_REQUEST_READ asks for one, PARAM_SET sets one, PARAM_VALUE answers both. An answer
-to PARAM_SET says what was understood, not what is kept, so whoever writes reads again.
-Questions are put `TRIES` times, since links lose packets.
+to PARAM_SET says what was understood, not what is kept, so whoever writes reads again,
+once no answer is on its way any more. Questions are put `TRIES` times, since links lose
+packets; what is no number is no answer. A link that hangs up is opened again: an
+autopilot may start anew meanwhile.
 
 A parameter travels as a float of 32 bits; whole numbers of PX4 as their bits in one.
 """
@@ -11,7 +13,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterable, Mapping
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any, Self
 
 import numpy as np
@@ -28,6 +30,15 @@ BEAT, PATIENCE = 1.0, 0.7
 TRIES = 4
 """How often a question is put."""
 
+ROUNDS = 3
+"""How often all parameters are set, and read back, before that has failed."""
+
+QUIET, ENOUGH = 0.5, 3.0
+"""Time without an answer after which none is on its way, and the longest wait, s."""
+
+AWAY, AGAIN = 20.0, 0.5
+"""How long a link that hung up is tried again, and how often, s."""
+
 HEARTBEAT = 5.0
 """How long a first heartbeat may take, s."""
 
@@ -42,6 +53,8 @@ class ParameterLink:
     ----------
     address : as of the driver, ``mavlink:`` left out; only ``baud``, ``system`` and
         ``component`` matter here
+    connect : opens the line, and opens it again; by default what the address says
+    clock, pause : s of the host, and to let some go by
 
     Attributes
     ----------
@@ -57,7 +70,13 @@ class ParameterLink:
 
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(
+        self,
+        address: str,
+        connect: Callable[[], TwoWaySource] | None = None,
+        clock: Callable[[], float] = monotonic,
+        pause: Callable[[float], None] = sleep,
+    ) -> None:
         from pymavlink.dialects.v20 import all as dialect
 
         endpoint, options = split(address, "mavlink")
@@ -75,7 +94,9 @@ class ParameterLink:
         self._beat = -np.inf
         self.autopilot, self.armed = 0, False
         self._target = (0, 0)
-        self._line: TwoWaySource = opener(endpoint, baud)()
+        self._clock, self._pause, self._answered = clock, pause, -np.inf
+        self._connect = connect or opener(endpoint, baud)
+        self._line: TwoWaySource = self._connect()
         try:
             self._greet()
         except BaseException:
@@ -122,6 +143,20 @@ class ParameterLink:
             If one is not kept as it was set.
 
         """
+        for _ in range(ROUNDS):
+            self._set(values)
+            self._settle()
+            kept = self.read(values)
+            wrong = {n: kept[n] for n, v in values.items() if not same(kept[n], v)}
+            if not wrong:
+                return
+        raise DeviceError(
+            f"{self.name}: the autopilot did not take what was set: it keeps"
+            f" {listed(wrong)}"
+        )
+
+    def _set(self, values: Mapping[str, float]) -> None:
+        """Set parameters until each was answered as it was set, or often enough."""
         for name in values:
             self._heard.pop(name, None)
 
@@ -134,15 +169,16 @@ class ParameterLink:
                         )
                     )
 
-        self._until(lambda: all(same(self._heard.get(n), v) for n, v in values.items()),
-                    ask)  # fmt: skip
-        kept = self.read(values)
-        wrong = {n: kept[n] for n, v in values.items() if not same(kept[n], v)}
-        if wrong:
-            raise DeviceError(
-                f"{self.name}: the autopilot did not take what was set: it keeps"
-                f" {listed(wrong)}"
-            )
+        self._until(
+            lambda: all(same(self._heard.get(n), v) for n, v in values.items()), ask
+        )
+
+    def _settle(self) -> None:
+        """Let answers that are late come before anything is asked anew."""
+        begin = self._clock()
+        self._answered = max(self._answered, begin)
+        while self._clock() < min(self._answered + QUIET, begin + ENOUGH):
+            self._listen()
 
     def close(self) -> None:
         """Release the link; safe to call twice."""
@@ -158,15 +194,15 @@ class ParameterLink:
         """Ask until it is done, or was asked often enough."""
         for _ in range(TRIES):
             ask()
-            deadline = monotonic() + PATIENCE
-            while monotonic() < deadline:
+            deadline = self._clock() + PATIENCE
+            while self._clock() < deadline:
                 self._listen()
                 if done():
                     return
 
     def _greet(self) -> None:
-        deadline = monotonic() + HEARTBEAT
-        while not self._vehicles and monotonic() < deadline:
+        deadline = self._clock() + HEARTBEAT
+        while not self._vehicles and self._clock() < deadline:
             self._listen()
         if not self._vehicles:
             raise DeviceError(
@@ -174,8 +210,8 @@ class ParameterLink:
                 " check link, port and baud rate"
             )
         named = all(self._wanted.values())
-        settle = monotonic() + (0.0 if named else BEAT)
-        while monotonic() < settle:
+        settle = self._clock() + (0.0 if named else BEAT)
+        while self._clock() < settle:
             self._listen()  # others on the same link say so within a second
         if len(self._vehicles) > 1:
             several = ", ".join(
@@ -190,15 +226,14 @@ class ParameterLink:
 
     def _listen(self) -> None:
         """Say that we are there, and take in what comes within a moment."""
-        if monotonic() - self._beat >= BEAT:
-            self._beat = monotonic()
+        if self._clock() - self._beat >= BEAT:
+            self._beat = self._clock()
             self._send(self._out.heartbeat_encode(6, NO_AUTOPILOT, 0, 0, 4))
         try:
             data = self._line.read()
         except OSError as fault:
-            raise DeviceError(
-                f"{self.name} hung up: {fault}; check the link"
-            ) from fault
+            self._reopen(fault)
+            return
         for message in self._in.parse_buffer(data) or []:
             self._take(message)
 
@@ -214,8 +249,9 @@ class ParameterLink:
             if self.autopilot == PX4 and message.param_type == INT32:
                 bits = struct.pack("<f", message.param_value)
                 value = float(struct.unpack("<i", bits)[0])
-            # the shortest number that is this float of 32 bits
-            self._heard[message.param_id] = float(str(np.float32(value)))
+            self._answered = self._clock()
+            if np.isfinite(value):  # the shortest number that is this float of 32 bits
+                self._heard[message.param_id] = float(str(np.float32(value)))
 
     def _send(self, message: Any) -> None:
         packed = message.pack(self._out)
@@ -223,9 +259,20 @@ class ParameterLink:
         try:
             self._line.write(packed)
         except OSError as fault:
-            raise DeviceError(
-                f"{self.name} hung up: {fault}; check the link"
-            ) from fault
+            self._reopen(fault)
+
+    def _reopen(self, fault: OSError) -> None:
+        """Open a line that hung up again; what was asked is asked anew by who waits."""
+        self._line.close()
+        until = self._clock() + AWAY
+        while self._clock() < until:
+            self._pause(AGAIN)
+            try:
+                self._line = self._connect()
+            except (OSError, DeviceError):
+                continue
+            return
+        raise DeviceError(f"{self.name} hung up: {fault}; check the link") from fault
 
 
 def same(kept: float | None, wanted: float) -> bool:

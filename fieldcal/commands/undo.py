@@ -30,10 +30,13 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.write import ask, check_ready, opened
     from fieldcal.install.transaction import (
+        WriteRolledBack,
+        broken_off,
         check_unchanged,
         install,
         last_saved,
         note_done,
+        whole,
     )
 
     path, known = last_saved(args.session)
@@ -41,13 +44,21 @@ def run(args: argparse.Namespace) -> int:
     device = args.device or known["device"]
     with opened(device) as link:
         check_ready(link, link.autopilot)
-        if not args.force:
+        if known["done"] and not args.force:
             check_unchanged(link, new, "when it was written", old)
         now = link.read(old)
+        if said := broken_off(now, old, new):
+            sys.stderr.write(f"{said}\n")
         for name, value in old.items():
             sys.stdout.write(f"{name}: {now[name]:.9g} -> {value:.9g}\n")
         ask(f"give these {len(old)} parameters back to {device}", args.yes)
-        install(link, now, old)
+        note_done(path, done=False)  # from here on it may be broken off
+        back = now if whole(now, new) else {**now, **new}
+        try:
+            install(link, back, old, "as they were written")
+        except WriteRolledBack:
+            note_done(path, done=True)
+            raise
     note_done(path, undone=True)
     sys.stderr.write(f"given back and read back: {len(old)} parameters\n")
     return 0

@@ -187,22 +187,35 @@ def _to_device(
     from fieldcal.drivers.mavlink_parameters import same
     from fieldcal.install.transaction import (
         WriteRolledBack,
+        broken_off,
         check_unchanged,
         install,
         note_done,
         save,
+        unfinished,
     )
 
     known = {c.name: c.old for c in wanted}
     new = {c.name: c.new for c in wanted}
     with opened(args.device) as link:
         check_ready(link, installed.autopilot)
-        old = check_unchanged(link, known, "while it was recorded", new)
-        if all(same(old[name], value) for name, value in new.items()):
+        earlier = unfinished(session.folder)
+        if earlier:  # whatever it keeps, it comes from there
+            now = link.read(known)
+            old = {name: earlier[1]["old"].get(name, now[name]) for name in now}
+            if said := broken_off(now, old, earlier[1]["new"]):
+                sys.stderr.write(f"{said}\n")
+        else:
+            now = old = check_unchanged(link, known, "while it was recorded", new)
+        if all(same(now[name], value) for name, value in new.items()):
+            if earlier:
+                note_done(earlier[0], done=True)
             sys.stderr.write(f"all {len(new)} parameters are installed already\n")
             return
         ask(f"write these {len(new)} parameters to {args.device}", args.yes)
         path = save(session.folder, args.device, old, new)
+        if earlier:
+            note_done(earlier[0], undone=True)
         try:
             install(link, old, new)
         except WriteRolledBack:

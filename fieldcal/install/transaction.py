@@ -46,7 +46,7 @@ def check_unchanged(
     link: ParameterLink,
     known: Mapping[str, float],
     since: str,
-    other: Mapping[str, float] | None = None,
+    other: Mapping[str, float],
 ) -> dict[str, float]:
     """Return what the autopilot keeps; refuse if that is not as in the proposal.
 
@@ -70,8 +70,7 @@ def check_unchanged(
     for name, value in known.items():
         if name in GYR_OFFSETS:
             continue
-        also = (other or {}).get(name, value)
-        if not (same(now[name], value) or same(now[name], also)):
+        if not (same(now[name], value) or same(now[name], other[name])):
             raise InputError(
                 f"{name} = {now[name]:.9g} on the autopilot, and was {value:.9g}"
                 f" {since}: somebody has changed it since; record again"
@@ -80,9 +79,18 @@ def check_unchanged(
 
 
 def install(
-    link: ParameterLink, old: Mapping[str, float], new: Mapping[str, float]
+    link: ParameterLink,
+    old: Mapping[str, float],
+    new: Mapping[str, float],
+    back: str = "as before",
 ) -> None:
     """Write, read back, and undo it if anything is not as wanted.
+
+    Parameters
+    ----------
+    link : to the autopilot
+    old, new : what it has after it was undone, and after it was not
+    back : what the old ones are, for the error
 
     Raises
     ------
@@ -101,9 +109,38 @@ def install(
                 f"{said}; and it could not be undone ({again}): set by hand"
                 f" {listed(old)}"
             ) from failed
-        raise WriteRolledBack(
-            f"{said}; undone, all {len(old)} are as before"
-        ) from failed
+        raise WriteRolledBack(f"{said}; undone, all {len(old)} are {back}") from failed
+
+
+def whole(now: Mapping[str, float], some: Mapping[str, float]) -> bool:
+    """Whether what an autopilot keeps is one set, but for what it sets by itself."""
+    return all(same(now[n], v) for n, v in some.items() if n not in GYR_OFFSETS)
+
+
+def broken_off(
+    now: Mapping[str, float], old: Mapping[str, float], new: Mapping[str, float]
+) -> str:
+    """Sentence where it keeps part of each, as after a kill; empty if it does not."""
+    if whole(now, old) or whole(now, new):
+        return ""
+    done = sum(same(now[n], v) for n, v in new.items())
+    return (
+        f"writing was broken off before: {done} of {len(new)} parameters are the new"
+        " ones"
+    )
+
+
+def unfinished(folder: Path) -> tuple[Path, dict[str, Any]] | None:
+    """The last set saved in a session of which nobody noted what became of it."""
+    for file in sorted(folder.glob(f"{SAVED}*.json"), reverse=True):
+        try:
+            document = json.loads(file.read_text("utf-8"))
+            if document.get("undone") or document.get("done"):
+                return None
+            return file, {"old": dict(document["old"]), "new": dict(document["new"])}
+        except (OSError, ValueError, KeyError, AttributeError, TypeError):
+            continue
+    return None
 
 
 def save(
@@ -145,7 +182,9 @@ def save_removed(folder: Path) -> list[Path]:
         old = {name: known.values[name] for name in new}
         if old != new:  # else a run before it had taken out what there was
             first = device if isinstance(device, str) else device[0]
-            return [save(folder, first, old, new)]
+            path = save(folder, first, old, new)
+            note_done(path, done=True)  # by that run
+            return [path]
     return []
 
 
@@ -168,7 +207,8 @@ def last_saved(path: Path) -> tuple[Path, dict[str, Any]]:
             document = json.loads(file.read_text("utf-8"))
             old, new = ({str(k): float(v) for k, v in document[key].items()}
                         for key in ("old", "new"))  # fmt: skip
-            known = {"device": str(document["device"]), "old": old, "new": new}
+            known = {"device": str(document["device"]), "old": old, "new": new,
+                     "done": bool(document.get("done"))}  # fmt: skip
         except (OSError, ValueError, KeyError, AttributeError, TypeError) as error:
             raise InputError(
                 f"{file}: is no saved set of parameters: {error}"

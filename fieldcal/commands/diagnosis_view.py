@@ -6,6 +6,8 @@ behind them follows where it is asked for.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from typing import IO, TYPE_CHECKING
 
 from fieldcal.calibration.wording import position_numbers, pretty
@@ -31,8 +33,8 @@ STYLES = {
 STEPS = 3
 """Steps of what to do that are shown without being asked for."""
 
-BAR = 24
-"""Width of a bar of the picture, characters."""
+BAR = 14
+"""Width of a bar of the picture, characters: two stand side by side in 80."""
 
 FOLLOWS = 22
 """Least width of what a mismatch follows, characters: some words on each line."""
@@ -102,7 +104,7 @@ def _lines(diagnosis: Diagnosis) -> object:
     for name, ratio in (("left out", 5), ("how big", 7)):
         table.add_column(name, ratio=ratio)
     table.add_column("how sure", no_wrap=True)
-    table.add_column("what it does to the calibration", ratio=7)
+    table.add_column("does to the calibration", ratio=7)
     for line in diagnosis.lines:
         cells = (line.what, line.size, line.sure, line.does)
         table.add_row(*map(Text, cells))
@@ -117,17 +119,28 @@ def _picture(console: Console, diagnosis: Diagnosis) -> None:
     names = [n for n in before if before[n] > 0 and after.get(n, 0.0) > 0]
     if not names:
         return
-    console.print("held-out rms  ░ before  █ after", style="bold")
-    grid = Table.grid(padding=(0, 1))
-    for name in names:
-        alike = [n for n in names if n[0] == name[0]]
-        most = max(max(before[n], after[n]) for n in alike)
-        first, then = (round(BAR * q[name] / most) for q in (before, after))
-        bar = "█" * max(1, then) + "░" * (first - max(1, then))
-        unit = UNITS[0] if name[0] == "a" else UNITS[1]
-        change = f"{before[name]:.3g} → {after[name]:.3g} {pretty(unit)}"
-        grid.add_row(name, f"{bar:<{BAR}}", change)
+    legend = f"held-out rms, {pretty(UNITS[0])} and {pretty(UNITS[1])}"
+    console.print(f"{legend}   ░ before  █ after", style="bold")
+    grid = Table.grid(padding=(0, 2))
+    triads = [[n for n in names if n[0] == triad] for triad in "ag"]
+    for pair in zip_longest(*(t for t in triads if t)):
+        grid.add_row(*(_bar(name, names, before, after) for name in pair))
     console.print(grid)
+
+
+def _bar(
+    name: str | None,
+    names: Sequence[str],
+    before: Mapping[str, float],
+    after: Mapping[str, float],
+) -> str:
+    """What was left of a channel's residual, on the scale of its sensor's largest."""
+    if name is None:
+        return ""
+    most = max(max(before[n], after[n]) for n in names if n[0] == name[0])
+    first, then = (round(BAR * q[name] / most) for q in (before, after))
+    bar = "█" * max(1, then) + "░" * (first - max(1, then))
+    return f"{name} {bar:<{BAR}} {before[name]:.3g} → {after[name]:.3g}"
 
 
 def _details(console: Console, diagnosis: Diagnosis) -> None:

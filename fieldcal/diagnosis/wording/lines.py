@@ -15,9 +15,9 @@ SEEN = 1.0
 """Standard deviations below which a parameter counts as not moved."""
 
 TREATED = {
-    "mend": "none: samples are put right first",
-    "mask": "none: its samples are left out",
-    "note": "none that is known",
+    "mend": "nothing: put right",
+    "mask": "nothing: left out",
+    "note": "nothing known",
 }
 """What faults of samples do to a calibration, by what is done about them."""
 
@@ -55,7 +55,7 @@ def size(parameters: Mapping[str, Quantity]) -> str:
     told = [n for n, q in parameters.items() if q.unit != "s"] or list(parameters)
     name = max(told, key=lambda n: _clear(parameters[n]))
     clear = sum(_clear(q) > 3 for n, q in parameters.items() if n != name)
-    more = f" (+ {clear} more)" if clear else ""
+    more = f" (+{clear})" if clear else ""
     return f"{name.removesuffix('_deg')} {pretty_quantity(parameters[name])}{more}"
 
 
@@ -81,7 +81,7 @@ def _does(found: FoundEffect) -> str:
     if isinstance(effect, Scatter):
         return "widens its ±"
     if isinstance(effect, Line):
-        return "none: it is subtracted"
+        return "nothing: subtracted"
     if not found.moves:
         return "nothing that shows"
     name = max(found.moves, key=lambda n: _clear(found.moves[n]))

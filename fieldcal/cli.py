@@ -116,12 +116,12 @@ def _guarded(name: str, arguments: list[str]) -> int:
     from fieldcal.core.errors import FieldcalError
     from fieldcal.core.shown import one_line
 
-    command = _load(name)
+    command, printed = _load(name), False
     try:
         code = command.run(_command_parser(name, command).parse_args(arguments))
         return _flushed(code)
     except FieldcalError as error:
-        said, code = one_line(str(error)), error.exit_code
+        said, code, printed = one_line(str(error)), error.exit_code, error.printed
     except KeyboardInterrupt:
         said, code = "interrupted", INTERRUPTED
     except BrokenPipeError:
@@ -130,7 +130,7 @@ def _guarded(name: str, arguments: list[str]) -> int:
     except Exception as error:  # the operator gets a sentence whatever it is
         said, code = _broken(name, arguments, error), BROKEN
     sys.stderr.write(f"fieldcal {name}: {said}\n")
-    if "--json" in arguments:
+    if "--json" in arguments and not printed:
         failed = {"error": said, "exit_code": code}
         sys.stdout.write(json.dumps(failed, ensure_ascii=False) + "\n")
     return code

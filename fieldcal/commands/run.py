@@ -172,7 +172,11 @@ def _carried_out(args: argparse.Namespace) -> int:
                 sys.stdout.write(f"report:   {page}\n")
     if not args.json:
         run_view.show_decisions(found, further, folder)
-    check_heard(others)
+    try:
+        check_heard(others)
+    except FieldcalError as error:
+        error.printed = bool(args.json)
+        raise
     return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
 
 

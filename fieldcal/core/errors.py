@@ -26,9 +26,16 @@ from typing import ClassVar
 
 
 class FieldcalError(Exception):
-    """Base of every error raised on purpose; the text is for the operator."""
+    """Base of every error raised on purpose; the text is for the operator.
+
+    Attributes
+    ----------
+    printed : whether a result was printed all the same
+
+    """
 
     exit_code: ClassVar[int] = 2
+    printed = False
 
 
 class InputError(FieldcalError):

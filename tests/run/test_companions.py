@@ -98,7 +98,10 @@ def test_all_devices_are_gone_on_with_after_a_kill(tmp_path: Path) -> None:
         before = list(read_marks(folder / "marks.jsonl"))
         code, result, said = led(devices, [], "--resume", str(session))
         truths = [device.truth for device in devices]
-    assert code == 0, said
+    reasons = [
+        each["decision"]["reasons"] for each in (result, *result["further"].values())
+    ]
+    assert code == 0, (reasons, said)
     check(session, truths, urls, result)
     taken = [m for m in before if m["event"] == "window"]
     after = [m for m in read_marks(folder / "marks.jsonl") if m["event"] == "window"]

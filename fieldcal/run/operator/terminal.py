@@ -236,7 +236,8 @@ class ConsoleOperator:
         style = f"bold reverse {colour}".strip()
         width = self._console.width
         lines: list[RenderableType] = [Text(f" {words}{number}".ljust(width), style)]
-        name = hold.position.name if hold and words == TURN else detail
+        what = detail.partition(": ")[2] or detail  # the number stands above
+        name = hold.position.name if hold and words == TURN else what
         lines.append(Text(f" {name}".ljust(width), style))
         if view and hold is view.hold:
             lines += [Text(line) for line in widgets.short(view)]

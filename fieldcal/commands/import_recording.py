@@ -210,8 +210,8 @@ def _bring(
         )
     elif not imported.stretches:
         err(
-            "no still stretch was found: write the positions into session.toml, or try"
-            " --still with a shorter time\n"
+            "write the positions into session.toml, or try --still with a shorter"
+            " time\n"
         )
     sys.stdout.write(f"{folder}\n")
     return imported

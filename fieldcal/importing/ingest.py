@@ -24,7 +24,7 @@ from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
 from fieldcal.windows.cells import Cells
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.stretch_ends import reasons
-from fieldcal.windows.stretches import still_stretches_of_file, summary
+from fieldcal.windows.stretches import still_stretches_of_file, summary, why_none
 
 LONG = 5.0
 """Mean periods without a sample that are a gap."""
@@ -228,6 +228,7 @@ def _fill(
         rest = cells.table
         rows.add(summary(rest))
         stretches = still_stretches_of_file(rows, rest.origin, written.between, still)
+        why = "" if stretches or still == np.inf else why_none(rows, rest.origin)
         ends = reasons(rows, rest.origin, stretches)
         rests = np.array([_mean_of(written.between(*span)) for span in stretches])
     repairs = [*recording.mended, *judge.mended]
@@ -245,7 +246,8 @@ def _fill(
         for (s, e), (began, ended) in zip(stretches, ends, strict=True)
     )
     (part / MARKS).write_text(marks, "utf-8")
-    says = [*repairs, *recording.says]
+    none = [f"no still stretch was found: {why}"] if why else []
+    says = [*repairs, *recording.says, *none]
     return facts, stretches, says, rests.reshape(-1, 3)
 
 

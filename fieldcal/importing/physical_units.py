@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
@@ -60,6 +61,9 @@ _AGREES = 0.9
 
 _SWUNG = 0.3
 """Part by which |a| is not g: then a hand is felt, and (2) does not hold."""
+
+_OFTEN, _RAIL = 5, 1.5
+"""Rows at one value that are a rail, and how far it is out, in standard deviations."""
 
 _LAG = 0.5
 """Time over which (2) is integrated, s: jerks of a hand are shorter."""
@@ -261,11 +265,12 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
     lag = max(2, round(_LAG / step)) if step > 0 else len(t)
     if len(t) < 4 * lag:
         return None
+    clipped = _at_rails(gyr)
     up = (acc - gravity.offset) / gravity.size
     length = np.maximum(np.linalg.norm(up, axis=1), 0.1)
     up, gyr = up / length[:, None], gyr - np.median(gyr, axis=0)
     turning = np.cross(up, gyr)
-    swung = np.abs(length - 1) > _SWUNG
+    swung = (np.abs(length - 1) > _SWUNG) | clipped
     steps[swung[1:] | swung[:-1]] = np.nan
     middle = (turning[1:] + turning[:-1]) / 2 * steps[:, None]
     right = _over(middle, lag)
@@ -279,6 +284,19 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
     if both < _AGREES * np.sqrt(power * moved):
         return None
     return power / both
+
+
+def _at_rails(gyr: Array) -> NDArray[np.bool_]:
+    """Rows (n, 3) in which an axis is at the greatest or least value, again and again.
+
+    An output that is clipped says less than the rate, so it tells no scale.
+    """
+    ends = np.array([gyr.min(axis=0), gyr.max(axis=0)])
+    often = [(gyr == end).sum(axis=0) >= _OFTEN for end in ends]
+    turns = np.abs(ends - np.median(gyr, axis=0)) > _RAIL * gyr.std(axis=0)
+    low, high = ((gyr == ends[i]) & often[i] & turns[i] for i in (0, 1))
+    rails: NDArray[np.bool_] = (low | high).any(axis=1)
+    return rails
 
 
 def _over(steps: Array, lag: int) -> Array:

@@ -34,6 +34,9 @@ _CLEARLY = 0.98
 _OWN = 4.0
 """Spread, in multiples of what is usual in a stretch, that still belongs to it."""
 
+_FLIPS = 0.6
+"""Part of a step of a coarse output that means of cells spread by when it flips."""
+
 _LONGEST = 36_000
 """Cells of the longest stretch, an hour: a longer rest is several of them."""
 
@@ -127,6 +130,27 @@ def still_stretches_of_file(
     return found
 
 
+def why_none(rows: CellRows, origin: Array) -> str:
+    """Say why the calmest part of a recording without still stretches is none.
+
+    Parameters
+    ----------
+    rows, origin : as in `still_stretches_of_file`
+
+    """
+    if len(rows) < 2 * _SPAN:
+        return f"it lasts less than {2 * _SPAN * CELL:g} s"
+    runs = _at_rest(rows, StillnessLimits().noise)
+    if not runs:
+        return "nowhere is it calmer than elsewhere, or it turns all the time"
+    longest = max(runs, key=lambda run: run.last - run.first)
+    cells = _table(rows[longest.first : longest.last + 1], origin)
+    start, end = float(cells.times[0]), float(cells.times[-1])
+    worst = judge(cells, StillnessLimits()).worst
+    text = f"its calmest part, {start:.1f} to {end:.1f} s, "
+    return text + (str(worst.error(start)) if worst.ratio > 1 else "is too short")
+
+
 def _table(rows: Array, origin: Array) -> CellTable:
     """Cells of rows of `summary`."""
     return CellTable(rows[:, 0], rows[:, 1:], origin)
@@ -149,10 +173,19 @@ def _clear(cells: CellTable, shortest: float) -> tuple[float, float] | None:
 
 
 class _Usual(NamedTuple):
-    """Number of values in a cell, (6,), and the shortest time that is a pause, s."""
+    """What is usual of cells.
+
+    Attributes
+    ----------
+    counts : (6,) values in one
+    pause : shortest time that is a pause, s
+    flips : (6,) spread that an output makes which flips between two steps
+
+    """
 
     counts: Array
     pause: float
+    flips: Array
 
 
 def _spans(rows: CellRows, usual: _Usual) -> Iterator[Spans]:
@@ -181,12 +214,15 @@ def _usual(rows: CellRows) -> _Usual:
     """What is usual of the cells, by their medians."""
     every = -(-len(rows) // _SAMPLE)
     counts, steps = [], []
+    finest = np.full(6, np.inf)
     for first in range(0, len(rows), _PART):
         part = rows[first : first + _PART]
+        finest = np.minimum(finest, part[:, 27:33].min(axis=0))
         counts.append(part[-first % every :: every, 1:7].copy())
         steps.append(np.diff(part[:, 0])[-first % every :: every])
     pause = _PAUSE * max(float(np.median(np.concatenate(steps))), _SPAN * CELL / _PAUSE)
-    return _Usual(np.median(np.concatenate(counts), axis=0), pause)
+    flips = _FLIPS * np.where(np.isfinite(finest), finest, 0.0)
+    return _Usual(np.median(np.concatenate(counts), axis=0), pause, flips)
 
 
 def _at_rest(rows: CellRows, bound: Array) -> list[_Run]:
@@ -212,8 +248,10 @@ def _at_rest(rows: CellRows, bound: Array) -> list[_Run]:
     valley = np.clip(_valley((some / scale).max(axis=1)), _LEAST, _MOST)
     kept: list[_Run] = []
     spans = short or _spans(rows, usual)
-    for first, spread, level in _calm(spans, np.minimum(valley * scale, bound)):
+    least = np.maximum(np.minimum(valley * scale, bound), usual.flips)
+    for first, spread, level in _calm(spans, least):
         own = np.maximum(np.quantile(spread, 0.3, axis=0), quiet)
+        own = np.maximum(own, usual.flips / _OWN)
         own = np.where(own > 0, own, np.inf)
         for a, b in _runs((spread < _OWN * own).all(axis=1)):
             rate = np.median(level[a:b, 3:], axis=0)

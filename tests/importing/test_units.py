@@ -223,3 +223,15 @@ def test_few_directions_make_no_sphere(points: Array) -> None:
     found = physics.gravity_in(points + noise)
     assert found is not None and not found.round
     assert found.size == pytest.approx(np.median(np.linalg.norm(points, axis=1)), 0.01)
+
+
+@pytest.mark.parametrize("unit", ["rad/s", "deg/s"])
+def test_clipped_rates_tell_their_unit_by_what_is_not(
+    tmp_path: Path, unit: str
+) -> None:
+    rows = turned(9, 50.0)
+    rows[:, 4:] = np.clip(rows[:, 4:], -1.5, 1.5)
+    log = np.column_stack([rows[:, :4], rows[:, 4:] * GYR[unit]])
+    path, out = write(tmp_path, log), tmp_path / "out"
+    assert main(["import", str(path), "--columns", COLUMNS, "-o", str(out)]) == 0
+    np.testing.assert_allclose(Session.open(out).block.gyr, rows[:, 4:], atol=1e-6)

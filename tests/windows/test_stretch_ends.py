@@ -8,7 +8,7 @@ import pytest
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows.cells import Cells
 from fieldcal.windows.stretch_ends import reasons
-from fieldcal.windows.stretches import still_stretches, summary
+from fieldcal.windows.stretches import still_stretches, summary, why_none
 
 RATE = 50.0
 
@@ -47,3 +47,32 @@ def test_what_ends_a_stretch_is_said(change: str, ended: str) -> None:
     (first, second) = reasons(summary(table), table.origin, spans)
     assert first[0] == "the recording begins" and second[1] == "the recording ends"
     assert ended in first[1] and ended in second[0]
+
+
+def turned_slowly(rate: float) -> Block:
+    """A device that never rests: gravity goes round at some rad/s."""
+    rng = np.random.default_rng(2)
+    t = np.arange(round(30 * RATE)) / RATE
+    up = np.column_stack([np.sin(rate * t), 0 * t, np.cos(rate * t)])
+    gyr = np.array([0.0, -rate, 0.0]) + rng.normal(0, 1e-3, (len(t), 3))
+    return Block.of(t, 9.8 * up + rng.normal(0, 0.01, (len(t), 3)), gyr)
+
+
+@pytest.mark.parametrize(
+    ("block", "says"),
+    [(turned_slowly(0.005), "s, creeping on ax"),
+     (turned_slowly(1.0)[:80], "less than")],
+)  # fmt: skip
+def test_why_there_is_none_is_said(block: Block, says: str) -> None:
+    assert not still_stretches(block)
+    cells = Cells()
+    cells.add(block)
+    assert says in why_none(summary(cells.table), cells.table.origin)
+
+
+def test_a_coarse_output_that_flips_rests() -> None:
+    block = recorded("turn")
+    coarse = Block.of(
+        block.t, np.round(block.acc / 0.1) * 0.1, np.round(block.gyr / 0.02) * 0.02
+    )
+    assert len(still_stretches(coarse)) == 2

@@ -349,7 +349,7 @@ def test_spans_are_spreads_and_means_of_a_second(
         mean = row[7:13] / np.maximum(row[1:7], 1.0)
         last = np.where(row[1:7] >= usual / 2, mean, last)
         means.append(last)
-    parts = list(stretches._spans(rows, stretches._Usual(usual, np.inf)))
+    parts = list(stretches._spans(rows, stretches._Usual(usual, np.inf, np.zeros(6))))
     assert [first for first, _, _ in parts] == list(range(0, m - 9, 16))
     spread, level = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     assert len(spread) == len(level) == m - 9

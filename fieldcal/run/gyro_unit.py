@@ -8,7 +8,6 @@ by its accelerometers while the rates move as no device at rest does.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,16 +19,18 @@ from fieldcal.importing.physical_units import (
     fitting,
     rate_in,
 )
-from fieldcal.windows import Stillness
 
 PART = 0.05
 """Device time of which one mean is kept, s."""
 
-MEMORY = 6000
-"""Means that are kept: five minutes."""
+MEMORY = 2400
+"""Means that are kept: two minutes."""
 
-EVERY = 1.0
+EVERY = 2.0
 """Device time between two looks, s."""
+
+CALM = 0.1
+"""Scatter of means of the accelerometers that is rest, m/s^2."""
 
 HINT = 5.0
 """Rest by the accelerometers alone after which moving rates are asked about, s."""
@@ -54,25 +55,21 @@ class GyroUnitWatch:
         self._means: deque[Array] = deque(maxlen=MEMORY)
         self._part: list[Block] = []
         self._looked = -np.inf
-        self._felt, self._whole = Stillness(), Stillness()
-        self._last = self._moves = np.nan
         self._proved = False
         self.says = self.unit = ""
 
     def add(self, block: Block) -> None:
-        """Take in the block that follows."""
-        self._felt.add(replace(block, gyr=np.full_like(block.gyr, np.nan)))
-        self._whole.add(block)
-        self._last = float(block.t[-1])
-        if self._felt.since is None or self._whole.still:
-            self._moves = self._last
+        """Take in the block that follows; costs nothing once the unit is known."""
+        if self.unit:
+            return
+        last = float(block.t[-1])
         self._part.append(block)
-        if self._last - self._part[0].t[0] >= PART:
+        if last - self._part[0].t[0] >= PART:
             rows = [np.column_stack([b.t, b.acc, b.gyr]) for b in self._part]
             self._means.append(np.vstack(rows).mean(axis=0))
             self._part = []
-        if self._last - self._looked >= EVERY and not self.says:
-            self._looked = self._last
+        if last - self._looked >= EVERY and not self.says:
+            self._looked = last
             self.says = self._look()
 
     def _look(self) -> str:
@@ -98,16 +95,17 @@ class GyroUnitWatch:
             f" again with gyr_unit={fits[0].unit} in the device's address"
         )
 
-    @property
-    def asks(self) -> str:
-        """What moves although it rests, as long as no turn has told; empty if nothing.
+    def asks(self, moving: float) -> str:
+        """What to ask of a device that has not come to rest for so long, s.
 
-        To be asked where rates alone keep the device from being at rest.
+        Empty unless it rests by its accelerometers alone, and no turn has told.
         """
-        if self.says or self._proved or not self._last - self._moves >= HINT:
+        lately = np.array(self._means)[-int(HINT / PART) :]
+        if self.says or self._proved or moving < HINT or len(lately) < HINT / PART:
             return ""
-        rates = np.array(self._means)[-int(HINT / PART) :, 4:]
-        size = float(np.nanmax(np.abs(rates), initial=0.0))
+        if not (lately[:, 1:4].std(axis=0) < CALM).all():
+            return ""
+        size = float(np.nanmax(np.abs(lately[:, 4:]), initial=0.0))
         return (
             f"the accelerometers rest, the gyroscopes read up to {size:.2g} rad/s: if"
             " they are in deg/s, begin again with gyr_unit=deg/s in the device's"

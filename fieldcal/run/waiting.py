@@ -82,7 +82,7 @@ class PositionWait:
         self._began: float | None = None
         self._rested = self._turned = False
         self._start()
-        self._last = self._last_host = np.nan
+        self._last = self._last_host = self._stirred = np.nan
         self.waited = self.waited_host = 0.0
 
     def _start(self) -> None:
@@ -122,6 +122,8 @@ class PositionWait:
         self._resting.add(block, self._stillness.since)
         self._turned |= self._rested and self._stillness.since is None
         self._rested |= self._stillness.since is not None
+        if self._stillness.since is not None or np.isnan(self._stirred):
+            self._stirred = self._last
         if self._resting.seconds > 0:
             self.f = force(self._resting.block.acc, self._about)
             self.where = self.arrival = self._judged(self.f)
@@ -152,7 +154,8 @@ class PositionWait:
     def reason(self) -> WaitReason:
         """What it waits for."""
         if self._stillness.since is None:
-            if wrong := self._units and (self._units.says or self._units.asks):
+            units, moving = self._units, self._last - self._stirred
+            if wrong := units and (units.says or units.asks(moving)):
                 return WaitReason(WaitState.WRONG_UNIT, wrong)
             measured = np.isfinite(self.meter)
             return WaitReason(WaitState.MOVING if measured else WaitState.LISTENING)

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.drivers.framing import as_doubles
 
@@ -32,6 +33,10 @@ Words = NDArray[np.unsignedinteger[Any]]
 Bytes = NDArray[np.uint8]
 
 WORD = 8
+
+LONGEST = 64
+"""Bytes of the longest frame, and bits of the longest number."""
+
 _FLOATS = {16: np.float16, 32: np.float32, 64: np.float64}
 
 
@@ -66,7 +71,15 @@ class Field:
 
     @classmethod
     def of(cls, signal: Signal) -> Field:
-        """Lay out a signal of a database."""
+        """Lay out a signal of a database.
+
+        Raises
+        ------
+        InputError
+            If no frame can hold it, or its scale is no number.
+
+        """
+        _check(signal)
         big, length = signal.byte_order == "big_endian", signal.length
         if big:
             begin = 8 * (signal.start // 8) + 7 - signal.start % 8
@@ -132,3 +145,20 @@ class Field:
     def span(self) -> float:
         """What a counter in it counts to before it wraps, raw."""
         return float("inf") if self.floating else float(2**self.length)
+
+
+def _check(signal: Signal) -> None:
+    """Refuse a signal that no frame has."""
+    fits = 0 < signal.length <= LONGEST and signal.start + signal.length <= 8 * LONGEST
+    if signal.is_float:
+        fits = fits and signal.length in _FLOATS
+    try:
+        finite = all(np.isfinite(float(v)) for v in (signal.scale, signal.offset))
+    except OverflowError:
+        finite = False
+    if not (fits and finite):
+        raise InputError(
+            f"signal {signal.name} of the DBC file has {signal.length} bits from bit"
+            f" {signal.start} on and the scale {str(signal.scale)[:20]}: no frame holds"
+            " such a number; mend it, or name another signal by map"
+        )

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import Profile
@@ -79,7 +80,7 @@ def to_toml(profile: Profile) -> str:
 
 def _load(path: Path) -> Mapping[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return load_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

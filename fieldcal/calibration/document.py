@@ -7,7 +7,6 @@ the schema does not know are kept in `Calibration.info`.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any, get_args
@@ -17,6 +16,7 @@ import numpy as np
 from fieldcal.calibration.gauge import in_sample_units, in_si_units
 from fieldcal.calibration.names import group_of
 from fieldcal.calibration.parameters import COMPONENTS, Calibration, Method
+from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError
 
 FORMAT = 1
@@ -26,7 +26,7 @@ KEYS = ("format", "method", "verdict", "warnings", "parameters", "covariance", "
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of ``result.json``."""
     text = files("fieldcal").joinpath("schemas/result.schema.json").read_text("utf-8")
-    found: dict[str, Any] = json.loads(text)
+    found: dict[str, Any] = load_json(text)
     return found
 
 

@@ -6,7 +6,6 @@ file of the user's has the same tables and may leave out whatever it does not ch
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from importlib.resources import files
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError
 
 DEFAULTS = "limits.toml"
@@ -67,7 +67,7 @@ def read(grade: str, path: Path | None = None) -> GradeLimits:
 
     """
     text = files("fieldcal.calibration").joinpath(DEFAULTS).read_text("utf-8")
-    values = dict(_table(tomllib.loads(text), grade, DEFAULTS))
+    values = dict(_table(load_toml(text), grade, DEFAULTS))
     if path is not None:
         values |= _table(_load(path), grade, str(path))
     made = GradeLimits(**values)
@@ -81,12 +81,12 @@ def read(grade: str, path: Path | None = None) -> GradeLimits:
 
 def _load(path: Path) -> Mapping[str, Any]:
     try:
-        tables = tomllib.loads(path.read_text("utf-8"))
+        tables = load_toml(path.read_text("utf-8"))
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such file of limits; check --limits") from error
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: is no file of limits: {error}") from error
-    grades = tomllib.loads(
+    grades = load_toml(
         files("fieldcal.calibration").joinpath(DEFAULTS).read_text("utf-8")
     )
     odd = [name for name in tables if name not in grades]

@@ -104,15 +104,16 @@ def read(path: Path) -> Calibration:
 
     """
     from fieldcal.calibration import Calibration
+    from fieldcal.core.documents import load_json
     from fieldcal.core.errors import InputError
     from fieldcal.session.folder import RESULT
 
     file = path / RESULT if path.is_dir() else path
     try:
-        document = json.loads(file.read_text("utf-8"))
+        document = load_json(file.read_text("utf-8"))
     except FileNotFoundError:
         raise InputError(f"{file} is not there: run fieldcal solve first") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as fault:
+    except (OSError, ValueError) as fault:
         raise InputError(f"{file} cannot be read: {fault}") from None
     try:
         return Calibration.from_json(document)

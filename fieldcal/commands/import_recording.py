@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,11 +114,11 @@ def run(args: argparse.Namespace) -> int:
             folder = args.output / name
         names = _chosen(recording, args.instance)
         rests: dict[str, Array] = {}
+        inner = folders_of([stream.name for stream in names])
         for stream in names:
             # what was said of one IMU of the file is no matter of another
             one = recording.alone(stream.name)
-            inner = re.sub(r"[^\w.-]+", "_", stream.name).strip("_")
-            there = folder / inner if len(names) > 1 else folder
+            there = folder / inner[stream.name] if len(names) > 1 else folder
             imported = _bring(args, one, stream, there)
             rests[stream.name] = imported.rests
         if len(names) > 1:
@@ -153,6 +154,22 @@ def _list(opened: list[Recording]) -> int:
             named = (recording.path, stream.name, stream.says)
             sys.stdout.write("\t".join(one_line(str(part)) for part in named) + "\n")
     return 0
+
+
+def folders_of(streams: Sequence[str]) -> dict[str, str]:
+    """Folder of each stream; those whose names differ in signs alone are numbered.
+
+    >>> folders_of(["/a/b", "/a_b", "/c"])
+    {'/a/b': 'a_b', '/a_b': 'a_b_2', '/c': 'c'}
+    """
+    found: dict[str, str] = {}
+    for name in streams:
+        plain = re.sub(r"[^\w.-]+", "_", name).strip("_.") or "imu"
+        folder, number = plain, 2
+        while folder.lower() in {taken.lower() for taken in found.values()}:
+            folder, number = f"{plain}_{number}", number + 1
+        found[name] = folder
+    return found
 
 
 def _chosen(recording: Recording, wanted: list[str]) -> list[ImuStream]:

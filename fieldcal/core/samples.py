@@ -22,6 +22,23 @@ ACC, GYR = slice(0, 3), slice(3, 6)
 
 UNKNOWN = np.array(np.nan)
 
+QUICKEST_HZ = 1e6
+"""No IMU has as many samples a second: such times are in another unit."""
+
+
+def too_quick(rate_hz: float) -> str:
+    """Sentence about a rate that no device has; empty if one may.
+
+    >>> too_quick(200.0)
+    ''
+    """
+    if not rate_hz > QUICKEST_HZ:
+        return ""
+    return (
+        f"its samples come {rate_hz:.2g} times a second, which no IMU does: the times"
+        " are in another unit than s; import the recording again with --time-unit"
+    )
+
 
 def common_unit(names: Iterable[str]) -> str | None:
     """Unit that channels share, "" for what is no channel; None if they share none.

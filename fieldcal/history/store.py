@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.calibration import Calibration
+from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError
 
 VERSION = 1
@@ -200,7 +201,7 @@ class History:
 
     def _run(self, row: tuple[Any, ...]) -> HistoryRun:
         try:
-            found = Calibration.from_json(json.loads(row[-1]))
+            found = Calibration.from_json(load_json(row[-1]))
         except (ValueError, InputError) as error:
             raise InputError(
                 f"{self.path}: calibration {row[0]} cannot be read ({error}); move the"

@@ -7,6 +7,7 @@ arrays, counted from 0. A table lies on its side where it is wider than long.
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -39,6 +40,10 @@ ROWS = 1 << 14
 """Rows read together: few enough to stay in the processor's cache."""
 
 DIMENSIONS = (1, 2)
+
+LARGE, DENSEST = 1 << 28, 50
+"""Bytes that an archive may always unpack to, and how many times its size beyond that:
+noise is not to be compressed."""
 
 NPZ, NPY = b"PK\x03\x04", b"\x93NUMPY"
 
@@ -262,11 +267,26 @@ def _matlab(path: Path) -> dict[str, ArrayTable]:
 
 
 def _numpy(path: Path) -> dict[str, ArrayTable]:
+    if zipfile.is_zipfile(path):
+        _check_size(path)
     loaded = np.load(path, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
         return _of_arrays({"array": loaded})
     with loaded:
         return _of_arrays({name: loaded[name] for name in loaded.files})
+
+
+def _check_size(path: Path) -> None:
+    """Refuse an archive that unpacks to far more than any recording does."""
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+    packed = sum(m.compress_size for m in members)
+    size = sum(m.file_size for m in members)
+    if size > LARGE and size > DENSEST * packed:
+        raise InputError(
+            f"{path}: unpacks from {packed / 1e6:.1f} MB to {size / 1e9:.1f} GB, as no"
+            " recording of a sensor does; save it again with numpy.savez"
+        )
 
 
 def _of_arrays(arrays: Mapping[str, Any]) -> dict[str, ArrayTable]:

@@ -191,7 +191,9 @@ class TextColumns(ColumnRecording):
             if not n:
                 continue
             t0 = block.t[0] if t0 is None else t0
-            yield replace(block, t=block.t - t0) if self.from_first else block
+            with np.errstate(invalid="ignore"):  # a time beyond all is no time
+                since = block.t - t0 if self.from_first else block.t
+            yield replace(block, t=since)
         if not seen:
             number, line = list(enumerate(top[:2], 1))[-1]
             raise InputError(

@@ -85,11 +85,18 @@ class McapLog(Recording):
         with on_disk(self.path, self.cut_off) as path:
             found = self._streamed if self.repair else self._indexed
             for topic, logged, said in found(path, stream, degrees):
-                if topic != stream:
-                    warm[said.header.frame_id] = said.temperature
-                    continue
-                degrees_now = warm.get(said.header.frame_id, np.nan)
-                rows.append(row_of(said, degrees_now, logged))
+                try:
+                    if topic != stream:
+                        warm[said.header.frame_id] = said.temperature
+                        continue
+                    degrees_now = warm.get(said.header.frame_id, np.nan)
+                    rows.append(row_of(said, degrees_now, logged))
+                except (AttributeError, TypeError) as error:
+                    raise InputError(
+                        f"{self.path}: messages of {topic} are none of the kind that"
+                        f" they are called, by their schema in the file ({error});"
+                        " record them again with the definition of their type"
+                    ) from error
                 if len(rows) == MANY:
                     yield block_of(rows)
                     rows = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import shutil
 import tempfile
@@ -14,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, too_quick
 from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.spool import SpooledRows
 from fieldcal.importing.validation import RowValidator, SampleWriter, digest
 from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
+from fieldcal.session.lock import SessionLock
 from fieldcal.windows.cells import Cells
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.stretch_ends import reasons
@@ -175,21 +177,41 @@ def import_stream(
         raise InputError(f"{folder}: is not empty; name another folder with -o")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
+        removed = remove_broken_off(folder)
         part = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+        held = SessionLock(part)
         try:
-            imported = _fill(part, recording, stream, about, still)
+            facts, stretches, says, rests = _fill(part, recording, stream, about, still)
+            held.release()
             part.chmod(0o755)
             _settle(*part.iterdir(), part)
             part.replace(folder)
             _settle(folder.parent)
         except BaseException:
+            held.release()
             shutil.rmtree(part, ignore_errors=True)
             raise
     except OSError as error:
         raise SessionError(
             f"{folder}: cannot be written: {disk_says(error)}"
         ) from error
-    return ImportedSession(folder, *imported)
+    return ImportedSession(folder, facts, stretches, [*removed, *says], rests)
+
+
+def remove_broken_off(folder: Path) -> list[str]:
+    """Remove what imports into this folder left that were killed, a sentence each.
+
+    An import that still runs holds a lock of its own.
+    """
+    said = []
+    for part in sorted(folder.parent.glob(f".{glob.escape(folder.name)}.????????")):
+        try:
+            SessionLock(part).release()
+        except (SessionError, OSError):
+            continue
+        shutil.rmtree(part, ignore_errors=True)
+        said.append(f"{part.name}, left by an import that was killed, is removed")
+    return said
 
 
 def _settle(*paths: Path) -> None:
@@ -223,6 +245,8 @@ def _fill(
                 written.add(good)
         if not facts.rows:
             raise InputError(f"{recording.path}: has no row that can be used")
+        if said := too_quick(facts.rate_hz):
+            raise InputError(f"{recording.path}: {said}")
         facts.left_out = judge.left_out
         written.close()
         rest = cells.table

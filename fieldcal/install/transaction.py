@@ -13,6 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from fieldcal.core.documents import load_json
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
@@ -134,7 +135,7 @@ def unfinished(folder: Path) -> tuple[Path, dict[str, Any]] | None:
     """The last set saved in a session of which nobody noted what became of it."""
     for file in sorted(folder.glob(f"{SAVED}*.json"), reverse=True):
         try:
-            document = json.loads(file.read_text("utf-8"))
+            document = load_json(file.read_text("utf-8"))
             if document.get("undone") or document.get("done"):
                 return None
             return file, {"old": dict(document["old"]), "new": dict(document["new"])}
@@ -162,7 +163,7 @@ def save(
 
 def note_done(path: Path, **what: Any) -> None:
     """Note in a saved set what became of it: ``done``, ``undone``."""
-    document = json.loads(path.read_text("utf-8"))
+    document = load_json(path.read_text("utf-8"))
     write_whole(path, json.dumps({**document, **what}, indent=2) + "\n")
 
 
@@ -204,7 +205,7 @@ def last_saved(path: Path) -> tuple[Path, dict[str, Any]]:
         files = save_removed(path)
     for file in reversed(files):
         try:
-            document = json.loads(file.read_text("utf-8"))
+            document = load_json(file.read_text("utf-8"))
             old, new = ({str(k): float(v) for k, v in document[key].items()}
                         for key in ("old", "new"))  # fmt: skip
             known = {"device": str(document["device"]), "old": old, "new": new,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.core.documents import load_json
 from fieldcal.core.errors import FieldcalError, InputError, SessionError
 from fieldcal.core.samples import Block
 from fieldcal.evaluation.observations import Rests, rests
@@ -141,7 +141,7 @@ def _calibration(session: Session, document: Mapping[str, Any]) -> Calibration:
 
 def _read(path: Path) -> Mapping[str, Any] | None:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = load_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:

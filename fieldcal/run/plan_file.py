@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import shlex
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -19,6 +18,7 @@ from typing import Any
 
 from fieldcal import procedures
 from fieldcal.acceptance.verification import planned
+from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, PlanError
 from fieldcal.core.positions import Position, forces
 from fieldcal.session import description, schemas
@@ -115,7 +115,7 @@ def read(path: Path) -> dict[str, Any]:
 
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return load_toml(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         known = ", ".join(procedures.names())
         raise InputError(

@@ -7,7 +7,6 @@ to it at once. So there is one way to go on, whether after a second or after a r
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -18,6 +17,7 @@ from fieldcal import procedures
 from fieldcal.acceptance.verification import planned
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
+from fieldcal.core.documents import load_json
 from fieldcal.core.errors import (
     DeviceError,
     FieldcalError,
@@ -244,7 +244,7 @@ def _remedy(folder: Path, session: Session) -> Mapping[str, Any]:
 
     """
     try:
-        result = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+        result = load_json((folder / RESULT).read_text(encoding="utf-8"))
         decision = result.get("decision", {})
     except (OSError, ValueError, AttributeError):
         decision = {}

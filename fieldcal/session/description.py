@@ -18,6 +18,7 @@ import numpy as np
 
 from fieldcal.calibration import Gauge
 from fieldcal.calibration.gauge import SI
+from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.frames import mounting_matrix
 from fieldcal.core.gravity import G0, gravity
@@ -177,7 +178,7 @@ def read(path: Path) -> Description:
 
     """
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        raw = load_toml(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise SessionError(
             f"{path.parent}: is no session: it has no {path.name}; name a folder that"

@@ -24,9 +24,10 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.documents import load_json
 from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.positions import Position
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, too_quick
 from fieldcal.session import description, sample_files
 from fieldcal.session.clock import steadied
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS, Description
@@ -127,6 +128,9 @@ class Session:
         """
         raw, cut = sample_files.read(sample_files.find(self.folder))
         self.warnings += cut
+        steps = np.diff(raw.t)
+        if len(steps) and (said := too_quick(1 / max(float(np.median(steps)), 1e-300))):
+            raise SessionError(f"{self.folder}: {said}")
         units, gauge = self.about.units, self.about.gauge.size
         for triad, unit in (
             (raw.acc, ACC_UNITS[units["acceleration"]] / gauge[0]),
@@ -212,9 +216,22 @@ def mark_line(mark: Mapping[str, Any]) -> str:
 
     >>> mark_line({"event": "told"})
     '{"event": "told", "crc32": "1a049d94"}\n'
+
+    Numbers that are none are null, so that each line is JSON.
     """
-    text = json.dumps(mark)
+    text = json.dumps(_valid(mark), allow_nan=False)
     return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'
+
+
+def _valid(value: Any) -> Any:
+    """Content that JSON has: a number that is none is null."""
+    if isinstance(value, Mapping):
+        return {key: _valid(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_valid(each) for each in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
 
 
 def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:
@@ -253,7 +270,7 @@ def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, 
 def _mark(line: str) -> dict[str, Any] | None:
     """Return a mark of a line; None if it is none, or not as it was written."""
     try:
-        mark = json.loads(line)
+        mark = load_json(line)
     except (ValueError, RecursionError):
         return None
     if not isinstance(mark, dict):

@@ -6,12 +6,12 @@ session.toml is judged as TOML reads it, marks.jsonl line by line.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from fieldcal.calibration import Calibration
+from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.session import description, sample_files
 from fieldcal.session.folder import DESCRIPTION, MARKS, RESULT, read_marks
@@ -92,7 +92,7 @@ def _marks(path: Path) -> Iterator[FileFault]:
 
 def _derived(path: Path) -> Iterator[FileFault]:
     try:
-        document = json.loads(path.read_text("utf-8"))
+        document = load_json(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         yield FileFault(path.name, f"is not JSON: {error}; make it again")
         return

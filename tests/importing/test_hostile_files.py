@@ -1,0 +1,152 @@
+"""Files that no recorder writes: each ends in one sentence and leaves nothing."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from logs import imu
+from mcap.writer import Writer
+from small_files import SMALL
+
+from fieldcal.cli import main
+from fieldcal.commands.import_recording import folders_of
+from fieldcal.session.folder import mark_line
+
+NAMES = "t,ax,ay,az,gx,gy,gz"
+
+
+def refused(*arguments: str, capsys: pytest.CaptureFixture[str]) -> str:
+    assert main([*arguments]) == 2
+    said = capsys.readouterr().err
+    assert len(said.strip().splitlines()) == 1
+    return said
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = " + "[" * 5000, "nested too deeply"),
+        ("[site]\nlatitude_deg = " + "9" * 5000, "a number of thousands of digits"),
+    ],
+)
+def test_toml_without_end(
+    tmp_path: Path, text: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "session.toml").write_text(f"format = 1\n{text}\n")
+    limits = tmp_path / "limits.toml"
+    limits.write_text(text)
+    assert says in refused("solve", str(tmp_path), capsys=capsys)
+    plan = ["run", "two_position", "--virtual", "--limits", str(limits)]
+    assert says in refused(*plan, "-o", str(tmp_path / "s"), capsys=capsys)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"format": ' + "9" * 5000 + "}"])
+def test_json_without_end(
+    tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "session.toml").write_text("format = 1\n")
+    (tmp_path / "result.json").write_text(text)
+    folder = str(tmp_path)
+    refused("compare", folder, folder, capsys=capsys)
+    refused("export", folder, "--format", "json", capsys=capsys)
+    refused("undo", str(tmp_path / "result.json"), capsys=capsys)
+
+
+@pytest.mark.parametrize("bits", ["0|100000", "510|16", "0|16@1- (1e999,0)"])
+def test_a_signal_that_no_frame_holds(
+    tmp_path: Path, bits: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = bits if "@" in bits else f"{bits}@1- (0.001,0)"
+    others = "".join(
+        f' SG_ {name} : {8 * i}|8@1- (1,0) [0|0] "{unit}" X\n'
+        for i, (name, unit) in enumerate(
+            [("ay", "g"), ("az", "g"), *((g, "rad/s") for g in ("gx", "gy", "gz"))]
+        )
+    )
+    signal = f'SG_ ax : {where} [0|0] "g" X'
+    dbc, log = tmp_path / "x.dbc", tmp_path / "x.log"
+    dbc.write_text(
+        f'VERSION ""\nBU_: X\nBO_ 256 F: 8 X\n {signal}\nBO_ 257 G: 8 X\n{others}'
+    )
+    log.write_text("(0.01) can0 100#0011223344556677\n" * 50)
+    refused("import", str(log), "--options", f"dbc={dbc}", capsys=capsys)
+
+
+def test_an_empty_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "empty.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        kind = writer.register_schema("sensor_msgs/msg/Imu", "ros2msg", b"")
+        topic = writer.register_channel("/imu", "cdr", kind)
+        for i in range(9):
+            writer.add_message(topic, i, bytes(400), i)
+        writer.finish()  # type: ignore[no-untyped-call]
+    for repair in ([], ["--repair"]):
+        said = refused("import", str(path), *repair, capsys=capsys)
+        assert "none of the kind that they are called" in said
+
+
+@pytest.mark.parametrize("spacing", [5e-14, 1e-9])
+def test_times_that_no_imu_has(
+    tmp_path: Path, spacing: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = np.random.default_rng(1).normal(0, 0.01, (3000, 7))
+    rows[:, 0], rows[:, 3] = spacing * np.arange(3000), rows[:, 3] + 9.81
+    path = tmp_path / "quick.csv"
+    np.savetxt(path, rows, delimiter=",", fmt="%.18g")
+    columns = ["--columns", NAMES, "--time-unit", "s"]
+    assert "no IMU does" in refused("import", str(path), *columns, capsys=capsys)
+    (tmp_path / "session.toml").write_text("format = 1\n")
+    header = NAMES + "\n"
+    (tmp_path / "samples.csv").write_text(header + path.read_text())
+    assert "--time-unit" in refused("diagnose", str(tmp_path), capsys=capsys)
+
+
+def test_an_archive_that_unpacks_to_gigabytes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bomb.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        with archive.open("imu.npy", "w", force_zip64=True) as file:
+            np.lib.format.write_array_header_1_0(
+                file, {"descr": "<f8", "fortran_order": False, "shape": (6 << 20, 7)}
+            )
+            for _ in range(7 * 48 // 8):
+                file.write(bytes(1 << 23))
+    said = refused("import", str(path), "--columns", NAMES, capsys=capsys)
+    assert "as no recording of a sensor does" in said
+
+
+def test_a_device_is_no_file(capsys: pytest.CaptureFixture[str]) -> None:
+    for named in ([], ["--format", "csv_like"]):
+        assert "has no end" in refused("import", "/dev/zero", *named, capsys=capsys)
+
+
+def test_topics_that_differ_in_signs_havefolders_of_of_their_own() -> None:
+    assert len({*folders_of(["/a/b", "/a_b", "/A_b", "a b", "..", "/"]).values()}) == 6
+
+
+def test_what_a_killed_import_left_is_named_and_removed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "log.csv"
+    SMALL["csv_like"](path, imu(1, 60))
+    left = tmp_path / ".s.abcdefgh"
+    left.mkdir()
+    (left / ".lock").write_text("")
+    (left / "samples.parquet").write_bytes(b"half")
+    call = ["import", str(path), "--columns", NAMES, "-o", str(tmp_path / "s")]
+    assert main(call) == 0, capsys.readouterr().err
+    assert ".s.abcdefgh, left by an import that was killed" in capsys.readouterr().err
+    assert not [p.name for p in tmp_path.glob(".s.*")]
+    assert not [p.name for p in (tmp_path / "s").iterdir() if p.name.startswith(".")]
+
+
+def test_a_mark_is_json_whatever_its_numbers_are() -> None:
+    line = mark_line({"event": "device", "x": [float("nan"), {"y": float("inf")}]})
+    assert json.loads(line, parse_constant=pytest.fail)["x"] == [None, {"y": None}]

@@ -15,6 +15,7 @@ import io
 import json
 import sys
 import tempfile
+from collections import Counter
 from pathlib import Path
 from time import process_time
 from typing import NamedTuple
@@ -91,9 +92,7 @@ def main() -> None:
         print(f"the recordings are not here: {REAL}")
         return
     only = [w.removeprefix("--only=") for w in sys.argv if w.startswith("--only=")]
-    print(
-        "| recording | options | still stretches | verdict | seconds | right answer |"
-    )
+    print("| recording | options | rests | verdict | seconds | right answer |")
     print("|---|---|---|---|---|---|")
     for one in PUBLISHED:
         if not only or one.folder in only:
@@ -102,7 +101,9 @@ def main() -> None:
 
 def row(one: Published, found: Verdict) -> str:
     """One line of the table."""
-    named = f"{found.verdict.replace('_', ' ')}: {', '.join(found.effects)}".strip(": ")
+    many = Counter(found.effects)
+    effects = ", ".join(f"{e} ×{n}" if n > 1 else e for e, n in many.items())
+    named = f"{found.verdict.replace('_', ' ')}: {effects}".strip(": ")
     right = {"?": "not known", "": "nothing"}.get(one.right, one.right)
     held = {"?": "", "": " ✓" if not found.effects else " ✗"}.get(
         one.right, " ✓" if set(one.right.split()) & set(found.effects) else " ✗"

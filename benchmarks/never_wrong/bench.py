@@ -30,6 +30,10 @@ SETS: dict[str, tuple[tuple[float, float], ...]] = {
     ),
 }  # fmt: skip
 
+SETTING = {"two": 5e-3, "five": 5e-3, "wide": 1e-2, "six_faces": 5e-2, "twelve": 5e-2}
+"""How well angles are set at worst, deg: a fixture that turns by 5 degrees gives a
+scale factor within the limits of the grade only where it sets them so well."""
+
 MOUNTINGS = (
     ("+x", "+y", "+z"),
     ("+x", "-z", "+y"),
@@ -46,7 +50,8 @@ class Bench:
     ----------
     places : positions, a name of `SETS`
     latitude, height : of the site, deg and m
-    tilt : of the base about z and about x, rad
+    tilt : about z and about x, rad
+    joints : whether that is what the joints' angles are off by, and not the base
     level_deg, angles_deg : what is said of level and angles, None where nothing is
     off : (n, 2) what each position's angles are off by, rad
     hold, way : s in a position, and from one to the next
@@ -63,6 +68,7 @@ class Bench:
     latitude: float
     height: float
     tilt: tuple[float, float]
+    joints: bool
     level_deg: float | None
     angles_deg: float | None
     off: Floats = field(repr=False)
@@ -129,7 +135,8 @@ def drawn(rng: np.random.Generator) -> Bench:
     places = str(rng.choice(list(SETS)))
     imported = places == "twelve"
     angles = np.array(SETS[places], float)
-    said = float(np.exp(rng.uniform(np.log(0.003), np.log(0.05))))
+    most = SETTING[places]
+    said = float(np.exp(rng.uniform(np.log(most / 10), np.log(most))))
     level = float(np.exp(rng.uniform(np.log(0.003), np.log(0.05))))
     wide = 0.5 if places in ("five", "wide", "six_faces") else level
     acc_noise = float(np.exp(rng.uniform(np.log(3e-4), np.log(2e-2))))
@@ -138,6 +145,7 @@ def drawn(rng: np.random.Generator) -> Bench:
         latitude=float(rng.uniform(-65, 65)),
         height=float(rng.uniform(0, 1500)),
         tilt=tuple(np.deg2rad(rng.normal(0, wide, 2)).tolist()),
+        joints=places != "two" and bool(rng.integers(2)),
         level_deg=level if places == "two" else None,
         angles_deg=said,
         off=np.deg2rad(rng.normal(0, said, angles.shape)),
@@ -197,8 +205,10 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
         joints = np.where((s > 0)[:, None], held[i - 1] + way[:, None] * moved, joints)
         rate = (1 - np.cos(2 * np.pi * s)) / (b - a) * ((s > 0) & (s < 1))
         speed += rate[:, None] * moved
-    alpha, beta = joints[:, 0] + bench.tilt[0], joints[:, 1] + bench.tilt[1]
-    f = turned(alpha, beta, np.array([0.0, -bench.gravity, 0.0]))
+    alpha, beta = joints.T
+    if bench.joints:
+        alpha, beta = alpha + bench.tilt[0], beta + bench.tilt[1]
+    f = turned(alpha, beta, _on_base(bench, np.array([0.0, -bench.gravity, 0.0])))
     latitude, heading = np.deg2rad(bench.latitude), rng.uniform(0, 2 * np.pi)
     north = EARTH * np.cos(latitude)
     earth = [
@@ -206,7 +216,7 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
         -EARTH * np.sin(latitude),
         north * np.cos(heading),
     ]
-    w = turned(alpha, beta, np.array(earth))
+    w = turned(alpha, beta, _on_base(bench, np.array(earth)))
     w[:, 0] += speed[:, 1]
     about_z = np.column_stack([np.zeros_like(beta), np.sin(beta), np.cos(beta)])
     w += about_z * speed[:, :1]
@@ -216,6 +226,15 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
     if bench.grain:
         acc = np.round(acc / bench.grain) * bench.grain
     return Samples(t, acc, gyr)
+
+
+def _on_base(bench: Bench, vector: Floats) -> Floats:
+    """A vector of level axes in those of the base, (3,)."""
+    if bench.joints:
+        return vector
+    about_z, about_x = (np.array([angle]) for angle in bench.tilt)
+    tilted: Floats = turned(about_z, about_x, vector)[0]
+    return tilted
 
 
 def wrongly_set(bench: Bench, off: Floats) -> Bench:

@@ -18,6 +18,7 @@ from fieldcal.acceptance.harmless import harmless
 from fieldcal.acceptance.level import level_missing, tilt_is_found
 from fieldcal.acceptance.remedy import Remedy, cheapest
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
+from fieldcal.acceptance.turned import turns_disagree
 from fieldcal.acceptance.verification import Verification
 from fieldcal.acceptance.witnesses import has_witnesses, left_out, witnesses
 from fieldcal.calibration import COMPONENTS, Calibration
@@ -111,6 +112,7 @@ def decide(
     checks = [
         _fit(found, limits),
         *_odd_positions(found, verification.ok is True),
+        *_turns(found, limits),
         *_uncertainty(found, limits),
         *_site(found, about),
         *_level(found, about),
@@ -201,6 +203,12 @@ def _odd_positions(found: Calibration, verified: bool) -> list[Check]:
     if verified or not left_out(found):
         return checks
     return [*checks, Check("witnesses", has_witnesses(found), witnesses(found))]
+
+
+def _turns(found: Calibration, limits: GradeLimits) -> list[Check]:
+    """Whether the gyroscopes were turned as the positions say."""
+    apart = turns_disagree(found, limits)
+    return [Check("turns", False, apart)] if apart else []
 
 
 def _first(found: Calibration) -> str:

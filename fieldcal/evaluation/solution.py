@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
@@ -26,15 +27,18 @@ from fieldcal.evaluation.not_carried import (
 from fieldcal.evaluation.observations import (
     Rests,
     angle_setting,
+    grain_of,
     observations,
     with_provenance,
 )
+from fieldcal.evaluation.unsaid import with_unsaid
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.rows import variances, widened
 from fieldcal.solve.shown import Shown
+from fieldcal.solve.words import UNLIKELY
 
 Turns = Literal["auto", "yes", "no"]
 
@@ -150,33 +154,44 @@ def solved(
         asked["angle_sigma_deg"] = angle_setting(about)
     printed = bool(asked.get("as_printed"))
     shown = None if printed or laid.prepared is None else explain(laid.prepared)
-    asked, notes = _as_shown(asked, shown)
-    notes += [] if printed else laid.unexamined
+    notes = [] if printed else laid.unexamined
     recorded = None if printed else laid.recorded(turns != "no", shown)
     found = solve(laid.observations, recorded=recorded, **asked)
+    angles, note = _as_shown(asked, shown, found)
+    if note:
+        asked["angle_sigma_deg"], notes = angles, [note, *notes]
+        found = solve(laid.observations, recorded=recorded, **asked)
     if turns == "yes":
         _insist(found, session, still)
     # why it is bad comes first
     ahead, behind = ((), found.warnings) if found.good else (found.warnings, ())
     found = replace(found, warnings=(*ahead, *still.warnings, *notes, *behind))
     found = _listed(with_provenance(found, about), laid.order)
+    if not printed:
+        found = with_unsaid(found, session, grain_of(session))
     if shown is None:
         return found
     return misread(shown.prepared, with_not_carried(found, uncarried(shown, found)))
 
 
 def _as_shown(
-    asked: dict[str, Any], shown: Explanation | None
-) -> tuple[dict[str, Any], list[str]]:
-    """What is asked for, with angles that the recording shows to be set less well."""
-    if shown is None or not (angles := angles_set(shown)) > asked["angle_sigma_deg"]:
-        return asked, []
-    note = (
+    asked: dict[str, Any], shown: Explanation | None, found: Calibration
+) -> tuple[float, str]:
+    """How well the recording shows that angles are set, deg, and a sentence if less.
+
+    What the set that was asked for explains, the tilt of the base among it, shows
+    nothing of the angles.
+    """
+    stated = float(asked["angle_sigma_deg"])
+    angles = 0.0 if shown is None else angles_set(shown)
+    explained = found.dof > 0 and chi2_tail(found.chi2, found.dof) >= UNLIKELY
+    if angles <= stated or explained:
+        return stated, ""
+    return angles, (
         f"the recording shows that angles are set to ± {angles:.2g}° only, not"
-        f" ± {asked['angle_sigma_deg']:.2g}°: the uncertainties are for that; mend the"
-        " fixture, or write down the angles that it really sets"
+        f" ± {stated:.2g}°: the uncertainties are for that; mend the fixture, or write"
+        " down the angles that it really sets"
     )
-    return asked | {"angle_sigma_deg": angles}, [note]
 
 
 def _insist(found: Calibration, session: Session, still: Rests) -> None:

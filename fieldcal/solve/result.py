@@ -310,5 +310,6 @@ def _info(
         out["carried"] = _carried(observations, found)
     if found.turns:
         chi2, dof = _turns(found)
-        out["turns"] = {"chi2": chi2, "dof": dof}
+        scatter = turns_scatter(found.found)
+        out["turns"] = {"chi2": chi2, "dof": dof, "scatter_rad": scatter}
     return out

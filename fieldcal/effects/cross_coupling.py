@@ -2,6 +2,9 @@
 
     U_i += sum over j != i of k_ij f_j
 
+Where nobody knows how the device stood, its axes are those of the accelerometers: z is
+that of az, and ay lies in the plane of y and z; k21, k31 and k32 are zero.
+
 U output and f specific force, m/s^2, device axes; k_ij, dimensionless, is the response
 of the accelerometer i to force along j. Source: Avrutov and Pozniak 2023, (6).
 
@@ -28,6 +31,7 @@ class CrossCoupling(Sensor):
     """Cross-coupling of the accelerometers."""
 
     params = tuple(Param(f"k{i + 1}{j + 1}", "1", 2e-2) for i, j in PAIRS)
+    turned_into = {f"k{i + 1}{j + 1}": f"k{j + 1}{i + 1}" for i, j in PAIRS if j < i}
     covariate = "force along the other axes"
     decided_by = "positions that load each axis alone, up and down"
     cure = "Solve with --cross: the coefficients go into the calibration."

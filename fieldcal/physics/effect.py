@@ -89,6 +89,10 @@ class Effect(ABC):
     like_calibration: ClassVar[bool] = False
     """Whether bias and scale factor do the same, so that it is only ever possible."""
 
+    turned_into: ClassVar[Mapping[str, str]] = {}
+    """Parameters with those that they become in a device that is turned as a whole:
+    where nobody knows how it stands, the rows show the sum of the two."""
+
     decided_by: ClassVar[str]
     cure: ClassVar[str]
     source: ClassVar[str]

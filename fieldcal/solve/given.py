@@ -39,11 +39,6 @@ Tilt = Literal["none", "angle_offset", "base_tilt"]
 TILTS = ("angle_offset", "base_tilt")
 """Models of one tilt: a set has one of them."""
 
-NOT_SHOWN = ("k21", "k31", "k32")
-"""Couplings that a common rotation makes of the others: where no orientation is known,
-the z accelerometer's axis is the z axis of the frame, and that of y lies in its y z
-plane."""
-
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
@@ -150,7 +145,7 @@ class Given(Dictionary):
         if w.tilt != "none" and oriented:
             yield self._estimated(w.tilt, known=w.level_deg)
         if w.cross:
-            yield self._estimated("cross_coupling", () if oriented else NOT_SHOWN)
+            yield self._estimated("cross_coupling", turned=not oriented)
         if w.gyro_cross:
             yield self._estimated("gyro_cross_coupling", free=priors.COUPLED)
         if any(w.earth) and oriented:
@@ -161,15 +156,20 @@ class Given(Dictionary):
     def _estimated(
         self,
         name: str,
-        left: Sequence[str] = (),
+        turned: bool = False,
         known: float | None = None,
         free: float = priors.FREE,
     ) -> Cause:
-        """An effect with all its parameters but some, free or of a known size."""
+        """An effect with its parameters, free or of a known size.
+
+        Those that a turn of the whole device makes of others are left out of one that
+        is `turned` as nobody knows.
+        """
         effect = catalogue()[name]
         if not isinstance(effect, Motion | Sensor):
             raise TypeError(f"{name} has no equation")
-        some = [j for j, p in enumerate(effect.params) if p.name not in left]
+        some = [j for j, p in enumerate(effect.params) 
+                if not (turned and p.name in effect.turned_into)]  # fmt: skip
         at = effect_columns(self, effect, [({}, 0)])[0][some]
         typical = np.array([effect.params[j].typical for j in some])
         size, fixed = typical * unit_of(self, effect), free

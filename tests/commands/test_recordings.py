@@ -179,3 +179,19 @@ def test_ten_short_intervals_have_next_to_no_freedom_and_that_is_said(
     if code != 2:
         result = json.loads((tmp_path / "s" / "result.json").read_text())
         assert "degree" in " ".join(result["warnings"])
+
+
+def test_diagnose_says_of_crooked_axes_what_solve_finds(
+    units: Callable[[int], Unit],
+) -> None:
+    """Nobody knows how the stops stood: both take the axis of az for z."""
+    unit = units(1)
+    assert main(["diagnose", str(unit.folder)]) == 1
+    said = json.loads((unit.folder / "diagnosis.json").read_text())
+    (found,) = (e for e in said["effects"] if e["id"] == "cross_coupling")
+    assert set(found["parameters"]) == {"k12", "k13", "k23"}
+    value, sigma = both(unit.result, "cross_coupling")
+    for name, v, s in zip(("k12", "k13", "k23"), value, sigma, strict=True):
+        one = found["parameters"][name]
+        assert 0 < one["sigma"] < 3 * s
+        assert abs(one["value"] - v) < 3 * np.hypot(one["sigma"], s)

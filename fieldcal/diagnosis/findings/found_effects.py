@@ -129,6 +129,7 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
             if s**2 < DETERMINED * wide**2:
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
+        own |= _whatever_turned(explanation, group, set(own))
         out |= _since_arrival(own, group)
     for shape in effect.shapes:
         known = [m for m in standing.members if shape.name in m[1].shape]
@@ -136,6 +137,31 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
         weight = np.array([1 / max(error, 1e-12) ** 2 for _, error in found])
         at = float(weight @ [at for at, _ in found] / weight.sum())
         out[shape.name] = Quantity(at, float(weight.sum() ** -0.5), shape.unit)
+    return out
+
+
+def _whatever_turned(
+    explanation: Explanation, group: Group, known: set[str]
+) -> dict[str, Quantity]:
+    """What a turn of the whole device leaves of two parameters is their sum.
+
+    Where nobody knows how it stood no other number is there to be found.
+    """
+    effect = group.effect
+    if effect is None or not explanation.dictionary.free.all():
+        return {}
+    names = [effect.params[j].name for j in group.params]
+    state, out = explanation.best.set.state, dict[str, Quantity]()
+    for gone, kept in effect.turned_into.items():
+        if gone in known or kept in known or not {gone, kept} <= set(names):
+            continue
+        at = _places(
+            explanation.best.set, group.columns[[names.index(gone), names.index(kept)]]
+        )
+        variance = float(state.inverse[np.ix_(at, at)].sum())
+        if variance < DETERMINED * (state.sizes[at] ** 2).sum():
+            value = float(state.estimate[at].sum())
+            out[kept] = Quantity(value, float(np.sqrt(variance)), effect.unit(kept))
     return out
 
 

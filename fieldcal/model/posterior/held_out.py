@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
+from fieldcal.model import priors
 from fieldcal.model.causes.cause import FEW
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import Fitted, whole
@@ -76,6 +78,23 @@ class HeldOut:
             rows = [_rows(p, left[p.rows]) for p in self.linear]
             _predict(out, rows, step, chosen, d)
         return out
+
+    def density(self, one: Set) -> float:
+        """How likely a set has each part, given the others, ln; nan where none can be.
+
+        With its sizes as the others show them, and but for a constant of the rows.
+        """
+        d, total = self.dictionary, 0.0
+        every = gram(self.linear, d, self.fitted.values, (), self.columns)
+        for i in np.unique(self.fold):
+            if not self.fold.max() or (search := self._without(int(i))) is None:
+                return float("nan")
+            rest = search.evaluated(one.members, one.sizes)
+            tau = priors.SIZES[list(rest.sizes.instability)] * search.unstable
+            there = rest.state
+            whole = Eliminated.of(every.weighed(tau), there.columns, there.sizes)
+            total += whole.score - there.score
+        return total
 
     def _without(self, i: int) -> Search | None:
         """What the rows say without a part; None where a channel has no others."""

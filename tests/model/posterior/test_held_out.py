@@ -15,7 +15,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.posterior.held_out import folds, held_out
+from fieldcal.model.posterior.held_out import HeldOut, folds, held_out
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import Fitted, whole
 from fieldcal.model.system.linear_system import System, gram
@@ -122,6 +122,22 @@ def test_residuals_are_those_of_a_refit_without_the_position(
         value[at] = one.fitted.values[at]
         expected = one.dense.y - one.dense.design @ value
         agree(found[left], expected.reshape(ROWS, 6)[left])
+
+
+@SETS
+def test_how_likely_each_position_is_given_the_others(keys: tuple[str, ...]) -> None:
+    one, expected = refit(keys), 0.0
+    state = one.fitted.set.state
+    for p in range(len(LADDER)):
+        kept = np.repeat(one.dictionary.x.position != p, 6)
+        rest = Dense(
+            one.dense.y[kept], one.dense.design[kept],
+            one.dense.cov[np.ix_(kept, kept)], one.dense.white[kept],
+        )  # fmt: skip
+        expected += one.dense.evidence(state.columns, state.sizes)
+        expected -= rest.evidence(state.columns, state.sizes)
+    found = HeldOut(one.fitted, [one.fitted.set]).density(one.fitted.set)
+    assert found == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize("free", [(), (3, 4)], ids=["misset", "loose"])

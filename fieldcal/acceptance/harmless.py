@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.solve.doubt import SUSPECT
+from fieldcal.model import thresholds
 
 SHARE = 0.1
 """Of what the grade allows, (1)."""
@@ -25,7 +25,7 @@ def harmless(found: Calibration, limits: GradeLimits) -> str:
     scatter = found.info.get("extra_scatter")
     doubt = max(found.info.get("bad_position", ()), default=0.0)
     most = SHARE * limits.acc_bias_sigma
-    if scatter is None or not 0 < scatter <= most or doubt >= SUSPECT:
+    if scatter is None or not 0 < scatter <= most or doubt >= thresholds.SUSPECT:
         return ""
     return (
         f"that is a scatter of {scatter:.2g} m/s², which the uncertainties have in them"

@@ -12,12 +12,14 @@ or where a position that was not fitted agrees.
 from __future__ import annotations
 
 from fieldcal.calibration import Calibration
-from fieldcal.solve.doubt import CERTAIN
+from fieldcal.model import thresholds
 
 
 def left_out(found: Calibration) -> int:
     """How many positions were given no weight."""
-    return sum(chance > CERTAIN for chance in found.info.get("bad_position", ()))
+    return sum(
+        chance > thresholds.CERTAIN for chance in found.info.get("bad_position", ())
+    )
 
 
 def has_witnesses(found: Calibration) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.model import thresholds
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
@@ -27,12 +28,6 @@ from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.turn_rows import Turns
 from fieldcal.model.turns.turn import Turning
 from fieldcal.session.description import Description
-
-ROUGH = 0.7
-"""Part of the noise that rounding makes when it is most of it."""
-
-SEES_EARTH = 20.0
-"""Earth rate over the noise of one window from which tactical gyroscopes see it."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +106,7 @@ class Explanation:
             return False
         samples = rows.length.sum() / len(d.held) * rate_of(self.prepared.source.block)
         ratio = EARTH_RATE / (np.nanmax(rows.noise[3:]) / np.sqrt(samples))
-        return bool(ratio > SEES_EARTH)
+        return bool(ratio > thresholds.SEES_EARTH)
 
 
 def explain(prepared: Prepared) -> Explanation:
@@ -146,7 +141,7 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
         Wander.of(rows, unit),
     )  # fmt: skip
     grain = grain_of(source.block, spans(source.block, about))
-    rough = bool((grain[:3] > ROUGH * rows.noise[:3]).any())
+    rough = bool((grain[:3] > thresholds.ROUGH * rows.noise[:3]).any())
     turning = Turning(source, rows, dictionary.since)
     turns = Turns(turning, dictionary, not rough) if turned else None
     return Inference(System(rows, dictionary), nominal, turns)

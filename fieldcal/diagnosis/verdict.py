@@ -38,7 +38,7 @@ from fieldcal.diagnosis.wording.advice import advice
 from fieldcal.diagnosis.wording.lines import lines
 from fieldcal.diagnosis.wording.paragraph import notes, paragraph
 from fieldcal.effects import catalogue
-from fieldcal.model import priors
+from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.model.rows.reduce import spans
 from fieldcal.session.description import Description
@@ -173,7 +173,7 @@ def _is_open(explanation: Explanation, one: Standing) -> bool:
     if one.name in catalogue() and catalogue()[one.name].like_calibration:
         return True
     others = explanation.posterior.probability(one.aliases, one.triads)
-    return others > priors.OPEN
+    return others > thresholds.OPEN
 
 
 def _probability(explanation: Explanation, verdict: Verdict) -> float:
@@ -255,5 +255,5 @@ def _spare(explanation: Explanation, first: int) -> int:
     for one in explanation.best.linear:
         if first <= one.channel < first + 3:
             reach[one.columns] |= np.abs(one.design).max(axis=0) > 0
-    narrowed = np.diag(found.inverse) < found_effects.DETERMINED * found.sizes**2
+    narrowed = np.diag(found.inverse) < thresholds.DETERMINED * found.sizes**2
     return int(sum(held) - turns - (reach[found.columns] & narrowed).sum())

@@ -25,17 +25,11 @@ from fieldcal.diagnosis.findings.found_effects import sizes
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.signal.chain import check
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.physics.effect import Chain, Scatter
 from fieldcal.session.folder import Session
-
-WRONG = 5.0
-"""Sigmas by which a parameter may move with what is left out before it is no longer to
-be used: no navigator has that in its margin."""
-
-REPORTED = 1.0
-"""Standard deviations from which it is reported."""
 
 BYTES = "decode_fault"
 
@@ -159,12 +153,12 @@ def with_not_carried(calibration: Calibration, missing: Uncarried) -> Calibratio
     )
     info = {"causes": dict(missing.causes), "moved_sigmas": dict(missing.moved)}
     found = replace(calibration, info={**calibration.info, "not_carried": info})
-    if abs(sigmas) < REPORTED:
+    if abs(sigmas) < thresholds.MOVED:
         return found
     sentence = (
         f"the recording shows {listed}, which this result does not carry: with it"
         f" {name} moves by {sigmas:+.1f} σ; fieldcal diagnose says what it is and what"
         " to do"
     )
-    good = calibration.good and abs(sigmas) < WRONG
+    good = calibration.good and abs(sigmas) < thresholds.MOVED_WRONG
     return replace(found, warnings=(sentence, *calibration.warnings), good=good)

@@ -12,5 +12,6 @@ add one, write its file in `effects/`.
 
 From below: `rows` and `turns` reduce samples, `causes` have columns, `evidence` weighs
 a set of causes, `system` linearises a session, `search` finds the best set, and
-`posterior` states probabilities and numbers. `priors` and `state` serve all of them.
+`posterior` states probabilities and numbers. `priors`, `thresholds` and `state` serve
+all of them.
 """

@@ -73,16 +73,6 @@ ALONE = 0.1
 UNKNOWN = 5e-4
 """Chance of a function that no effect makes, for each covariate."""
 
-NAMED = 0.5
-"""Probability from which an effect is reported."""
-
-SAME = 4.6
-"""Evidence, ln, by which an explanation may be behind and still stand for another: 100
-to 1, beyond which nobody would ask."""
-
-OPEN = 0.1
-"""Probability of what may stand in its place from which a cause is ambiguous."""
-
 
 def loosely() -> Array:
     """Probability of each of `SIZES` of instability where nobody looks for causes."""

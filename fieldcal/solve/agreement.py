@@ -17,11 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.physics.effect import Motion, Sensor
-from fieldcal.solve.doubt import CERTAIN
 from fieldcal.solve.given import Given
 from fieldcal.solve.observations import Mask
 
@@ -80,7 +79,7 @@ def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -
     free = means[:, ~random]
     # turns that nobody knows hide what they can make
     seen = _Seen(gram, d, channels, used)
-    good = (found.bad <= CERTAIN)[seen.window] | (0 not in channels)
+    good = (found.bad <= thresholds.CERTAIN)[seen.window] | (0 not in channels)
     columns = np.hstack([free, loose])[good]
     columns = columns[:, np.any(columns != 0.0, axis=0)]
     chi2, rank = _least(plain[np.ix_(good, good)], columns, y[good])

@@ -20,6 +20,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.names import group_of
+from fieldcal.model import thresholds
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
 from fieldcal.solve import printed
@@ -33,9 +34,6 @@ from fieldcal.solve.rows import of_means
 from fieldcal.solve.words import join
 
 TILTED: tuple[Tilt, ...] = ("angle_offset", "base_tilt")
-
-CLEAR = 3.0
-"""Evidence, ln, from which one model of the tilt counts as the better one."""
 
 
 def solve(
@@ -183,7 +181,7 @@ class _Session:
         ahead = usable["angle_offset"].found.score - usable["base_tilt"].found.score
         best, other = TILTED if ahead >= 0 else TILTED[::-1]
         ahead = abs(ahead)
-        if ahead > CLEAR:
+        if ahead > thresholds.BETTER_TILT:
             note = (
                 f"the tilt is taken as {best}: {other} fits worse, by {2 * ahead:.0f}"
                 " in chi2"

@@ -7,11 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
 from fieldcal.solve.observations import Observations
-
-SUSPECT, CERTAIN = 0.1, 0.99
-"""Probability that a window is bad from which it is reported, and from which it has no
-weight left."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +29,7 @@ class DoubtfulPosition:
     def of(cls, observations: Observations, bad: Array) -> DoubtfulPosition | None:
         """The worst position, (n,) probabilities; None where all positions agree."""
         worst = int(bad.argmax())
-        if bad[worst] < SUSPECT:
+        if bad[worst] < thresholds.SUSPECT:
             return None
         return cls(observations.positions[worst].name, float(bad[worst]))
 
@@ -48,7 +45,7 @@ class DoubtfulPosition:
     @property
     def sentence(self) -> str:
         """What happened, and what to do."""
-        if self.probability > CERTAIN:
+        if self.probability > thresholds.CERTAIN:
             return (
                 f"the position {self.name} disagrees with all others and was given no"
                 " weight: take it again"

@@ -13,6 +13,7 @@ import numpy as np
 
 from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sizing import Member
@@ -25,7 +26,6 @@ from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turning
 from fieldcal.solve.agreement import Fit, agreement
-from fieldcal.solve.doubt import CERTAIN, SUSPECT
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask
 from fieldcal.solve.shown import Shown
@@ -35,9 +35,6 @@ FOLLOWED, NEAR = 6, 0.01
 """Times that turns are followed at most, and the change of a scale factor from which
 once more: they are followed again in the end, and what is linear in a change leaves its
 square, 1e-4 and then 1e-8."""
-
-OPEN = 0.25
-"""Part of a variance before the rows from which they determined nothing."""
 
 DOUBTED = 0.02
 """Probability that a window is bad below which it moves no interval."""
@@ -192,13 +189,13 @@ def estimated(
         gram = inference.gram(*_settled(inference, given), None)
         found = _mixed(given, Search(given, gram), likely.members)
         worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
-        if worst.any() and (found.bad[worst] > SUSPECT).all():
+        if worst.any() and (found.bad[worst] > thresholds.SUSPECT).all():
             # a gross error bends the state so far that nothing is linear about it
             others = System(_without(rows, given, bad | worst), given)
             beside = Inference(others, nominal, turns)
             gram = inference.gram(*_settled(beside, given), None)
             found = _mixed(given, Search(given, gram), likely.members)
-        worst &= (found.bad > CERTAIN) & ~bad
+        worst &= (found.bad > thresholds.CERTAIN) & ~bad
         if not worst.any() or bad.sum() >= max(1, len(bad) // 6):
             break
         bad |= worst
@@ -206,7 +203,7 @@ def estimated(
     parameters = _parameters(given, gram, found, nominal, averaged)
     names, values, covariance, moved, missing = _determined(given, parameters)
     elsewhere = turning.contradicted if turning else ()
-    counts = set(given.held[found.bad <= CERTAIN].tolist())
+    counts = set(given.held[found.bad <= thresholds.CERTAIN].tolist())
     return Estimated(
         given, names, values, covariance, missing, found, moved,
         agreement(gram, given, found, (0, 1, 2)),
@@ -316,29 +313,19 @@ def _determined(
     for group in given.groups:
         before[group.columns] = group.sizes(group.fixed or 1.0)
     sigma = np.sqrt(np.diag(found.covariance))
-    limits = USEFUL | ({"gyr_scale": TURNED} if given.wanted.turned else {})
+    limits = thresholds.USEFUL | (
+        {"gyr_scale": thresholds.USEFUL_TURNED} if given.wanted.turned else {}
+    )
     known = [
         i
         for i, name in enumerate(given.names)
-        if sigma[i] ** 2 < OPEN * before[given.place(name)[0]] ** 2
+        if sigma[i] ** 2 < thresholds.DETERMINED * before[given.place(name)[0]] ** 2
         and sigma[i] < limits.get(group_of(name), np.inf)
     ]
     names = tuple(given.names[i] for i in known)
     missing = tuple(n for i, n in enumerate(given.names) if i not in known)
     square = found.covariance[np.ix_(known, known)]
     return names, found.values[known], square, found.moved[known], missing
-
-
-USEFUL = {
-    "acc_bias": 1.0, "cross_coupling": 0.1, "gyr_scale": 0.1,
-    "gyro_cross_coupling": 0.01, "angle_offset": 3.0, "base_tilt": 3.0,
-}  # fmt: skip
-"""Standard uncertainty from which a parameter is worse than a guess: no bias is a tenth
-of gravity, an axis is put in by hand to some hundredths, and an eye sees a tilt of
-three degrees."""
-
-TURNED = 0.01
-"""The same of the scale factor of gyroscopes where turns give it: makers do better."""
 
 
 def scatter_of(found: Mixture, channels: tuple[int, ...]) -> float:

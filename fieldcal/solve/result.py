@@ -13,6 +13,7 @@ from fieldcal.calibration.names import AXES, ParameterName, group_of, sensor_of
 from fieldcal.calibration.plausible import senseless
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import UNITS as CHANNEL_UNITS
+from fieldcal.model import thresholds
 from fieldcal.solve import words
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.doubt import DoubtfulPosition
@@ -29,17 +30,11 @@ OF_ACC = frozenset(
 )
 """Groups that the accelerometers at rest determine."""
 
-WRONG = 9.0
-"""chi2 per degree of freedom from which the model, not the noise, is at fault."""
-
 OF_TURNS = frozenset({"gyr_scale", "gyro_cross_coupling"})
 """Groups that turns determine."""
 
 MENTIONED = 3
 """Turns that are named one by one."""
-
-TURNED = 5
-"""Degrees of freedom of the turns from which their residual says something."""
 
 
 def calibration(
@@ -78,7 +73,7 @@ def calibration(
         *_contradicted(found, observations),
     ]
     acc = found.acc if any(map(_is_acc, names)) else found.gyr
-    good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < WRONG)
+    good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < thresholds.WRONG_MODEL)
     doubt = DoubtfulPosition.of(observations, found.bad)
     sentences += [
         *_few(method, found),
@@ -229,7 +224,7 @@ def _scattered(found: Estimated) -> list[str]:
             spread, unit = scatter_of(found.found, channels), CHANNEL_UNITS[channels[0]]
             sentences.append(words.excess(name, agreed.chi2, agreed.dof, spread, unit))
     chi2, dof = _turns(found)
-    if dof >= TURNED:
+    if dof >= thresholds.TURNS_TELL:
         sentences.append(
             words.excess("turns", chi2, dof, turns_scatter(found.found), "rad")
         )

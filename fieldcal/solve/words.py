@@ -9,13 +9,7 @@ import numpy as np
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
-from fieldcal.model.priors import NAMED
-
-UNLIKELY = 0.01
-"""Probability of a larger chi2 from which the scatter counts as beyond the noise."""
-
-MENTIONED = 0.1
-"""Probability from which a cause is named in a sentence."""
+from fieldcal.model import thresholds
 
 NO_DOF = "no degree of freedom: the residual says nothing; add a verification position"
 
@@ -46,7 +40,7 @@ def chance(chi2: float, dof: int) -> float:
 
 def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
     """Tell of scatter beyond the noise; nothing where there is none."""
-    if chi2 <= dof or chance(chi2, dof) >= UNLIKELY:
+    if chi2 <= dof or chance(chi2, dof) >= thresholds.BEYOND_NOISE:
         return ""
     few = "; of so few degrees of freedom it is itself uncertain" if dof < 5 else ""
     cause = "diagnosis can say where it comes from"
@@ -80,10 +74,14 @@ def carried(
     ended_s : when biases are as stated, s since the start; None if they stay
 
     """
-    if sure < NAMED:
+    if sure < thresholds.NAMED:
         return ""
     listed = join(
-        [f"{i} (probability {p:.2f})" for i, p in causes.items() if p >= MENTIONED]
+        [
+            f"{i} (probability {p:.2f})"
+            for i, p in causes.items()
+            if p >= thresholds.MENTIONED
+        ]
     )
     worst = int(np.abs(moved).argmax())
     when = ""

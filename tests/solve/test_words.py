@@ -9,6 +9,7 @@ from fieldcal.calibration import Nominal
 from fieldcal.calibration.plausible import senseless
 from fieldcal.core.positions import FIVE, WIDE, Position
 from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
 from fieldcal.solve import solve, words
 from fieldcal.solve.doubt import DoubtfulPosition
 
@@ -70,7 +71,7 @@ def test_chance_is_that_of_a_larger_chi2(chi2: float, dof: int) -> None:
 
 
 def test_scatter_is_told_from_one_in_a_hundred_on() -> None:
-    limit = chi_square.isf(words.UNLIKELY, 10)
+    limit = chi_square.isf(thresholds.BEYOND_NOISE, 10)
     assert words.excess("positions", 0.99 * limit, 10, 0.01, "m/s^2") == ""
     said = words.excess("positions", 1.01 * limit, 10, 0.01, "m/s^2")
     assert "dof 10" in said and "0.01 m/s^2" in said and "0.06°" in said

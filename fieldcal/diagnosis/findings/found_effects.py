@@ -16,7 +16,7 @@ from fieldcal.diagnosis.findings.stretch_means import rms
 from fieldcal.diagnosis.result import FoundEffect, Quantity
 from fieldcal.diagnosis.signal.line import Tone
 from fieldcal.effects import catalogue
-from fieldcal.model import priors
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member, likeliest
@@ -26,13 +26,6 @@ from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.system.way_rows import ARRIVAL_S
 from fieldcal.physics.effect import Scatter
 from fieldcal.physics.recording import Fault
-
-DETERMINED = 0.3
-"""Largest part of its prior variance that a reported parameter may keep."""
-
-
-SHOWS = 12.0
-"""Decrease of the weighted squares from which a cause shows in the windows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +50,7 @@ class Removed:
 def in_turns(lost: Removed) -> bool:
     """Whether windows lose nothing with a cause, or less than turns do."""
     windows = float(np.nan_to_num(lost.squares).max())
-    return windows < SHOWS or windows < lost.turned
+    return windows < thresholds.SHOWN_BY_WINDOWS or windows < lost.turned
 
 
 def rms_of(values: Array) -> float:
@@ -126,7 +119,7 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
         value, sigma, prior = estimates(explanation.best.set, group.columns)
         own: dict[str, Quantity] = {}
         for j, v, s, wide in zip(group.params, value, sigma, prior, strict=True):
-            if s**2 < DETERMINED * wide**2:
+            if s**2 < thresholds.DETERMINED * wide**2:
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
         own |= _whatever_turned(explanation, group, set(own))
@@ -159,7 +152,7 @@ def _whatever_turned(
             explanation.best.set, group.columns[[names.index(gone), names.index(kept)]]
         )
         variance = float(state.inverse[np.ix_(at, at)].sum())
-        if variance < DETERMINED * (state.sizes[at] ** 2).sum():
+        if variance < thresholds.DETERMINED * (state.sizes[at] ** 2).sum():
             value = float(state.estimate[at].sum())
             out[kept] = Quantity(value, float(np.sqrt(variance)), effect.unit(kept))
     return out

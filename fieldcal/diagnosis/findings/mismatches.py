@@ -18,18 +18,10 @@ from fieldcal.diagnosis.findings.found_effects import Removed, in_turns
 from fieldcal.diagnosis.findings.stretch_means import averages
 from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.model.rows.reduce import spans
 from fieldcal.physics.recording import Fault
-
-CLEAR = 25.0
-"""Squares that a channel has to lose for the mismatch to be in it."""
-
-PART = 0.03
-"""And at least this part of the most that any channel loses."""
-
-STANDS = 3.5
-"""Standard deviations from which a position stands out."""
 
 
 def of_cause(
@@ -49,7 +41,10 @@ def _of_residual(
     squares = lost.squares
     mean, sd, position = averages(explanation.rows, lost.residual)
     most = float(np.nanmax(squares))
-    for c in np.flatnonzero(squares >= min(max(CLEAR, PART * most), most)):
+    for c in np.flatnonzero(
+        squares
+        >= min(max(thresholds.IN_CHANNEL, thresholds.IN_CHANNEL_PART * most), most)
+    ):
         at = standing_out(mean[:, c] / sd[:, c], position)
         inside = np.isin(position, at)
         start, end = stretch(explanation, at)
@@ -68,7 +63,7 @@ def _of_residual(
 def standing_out(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
     """Positions whose residuals stand out; the largest, if none does."""
     size = np.nan_to_num(np.abs(z))
-    out = np.unique(position[size > STANDS])
+    out = np.unique(position[size > thresholds.STANDS_OUT])
     if not len(out):
         out = position[[int(np.argmax(size))]]
     return tuple(int(p) for p in out)
@@ -97,7 +92,7 @@ def _of_turns(
         off = turn.design[:, at] @ values[turn.columns[at]]
         way = turn.way_design[:, at] @ values[turn.columns[at]]
         squares[i] = float(turn.info @ off**2) + float(way @ way)
-    out = squares > max(STANDS**2, 0.05 * squares.max())
+    out = squares > max(thresholds.STANDS_OUT**2, 0.05 * squares.max())
     some = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
     places = tuple(sorted({p for t in some for p in t.positions}))
     source = explanation.prepared.source
@@ -146,7 +141,8 @@ def of_unknown(
         channels = (
             [CHANNELS.index(group.part)]
             if group.part in CHANNELS
-            else triad[squares > CLEAR].tolist() or [int(triad[squares.argmax()])]
+            else triad[squares > thresholds.IN_CHANNEL].tolist()
+            or [int(triad[squares.argmax()])]
         )
         for c in channels:
             mean, sd, position = averages(explanation.rows, lost.residual)

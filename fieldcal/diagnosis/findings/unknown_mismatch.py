@@ -10,9 +10,9 @@ import numpy as np
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.found_effects import estimates
 from fieldcal.diagnosis.result import Mismatch, Quantity
+from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import Standing
 
-STANDS = 3.5
 JOINTS = ("α", "β")
 
 
@@ -53,7 +53,7 @@ def misset(
     return tuple(
         (joint, Quantity(float(v), float(s), "deg"))
         for joint, v, s in pairs
-        if abs(v) > STANDS * s
+        if abs(v) > thresholds.STANDS_OUT * s
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
 from fieldcal.diagnosis.signal.periodogram import LONGEST, Complex, Pieces
+from fieldcal.model import thresholds
 from fieldcal.physics.effect import Line
 
 FEW, STRETCHES, FOLDS = 3, 5, 12
@@ -25,9 +26,6 @@ parts of the recording that are left out in turn."""
 
 AT_ONCE = 256
 """Frequencies tried together: all of a long recording would take much memory."""
-
-SHOWS = 4.0
-"""Standard deviations from which a channel counts as having the line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +179,7 @@ def _fitted(
     own = np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2)
     sigma = np.sqrt(own.real)
     if effect.kind == "sensor":  # outputs of their own: those without it have none
-        causes = np.where(np.abs(causes) > SHOWS * sigma, causes, 0.0)
+        causes = np.where(np.abs(causes) > thresholds.LINE * sigma, causes, 0.0)
     left = seen - response @ causes[..., None]
     fallen = np.abs(seen) ** 2 - np.abs(left) ** 2
     return causes, sigma, fallen[..., 0] @ weight
@@ -197,7 +195,9 @@ def _tone(pieces: Pieces, effect: Line, moments: Moments, offset: float) -> Tone
     amplitude = np.sqrt((np.abs(response @ causes) ** 2).mean(axis=0))
     error = pieces.noise * np.sqrt(2 / moments.counts.sum())
     clear = [
-        c for c, a, e in zip(CHANNELS, amplitude, error, strict=True) if a > SHOWS * e
+        c
+        for c, a, e in zip(CHANNELS, amplitude, error, strict=True)
+        if a > thresholds.LINE * e
     ]
     values, sigmas = _named(effect, causes, sigma)
     values["hz"] = float(hz)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.frames import turn
 from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
 from fieldcal.model.rows.reduce import Rows, RowSource, rate_of, spans
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.recording import medians
@@ -40,8 +41,6 @@ STEEP = 4.0
 SLOPE = 0.3
 """Part of the power at a frequency that is below it on a slope; beside a line, less."""
 
-ODDS = 1e-3
-"""Of a line where there is none, over all frequencies and channels."""
 
 NEAR = 2.0
 """Distance between two lines, in cycles of the shortest window."""
@@ -157,7 +156,7 @@ def highest(
     """
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     low = max(0.05, CYCLES / shortest)
-    best, near = np.log(ODDS), None
+    best, near = np.log(thresholds.LINE_BY_CHANCE), None
     for spectrum in spectra:
         hz, count = spectrum.hz, spectrum.count
         band = hz >= low

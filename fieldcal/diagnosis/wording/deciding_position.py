@@ -16,12 +16,10 @@ from fieldcal.core.positions import Position, ladder
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
-
-DECIDES = 5.0
-"""Difference in white noise of a window's mean that decides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +81,7 @@ def deciding_position(
             at = [i for i, angles in enumerate(held) if angles == (alpha, beta)]
             number = about.numbered(at[:1])[0] + 1 if at else 0
             best = DecidingPosition(alpha, beta, apart, number)
-    return best if best is not None and best.apart > DECIDES else None
+    return best if best is not None and best.apart > thresholds.DECIDES else None
 
 
 def _state(explanation: Explanation, found: Set) -> State:

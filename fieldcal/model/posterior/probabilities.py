@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model import priors
+from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import BOTH, Group, triads_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
@@ -96,7 +96,7 @@ class Posterior:
             if (near := near + 1) > LOOKED_AT:
                 break
             there = self._whole(less, offer, parts, offers)
-            if self._at_best(there, own) > own - priors.SAME:
+            if self._at_best(there, own) > own - thresholds.SAME:
                 if cause.name not in found or there.score > found[cause.name].score:
                     found[cause.name] = there
         return found
@@ -107,7 +107,7 @@ class Posterior:
         What was found has been refined: beside it a grid is too coarse.
         """
         at_points = self.evidence(there)
-        if self._refined is None or at_points > own - priors.SAME:
+        if self._refined is None or at_points > own - thresholds.SAME:
             return at_points
         if not any(_fades(m[1]) for m in there.members if m not in self.best.members):
             return at_points
@@ -174,7 +174,7 @@ class Posterior:
             members = tuple(m for m in self.best.members if m[0].name == name)
             one = Standing(name, members, np.nan, tuple(names))
             probability = self.probability([name, *alike], one.triads)
-            if probability >= priors.NAMED:
+            if probability >= thresholds.NAMED:
                 out.append(replace(one, probability=probability))
         return out
 

@@ -122,7 +122,7 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
             if s**2 < thresholds.DETERMINED * wide**2:
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
-        own |= _whatever_turned(explanation, group, set(own))
+        own = _whatever_turned(explanation, group, own)
         out |= _since_arrival(own, group)
     for shape in effect.shapes:
         known = [m for m in standing.members if shape.name in m[1].shape]
@@ -134,27 +134,28 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
 
 
 def _whatever_turned(
-    explanation: Explanation, group: Group, known: set[str]
+    explanation: Explanation, group: Group, own: dict[str, Quantity]
 ) -> dict[str, Quantity]:
-    """What a turn of the whole device leaves of two parameters is their sum.
+    """Numbers of a device of which nobody knows how it stands.
 
-    Where nobody knows how it stood no other number is there to be found.
+    What a turn of the whole device makes of two parameters is seen by their sum: where
+    that is better known than either, it is in the place of both.
     """
-    effect = group.effect
+    effect, out = group.effect, dict(own)
     if effect is None or not explanation.dictionary.free.all():
-        return {}
+        return out
     names = [effect.params[j].name for j in group.params]
-    state, out = explanation.best.set.state, dict[str, Quantity]()
+    found = explanation.best.set
     for gone, kept in effect.turned_into.items():
-        if gone in known or kept in known or not {gone, kept} <= set(names):
+        if not {gone, kept} <= set(names):
             continue
-        at = _places(
-            explanation.best.set, group.columns[[names.index(gone), names.index(kept)]]
-        )
-        variance = float(state.inverse[np.ix_(at, at)].sum())
-        if variance < thresholds.DETERMINED * (state.sizes[at] ** 2).sum():
-            value = float(state.estimate[at].sum())
-            out[kept] = Quantity(value, float(np.sqrt(variance)), effect.unit(kept))
+        at = _places(found, group.columns[[names.index(gone), names.index(kept)]])
+        cov = found.state.inverse[np.ix_(at, at)]
+        before = float((found.state.sizes[at] ** 2).sum())
+        if cov.sum() < min(np.diag(cov).min(), thresholds.DETERMINED * before):
+            out.pop(gone, None)
+            value, sigma = found.state.estimate[at].sum(), np.sqrt(cov.sum())
+            out[kept] = Quantity(float(value), float(sigma), effect.unit(kept))
     return out
 
 

@@ -53,6 +53,11 @@ class Refit:
         state = self.fitted.set.state
         mean, _ = rest.posterior(state.columns, state.sizes)
         value = np.zeros(self.dictionary.width)
+        first = 0
+        for group in self.dictionary.always:
+            own = slice(first, first := first + len(group.columns))
+            if not group.in_state:  # it says nothing of another position
+                mean[own] = 0.0
         np.add.at(value, state.columns, mean)
         return value, np.sqrt(np.bincount(state.columns, state.sizes**2, len(value)))
 

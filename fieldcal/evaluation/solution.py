@@ -32,13 +32,13 @@ from fieldcal.evaluation.observations import (
     with_provenance,
 )
 from fieldcal.evaluation.unsaid import with_unsaid
+from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.rows import variances, widened
 from fieldcal.solve.shown import Shown
-from fieldcal.solve.words import UNLIKELY
 
 Turns = Literal["auto", "yes", "no"]
 
@@ -184,7 +184,9 @@ def _as_shown(
     """
     stated = float(asked["angle_sigma_deg"])
     angles = 0.0 if shown is None else angles_set(shown)
-    explained = found.dof > 0 and chi2_tail(found.chi2, found.dof) >= UNLIKELY
+    explained = (
+        found.dof > 0 and chi2_tail(found.chi2, found.dof) >= thresholds.BEYOND_NOISE
+    )
     if angles <= stated or explained:
         return stated, ""
     return angles, (

@@ -13,6 +13,7 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
+from calibrations import calibration
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
@@ -23,34 +24,6 @@ from fieldcal.exporters import ExportSource, ardupilot, exporter, formats, px4
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.session.schemas import schema
-
-PAIRS = [f"{i}{j}" for i in "123" for j in "123" if i != j]
-
-
-def calibration(
-    rng: np.random.Generator, cross: float, gyr_scale: float = 0.0
-) -> Calibration:
-    values = {
-        "acc_bias": rng.normal(0, 0.3, 3),
-        "acc_scale": 1 + rng.normal(0, 0.02, 3),
-        "gyr_bias": rng.normal(0, 0.02, 3),
-    }
-    if gyr_scale:
-        values["gyr_scale"] = 1 + rng.normal(0, gyr_scale, 3)
-    flat = {
-        f"{g}.{a}": v
-        for g, three in values.items()
-        for a, v in zip("xyz", three, strict=True)
-    }
-    if cross:
-        flat |= {f"cross_coupling.k{p}": rng.normal(0, cross) for p in PAIRS}
-        if gyr_scale:
-            flat |= {f"gyro_cross_coupling.e{p}": rng.normal(0, cross) for p in PAIRS}
-    k = len(flat)
-    return Calibration(
-        "joint", tuple(flat), np.array(list(flat.values())), 1e-8 * np.eye(k),
-        ("1",) * k, 1.0, 1, 1e-3,
-    )  # fmt: skip
 
 
 def samples(rng: np.random.Generator, n: int = 200) -> Block:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import json
 import os
 import re
 import subprocess
@@ -332,7 +333,9 @@ def test_a_kernel_without_can_and_channels_that_are_not_there(
     ):
         assert main([*command, "--device", url]) == 3
         said = capsys.readouterr().err
-        assert re.search(says, said) and said.count("\n") == 1
+        event, sentence = said.splitlines()
+        assert json.loads(event)["exit_code"] == 3
+        assert re.search(says, sentence)
     for number, says in (
         (97, "the kernel has no CAN"),
         (19, "no such CAN channel"),

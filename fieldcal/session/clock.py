@@ -88,7 +88,8 @@ class SteadyClock:
     def rest(self) -> Block:
         """Return the rows that were held back: the last, of which nothing follows."""
         held, self._held = self._held, concat([])
-        if len(held) and abs(held.t[0] - self._last) > STEP:
+        far = len(held) and abs(held.t[0] - self._last) > STEP
+        if far and np.isfinite(self._period):
             self._step_to(float(held.t[0]))
         return replace(held, t=held.t + self._offset)
 
@@ -141,8 +142,12 @@ class SteadyTimes(NamedTuple):
 
 
 def steadied(block: Block) -> SteadyTimes | None:
-    """Take the steps of the clock out of a whole recording; None if there are none."""
-    if not (np.abs(np.diff(block.t)) > STEP).any():
+    """Take the steps of the clock out of a whole recording; None if there are none.
+
+    Where most times are so far apart, they are in another unit than seconds.
+    """
+    far = np.abs(np.diff(block.t)) > STEP
+    if not 0 < far.sum() < len(far) / 2:
         return None
     clock = SteadyClock()
     whole = concat([clock.add(block), clock.rest()])

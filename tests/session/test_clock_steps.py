@@ -60,7 +60,7 @@ def test_memory_is_that_of_the_rows_whatever_the_clock_says(
 
 
 def test_times_in_nanoseconds_are_no_clock_that_was_set() -> None:
-    """Windows in seconds hold none of them, which is said with the times as they are."""
+    """Windows in seconds hold none of them: said with the times as they are."""
     t = 1e9 * np.arange(200) / 100
     block = Block.of(t, np.zeros((200, 3)), np.zeros((200, 3)))
     assert steadied(block) is None

@@ -17,8 +17,12 @@ from fieldcal.core.shown import one_line
 if TYPE_CHECKING:
     from fieldcal.core.samples import Array
     from fieldcal.importing.ingest import ImportedSession
-    from fieldcal.importing.means import Scatter
-    from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
+    from fieldcal.importing.recording import (
+        ImuStream,
+        MeanScatter,
+        ReadOptions,
+        Recording,
+    )
 
 EXAMPLE = """\
   fieldcal import log.csv --columns t,ax,ay,az,gx,gy,gz --acc-unit g --gyr-unit deg/s
@@ -240,7 +244,7 @@ def _bring_means(
     stream: ImuStream,
     folder: Path,
     about: dict[str, Any],
-    scatter: Scatter,
+    scatter: MeanScatter,
 ) -> ImportedSession:
     """Make a session of a table of means."""
     from fieldcal.importing.ingest import import_stream

@@ -13,9 +13,9 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing import column_physics, columns, headings
 from fieldcal.importing.headings import Column, HeadingMatch
-from fieldcal.importing.means import Scatter, scatter_columns
+from fieldcal.importing.means import scatter_columns
 from fieldcal.importing.physical_units import are_means, gravity_in, rate_in
-from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
+from fieldcal.importing.recording import ImuStream, MeanScatter, ReadOptions, Recording
 
 SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
 """Rates of logs, Hz."""
@@ -94,7 +94,7 @@ class ColumnRecording(Recording):
             return dict.fromkeys(self.imus_found, self.wanted)
         return self.imus_found
 
-    def scatter(self) -> Scatter | None:
+    def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""
         table, wanted = self.beginning(), self.wanted
         at = self._numbers_of(wanted)
@@ -109,7 +109,7 @@ class ColumnRecording(Recording):
             if channel in where:
                 values[:, i] = table[:, where[channel]]
         count = table[:, where["n"]] if "n" in where else None
-        return Scatter(values, count, _has_time(wanted))
+        return MeanScatter(values, count, _has_time(wanted))
 
     def _numbers_of(self, wanted: ReadOptions) -> dict[str, int]:
         """Number of each channel's column among those of `beginning`."""

@@ -13,7 +13,7 @@ they are, the deviation from row to row.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,9 +21,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, concat
 from fieldcal.importing.heading_words import meaning
 from fieldcal.importing.headings import SCATTER, Column
-
-if TYPE_CHECKING:
-    from fieldcal.importing.recording import Recording
+from fieldcal.importing.recording import MeanScatter, Recording
 
 COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
 """Names of a column that holds how many samples a mean is of."""
@@ -33,22 +31,6 @@ COUPLED, PLAIN = 9, 6
 
 SPARE = 3
 """Degrees of freedom that tell a scatter."""
-
-
-class Scatter(NamedTuple):
-    """How much the samples behind means scatter, as a table writes it.
-
-    Attributes
-    ----------
-    values : (n, 6) in units of the table; nan where not written
-    many : (n,) samples of each mean; None where not written
-    timed : whether the table says when each was taken
-
-    """
-
-    values: Array
-    many: Array | None
-    timed: bool
 
 
 class Spread(NamedTuple):
@@ -149,7 +131,11 @@ def _misfit(free: Array, acc: Array, gravity: float) -> Array:
 
 
 def tables_of_means(
-    recording: Recording, stream: str, scatter: Scatter, gravity: float, said: str = ""
+    recording: Recording,
+    stream: str,
+    scatter: MeanScatter,
+    gravity: float,
+    said: str = "",
 ) -> dict[str, Any]:
     """Tables of session.toml for a table of means: [means], [[position]], [guessed].
 

@@ -12,17 +12,14 @@ from copy import copy
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.importing.gzip_stream import PIECE, pieces
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS
-
-if TYPE_CHECKING:
-    from fieldcal.importing.means import Scatter
 
 ROWS = 1 << 15
 """Rows that are looked at together."""
@@ -39,6 +36,22 @@ TEMP_UNITS = {
 """Kelvin in one of each, and deg C at its 0; "none" leaves it out."""
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+class MeanScatter(NamedTuple):
+    """How much the samples behind means scatter, as a table writes it.
+
+    Attributes
+    ----------
+    values : (n, 6) in units of the table; nan where not written
+    many : (n,) samples of each mean; None where not written
+    timed : whether the table says when each was taken
+
+    """
+
+    values: Array
+    many: Array | None
+    timed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +185,7 @@ class Recording(ABC):
         """What the file says of the device: units, what it has installed."""
         return {}
 
-    def scatter(self) -> Scatter | None:
+    def scatter(self) -> MeanScatter | None:
         """What the file says of the scatter behind its rows; None if they are samples.
 
         Rows that are means are one for each position.

@@ -42,7 +42,7 @@ from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait, force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import Description
-from fieldcal.windows import Average, LearnedNoise, Pieces
+from fieldcal.windows import Average, LearnedNoise, PiecedWindow
 
 R = TypeVar("R")
 
@@ -175,11 +175,11 @@ class Engine:
 
         None if the operator wants to begin it again.
         """
-        pieces, same = Pieces(self._noise, self._driver.grain), self._same
+        pieces, same = PiecedWindow(self._noise, self._driver.grain), self._same
         while True:
             self._arrive(hold)
             if self._same != same:  # what it sends now is not what it sent before
-                pieces, same = Pieces(self._noise, self._driver.grain), self._same
+                pieces, same = PiecedWindow(self._noise, self._driver.grain), self._same
             away = self._away
             try:
                 return self._average(hold, pieces)
@@ -320,7 +320,7 @@ class Engine:
             self._operator.tell("nothing was taken yet that could be repeated")
         return wish
 
-    def _average(self, hold: Hold, pieces: Pieces) -> Average | None:
+    def _average(self, hold: Hold, pieces: PiecedWindow) -> Average | None:
         """Fill a window; None if the operator wants to begin it again."""
         try:
             while True:
@@ -351,7 +351,7 @@ class Engine:
         self._say_if_cold()
         return average
 
-    def _fill(self, hold: Hold, pieces: Pieces) -> bool:
+    def _fill(self, hold: Hold, pieces: PiecedWindow) -> bool:
         """Take samples until a window is long enough; False if it is to begin again."""
         share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
         watch = WindowWatch(self._driver, hold.seconds, share)

@@ -6,7 +6,7 @@ here knows positions, parameters or files.
 
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.mean import Average
-from fieldcal.windows.pieces import Pieces
+from fieldcal.windows.pieces import PiecedWindow
 from fieldcal.windows.stillness import Stillness
 from fieldcal.windows.stretches import still_stretches
 from fieldcal.windows.window import LearnedNoise, Window, average
@@ -15,7 +15,7 @@ __all__ = [
     "Average",
     "StillnessLimits",
     "LearnedNoise",
-    "Pieces",
+    "PiecedWindow",
     "Stillness",
     "Window",
     "average",

@@ -29,8 +29,8 @@ AGREES = 4.0
 """Standard errors within which means agree; those of short pieces are known roughly."""
 
 
-class Pieces:
-    """The pieces of one window, the last of which fills.
+class PiecedWindow:
+    """A window that is made of clean pieces, the last of which fills.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.windows import Pieces
+from fieldcal.windows import PiecedWindow
 
 NOISE = np.array([0.02] * 3 + [2e-3] * 3)
 AT_REST = np.array([0.1, -9.8, 0.2, 1e-3, -2e-3, 3e-3])
@@ -19,7 +19,7 @@ def rest(rng: np.random.Generator, start: float, seconds: float, off: Array) -> 
     return Block.of(t, six[:, :3], six[:, 3:])
 
 
-def fed(pieces: Pieces, block: Block) -> None:
+def fed(pieces: PiecedWindow, block: Block) -> None:
     for first in range(0, len(block), 40):
         pieces.add(block[first : first + 40])
         if pieces.moved:
@@ -33,10 +33,10 @@ def gust(rng: np.random.Generator, start: float, seconds: float, push: float) ->
     return block
 
 
-def in_gusts(seed: int, off: Array | None = None) -> Pieces:
+def in_gusts(seed: int, off: Array | None = None) -> PiecedWindow:
     """Three pieces of 9, 9 and 12 s, the last one off by so much."""
     rng = np.random.default_rng(seed)
-    pieces = Pieces(None, Grain())
+    pieces = PiecedWindow(None, Grain())
     for start in (0.0, 12.0):
         fed(pieces, gust(rng, start, 9.0, 0.4))
         moved = pieces.moved
@@ -87,7 +87,7 @@ def test_a_device_that_lies_otherwise_afterwards_begins_again(channel: int) -> N
 
 def test_what_is_too_short_to_be_judged_is_not_kept() -> None:
     rng = np.random.default_rng(1)
-    pieces = Pieces(None, Grain())
+    pieces = PiecedWindow(None, Grain())
     fed(pieces, gust(rng, 0.0, 2.0, 2.0))
     moved = pieces.moved
     if moved is None:  # so short a piece may not even show it

@@ -13,7 +13,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 from fieldcal.run.waiting import PositionWait
-from fieldcal.windows import Average, Pieces
+from fieldcal.windows import Average, PiecedWindow
 
 Phase = Literal["turning", "averaging", "taken", "silent"]
 """What the engine waits for: to be in place, the window, the next step, samples."""
@@ -104,11 +104,11 @@ class Display:
         """Show where the device is on its way, and what is waited for."""
         self._show("turning", hold, waiting.where, waiting.meter, reason=reason)
 
-    def averaging(self, hold: Hold, window: Pieces) -> None:
+    def averaging(self, hold: Hold, window: PiecedWindow) -> None:
         """Show how far a window is."""
         self._show("averaging", hold, None, window.meter, window.elapsed, window.sigma)
 
-    def taken(self, hold: Hold, window: Pieces) -> None:
+    def taken(self, hold: Hold, window: PiecedWindow) -> None:
         """Show what a window has reached."""
         self._show("taken", hold, None, window.meter, window.elapsed, window.sigma)
 

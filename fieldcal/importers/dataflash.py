@@ -111,7 +111,8 @@ class DataflashLog(Recording):
     def _block(self, table: NDArray[np.void], name: str) -> Block:
         def column(column: str) -> Array:
             factor = self._log.factor(name, column)
-            values: Array = table[column].astype(float) * factor
+            with np.errstate(invalid="ignore"):  # a NaN that signals is one as well
+                values: Array = table[column].astype(float) * factor
             return values
 
         there = table.dtype.names or ()

@@ -371,6 +371,17 @@ def test_a_log_whose_format_calls_a_number_a_text_is_refused(tmp_path: Path) -> 
         whole(small.path, small.wanted, small.name, repair=False)
 
 
+def test_a_nan_that_signals_is_a_missing_number(tmp_path: Path) -> None:
+    """A damaged byte makes one; where it is cast, numpy warns."""
+    small = Small("dataflash", tmp_path / "file")
+    content = bytearray(small.content)
+    content[931] = 0x7F
+    small.path.write_bytes(content)
+    found = whole(small.path, small.wanted, small.name, repair=False)
+    assert len(found) == len(small.expected)
+    assert np.isnan(found.temperature).sum() == 1
+
+
 def test_every_format_is_tried() -> None:
     assert set(SMALL) | {"wire"} == set(formats())
 

@@ -13,50 +13,24 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.acceptance.change import check_change
+from fieldcal.acceptance.check import Check
+from fieldcal.acceptance.conditions import check_link, check_temperature
 from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.harmless import harmless
 from fieldcal.acceptance.level import level_missing, tilt_is_found
 from fieldcal.acceptance.remedy import Remedy, cheapest
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.turned import turns_disagree
+from fieldcal.acceptance.uncertainty import UNCERTAINTY, check_uncertainty
 from fieldcal.acceptance.verification import Verification
 from fieldcal.acceptance.witnesses import has_witnesses, left_out, witnesses
-from fieldcal.calibration import COMPONENTS, Calibration
+from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.calibration.names import ParameterName, group_of, sensor_of
 from fieldcal.core.chances import chi2_tail
-from fieldcal.history.family import expected
 from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.windows import Average
-
-UNCERTAINTY = " uncertainty"
-"""Behind the name of a group, of the check that its parameters are well known."""
-
-REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
-"""Groups whose uncertainty must be known and small; a sensor not read is excused."""
-
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """One comparison with a limit.
-
-    Attributes
-    ----------
-    name : of what was checked
-    ok : whether it is within the limit; None where it could not be checked
-    says : one sentence
-    value, limit : None where there is no number
-    unit : of both
-
-    """
-
-    name: str
-    ok: bool | None
-    says: str
-    value: float | None = None
-    limit: float | None = None
-    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,13 +87,13 @@ def decide(
         _fit(found, limits),
         *_odd_positions(found, verification.ok is True),
         *_turns(found, limits),
-        *_uncertainty(found, limits),
+        *check_uncertainty(found, limits),
         *_site(found, about),
         *_level(found, about),
-        *_change(found, limits, circumstances.family),
+        *check_change(found, limits, circumstances.family),
         verification,
-        *_temperature(np.asarray(circumstances.temperatures, float), limits),
-        *_link(circumstances.link, limits),
+        *check_temperature(np.asarray(circumstances.temperatures, float), limits),
+        *check_link(circumstances.link, limits),
         *(Check("the run", False, doubt) for doubt in circumstances.doubts),
     ]
     g, mounting = about.gravity, about.mounting
@@ -161,20 +135,13 @@ def with_decision(found: Calibration, made: Decision) -> Calibration:
     decision: dict[str, Any] = {
         "go": made.go,
         "reasons": list(made.reasons),
-        "checks": [_document(check) for check in made.checks],
+        "checks": [check.to_json() for check in made.checks],
     }
     if made.remedy is not None:
         decision["remedy"] = made.remedy.to_json()
     expectation = [each.to_json() for each in made.growth]
     more = {"decision": decision, "expectation": expectation}
     return replace(found, info={**found.info, **more})
-
-
-def _document(check: Check) -> dict[str, Any]:
-    out: dict[str, Any] = {"name": check.name, "ok": check.ok, "says": check.says}
-    if check.value is not None:
-        out |= {"value": check.value, "limit": check.limit, "unit": check.unit}
-    return out
 
 
 def _fit(found: Calibration, limits: GradeLimits) -> Check:
@@ -215,58 +182,6 @@ def _first(found: Calibration) -> str:
     return found.warnings[0] if found.warnings else "see the fit"
 
 
-def _uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
-    checks = []
-    for group in COMPONENTS:
-        limit = limits.sigma(group)
-        read = {sensor_of(group_of(name)) for name in found.names}
-        sensor_read = sensor_of(group) in read
-        if limit is None or not sensor_read:
-            continue
-        unit = COMPONENTS[group][1]
-        _, sigma = found.vector(group)
-        lacking = [a for a, s in zip("xyz", sigma, strict=True) if not np.isfinite(s)]
-        if lacking and group in REQUIRED:
-            says = f"{group} {' '.join(lacking)} was not determined by these positions"
-            checks.append(Check(group + UNCERTAINTY, False, says))
-        elif not lacking:
-            worst = int(np.argmax(sigma))
-            ok = bool(sigma[worst] <= limit)
-            says = (
-                f"{group} {'xyz'[worst]} is known to ± {_apart(sigma[worst], limit)}"
-                f"{_of(unit)}, {'within' if ok else 'more than'} {limit:.2g}{_of(unit)}"
-            )
-            if not ok and sensor_of(group) == "acc":
-                says += _by_angles(found, limits)
-            value = float(sigma[worst])
-            checks.append(Check(group + UNCERTAINTY, ok, says, value, limit, unit))
-    return checks
-
-
-def _apart(value: float, limit: float) -> str:
-    """A value with as many digits as tell it from its limit.
-
-    >>> _apart(0.02041, 0.02), _apart(0.03123, 0.02)
-    ('0.0204', '0.031')
-    """
-    for digits in range(2, 7):
-        text = f"{value:.{digits}g}"
-        if float(text) != float(f"{limit:.{digits}g}"):
-            break
-    return text
-
-
-def _by_angles(found: Calibration, limits: GradeLimits) -> str:
-    """Remedy where the setting of the angles limits the uncertainty."""
-    angles = float(found.info.get("angle_sigma_deg") or 0.0)
-    if found.method == "scalar" or angles < limits.angle_setting_deg:
-        return ""
-    return (
-        f"; angles count as set to ± {angles:.2g}°: if they are set better say so"
-        " (--angles), else turn further"
-    )
-
-
 def _site(found: Calibration, about: Description) -> list[Check]:
     """Whether gravity is known, which every accelerometer's scale is measured by."""
     if "acc_scale" not in found.groups:
@@ -284,53 +199,6 @@ def _level(found: Calibration, about: Description) -> list[Check]:
         return [Check("level", False, level_missing(about))]
     says = f"the base is level to ± {level:.2g}°, as stated; each ± includes it"
     return [Check("level", True, says)]
-
-
-def _change(
-    found: Calibration, limits: GradeLimits, family: Sequence[Calibration] | None
-) -> list[Check]:
-    if family is None:
-        return [Check("change", None, "no serial number, so no history to compare")]
-    if not family:
-        return [Check("change", None, "first calibration of this device")]
-    known = [n for n in found.names if limits.repeat(group_of(n)) is not None]
-    checks = []
-    for group in dict.fromkeys(group_of(n) for n in known):
-        names = [n for n in known if group_of(n) == group]
-        made = [_compared(found, n, limits, family, len(known)) for n in names]
-        checks += sorted(filter(None, made), key=lambda c: c.value or 0.0)[:1]
-    return checks
-
-
-def _compared(
-    found: Calibration,
-    name: str,
-    limits: GradeLimits,
-    family: Sequence[Calibration],
-    together: int,
-) -> Check | None:
-    """One parameter against earlier runs; all parameters share the probability."""
-    earlier = [c for c in family if name in c.names]
-    parameter = ParameterName.of(name)
-    repeat = limits.repeat(parameter.group)
-    if not earlier or repeat is None:
-        return None
-    value, sigma = found.value(name), found.uncertainty(name)
-    usual = expected(
-        np.array([c.value(name) for c in earlier]),
-        np.array([c.uncertainty(name) for c in earlier]),
-        repeat,
-    )
-    chance, limit = usual.chance(value, sigma), limits.family_chance / together
-    ok = chance >= limit
-    unit = _of(found.units[found.names.index(name)])
-    says = (
-        f"{parameter.group} {parameter.component} differs from {usual.runs} earlier"
-        f" calibration{'s' if usual.runs > 1 else ''} by {value - usual.mean:+.2g}"
-        f" ± {usual.sigma(sigma):.2g}{unit}"
-        f"{'' if ok else ': out of family; inspect the device before you use it'}"
-    )
-    return Check(f"{parameter.group} change", ok, says, chance, limit, "1")
 
 
 def _verification(verification: Verification | None, limits: GradeLimits) -> Check:
@@ -352,50 +220,3 @@ def _verification(verification: Verification | None, limits: GradeLimits) -> Che
     return Check(
         "verification", not (far or odd), says, verification.largest, limit, "m/s^2"
     )
-
-
-def _temperature(
-    temperatures: np.ndarray[Any, Any], limits: GradeLimits
-) -> list[Check]:
-    known = temperatures[np.isfinite(temperatures)]
-    if not len(known):
-        return [Check("temperature", None, "the device reports no temperature")]
-    low, high = float(known.min()), float(known.max())
-    least, most = limits.temperature_min_c, limits.temperature_max_c
-    ok = least <= low and high <= most
-    says = f"{low:.1f} to {high:.1f} °C, allowed {least:g} to {most:g} °C"
-    span, wide = high - low, limits.temperature_span_k
-    steady = span <= wide
-    changed = (
-        f"the temperature changed by {span:.1f} K from window to window, allowed"
-        f" {wide:g} K{'' if steady else ': let it warm up, then run again'}"
-    )
-    far = low if low < least else high
-    bound = least if low < least else most
-    return [
-        Check("temperature", ok, says, far, bound, "°C"),
-        Check("temperature change", steady, changed, span, wide, "K"),
-    ]
-
-
-def _link(link: Mapping[str, int] | None, limits: GradeLimits) -> list[Check]:
-    if not link or not link.get("samples"):
-        return [Check("link", None, "losses of the link were not recorded")]
-    samples, missing, bad = (link.get(k, 0) for k in ("samples", "missing", "bad"))
-    checks = []
-    for name, count, limit in (
-        ("samples missing", missing, limits.lost_share),
-        ("frames refused", bad, limits.bad_share),
-    ):
-        share = count / (samples + count)
-        ok = share <= limit
-        says = (
-            f"{count} of {samples + count} {name} ({share:.2%}), allowed {limit:.2%}"
-            f"{'' if ok else ': check cable and baud rate'}"
-        )
-        checks.append(Check(f"link: {name}", ok, says, share, limit, "1"))
-    return checks
-
-
-def _of(unit: str) -> str:
-    return "" if unit == "1" else f" {unit.replace('^2', '²')}"

@@ -28,6 +28,14 @@ from fieldcal.importing import columns
 from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.gzip_stream import HEAD, PIECE
 from fieldcal.importing.headings import Column
+from fieldcal.importing.text_lines import (
+    TOP,
+    behind,
+    plain_numbers,
+    split_lines,
+    top_lines,
+    width_of,
+)
 from fieldcal.importing.text_top import (
     headings_above,
     is_number,
@@ -35,7 +43,6 @@ from fieldcal.importing.text_top import (
     rate_above,
     separator_of,
 )
-from fieldcal.session.arrow_stream import numbers
 
 WHAT = "text with columns"
 
@@ -44,9 +51,6 @@ MARK = b"\xef\xbb\xbf"
 
 WIDE = (b"\xff\xfe", b"\xfe\xff")
 """What UTF-16 begins with."""
-
-TOP = 1000
-"""Lines at the top among which the first of numbers is looked for."""
 
 AXES = ("x", "y", "z")
 
@@ -147,13 +151,13 @@ class TextColumns(ColumnRecording):
 
     @cached_property
     def _lines(self) -> list[str]:
-        return next((_top(data) for data in self._pieces()), [])
+        return next((top_lines(data) for data in self._pieces()), [])
 
     @cached_property
     def _numbers(self) -> Array:
         lines: list[str] = []
         for data in self._pieces():
-            lines += _split(data)
+            lines += split_lines(data)
             if len(lines) > BEGINNING:
                 break
         return numbers_of(lines[:BEGINNING], self.wanted.separator)
@@ -177,7 +181,7 @@ class TextColumns(ColumnRecording):
                 top, begun = self._begin(data, use), True
                 if not 0 <= self._skip < len(top):
                     break
-                data, first = _behind(data, self._skip), top[self._skip]
+                data, first = behind(data, self._skip), top[self._skip]
                 separator = self.wanted.separator or separator_of(first)
                 self._check_width(first, separator)
                 if separator != "," and "," in first:
@@ -206,7 +210,7 @@ class TextColumns(ColumnRecording):
         """Lines at the top, as many as it takes to find the first of numbers."""
         top = [""]
         for many in (NAMED, TOP):
-            top = _top(data, many)
+            top = top_lines(data, many)
             self._skip = self._heading(top, use)
             if 0 <= self._skip < len(top):
                 break
@@ -237,7 +241,9 @@ class TextColumns(ColumnRecording):
         if self.wanted.skip is not None:
             return self.wanted.skip
         width = len(self.wanted.columns)
-        full = max((_width(line, self._parted(line)) for line in lines[:50]), default=0)
+        full = max(
+            (width_of(line, self._parted(line)) for line in lines[:50]), default=0
+        )
         for i, line in enumerate(lines):
             separator = self._parted(line)
             cells = [c.strip() for c in line.split(separator)]
@@ -252,7 +258,7 @@ class TextColumns(ColumnRecording):
         return self.wanted.separator or separator_of(line)
 
     def _check_width(self, line: str, separator: str | None) -> None:
-        width, named = _width(line, separator), len(self.wanted.columns)
+        width, named = width_of(line, separator), len(self.wanted.columns)
         if width != named:
             raise InputError(
                 f"{self.path}: has {width} columns, {named} are named;"
@@ -263,10 +269,10 @@ class TextColumns(ColumnRecording):
         self, data: bytes, use: list[int], separator: str | None, seen: int
     ) -> Sequence[Array]:
         """Numbers of the wanted columns, (n,) each."""
-        plain = _plain(data, len(self.wanted.columns), use, separator)
+        plain = plain_numbers(data, len(self.wanted.columns), use, separator)
         if plain is not None:
             return plain
-        lines = _split(data)
+        lines = split_lines(data)
         every = len(use) == len(self.wanted.columns)
         how: dict[str, Any] = {"delimiter": separator, "ndmin": 2, "comments": None}
         if not every:
@@ -301,59 +307,3 @@ class TextColumns(ColumnRecording):
                 self.damaged(f"{self.place(number)}, column {name}", what)
                 return []
         return row
-
-
-def _plain(
-    data: bytes, width: int, use: list[int], separator: str | None
-) -> list[Array] | None:
-    """Numbers of columns by Arrow, (n,) each; None if they are not all numbers."""
-    if separator is None or len(separator) > 1:
-        return None
-    import pyarrow as pa
-    import pyarrow.csv
-
-    comma = separator != "," and b"," in data[: data.find(b"\n")]
-    names = [str(i) for i in range(width)]
-    wanted = [names[i] for i in use]
-    try:
-        table = pyarrow.csv.read_csv(
-            pa.BufferReader(data),
-            pyarrow.csv.ReadOptions(
-                use_threads=False, column_names=names, block_size=len(data) + 1
-            ),
-            pyarrow.csv.ParseOptions(delimiter=separator, quote_char=False),
-            pyarrow.csv.ConvertOptions(
-                column_types=dict.fromkeys(wanted, pa.float64()),
-                decimal_point="," if comma else ".",
-                include_columns=wanted,
-                null_values=[""],
-            ),
-        )
-    except (pa.ArrowInvalid, ValueError):
-        return None
-    return [numbers(table.column(name)) for name in wanted]
-
-
-def _split(data: bytes) -> list[str]:
-    lines = data.decode(errors="replace").replace("\r\n", "\n").split("\n")
-    return [line for line in lines if line.strip()]
-
-
-def _top(data: bytes, many: int = TOP) -> list[str]:
-    """First lines, of so many those that are not empty."""
-    return _split(b"\n".join(data.split(b"\n", many)[:many]))
-
-
-def _behind(data: bytes, many: int) -> bytes:
-    """What stands behind so many lines that are not empty."""
-    at = 0
-    while many and at < len(data):
-        end = data.find(b"\n", at)
-        end = len(data) if end < 0 else end
-        many -= bool(data[at:end].strip())
-        at = end + 1
-    return data[at:]
-
-
-def _width(line: str, separator: str | None) -> int:
-    return len(line.split(separator))

@@ -16,7 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing import physical_units as physics
+from fieldcal.importing.gravity_size import FEWEST_MEANS, Gravity, are_means, gravity_in
+from fieldcal.importing.rate_size import rate_in
+from fieldcal.importing.scales import ACC_OUT, ACC_SCALES, fitting
 
 GROWS = 0.999
 """Share of steps of a time that are positive: a line may be damaged."""
@@ -56,7 +58,7 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     known : channels that are named, by column
 
     """
-    if len(table) < physics.FEWEST_MEANS:
+    if len(table) < FEWEST_MEANS:
         return None
     channels = dict(known)
     times = [i for i in _growing(table) if i not in known]
@@ -144,7 +146,7 @@ def _pair(
             if set(force) & set(rate) or gravity is None:
                 continue
             acc, gyr = table[:, list(force)], table[:, list(rate)]
-            if physics.rate_in(_even(clock), acc, gyr, gravity) is not None:
+            if rate_in(_even(clock), acc, gyr, gravity) is not None:
                 turning.append((force, rate))
     if len(turning) == 1:
         return turning[0], "gravity turns in the first three as the other three say"
@@ -163,20 +165,20 @@ def _pair(
 
 def _scattered(values: Array, size: float) -> bool:
     """Whether values (n, 3) differ from row to row by much of a length: noise alone."""
-    if physics.are_means(values):
+    if are_means(values):
         return False
     differ = np.abs(np.diff(values, axis=0))
     return bool(np.nanmedian(differ, axis=0).max() > NOISY * size)
 
 
-def _is_round(gravity: physics.Gravity | None) -> bool:
+def _is_round(gravity: Gravity | None) -> bool:
     return gravity is not None and gravity.round
 
 
-def _plain(gravity: physics.Gravity | None) -> bool:
+def _plain(gravity: Gravity | None) -> bool:
     """Whether a length is gravity in a unit, or in counts of an 16-bit sensor."""
-    within = physics.ACC_OUT[0]
-    fits = physics.fitting(gravity.size, physics.ACC_SCALES, within) if gravity else []
+    within = ACC_OUT[0]
+    fits = fitting(gravity.size, ACC_SCALES, within) if gravity else []
     return any(fit.lsb == 1 or fit.lsb >= LEAST_COUNTS for fit in fits)
 
 
@@ -188,11 +190,11 @@ def _even(clock: Array) -> Array:
     return scaled
 
 
-def _gravity(table: Array, three: Three) -> physics.Gravity | None:
+def _gravity(table: Array, three: Three) -> Gravity | None:
     """What three columns read at rest, if it is gravity in a usual unit."""
     values = table[:, list(three)]
-    found = physics.gravity_in(values)
+    found = gravity_in(values)
     if found is None or _scattered(values, found.size):
         return None
-    within = physics.ACC_OUT[not found.round]
-    return found if physics.fitting(found.size, physics.ACC_SCALES, within) else None
+    within = ACC_OUT[not found.round]
+    return found if fitting(found.size, ACC_SCALES, within) else None

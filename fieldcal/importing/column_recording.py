@@ -12,9 +12,10 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing import column_physics, columns, headings
+from fieldcal.importing.gravity_size import are_means, gravity_in
 from fieldcal.importing.headings import Column, HeadingMatch
 from fieldcal.importing.means import scatter_columns
-from fieldcal.importing.physical_units import are_means, gravity_in, rate_in
+from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import ImuStream, MeanScatter, ReadOptions, Recording
 
 SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0

@@ -15,11 +15,22 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing import physical_units as physics
+from fieldcal.importing.gravity_size import Gravity, gravity_in, with_length
 from fieldcal.importing.merge import MergedFiles
-from fieldcal.importing.physical_units import Gravity, Scale
+from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import ReadOptions, Recording
-from fieldcal.session.description import UNSCALED
+from fieldcal.importing.scales import (
+    ACC_OUT,
+    ACC_SCALES,
+    FEWEST,
+    GYR_OUT,
+    GYR_SCALES,
+    fitting,
+)
+from fieldcal.importing.thermometers import temperature_counts, temperature_fits
+from fieldcal.importing.time_units import TIME_SIZES, time_units
+from fieldcal.importing.unit_answers import answers, as_written, unusual
+from fieldcal.importing.unit_doubts import SaidUnits, hold_own_units
 
 ROWS = 1 << 17
 """Rows at the beginning by which units are told."""
@@ -30,11 +41,6 @@ FAST = 0.5
 ROUGH = 0.02
 """Scatter of rates from sample to sample, rad/s, that nothing at rest shows."""
 
-FAR = 0.25
-"""Logarithm of what no sensor in the unit that is said is out by."""
-
-NO_GRAVITY = 0.05
-"""Part of g below which gravity was taken out; mg and g in m/s^2 read otherwise."""
 
 OFFSET = 0.25
 """Part of g that no bias is: what raw counts show more is where their zero lies."""
@@ -66,7 +72,7 @@ def settle_units(recording: Recording, stream: str) -> Settled:
     parts = recording.parts if isinstance(recording, MergedFiles) else [recording]
     block = _beginning(recording.alone(stream), stream)
     if not all(part.asks_units for part in parts):
-        _hold_against_physics(recording, block)
+        hold_own_units(recording, block)
         return Settled({})
     guess = _Guess(str(recording.path), _said(parts), block)
     for part in parts:
@@ -74,28 +80,6 @@ def settle_units(recording: Recording, stream: str) -> Settled:
     parts[0].says += guess.doubts
     columns = {k: why for part in parts for k, why in part.guessed.items()}
     return Settled(columns | guess.found, guess.acc_bias)
-
-
-def _hold_against_physics(recording: Recording, block: Block) -> None:
-    """Ask or say where a format's own units cannot be.
-
-    Raises
-    ------
-    InputError
-        If the format has an option that would make them right.
-
-    """
-    gravity = physics.gravity_in(block.acc)
-    if gravity is None or abs(np.log(gravity.size / G0)) < FAR:
-        return
-    turned = physics.rate_in(block.t, block.acc, block.gyr, gravity)
-    odd = (
-        f"|a| at rest is {gravity.size:.4g} m/s^2, {gravity.size / G0:.3g} times"
-        " gravity: its full scale or unit is another"
-    )
-    if answer := recording.rescaled(gravity.size / G0, turned or 1.0):
-        raise InputError(f"{recording.path}: {odd}: add {answer}")
-    recording.says.append(odd)
 
 
 def _beginning(recording: Recording, stream: str) -> Block:
@@ -142,18 +126,20 @@ class _Guess:
         self._name, self.said, self._read = name, said, said
         if not (said.time_unit or said.rate_hz):
             self._time(block.t)
-        gravity = physics.gravity_in(block.acc)
+        gravity = gravity_in(block.acc)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
         if gravity and not said.acc_unit and said.acc_lsb == 1:
             self._acceleration(gravity, block.acc)
         elif gravity and said.acc_lsb != 1:
-            gravity = physics.with_length(block.acc, G0) or gravity
+            gravity = with_length(block.acc, G0) or gravity
         if gravity and self.said.acc_lsb != 1:
             self._offset(gravity)
         if not said.gyr_unit and said.gyr_lsb == 1:
             self._rates(block, gravity)
-        self._doubt(block, gravity)
+        if gravity:
+            said_units = SaidUnits(name, self.said, self.found)
+            self.doubts += said_units.doubts(block, gravity)
         if not said.temp_unit:
             self._temperature(block.temperature)
 
@@ -171,25 +157,23 @@ class _Guess:
         return wanted
 
     def _time(self, t: Array) -> None:
-        fits = physics.time_units(t)
+        fits = time_units(t)
         steps = np.diff(t[np.isfinite(t)])
         step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
         if len(fits) == 1 and fits != ["s"]:
-            rate = physics.TIME_SIZES[fits[0]] / step if step else np.nan
+            rate = TIME_SIZES[fits[0]] / step if step else np.nan
             self.said = replace(self.said, time_unit=fits[0])
             self.found["time"] = f"{fits[0]}, which makes {rate:.4g} Hz"
         elif len(fits) > 1:
-            rates = (f"{physics.TIME_SIZES[u] / step:.4g} Hz in {u}" for u in fits)
+            rates = (f"{TIME_SIZES[u] / step:.4g} Hz in {u}" for u in fits)
             self._ask(
                 f"its times may be {' or '.join(rates)}",
                 [f"--time-unit {u}" for u in fits],
             )
 
     def _acceleration(self, gravity: Gravity, acc: Array) -> None:
-        fits = physics.fitting(
-            gravity.size, physics.ACC_SCALES, physics.ACC_OUT[not gravity.round]
-        )
-        fits = _as_written(fits, acc)
+        fits = fitting(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
+        fits = as_written(fits, acc)
         shows = f"|a| at rest is {gravity.size:.4g}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
@@ -197,7 +181,7 @@ class _Guess:
             self._ask(
                 f"{shows}, which is gravity in"
                 f" {' or '.join(map(str, fits)) or 'no usual unit'}",
-                _answers("acc", fits, "g", 2048),
+                answers("acc", fits, "g", 2048),
             )
         if fits[0].unit != "m/s^2":
             self.found["acceleration"] = f"{fits[0]}: {shows}"
@@ -212,9 +196,9 @@ class _Guess:
 
     def _rates(self, block: Block, gravity: Gravity | None) -> None:
         gyr = block.gyr[np.isfinite(block.gyr).all(axis=1)]
-        if len(gyr) < physics.FEWEST:
+        if len(gyr) < FEWEST:
             return
-        reads = gravity and physics.rate_in(block.t, block.acc, block.gyr, gravity)
+        reads = gravity and rate_in(block.t, block.acc, block.gyr, gravity)
         if reads is None or gravity is None:
             usual = float(np.median(np.abs(gyr).max(axis=1)))
             noise = float(np.nanmedian(np.abs(np.diff(gyr, axis=0)), axis=0).max())
@@ -222,15 +206,13 @@ class _Guess:
                 shown = f"{usual:.4g}" if usual > FAST else f"a scatter of {noise:.2g}"
                 self._ask(
                     f"nothing says the unit of its rates, and {shown} rad/s is no rest",
-                    _unusual(gyr),
+                    unusual(gyr),
                 )
             self.found["angular_rate"] = "rad/s: it is the usual one, and no turn tells"
             self.said = replace(self.said, gyr_unit="rad/s")
             return
-        fits = physics.fitting(
-            reads, physics.GYR_SCALES, physics.GYR_OUT[not gravity.round]
-        )
-        fits = _as_written(fits, block.gyr)
+        fits = fitting(reads, GYR_SCALES, GYR_OUT[not gravity.round])
+        fits = as_written(fits, block.gyr)
         if self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
             # who writes one sensor's registers as they are, writes the other's so too
             fits = counts
@@ -238,67 +220,14 @@ class _Guess:
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
-                _answers("gyr", fits, "deg/s", 16.4),
+                answers("gyr", fits, "deg/s", 16.4),
             )
         if fits[0].unit != "rad/s":
             self.found["angular_rate"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
 
-    def _doubt(self, block: Block, gravity: Gravity | None) -> None:
-        """Hold units that are said against physics."""
-        if gravity is None:
-            return
-        reads, option = gravity.size / G0, "--acc-unit"
-        if reads < NO_GRAVITY and self._said_of("a"):
-            raise InputError(
-                f"{self._name}: |a| at rest is {gravity.size:.3g} m/s^2: gravity was"
-                " taken out of these accelerations, and nothing can be calibrated by"
-                " them; log those with gravity in them"
-            )
-        if self._said_of("a") and abs(np.log(reads)) > FAR:
-            fits = [
-                s.unit
-                for s in physics.ACC_SCALES[:3]
-                if abs(np.log(gravity.size / self.said.acc_scale / s.size)) < FAR
-            ]
-            shows = f"|a| at rest is {gravity.size:.4g} m/s^2 then, not gravity"
-            self._contradict("a", self.said.acc_unit, shows, option, fits)
-        if not self._said_of("g"):
-            return
-        turned = physics.rate_in(block.t, block.acc, block.gyr, gravity)
-        if turned is not None and abs(np.log(turned)) > FAR:
-            scale = self.said.gyr_scale
-            fits = [
-                s.unit
-                for s in physics.GYR_SCALES[:3]
-                if abs(np.log(turned / scale / s.size)) < FAR
-            ]
-            shows = f"rates are {turned:.4g} times those at which gravity turns"
-            self._contradict("g", self.said.gyr_unit, shows, "--gyr-unit", fits)
-
-    def _said_of(self, kind: str) -> bool:
-        """Whether the user or the file says a unit that has a size."""
-        unit, what = {
-            "a": (self.said.acc_unit, "acceleration"),
-            "g": (self.said.gyr_unit, "angular_rate"),
-        }[kind]
-        return bool(unit) and what not in self.found and unit not in UNSCALED
-
-    def _contradict(
-        self, kind: str, unit: str, shows: str, option: str, fits: list[str]
-    ) -> None:
-        """Ask about a unit of the file's; of the user's only say what is odd."""
-        if kind not in self.said.named:
-            self.doubts.append(f"{unit} as you say, but {shows}")
-            return
-        answers = [f"{option} {one}" for one in fits if one != unit]
-        self._ask(
-            f"the names of its columns say {unit}, but {shows}",
-            [*answers, f"{option} {unit}, if it is so"],
-        )
-
     def _temperature(self, values: Array) -> None:
-        fits = physics.temperature_fits(values)
+        fits = temperature_fits(values)
         if "degC" in fits:
             return
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
@@ -307,7 +236,7 @@ class _Guess:
                 f"its temperature reads {low:.6g} to {high:.6g}, which is no deg C",
                 [
                     *(f"--temp-unit {unit}" for unit in fits),
-                    *physics.temperature_counts(low, high),
+                    *temperature_counts(low, high),
                     "--temp-unit none, which leaves it out",
                 ],
             )
@@ -317,31 +246,3 @@ class _Guess:
 
     def _ask(self, what: str, answers: list[str]) -> None:
         raise InputError(f"{self._name}: {what}: add {' or '.join(answers)}")
-
-
-def _as_written(fits: list[Scale], values: Array) -> list[Scale]:
-    """Scales without counts, where values are no whole numbers and others do."""
-    known = values[np.isfinite(values)]
-    plain = [fit for fit in fits if fit.lsb == 1]
-    return plain if plain and (known != np.round(known)).any() else fits
-
-
-def _unusual(gyr: Array) -> list[str]:
-    """Options for rates of which no turn tells: counts, if they are whole numbers."""
-    if (gyr == np.round(gyr)).all():
-        counts = [s for s in physics.GYR_SCALES if s.lsb != 1][1:5]
-        return _answers("gyr", counts, "deg/s", 16.4)
-    return ["--gyr-unit deg/s", "--gyr-unit rad/s, if it is so"]
-
-
-def _answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
-    """Options to paste: those that fit, or examples."""
-    lines = [
-        f"--{kind}-unit {s.unit}" + (f" --{kind}-lsb {s.lsb:.6g}" if s.lsb != 1 else "")
-        for s in fits
-    ]
-    return lines or [
-        f"--{kind}-unit {unit} --{kind}-lsb {lsb:g} (counts in one {unit}, as its data"
-        " sheet says)",
-        f"--{kind}-unit {unit}",
-    ]

@@ -12,13 +12,9 @@ from collections import deque
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.physical_units import (
-    GYR_OUT,
-    GYR_SCALES,
-    Gravity,
-    fitting,
-    rate_in,
-)
+from fieldcal.importing.gravity_size import Gravity
+from fieldcal.importing.rate_size import rate_in
+from fieldcal.importing.scales import GYR_OUT, GYR_SCALES, fitting
 
 PART = 0.05
 """Device time of which one mean is kept, s."""

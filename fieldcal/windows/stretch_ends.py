@@ -12,7 +12,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, UNITS, Array
 from fieldcal.windows.cells import CELL, CellTable
-from fieldcal.windows.stretches import CellRows
+from fieldcal.windows.rests import CellRows
 
 BEYOND = 1.0
 """Time beyond a stretch that is looked at, s."""

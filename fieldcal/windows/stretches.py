@@ -1,82 +1,27 @@
 """Finds still stretches of a recording without marks.
 
-    r_i = max over channels of sd(y over 1 s about i) / quietest tenth of them     (1)
-
-y are cell means. Rest and turns make two heaps of log r; the valley between them (Otsu
-1979) tells one from the other, be the rest on a table or in a hand. Each stretch is
-then held to its own noise, to the level of the gyroscopes at rest, and to the test that
-a window must pass, so that no sample of a turn gets in. What happens during a pause
-of the recording nobody knows: a stretch ends there.
+Where cells are at rest (`rests`) is held to the test that a window must pass, so that
+no sample of a turn gets in.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells, CellTable, hold_last
+from fieldcal.windows.cells import CELL, Cells, CellTable
 from fieldcal.windows.limits import StillnessLimits
+from fieldcal.windows.rests import SPAN, CellRows, at_rest, table_of
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.verdict import judge
-
-_SPAN = 10
-"""Cells whose spread tells rest from motion: 1 s."""
-
-_LEAST, _MOST = 4.0, 64.0
-"""Bounds on the valley, in multiples of the quietest: a recording may have no turn."""
 
 _CLEARLY = 0.98
 """Ratio of departure to what is allowed that the sums of a recording must keep."""
 
-_OWN = 4.0
-"""Spread, in multiples of what is usual in a stretch, that still belongs to it."""
-
-_FLIPS = 0.6
-"""Part of a step of a coarse output that means of cells spread by when it flips."""
-
-_LONGEST = 36_000
-"""Cells of the longest stretch, an hour: a longer rest is several of them."""
-
-_PART = 4096
-"""Spans looked at together: all of them at once would take ten times their memory."""
-
-_SAMPLE = 1 << 15
-"""Spans by which the usual is judged: of a longer recording, evenly spread ones."""
-
-_PAUSE = 5.0
-"""Usual distances from one cell to the next that are a pause, if they make a span."""
-
-_RATE = 0.02
-"""Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
-
-Runs = list[tuple[int, int]]
-
-Spans = tuple[int, Array, Array]
-"""First of some spans, the spread and the mean of each, (k, 6)."""
-
 Between = Callable[[float, float], Iterable[Block]]
 """Samples from a time up to another, s, in order, in blocks."""
-
-
-class CellRows(Protocol):
-    """Rows of `summary` of all cells of a recording, in memory or elsewhere."""
-
-    def __len__(self) -> int:
-        """Count the cells."""
-
-    def __getitem__(self, some: slice, /) -> Array:
-        """Give some of them, (k, 35)."""
-
-
-class _Run(NamedTuple):
-    """Spans [first, last) at rest, and the median rate there, (3,) rad/s."""
-
-    first: int
-    last: int
-    rate: Array
 
 
 def still_stretches(
@@ -115,14 +60,14 @@ def still_stretches_of_file(
     min_seconds : as in `still_stretches`
 
     """
-    if len(rows) < 2 * _SPAN:
+    if len(rows) < 2 * SPAN:
         return []
     shortest = max(1.0, min_seconds)
     found: list[tuple[float, float]] = []
-    for run in _at_rest(rows, StillnessLimits().noise):
-        first, last = run.first + _SPAN // 2, run.last - 1 + _SPAN // 2
-        cells = _table(rows[first : last + 1], origin)
-        if clear := _clear(_table(rows[first:last], origin), shortest):
+    for run in at_rest(rows, StillnessLimits().noise):
+        first, last = run.first + SPAN // 2, run.last - 1 + SPAN // 2
+        cells = table_of(rows[first : last + 1], origin)
+        if clear := _clear(table_of(rows[first:last], origin), shortest):
             found.append(clear)
         else:
             start, end = float(cells.times[0]), float(cells.times[-1])
@@ -138,22 +83,17 @@ def why_none(rows: CellRows, origin: Array) -> str:
     rows, origin : as in `still_stretches_of_file`
 
     """
-    if len(rows) < 2 * _SPAN:
-        return f"it lasts less than {2 * _SPAN * CELL:g} s"
-    runs = _at_rest(rows, StillnessLimits().noise)
+    if len(rows) < 2 * SPAN:
+        return f"it lasts less than {2 * SPAN * CELL:g} s"
+    runs = at_rest(rows, StillnessLimits().noise)
     if not runs:
         return "nowhere is it calmer than elsewhere, or it turns all the time"
     longest = max(runs, key=lambda run: run.last - run.first)
-    cells = _table(rows[longest.first : longest.last + 1], origin)
+    cells = table_of(rows[longest.first : longest.last + 1], origin)
     start, end = float(cells.times[0]), float(cells.times[-1])
     worst = judge(cells, StillnessLimits()).worst
     text = f"its calmest part, {start:.1f} to {end:.1f} s, "
     return text + (str(worst.error(start)) if worst.ratio > 1 else "is too short")
-
-
-def _table(rows: Array, origin: Array) -> CellTable:
-    """Cells of rows of `summary`."""
-    return CellTable(rows[:, 0], rows[:, 1:], origin)
 
 
 def _clear(cells: CellTable, shortest: float) -> tuple[float, float] | None:
@@ -170,145 +110,6 @@ def _clear(cells: CellTable, shortest: float) -> tuple[float, float] | None:
     ):
         return None
     return first, float(np.nextafter(last, np.inf))
-
-
-class _Usual(NamedTuple):
-    """What is usual of cells.
-
-    Attributes
-    ----------
-    counts : (6,) values in one
-    pause : shortest time that is a pause, s
-    flips : (6,) spread that an output makes which flips between two steps
-
-    """
-
-    counts: Array
-    pause: float
-    flips: Array
-
-
-def _spans(rows: CellRows, usual: _Usual) -> Iterator[Spans]:
-    """First span of a part, the spread and the mean of each of them, (k, 6).
-
-    The mean of a cell with few values is that of the cell before: unlike
-    `CellTable.steady`, that is true of a device that was turned meanwhile, for no line
-    goes through all of its positions. The spread over a pause is infinite.
-    """
-    before: Array = np.zeros((1, 6))
-    for first in range(0, len(rows) - _SPAN + 1, _PART):
-        part = rows[first : first + _PART + _SPAN - 1]
-        cells = _table(part, np.zeros(6))
-        means = hold_last(
-            np.where(cells.counts < usual.counts / 2, np.nan, cells.means), before
-        )
-        before = means[_PART - 1 : _PART]
-        view = np.lib.stride_tricks.sliding_window_view(means, _SPAN, axis=0)
-        spread = view.std(axis=-1)
-        paused = np.concatenate([[0], np.cumsum(np.diff(cells.times) > usual.pause)])
-        spread[paused[_SPAN - 1 :] > paused[: len(spread)]] = np.inf
-        yield first, spread, view.mean(axis=-1)
-
-
-def _usual(rows: CellRows) -> _Usual:
-    """What is usual of the cells, by their medians."""
-    every = -(-len(rows) // _SAMPLE)
-    counts, steps = [], []
-    finest = np.full(6, np.inf)
-    for first in range(0, len(rows), _PART):
-        part = rows[first : first + _PART]
-        finest = np.minimum(finest, part[:, 27:33].min(axis=0))
-        counts.append(part[-first % every :: every, 1:7].copy())
-        steps.append(np.diff(part[:, 0])[-first % every :: every])
-    pause = _PAUSE * max(float(np.median(np.concatenate(steps))), _SPAN * CELL / _PAUSE)
-    flips = _FLIPS * np.where(np.isfinite(finest), finest, 0.0)
-    return _Usual(np.median(np.concatenate(counts), axis=0), pause, flips)
-
-
-def _at_rest(rows: CellRows, bound: Array) -> list[_Run]:
-    """Runs of spans at rest by (1), by their own noise and rate.
-
-    `bound` (6,) is what no spread at rest exceeds.
-    """
-    usual = _usual(rows)
-    every = -(-len(rows) // _SAMPLE)
-    # all spans of a long recording would not fit into memory: they are made twice
-    short = list(_spans(rows, usual)) if len(rows) <= _PART else []
-    some = np.concatenate(
-        [
-            spread[-first % every :: every].copy()
-            for first, spread, _ in short or _spans(rows, usual)
-        ]
-    )
-    some = some[np.isfinite(some).all(axis=1)]
-    if not len(some):
-        return []
-    quiet = np.quantile(some, 0.1, axis=0)
-    scale = np.where(quiet > 0, quiet, np.inf)
-    valley = np.clip(_valley((some / scale).max(axis=1)), _LEAST, _MOST)
-    kept: list[_Run] = []
-    spans = short or _spans(rows, usual)
-    least = np.maximum(np.minimum(valley * scale, bound), usual.flips)
-    for first, spread, level in _calm(spans, least):
-        own = np.maximum(np.quantile(spread, 0.3, axis=0), quiet)
-        own = np.maximum(own, usual.flips / _OWN)
-        own = np.where(own > 0, own, np.inf)
-        for a, b in _runs((spread < _OWN * own).all(axis=1)):
-            rate = np.median(level[a:b, 3:], axis=0)
-            kept.append(_Run(first + a, first + b, rate))
-    if not kept:
-        return []
-    rates = np.array([run.rate for run in kept])
-    rest = _weighted_median(rates, np.array([run.last - run.first for run in kept]))
-    turning = np.nan_to_num(np.abs(rates - rest)).max(axis=1) > _RATE
-    return [run for run, turns in zip(kept, turning, strict=True) if not turns]
-
-
-def _calm(spans: Iterable[Spans], bound: Array) -> Iterator[Spans]:
-    """Runs of spans whose spread is below `bound` (6,), `_LONGEST` at most.
-
-    Gives the first span of each, with the spread and the mean of all, (k, 6).
-    """
-    waiting: list[tuple[Array, Array]] = []
-    began = length = 0
-    for first, spread, level in spans:
-        for a, b in _runs((spread < bound).all(axis=1)):
-            goes_on = began + length == first + a and length + b - a <= _LONGEST
-            if waiting and not goes_on:
-                yield began, *_joined(waiting)
-                waiting = []
-            if not waiting:
-                began, length = first + a, 0
-            waiting.append((spread[a:b], level[a:b]))
-            length += b - a
-    if waiting:
-        yield began, *_joined(waiting)
-
-
-def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-    spreads, levels = zip(*parts, strict=True)
-    return np.concatenate(spreads), np.concatenate(levels)
-
-
-def _weighted_median(values: Array, weights: Any) -> Array:
-    """Median of each column of `values` (n, c), each counted `weights` (n,) times."""
-    order = np.argsort(values, axis=0)
-    total = np.cumsum(weights[order], axis=0)
-    middle = (2 * total < total[-1]).sum(axis=0)
-    place = np.take_along_axis(order, middle[None], axis=0)
-    median: Array = np.take_along_axis(values, place, axis=0)[0]
-    return median
-
-
-def _valley(ratio: Array) -> float:
-    """Threshold that splits the logarithms of `ratio` into two heaps best."""
-    logs = np.sort(np.log(np.maximum(ratio, 1e-3)))
-    n = np.arange(1, len(logs))
-    below = np.cumsum(logs)[:-1] / n
-    above = (logs.sum() - n * below) / (len(logs) - n)
-    between = n * (len(logs) - n) * (above - below) ** 2
-    k = int(np.argmax(between))
-    return float(np.exp((below[k] + above[k]) / 2))
 
 
 def _passing(
@@ -331,8 +132,3 @@ def _passing(
         *_passing(between, start, min(worst.at, end), shortest),
         *_passing(between, max(after, start), end, shortest),
     ]
-
-
-def _runs(flags: Any) -> Runs:
-    edges = np.flatnonzero(np.diff(flags.astype(int), prepend=0, append=0))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

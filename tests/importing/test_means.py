@@ -11,8 +11,8 @@ from laid_about import G, write
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
+from fieldcal.importing.gravity_size import are_means
 from fieldcal.importing.means import spread
-from fieldcal.importing.physical_units import are_means
 from fieldcal.session.folder import Session
 
 BIAS, RATE = np.array([0.1, -0.05, 0.2]), np.array([0.01, -0.02, 0.005])

@@ -1,0 +1,64 @@
+"""Whether a calibration is of one family with earlier ones of the same device.
+
+The history is compared with; nothing of it enters the calibration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.acceptance.check import Check, shown_unit
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import ParameterName, group_of
+from fieldcal.history.family import expected
+
+
+def check_change(
+    found: Calibration, limits: GradeLimits, family: Sequence[Calibration] | None
+) -> list[Check]:
+    """Compare each group with what the history lets expect, by its worst parameter."""
+    if family is None:
+        return [Check("change", None, "no serial number, so no history to compare")]
+    if not family:
+        return [Check("change", None, "first calibration of this device")]
+    known = [n for n in found.names if limits.repeat(group_of(n)) is not None]
+    checks = []
+    for group in dict.fromkeys(group_of(n) for n in known):
+        names = [n for n in known if group_of(n) == group]
+        made = [_compared(found, n, limits, family, len(known)) for n in names]
+        checks += sorted(filter(None, made), key=lambda c: c.value or 0.0)[:1]
+    return checks
+
+
+def _compared(
+    found: Calibration,
+    name: str,
+    limits: GradeLimits,
+    family: Sequence[Calibration],
+    together: int,
+) -> Check | None:
+    """One parameter against earlier runs; all parameters share the probability."""
+    earlier = [c for c in family if name in c.names]
+    parameter = ParameterName.of(name)
+    repeat = limits.repeat(parameter.group)
+    if not earlier or repeat is None:
+        return None
+    value, sigma = found.value(name), found.uncertainty(name)
+    usual = expected(
+        np.array([c.value(name) for c in earlier]),
+        np.array([c.uncertainty(name) for c in earlier]),
+        repeat,
+    )
+    chance, limit = usual.chance(value, sigma), limits.family_chance / together
+    ok = chance >= limit
+    unit = shown_unit(found.units[found.names.index(name)])
+    says = (
+        f"{parameter.group} {parameter.component} differs from {usual.runs} earlier"
+        f" calibration{'s' if usual.runs > 1 else ''} by {value - usual.mean:+.2g}"
+        f" ± {usual.sigma(sigma):.2g}{unit}"
+        f"{'' if ok else ': out of family; inspect the device before you use it'}"
+    )
+    return Check(f"{parameter.group} change", ok, says, chance, limit, "1")

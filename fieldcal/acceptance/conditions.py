@@ -1,0 +1,56 @@
+"""What the samples were taken under: temperature and link."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fieldcal.acceptance.check import Check
+from fieldcal.calibration.limits import GradeLimits
+
+
+def check_temperature(
+    temperatures: np.ndarray[Any, Any], limits: GradeLimits
+) -> list[Check]:
+    """Whether windows were taken in the allowed range, and at one temperature."""
+    known = temperatures[np.isfinite(temperatures)]
+    if not len(known):
+        return [Check("temperature", None, "the device reports no temperature")]
+    low, high = float(known.min()), float(known.max())
+    least, most = limits.temperature_min_c, limits.temperature_max_c
+    ok = least <= low and high <= most
+    says = f"{low:.1f} to {high:.1f} °C, allowed {least:g} to {most:g} °C"
+    span, wide = high - low, limits.temperature_span_k
+    steady = span <= wide
+    changed = (
+        f"the temperature changed by {span:.1f} K from window to window, allowed"
+        f" {wide:g} K{'' if steady else ': let it warm up, then run again'}"
+    )
+    far = low if low < least else high
+    bound = least if low < least else most
+    return [
+        Check("temperature", ok, says, far, bound, "°C"),
+        Check("temperature change", steady, changed, span, wide, "K"),
+    ]
+
+
+def check_link(link: Mapping[str, int] | None, limits: GradeLimits) -> list[Check]:
+    """Whether the link lost or damaged no more than is allowed."""
+    if not link or not link.get("samples"):
+        return [Check("link", None, "losses of the link were not recorded")]
+    samples, missing, bad = (link.get(k, 0) for k in ("samples", "missing", "bad"))
+    checks = []
+    for name, count, limit in (
+        ("samples missing", missing, limits.lost_share),
+        ("frames refused", bad, limits.bad_share),
+    ):
+        share = count / (samples + count)
+        ok = share <= limit
+        says = (
+            f"{count} of {samples + count} {name} ({share:.2%}), allowed {limit:.2%}"
+            f"{'' if ok else ': check cable and baud rate'}"
+        )
+        checks.append(Check(f"link: {name}", ok, says, share, limit, "1"))
+    return checks

@@ -1,0 +1,70 @@
+"""Whether the parameters are known well enough for the grade."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.acceptance.check import Check, shown_unit
+from fieldcal.calibration import COMPONENTS, Calibration
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import group_of, sensor_of
+
+UNCERTAINTY = " uncertainty"
+"""Behind the name of a group, of the check that its parameters are well known."""
+
+REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
+"""Groups whose uncertainty must be known and small; a sensor not read is excused."""
+
+
+def check_uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
+    """Whether each group that has a limit is known well enough."""
+    checks = []
+    for group in COMPONENTS:
+        limit = limits.sigma(group)
+        read = {sensor_of(group_of(name)) for name in found.names}
+        sensor_read = sensor_of(group) in read
+        if limit is None or not sensor_read:
+            continue
+        unit = COMPONENTS[group][1]
+        shown = shown_unit(unit)
+        _, sigma = found.vector(group)
+        lacking = [a for a, s in zip("xyz", sigma, strict=True) if not np.isfinite(s)]
+        if lacking and group in REQUIRED:
+            says = f"{group} {' '.join(lacking)} was not determined by these positions"
+            checks.append(Check(group + UNCERTAINTY, False, says))
+        elif not lacking:
+            worst = int(np.argmax(sigma))
+            ok = bool(sigma[worst] <= limit)
+            says = (
+                f"{group} {'xyz'[worst]} is known to ± {_apart(sigma[worst], limit)}"
+                f"{shown}, {'within' if ok else 'more than'} {limit:.2g}{shown}"
+            )
+            if not ok and sensor_of(group) == "acc":
+                says += _by_angles(found, limits)
+            value = float(sigma[worst])
+            checks.append(Check(group + UNCERTAINTY, ok, says, value, limit, unit))
+    return checks
+
+
+def _apart(value: float, limit: float) -> str:
+    """A value with as many digits as tell it from its limit.
+
+    >>> _apart(0.02041, 0.02), _apart(0.03123, 0.02)
+    ('0.0204', '0.031')
+    """
+    for digits in range(2, 7):
+        text = f"{value:.{digits}g}"
+        if float(text) != float(f"{limit:.{digits}g}"):
+            break
+    return text
+
+
+def _by_angles(found: Calibration, limits: GradeLimits) -> str:
+    """Remedy where the setting of the angles limits the uncertainty."""
+    angles = float(found.info.get("angle_sigma_deg") or 0.0)
+    if found.method == "scalar" or angles < limits.angle_setting_deg:
+        return ""
+    return (
+        f"; angles count as set to ± {angles:.2g}°: if they are set better say so"
+        " (--angles), else turn further"
+    )

@@ -1,0 +1,96 @@
+"""What 1 rad/s reads in the numbers of a file, by its turns.
+
+    d(u)/dt = u x w,   u = a / |a|                                                 (1)
+
+As gravity turns in device axes while the device is turned, this gives the scale of the
+rates w.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.gravity_size import Gravity
+from fieldcal.importing.scales import FEWEST
+
+_TURNED = 0.5
+"""Turn of gravity that all of a recording must have for (1), rad."""
+
+_AGREES = 0.9
+"""Correlation of both sides of (1) from which on it is believed."""
+
+_SWUNG = 0.3
+"""Part by which |a| is not g: then a hand is felt, and (1) does not hold."""
+
+_OFTEN, _RAIL = 5, 1.5
+"""Rows at one value that are a rail, and how far it is out, in standard deviations."""
+
+_LAG = 0.5
+"""Time over which (1) is integrated, s: jerks of a hand are shorter."""
+
+
+def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
+    """What 1 rad/s reads in numbers (n, 3) of a file, by (1); None if nothing turns.
+
+    Parameters
+    ----------
+    t : (n,) s
+    acc, gyr : (n, 3) in numbers of the file
+    gravity : what the accelerometers read at rest
+
+    """
+    known = np.isfinite(np.column_stack([t, acc, gyr])).all(axis=1)
+    t, acc, gyr = t[known], acc[known], gyr[known]
+    if len(t) < FEWEST:
+        return None
+    steps = np.diff(t)
+    steps[(steps > _LAG) | (steps < 0)] = np.nan
+    step = float(np.nanmean(steps)) if np.isfinite(steps).any() else 0.0
+    lag = max(2, round(_LAG / step)) if step > 0 else len(t)
+    if len(t) < 4 * lag:
+        return None
+    clipped = _at_rails(gyr)
+    up = (acc - gravity.offset) / gravity.size
+    length = np.maximum(np.linalg.norm(up, axis=1), 0.1)
+    up, gyr = up / length[:, None], gyr - np.median(gyr, axis=0)
+    turning = np.cross(up, gyr)
+    swung = (np.abs(length - 1) > _SWUNG) | clipped
+    steps[swung[1:] | swung[:-1]] = np.nan
+    middle = (turning[1:] + turning[:-1]) / 2 * steps[:, None]
+    right = _over(middle, lag)
+    left = up[lag:] - up[:-lag]
+    whole = np.isfinite(right).all(axis=1)
+    left, right = left[whole].ravel(), right[whole].ravel()
+    power, moved = float(right @ right), float(left @ left)
+    if not power or moved < _TURNED**2 * lag:
+        return None
+    both = float(left @ right)
+    if both < _AGREES * np.sqrt(power * moved):
+        return None
+    return power / both
+
+
+def _at_rails(gyr: Array) -> NDArray[np.bool_]:
+    """Rows (n, 3) in which an axis is at the greatest or least value, again and again.
+
+    An output that is clipped says less than the rate, so it tells no scale.
+    """
+    ends = np.array([gyr.min(axis=0), gyr.max(axis=0)])
+    often = [(gyr == end).sum(axis=0) >= _OFTEN for end in ends]
+    turns = np.abs(ends - np.median(gyr, axis=0)) > _RAIL * gyr.std(axis=0)
+    low, high = ((gyr == ends[i]) & often[i] & turns[i] for i in (0, 1))
+    rails: NDArray[np.bool_] = (low | high).any(axis=1)
+    return rails
+
+
+def _over(steps: Array, lag: int) -> Array:
+    """Sums of `lag` successive steps (n, 3); nan over a pause."""
+    paused = np.isnan(steps)
+    total = np.cumsum(np.where(paused, 0.0, steps), axis=0)
+    gaps = np.cumsum(paused, axis=0)
+    total, gaps = (np.vstack([np.zeros((1, 3)), x]) for x in (total, gaps))
+    sums: Array = total[lag:] - total[:-lag]
+    sums[(gaps[lag:] > gaps[:-lag]).any(axis=1)] = np.nan
+    return sums

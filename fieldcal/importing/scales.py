@@ -1,0 +1,82 @@
+"""Units and full scales that the numbers of a file may be in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.gravity import G0
+
+FEWEST = 50
+"""Rows that tell anything."""
+
+ACC_OUT = (0.06, 0.15)
+"""Logarithm of what factory scales are out by: offset known, and not."""
+
+GYR_OUT = (0.05, 0.25)
+"""Likewise of rates, where an offset tilts the gravity that is seen to turn."""
+
+
+class Scale(NamedTuple):
+    """A way to read numbers as a quantity.
+
+    Attributes
+    ----------
+    size : what the quantity reads in it: |a| at rest, or 1 rad/s
+    unit, lsb : as the user would give it
+
+    """
+
+    size: float
+    unit: str
+    lsb: float = 1.0
+
+    def __str__(self) -> str:
+        """Say it: "g" or "counts of 16384 in one g"."""
+        return (
+            self.unit if self.lsb == 1 else f"counts, {self.lsb:.6g} in a {self.unit}"
+        )
+
+
+def _counts(per_unit: float) -> float:
+    """Counts of 16 bits in a unit, by the full scale."""
+    return 2**15 / per_unit
+
+
+_G_COUNTS = (
+    *(_counts(full) for full in (2, 3, 4, 6, 8, 12, 16, 24, 32)),
+    *(512.0, 256.0, 128.0, 64.0),
+)
+
+_DEG_COUNTS = (
+    *(_counts(full) for full in (125, 250, 500, 1000, 2000)),
+    *(1 / milli for milli in (8.75e-3, 17.5e-3, 35e-3, 70e-3)),
+)
+
+ACC_SCALES = (
+    Scale(G0, "m/s^2"),
+    Scale(1.0, "g"),
+    Scale(1000.0, "mg"),
+    *(Scale(c, "g", c) for c in _G_COUNTS),
+)
+
+GYR_SCALES = (
+    Scale(1.0, "rad/s"),
+    Scale(180 / np.pi, "deg/s"),
+    Scale(1000.0, "mrad/s"),
+    *(Scale(c * 180 / np.pi, "deg/s", c) for c in _DEG_COUNTS),
+)
+
+
+def fitting(size: float, scales: tuple[Scale, ...], within: float) -> list[Scale]:
+    """Ways to read a quantity that shows as `size`, within a factor, nearest first.
+
+    Parameters
+    ----------
+    size, scales : what it shows as, and what it might
+    within : logarithm of the factor
+
+    """
+    away = {s: abs(float(np.log(size / s.size))) for s in scales}
+    return sorted((s for s in scales if away[s] <= within), key=away.__getitem__)

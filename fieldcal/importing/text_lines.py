@@ -1,0 +1,67 @@
+"""Lines of a text of numbers: the first, those behind, and all at once by Arrow."""
+
+from __future__ import annotations
+
+from fieldcal.core.samples import Array
+from fieldcal.session.arrow_stream import numbers
+
+TOP = 1000
+"""Lines at the top among which the first of numbers is looked for."""
+
+
+def split_lines(data: bytes) -> list[str]:
+    """Lines that are not empty."""
+    lines = data.decode(errors="replace").replace("\r\n", "\n").split("\n")
+    return [line for line in lines if line.strip()]
+
+
+def top_lines(data: bytes, many: int = TOP) -> list[str]:
+    """First lines, of so many those that are not empty."""
+    return split_lines(b"\n".join(data.split(b"\n", many)[:many]))
+
+
+def behind(data: bytes, many: int) -> bytes:
+    """What stands behind so many lines that are not empty."""
+    at = 0
+    while many and at < len(data):
+        end = data.find(b"\n", at)
+        end = len(data) if end < 0 else end
+        many -= bool(data[at:end].strip())
+        at = end + 1
+    return data[at:]
+
+
+def width_of(line: str, separator: str | None) -> int:
+    """How many cells a line has."""
+    return len(line.split(separator))
+
+
+def plain_numbers(
+    data: bytes, width: int, use: list[int], separator: str | None
+) -> list[Array] | None:
+    """Numbers of columns by Arrow, (n,) each; None if they are not all numbers."""
+    if separator is None or len(separator) > 1:
+        return None
+    import pyarrow as pa
+    import pyarrow.csv
+
+    comma = separator != "," and b"," in data[: data.find(b"\n")]
+    names = [str(i) for i in range(width)]
+    wanted = [names[i] for i in use]
+    try:
+        table = pyarrow.csv.read_csv(
+            pa.BufferReader(data),
+            pyarrow.csv.ReadOptions(
+                use_threads=False, column_names=names, block_size=len(data) + 1
+            ),
+            pyarrow.csv.ParseOptions(delimiter=separator, quote_char=False),
+            pyarrow.csv.ConvertOptions(
+                column_types=dict.fromkeys(wanted, pa.float64()),
+                decimal_point="," if comma else ".",
+                include_columns=wanted,
+                null_values=[""],
+            ),
+        )
+    except (pa.ArrowInvalid, ValueError):
+        return None
+    return [numbers(table.column(name)) for name in wanted]

@@ -1,0 +1,50 @@
+"""Units and counts that the temperatures of a file may be in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+
+
+def temperature_fits(values: Array) -> Mapping[str, float]:
+    """Readings of temperatures (n,), with the median of each in deg C."""
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return {"degC": np.nan}
+    low, middle, high = (float(f(values)) for f in (np.min, np.median, np.max))
+    if -60 <= low and high <= 150:
+        return {"degC": middle}
+    found = {}
+    if -6000 <= low and high <= 15000 and abs(middle) > 1000:
+        found["cdegC"] = middle / 100
+    if 213 <= low and high <= 423:
+        found["K"] = middle - 273.15
+    return found
+
+
+_THERMOMETERS = ((256.0, 25.0), (340.0, 36.53), (333.87, 21.0))
+"""Counts in 1 K, and deg C at count 0, of the usual sensors."""
+
+
+def temperature_counts(low: float, high: float) -> list[str]:
+    """Options that make deg C of counts from `low` to `high`, as the usual sensors do.
+
+    >>> temperature_counts(65236, 65240)[0]
+    '--temp-unit count --temp-lsb 256 --temp-zero -231 (23.8 to 23.8 deg C)'
+    """
+    wrapped = 2**16 if low >= 2**15 else 0
+    found = []
+    for lsb, zero in _THERMOMETERS:
+        coldest, warmest = (zero + (n - wrapped) / lsb for n in (low, high))
+        if -45 <= coldest and warmest <= 105:
+            found.append(
+                f"--temp-unit count --temp-lsb {lsb:g} --temp-zero"
+                f" {zero - wrapped / lsb:.6g} ({coldest:.1f} to {warmest:.1f} deg C)"
+            )
+    return found or [
+        "--temp-unit count --temp-lsb 256 --temp-zero 25 (counts in 1 K, deg C at count"
+        " 0, as its data sheet says)"
+    ]

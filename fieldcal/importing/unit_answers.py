@@ -1,0 +1,36 @@
+"""Answers to a question about a unit: options to paste behind the command."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.scales import GYR_SCALES, Scale
+
+
+def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
+    """Options to paste: those that fit, or examples."""
+    lines = [
+        f"--{kind}-unit {s.unit}" + (f" --{kind}-lsb {s.lsb:.6g}" if s.lsb != 1 else "")
+        for s in fits
+    ]
+    return lines or [
+        f"--{kind}-unit {unit} --{kind}-lsb {lsb:g} (counts in one {unit}, as its data"
+        " sheet says)",
+        f"--{kind}-unit {unit}",
+    ]
+
+
+def as_written(fits: list[Scale], values: Array) -> list[Scale]:
+    """Scales without counts, where values are no whole numbers and others do."""
+    known = values[np.isfinite(values)]
+    plain = [fit for fit in fits if fit.lsb == 1]
+    return plain if plain and (known != np.round(known)).any() else fits
+
+
+def unusual(gyr: Array) -> list[str]:
+    """Options for rates of which no turn tells: counts, if they are whole numbers."""
+    if (gyr == np.round(gyr)).all():
+        counts = [s for s in GYR_SCALES if s.lsb != 1][1:5]
+        return answers("gyr", counts, "deg/s", 16.4)
+    return ["--gyr-unit deg/s", "--gyr-unit rad/s, if it is so"]

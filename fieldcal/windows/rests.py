@@ -1,0 +1,218 @@
+"""Where cells of a recording are at rest, be it on a table or in a hand.
+
+    r_i = max over channels of sd(y over 1 s about i) / quietest tenth of them     (1)
+
+y are cell means. Rest and turns make two heaps of log r; the valley between them (Otsu
+1979) tells one from the other. Each run is then held to its own noise and to the level
+of the gyroscopes at rest. What happens during a pause of the recording nobody knows: a
+run ends there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.windows.cells import CELL, CellTable, hold_last
+
+SPAN = 10
+"""Cells whose spread tells rest from motion: 1 s."""
+
+_LEAST, _MOST = 4.0, 64.0
+"""Bounds on the valley, in multiples of the quietest: a recording may have no turn."""
+
+_OWN = 4.0
+"""Spread, in multiples of what is usual in a stretch, that still belongs to it."""
+
+_FLIPS = 0.6
+"""Part of a step of a coarse output that means of cells spread by when it flips."""
+
+_LONGEST = 36_000
+"""Cells of the longest stretch, an hour: a longer rest is several of them."""
+
+_PART = 4096
+"""Spans looked at together: all of them at once would take ten times their memory."""
+
+_SAMPLE = 1 << 15
+"""Spans by which the usual is judged: of a longer recording, evenly spread ones."""
+
+_PAUSE = 5.0
+"""Usual distances from one cell to the next that are a pause, if they make a span."""
+
+_RATE = 0.02
+"""Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
+
+Runs = list[tuple[int, int]]
+
+Spans = tuple[int, Array, Array]
+"""First of some spans, the spread and the mean of each, (k, 6)."""
+
+
+class CellRows(Protocol):
+    """Rows of `summary` of all cells of a recording, in memory or elsewhere."""
+
+    def __len__(self) -> int:
+        """Count the cells."""
+
+    def __getitem__(self, some: slice, /) -> Array:
+        """Give some of them, (k, 35)."""
+
+
+class RestRun(NamedTuple):
+    """Spans [first, last) at rest, and the median rate there, (3,) rad/s."""
+
+    first: int
+    last: int
+    rate: Array
+
+
+def table_of(rows: Array, origin: Array) -> CellTable:
+    """Cells of rows of `summary`."""
+    return CellTable(rows[:, 0], rows[:, 1:], origin)
+
+
+class _Usual(NamedTuple):
+    """What is usual of cells.
+
+    Attributes
+    ----------
+    counts : (6,) values in one
+    pause : shortest time that is a pause, s
+    flips : (6,) spread that an output makes which flips between two steps
+
+    """
+
+    counts: Array
+    pause: float
+    flips: Array
+
+
+def _spans(rows: CellRows, usual: _Usual) -> Iterator[Spans]:
+    """First span of a part, the spread and the mean of each of them, (k, 6).
+
+    The mean of a cell with few values is that of the cell before: unlike
+    `CellTable.steady`, that is true of a device that was turned meanwhile, for no line
+    goes through all of its positions. The spread over a pause is infinite.
+    """
+    before: Array = np.zeros((1, 6))
+    for first in range(0, len(rows) - SPAN + 1, _PART):
+        part = rows[first : first + _PART + SPAN - 1]
+        cells = table_of(part, np.zeros(6))
+        means = hold_last(
+            np.where(cells.counts < usual.counts / 2, np.nan, cells.means), before
+        )
+        before = means[_PART - 1 : _PART]
+        view = np.lib.stride_tricks.sliding_window_view(means, SPAN, axis=0)
+        spread = view.std(axis=-1)
+        paused = np.concatenate([[0], np.cumsum(np.diff(cells.times) > usual.pause)])
+        spread[paused[SPAN - 1 :] > paused[: len(spread)]] = np.inf
+        yield first, spread, view.mean(axis=-1)
+
+
+def _usual(rows: CellRows) -> _Usual:
+    """What is usual of the cells, by their medians."""
+    every = -(-len(rows) // _SAMPLE)
+    counts, steps = [], []
+    finest = np.full(6, np.inf)
+    for first in range(0, len(rows), _PART):
+        part = rows[first : first + _PART]
+        finest = np.minimum(finest, part[:, 27:33].min(axis=0))
+        counts.append(part[-first % every :: every, 1:7].copy())
+        steps.append(np.diff(part[:, 0])[-first % every :: every])
+    pause = _PAUSE * max(float(np.median(np.concatenate(steps))), SPAN * CELL / _PAUSE)
+    flips = _FLIPS * np.where(np.isfinite(finest), finest, 0.0)
+    return _Usual(np.median(np.concatenate(counts), axis=0), pause, flips)
+
+
+def at_rest(rows: CellRows, bound: Array) -> list[RestRun]:
+    """Runs of spans at rest by (1), by their own noise and rate.
+
+    `bound` (6,) is what no spread at rest exceeds.
+    """
+    usual = _usual(rows)
+    every = -(-len(rows) // _SAMPLE)
+    # all spans of a long recording would not fit into memory: they are made twice
+    short = list(_spans(rows, usual)) if len(rows) <= _PART else []
+    some = np.concatenate(
+        [
+            spread[-first % every :: every].copy()
+            for first, spread, _ in short or _spans(rows, usual)
+        ]
+    )
+    some = some[np.isfinite(some).all(axis=1)]
+    if not len(some):
+        return []
+    quiet = np.quantile(some, 0.1, axis=0)
+    scale = np.where(quiet > 0, quiet, np.inf)
+    valley = np.clip(_valley((some / scale).max(axis=1)), _LEAST, _MOST)
+    kept: list[RestRun] = []
+    spans = short or _spans(rows, usual)
+    least = np.maximum(np.minimum(valley * scale, bound), usual.flips)
+    for first, spread, level in _calm(spans, least):
+        own = np.maximum(np.quantile(spread, 0.3, axis=0), quiet)
+        own = np.maximum(own, usual.flips / _OWN)
+        own = np.where(own > 0, own, np.inf)
+        for a, b in _runs((spread < _OWN * own).all(axis=1)):
+            rate = np.median(level[a:b, 3:], axis=0)
+            kept.append(RestRun(first + a, first + b, rate))
+    if not kept:
+        return []
+    rates = np.array([run.rate for run in kept])
+    rest = _weighted_median(rates, np.array([run.last - run.first for run in kept]))
+    turning = np.nan_to_num(np.abs(rates - rest)).max(axis=1) > _RATE
+    return [run for run, turns in zip(kept, turning, strict=True) if not turns]
+
+
+def _calm(spans: Iterable[Spans], bound: Array) -> Iterator[Spans]:
+    """Runs of spans whose spread is below `bound` (6,), `_LONGEST` at most.
+
+    Gives the first span of each, with the spread and the mean of all, (k, 6).
+    """
+    waiting: list[tuple[Array, Array]] = []
+    began = length = 0
+    for first, spread, level in spans:
+        for a, b in _runs((spread < bound).all(axis=1)):
+            goes_on = began + length == first + a and length + b - a <= _LONGEST
+            if waiting and not goes_on:
+                yield began, *_joined(waiting)
+                waiting = []
+            if not waiting:
+                began, length = first + a, 0
+            waiting.append((spread[a:b], level[a:b]))
+            length += b - a
+    if waiting:
+        yield began, *_joined(waiting)
+
+
+def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    spreads, levels = zip(*parts, strict=True)
+    return np.concatenate(spreads), np.concatenate(levels)
+
+
+def _weighted_median(values: Array, weights: Any) -> Array:
+    """Median of each column of `values` (n, c), each counted `weights` (n,) times."""
+    order = np.argsort(values, axis=0)
+    total = np.cumsum(weights[order], axis=0)
+    middle = (2 * total < total[-1]).sum(axis=0)
+    place = np.take_along_axis(order, middle[None], axis=0)
+    median: Array = np.take_along_axis(values, place, axis=0)[0]
+    return median
+
+
+def _valley(ratio: Array) -> float:
+    """Threshold that splits the logarithms of `ratio` into two heaps best."""
+    logs = np.sort(np.log(np.maximum(ratio, 1e-3)))
+    n = np.arange(1, len(logs))
+    below = np.cumsum(logs)[:-1] / n
+    above = (logs.sum() - n * below) / (len(logs) - n)
+    between = n * (len(logs) - n) * (above - below) ** 2
+    k = int(np.argmax(between))
+    return float(np.exp((below[k] + above[k]) / 2))
+
+
+def _runs(flags: Any) -> Runs:
+    edges = np.flatnonzero(np.diff(flags.astype(int), prepend=0, append=0))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -81,10 +81,7 @@ class Field:
         """
         _check(signal)
         big, length = signal.byte_order == "big_endian", signal.length
-        if big:
-            begin = 8 * (signal.start // 8) + 7 - signal.start % 8
-        else:
-            begin = signal.start
+        begin = _begin(signal)
         head, end = begin // 8, (begin + length + 7) // 8
         shift = 8 * end - begin - length if big else begin % 8
         first, ninth = head, -1
@@ -147,9 +144,17 @@ class Field:
         return float("inf") if self.floating else float(2**self.length)
 
 
+def _begin(signal: Signal) -> int:
+    """Bits of a frame before those of a signal, in its order of the bytes."""
+    if signal.byte_order == "big_endian":
+        return 8 * (signal.start // 8) + 7 - signal.start % 8
+    return signal.start
+
+
 def _check(signal: Signal) -> None:
     """Refuse a signal that no frame has."""
-    fits = 0 < signal.length <= LONGEST and signal.start + signal.length <= 8 * LONGEST
+    end = _begin(signal) + signal.length
+    fits = 0 < signal.length <= LONGEST and end <= 8 * LONGEST
     if signal.is_float:
         fits = fits and signal.length in _FLOATS
     try:

@@ -6,6 +6,7 @@ And what many need, and nobody wants to wait for twice.
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,9 @@ from processes import Recalibrated, recalibrate
 
 # as the commands do: threads for small matrices only wait for each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# hundreds of processes are started: each would compile what it imports anew
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]

@@ -10,6 +10,7 @@ from cantools.database.namedsignalvalue import NamedSignalValue
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.drivers.can_fields import Bytes, Field
 from fieldcal.drivers.can_map import SHIPPED, load
@@ -72,6 +73,21 @@ def test_any_signal_is_what_cantools_says(pair: tuple[Signal, int], seed: int) -
     with np.errstate(over="ignore", invalid="ignore"):
         want = decoded(message, signal, data)
     np.testing.assert_allclose(got, want, rtol=1e-12)
+
+
+def test_a_signal_may_end_where_the_longest_frame_does_and_no_bit_later() -> None:
+    frame = np.arange(64, dtype=np.uint8)[None]
+    last = bytes([60, 61, 62, 63])
+    little = Field.of(Signal("s", 480, 32, byte_order="little_endian"))
+    assert little.values(frame) == int.from_bytes(last, "little")
+    big = Field.of(Signal("s", 487, 32, byte_order="big_endian"))
+    assert big.values(frame) == int.from_bytes(last, "big")
+    for beyond in (
+        Signal("s", 480, 33, byte_order="little_endian"),
+        Signal("s", 487, 33, byte_order="big_endian"),
+    ):
+        with pytest.raises(InputError, match="no frame holds such a number"):
+            Field.of(beyond)
 
 
 def every_signal(database: Database) -> list[tuple[Message, Signal]]:

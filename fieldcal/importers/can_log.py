@@ -45,7 +45,9 @@ KINDS = (
         "CanutilsLogReader",
     ),
     CanLogKind(
-        "asc", re.compile(rb"\s*(date |base (hex|dec))", re.IGNORECASE), "ASCReader"
+        "asc",
+        re.compile(rb"\s*(date [^\n]*\d{4}|base (hex|dec))", re.IGNORECASE),
+        "ASCReader",
     ),
     CanLogKind("blf", re.compile(rb"LOGG"), "BLFReader"),
     CanLogKind("trc", re.compile(rb"\s*;(\$FILEVERSION|#+)"), "TRCReader"),

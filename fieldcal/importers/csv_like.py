@@ -26,8 +26,11 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.column_recording import ColumnRecording, Heading
-from fieldcal.importing.gzip_stream import HEAD, PIECE
+from fieldcal.importing.columns import SKIP
+from fieldcal.importing.gzip_stream import PIECE
 from fieldcal.importing.headings import Column
+from fieldcal.importing.text_encoding import as_utf8, is_plain, wide
+from fieldcal.importing.text_forms import CLOCK, TextForm, forms_of
 from fieldcal.importing.text_lines import (
     TOP,
     behind,
@@ -46,12 +49,6 @@ from fieldcal.importing.text_top import (
 
 WHAT = "text with columns"
 
-MARK = b"\xef\xbb\xbf"
-"""What some programs write before UTF-8."""
-
-WIDE = (b"\xff\xfe", b"\xfe\xff")
-"""What UTF-16 begins with."""
-
 AXES = ("x", "y", "z")
 
 NAMED = 50
@@ -60,34 +57,22 @@ NAMED = 50
 BEGINNING = 1 << 16
 """Rows at the beginning by which physics tells columns."""
 
-PLAIN = bytes([*range(32, 127), *b"\t\r\n"])
-"""Characters of a text."""
-
 _CHECKED = re.compile(rb"\$.*\*[0-9A-Fa-f]{2}\s*$")
-
-TEXT = 0.95
-"""Share of them that a text has among its first bytes."""
 
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether these are the first bytes of a text."""
     if b"\0" in head:
-        return _is_wide(head)
+        return wide(head) is not None
     lines = head.split(b"\n")[1:-1]
     if lines and sum(map(_is_checked, lines)) > len(lines) / 2:
         return False
-    strange = head.translate(None, delete=PLAIN)
-    return len(strange) <= (1 - TEXT) * len(head)
+    return is_plain(head)
 
 
 def _is_checked(line: bytes) -> bool:
     """Whether a line ends with a checksum, as those of a port do."""
     return _CHECKED.search(line) is not None
-
-
-def _is_wide(head: bytes) -> bool:
-    """Whether this is UTF-16: every second byte of plain text is 0."""
-    return head.startswith(WIDE) and head.count(0) > len(head) / 3
 
 
 class TextColumns(ColumnRecording):
@@ -107,7 +92,8 @@ class TextColumns(ColumnRecording):
 
     def place(self, row: int) -> str:
         """Name a line; empty ones are not counted."""
-        return f"line {self._skip + row + 1}"
+        gathered = any(form.gathers for form in self._forms)
+        return f"{'record' if gathered else 'line'} {self._skip + row + 1}"
 
     def pieces(self, size: int = PIECE) -> Iterator[bytes]:
         """Bytes of the text, unpacked."""
@@ -127,6 +113,11 @@ class TextColumns(ColumnRecording):
     def heading(self) -> list[Heading]:
         """What stands above its numbers."""
         found = headings_above(self._lines, self.wanted.separator)
+        for form in self._forms:
+            if form.names:
+                found = [Heading([Column("", name) for name in form.names], SKIP)]
+            if form.clock is not None:
+                found = [_clocked(one, form.clock) for one in found]
         if not self.sensor:
             return found
         return [Heading([self._of(c) for c in way.columns], way.skip) for way in found]
@@ -143,7 +134,7 @@ class TextColumns(ColumnRecording):
 
     def ask(self) -> str:
         """Say how its columns are named."""
-        lines = self._lines or [""]
+        lines = self._top or [""]
         return (
             f"{self.path}: say what its columns are, such as --columns"
             f" t,ax,ay,az,gx,gy,gz; its first line is {lines[0][:60]!r}"
@@ -173,15 +164,15 @@ class TextColumns(ColumnRecording):
             return
         columns.check(self.wanted)
         names = [c for c in self.wanted.columns]
-        use = [i for i, name in enumerate(names) if name != columns.SKIP]
+        use = [i for i, name in enumerate(names) if name != SKIP]
         samples, separator, seen = columns.ColumnReader(self.wanted), None, 0
-        begun, t0, top = False, None, [""]
+        begun, t0, first_lines = False, None, [""]
         for data in self._pieces():
             if not begun:
-                top, begun = self._begin(data, use), True
-                if not 0 <= self._skip < len(top):
+                first_lines, begun = self._begin(data, use), True
+                if not 0 <= self._skip < len(first_lines):
                     break
-                data, first = behind(data, self._skip), top[self._skip]
+                data, first = behind(data, self._skip), first_lines[self._skip]
                 separator = self.wanted.separator or separator_of(first)
                 self._check_width(first, separator)
                 if separator != "," and "," in first:
@@ -199,7 +190,7 @@ class TextColumns(ColumnRecording):
                 since = block.t - t0 if self.from_first else block.t
             yield replace(block, t=since)
         if not seen:
-            number, line = list(enumerate(top[:2], 1))[-1]
+            number, line = list(enumerate(first_lines[:2], 1))[-1]
             raise InputError(
                 f"{self.path}: no line has numbers in the columns {','.join(names)};"
                 f" line {number} is {line[:60]!r}: name each column in its order, _ for"
@@ -208,21 +199,40 @@ class TextColumns(ColumnRecording):
 
     def _begin(self, data: bytes, use: Sequence[int]) -> list[str]:
         """Lines at the top, as many as it takes to find the first of numbers."""
-        top = [""]
+        lines = [""]
         for many in (NAMED, TOP):
-            top = top_lines(data, many)
-            self._skip = self._heading(top, use)
-            if 0 <= self._skip < len(top):
+            lines = top_lines(data, many)
+            self._skip = self._heading(lines, use)
+            if 0 <= self._skip < len(lines):
                 break
-        return top
+        return lines
 
     def _pieces(self) -> Iterator[bytes]:
         """Whole lines of the file, many at a time."""
-        rest, mark = b"", MARK
-        for data in self.pieces():
-            if mark and _is_wide(data[:HEAD]):
-                raise InputError(f"{self.path}: is text in UTF-16: save it as UTF-8")
-            data, mark = data.removeprefix(mark), b""
+        readers = [form.reader() for form in self._forms]
+        for data in self._whole_lines():
+            if not readers:
+                yield data
+                continue
+            lines = split_lines(data)
+            for read in readers:
+                lines = read(lines)
+            yield ("\n".join(lines) + "\n").encode()
+
+    @cached_property
+    def _forms(self) -> list[TextForm]:
+        """What must be undone before the text is one of columns."""
+        return forms_of(self._top, self.wanted.separator)
+
+    @cached_property
+    def _top(self) -> list[str]:
+        """First lines, as they stand in the file."""
+        return next((top_lines(data) for data in self._whole_lines()), [])
+
+    def _whole_lines(self) -> Iterator[bytes]:
+        """Whole lines of the file as UTF-8, many at a time."""
+        rest = b""
+        for data in as_utf8(self.pieces()):
             end = data.rfind(b"\n") + 1
             if not end:
                 rest += data
@@ -298,7 +308,7 @@ class TextColumns(ColumnRecording):
             return []
         row = []
         for name, cell in zip(self.wanted.columns, cells, strict=True):
-            if name == columns.SKIP:
+            if name == SKIP:
                 continue
             try:
                 row.append(float(cell.strip() or "nan"))
@@ -307,3 +317,12 @@ class TextColumns(ColumnRecording):
                 self.damaged(f"{self.place(number)}, column {name}", what)
                 return []
         return row
+
+
+def _clocked(heading: Heading, clock: int) -> Heading:
+    """A heading with the column of which the clock was read."""
+    named = [
+        Column("", CLOCK) if i == clock else column
+        for i, column in enumerate(heading.columns)
+    ]
+    return Heading(named, heading.skip)

@@ -13,12 +13,32 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 SPELLINGS = {
-    "m/s^2": ("m/s^2", "m/s2", "m/s²", "m/s/s", "m/s**2", "mps2", "m s-2", "ms-2"),
+    "m/s^2": (
+        "m/s^2",
+        "m/s2",
+        "m/s²",
+        "m/s/s",
+        "m/s**2",
+        "mps2",
+        "m s-2",
+        "ms-2",
+        "m s^-2",
+        "m/(s^2)",
+    ),
     "mg": ("mg", "milli g", "millig"),
     "g": ("g", "g's", "gs"),
-    "deg/s": ("deg/s", "°/s", "dps", "degps", "deg s-1", "deg/sec", "°/sec"),
+    "deg/s": (
+        "deg/s",
+        "°/s",
+        "dps",
+        "degps",
+        "deg s-1",
+        "deg/sec",
+        "°/sec",
+        "deg s^-1",
+    ),
     "mrad/s": ("mrad/s", "mradps"),
-    "rad/s": ("rad/s", "radps", "rad s-1", "rad/sec", "rps"),
+    "rad/s": ("rad/s", "radps", "rad s-1", "rad/sec", "rps", "rad s^-1"),
     "s": ("s", "sec", "secs", "seconds", "second"),
     "ms": ("ms", "msec", "millis", "milliseconds"),
     "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
@@ -41,9 +61,22 @@ UNITS = {
 
 AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
 
+TELLING = ("m/s^2", "rad/s", "deg/s", "mrad/s")
+"""Units that tell the kind of a sensor, whatever its axes are called."""
+
 _SENSORS = {
-    "a": ("a", "f", "acc", "accel", "accelerometer", "acceleration", "accs", "accl"),
-    "g": ("g", "w", "gyr", "gyro", "gyroscope", "gyros", "omega", "rate"),
+    "a": (
+        "a",
+        "f",
+        "acc",
+        "accel",
+        "accelerometer",
+        "acceleration",
+        "accs",
+        "accl",
+        "ac",
+    ),
+    "g": ("g", "w", "gyr", "gyro", "gyroscope", "gyros", "omega", "rate", "gy"),
     "m": ("m", "mag", "magnetometer", "magnetic", "compass"),
 }
 _PHRASES = (
@@ -154,7 +187,9 @@ def _of_words(words: list[str], unit: str | None) -> Meaning | None:
     for i, word in enumerate(words):
         rest = words[:i] + words[i + 1 :]
         kind = next((k for k, names in _SENSORS.items() if word[:-1] in names), "")
-        if kind and word[-1] in "xyz":
+        # of "GyX" the axis is the X
+        apart = word in _SENSORS["g"] and bool(rest[i:]) and rest[i] in AXES
+        if kind and word[-1] in "xyz" and not apart:
             return Meaning(kind, word[-1], unit, tuple(rest))
     for i, word in enumerate(words):
         rest = words[:i] + words[i + 1 :]
@@ -170,7 +205,10 @@ def _of_words(words: list[str], unit: str | None) -> Meaning | None:
         if word in words:
             label = tuple(w for w in words if w != word)
             return Meaning("temperature", "", unit, label)
-    return Meaning("", words[0], unit) if words in (["x"], ["y"], ["z"]) else None
+    if words in (["x"], ["y"], ["z"]):
+        return Meaning("", words[0], unit)
+    # whatever it is called, an axis in rad/s is one of a gyroscope
+    return _with_axis("", words, unit) if unit in TELLING else None
 
 
 def _place(words: Sequence[str], phrase: Sequence[str]) -> int | None:

@@ -10,8 +10,12 @@ TOP = 1000
 
 
 def split_lines(data: bytes) -> list[str]:
-    """Lines that are not empty."""
-    lines = data.decode(errors="replace").replace("\r\n", "\n").split("\n")
+    """Lines that are not empty, in UTF-8 or else in the code page of older Windows."""
+    try:
+        text = data.decode()
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", errors="replace")
+    lines = text.replace("\r\n", "\n").split("\n")
     return [line for line in lines if line.strip()]
 
 

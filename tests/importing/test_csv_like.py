@@ -92,11 +92,13 @@ def test_a_mark_of_utf_8_costs_no_row(tmp_path: Path, ends: str) -> None:
     np.testing.assert_array_equal(got.acc, [[1, 2, 3], [4, 5, 6]])
 
 
-def test_utf_16_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be", "utf-16-le"])
+def test_utf_16_is_read(tmp_path: Path, encoding: str) -> None:
     path = tmp_path / "log.csv"
-    path.write_bytes("1,2,3\n4,5,6\n".encode("utf-16"))
-    with pytest.raises(InputError, match="UTF-16: save it as UTF-8"):
-        concat(open_recording(path, Layout(ACC, rate_hz=1)).blocks("0"))
+    path.write_bytes("1,2,3\r\n4,5,6\r\n".encode(encoding))
+    recording = open_recording(path, Layout(ACC, rate_hz=1))
+    got = concat(list(recording.blocks("0")))
+    np.testing.assert_array_equal(got.acc, [[1, 2, 3], [4, 5, 6]])
 
 
 @pytest.mark.parametrize("cut", [2, 3, 4])

@@ -1,0 +1,129 @@
+"""Times that a text writes as a clock does: ``2024-05-03T23:59:50.123Z``, ``23:59:50``.
+
+Dates may stand before the time of day, in any usual order, or in a column of their own;
+AM and PM, decimal commas and zones are understood, and spreadsheets' ``59:50.1``
+(minutes and seconds) as well. Times count in seconds from the first midnight, or the
+first hour. Which of 03/05 is the month matters only where the date changes: the reading
+that lies nearest to the date before is taken.
+"""
+
+from __future__ import annotations
+
+import re
+from datetime import date
+
+_DATE = (
+    r"(?P<date>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}"
+    r"|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})"
+)
+_TIME = (
+    r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:[.,:]\d+)?)"
+    r"(?:\s*(?P<half>[AaPp][Mm]))?(?:\s*(?:Z|UTC|GMT|[+-]\d\d:?\d\d))?"
+)
+_CLOCK = re.compile(rf"(?:{_DATE}[T ,;\t]\s*)?{_TIME}")
+_MINUTES = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d{2}[.,]\d+)")
+_DAY = re.compile(_DATE)
+IN_LINE = re.compile(rf"{_DATE}[T ]\s*{_TIME}(?=\s|$)")
+"""A date and time between columns that spaces part."""
+
+_MONTHS = "jan feb mar apr may jun jul aug sep oct nov dec".split()
+DAY, HOUR = 86400.0, 3600.0
+
+
+def is_clock(cell: str) -> bool:
+    """Whether a cell is a time of day, with a date or without.
+
+    >>> [is_clock(c) for c in ("23:59:50.123", "05/03/2024 11:59 PM", "1.5", "59:50.1")]
+    [True, False, False, True]
+    """
+    cell = cell.strip()
+    return bool(_CLOCK.fullmatch(cell) or _MINUTES.fullmatch(cell))
+
+
+def is_date(cell: str) -> bool:
+    """Whether a cell is a date alone."""
+    return _DAY.fullmatch(cell.strip()) is not None
+
+
+class ClockText:
+    """Reads the times of one column, in the order of the file.
+
+    >>> clock = ClockText()
+    >>> [clock.seconds(text) for text in ("23:59:59.5", "00:00:00.25", "no time")]
+    [86399.5, 86400.25, None]
+    """
+
+    def __init__(self) -> None:
+        self._days: dict[str, int] = {}
+        self._first: int | None = None
+        self._day, self._last = 0, 0.0
+
+    def seconds(self, text: str, day: str = "") -> float | None:
+        """Seconds since the first midnight; None of what is no time.
+
+        Parameters
+        ----------
+        text : with or without a date
+        day : the date, where it has a column of its own
+
+        """
+        said = _CLOCK.fullmatch(text.strip())
+        if said is None:
+            return self._of_minutes(text)
+        h, half = int(said["h"]), (said["half"] or "").lower()
+        if half:
+            h = h % 12 + (12 if half == "pm" else 0)
+        s = float(re.sub("[,:]", ".", said["s"]))
+        since = HOUR * h + 60.0 * int(said["m"]) + s
+        if written := said["date"] or day.strip():
+            return DAY * self._number(written) + since
+        return self._unwrapped(since, DAY)
+
+    def _of_minutes(self, text: str) -> float | None:
+        said = _MINUTES.fullmatch(text.strip())
+        if said is None:
+            return None
+        s = float(said["s"].replace(",", "."))
+        return self._unwrapped(60.0 * int(said["m"]) + s, HOUR)
+
+    def _unwrapped(self, since: float, period: float) -> float:
+        """A time that begins again with each period."""
+        if since < self._last - period / 2:
+            self._day += 1
+        self._last = since
+        return period * self._day + since
+
+    def _number(self, written: str) -> int:
+        """Days since the first date."""
+        if written not in self._days:
+            read = _readings(written)
+            if self._first is None:
+                # the reading that stands, should the date change
+                self._days[written], self._first = 0, (read or [0])[0]
+                self._read = read or [0]
+            else:
+                steps = [b - a for a in self._read for b in read] or [0]
+                later = [n for n in steps if n >= 0] or steps
+                self._days[written] = min(later, key=abs)
+        return self._days[written]
+
+
+def _readings(written: str) -> list[int]:
+    """Days of all that a date may be."""
+    parts = re.split(r"[-/. ]", written)
+    if not parts[1].isdecimal():
+        month = parts[1].lower()
+        if month not in _MONTHS:
+            return []
+        tries = [(parts[2], str(_MONTHS.index(month) + 1), parts[0])]
+    elif len(parts[0]) == len("2024"):
+        tries = [(parts[0], parts[1], parts[2])]
+    else:
+        tries = [(parts[2], parts[0], parts[1]), (parts[2], parts[1], parts[0])]
+    found = []
+    for y, m, d in tries:
+        try:
+            found.append(date(int(y) % 100 + 2000, int(m), int(d)).toordinal())
+        except ValueError:
+            continue
+    return found

@@ -1,0 +1,102 @@
+"""Values with their labels in a line, as programs print them for people.
+
+    ax: 0.12 ay: 0.34 az: 9.81        AcX = 12 | AcY = 34 | AcZ = 16384
+    Acceleration X: 0.1, Y: 0.2, Z: 9.8 m/s^2
+    12:34:56.789 -> Accel: 0.1, 0.2, 9.8 g  Gyro: 1, 2, 3
+
+An axis alone belongs to the label before it; three values behind one label are axes; a
+unit holds for all axes before it. A time of day at the beginning is one of the monitor.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from fieldcal.importing.heading_words import unit_in
+
+TIME = "utc time [s]"
+"""Name of the time that a monitor writes before a line."""
+
+AXES = ("x", "y", "z")
+
+OFTEN = 0.5
+"""Share of the commonest label's lines in which others are no column."""
+
+LONGEST = 12
+"""Letters of a unit; what is longer is a sentence."""
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
+_VALUES = re.compile(rf"\s*({_NUMBER}(?:[\s,;|]+{_NUMBER})*)\s*(.*)", re.DOTALL)
+_ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*(?:->|>|:|\s)\s*")
+
+Labelled = tuple[str, str]
+"""A label and its value."""
+
+
+def labelled_values(line: str) -> list[Labelled]:
+    """Labels and values of a line; empty if it holds something else.
+
+    >>> labelled_values("Acceleration X: -0.1, Y: 0.2 m/s^2")
+    [('Acceleration X [m/s^2]', '-0.1'), ('Acceleration Y [m/s^2]', '0.2')]
+    >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
+    ([], [])
+    """
+    arrival = _ARRIVAL.match(line)
+    rest = line[arrival.end() :] if arrival else line
+    parts = _LABEL.split(rest)
+    if len(parts) < len(AXES) or parts[0].strip(" \t,;|"):
+        return []
+    read: list[tuple[str, str, str]] = []
+    for label, text in zip(parts[1::2], parts[2::2], strict=True):
+        said = _VALUES.fullmatch(text)
+        values = re.findall(_NUMBER, said[1]) if said else []
+        if said is None or len(values) not in (1, len(AXES)):
+            return []
+        label, moved = _apart(label)
+        if moved and read:
+            read = _with_unit(read, moved)
+        label = _whole(label, read[-1][0] if read else "")
+        names = [f"{label} {a}" for a in AXES] if len(values) > 1 else [label]
+        read += [(n, v, "") for n, v in zip(names, values, strict=True)]
+        behind = said[2].strip(" \t,;|")
+        if len(behind) > LONGEST:
+            return []
+        if unit_in(behind):
+            read = _with_unit(read, behind)
+    first = [(TIME, arrival[1].strip())] if arrival else []
+    return first + [(f"{n} [{u}]" if u else n, v) for n, v, u in read]
+
+
+def _apart(label: str) -> tuple[str, str]:
+    """A label, and the unit of the value before it that stands before it."""
+    first, _, rest = label.partition(" ")
+    return (rest.strip(), first) if rest.strip() and unit_in(first) else (label, "")
+
+
+def _whole(label: str, before: str) -> str:
+    """A label; of an axis alone with what the one before it says."""
+    bare, _, axis = before.rpartition(" ")
+    alone = label.strip().lower() in AXES and axis.lower() in AXES
+    return f"{bare} {label}" if alone and bare else label
+
+
+def _with_unit(
+    read: Sequence[tuple[str, str, str]], unit: str
+) -> list[tuple[str, str, str]]:
+    """What was read, with a unit behind the last of it: of all its axes."""
+    bare = read[-1][0].rpartition(" ")[0]
+
+    def mine(name: str) -> bool:
+        return name == read[-1][0] or bool(bare and name.rpartition(" ")[0] == bare)
+
+    return [(n, v, u or (unit if mine(n) else "")) for n, v, u in read]
+
+
+def names_of(rows: Iterable[Sequence[Labelled]]) -> list[str]:
+    """Labels that come again and again, in their order."""
+    seen = Counter(name for row in rows for name, _ in row)
+    usual = max(seen.values(), default=0)
+    return [name for name, many in seen.items() if many >= OFTEN * usual]

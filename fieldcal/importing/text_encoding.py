@@ -1,0 +1,62 @@
+"""Bytes of a text as UTF-8.
+
+Texts come in UTF-8, with a mark before it or without, in UTF-16 of either order, and in
+the code page 1252 of older Windows programs.
+"""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Iterable, Iterator
+
+MARK = b"\xef\xbb\xbf"
+"""What some programs write before UTF-8."""
+
+WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
+"""What UTF-16 begins with, where it has a mark."""
+
+HALF = 0.45
+"""Share of the bytes of a text in UTF-16 that are 0, all in the same half of each."""
+
+PLAIN = bytes([*range(32, 127), *b"\t\r\n"])
+"""Characters of a text."""
+
+TEXT = 0.95
+"""Share of them that a text has among its first bytes."""
+
+LOOKED = 4096
+"""First bytes by which the encoding is told."""
+
+
+def is_plain(head: bytes) -> bool:
+    """Whether most bytes are characters of a text."""
+    return len(head.translate(None, delete=PLAIN)) <= (1 - TEXT) * len(head)
+
+
+def wide(head: bytes) -> str | None:
+    """Return the UTF-16 in which a text begins, as Python calls it; None of another.
+
+    >>> wide("t,ax".encode("utf-16-be")), wide(b"t,ax")
+    ('utf-16-be', None)
+    """
+    marked = WIDE.get(head[:2])
+    head = head[2 if marked else 0 : len(head) // 2 * 2]
+    for name, zeros, letters in (
+        ("utf-16-le", head[1::2], head[::2]),
+        ("utf-16-be", head[::2], head[1::2]),
+    ):
+        empty = zeros.count(0) >= 2 * HALF * len(zeros)
+        if empty and is_plain(letters) and marked in (None, name):
+            return name if head else None
+    return None
+
+
+def as_utf8(pieces: Iterable[bytes]) -> Iterator[bytes]:
+    """Bytes of a text in UTF-8, whatever it is in."""
+    decoder: codecs.IncrementalDecoder | None = None
+    for number, data in enumerate(pieces):
+        if not number:
+            name = wide(data[:LOOKED])
+            decoder = codecs.getincrementaldecoder(name)("replace") if name else None
+            data = data if decoder else data.removeprefix(MARK)
+        yield decoder.decode(data).lstrip("\ufeff").encode() if decoder else data

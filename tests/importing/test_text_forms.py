@@ -1,0 +1,151 @@
+"""Texts as monitors, spreadsheets and loggers write them become plain columns."""
+
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldcal.core.samples import Block, concat
+from fieldcal.importers import open_recording
+from fieldcal.importing.clock_text import ClockText, is_clock
+from fieldcal.importing.labels import labelled_values
+from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.text_forms import forms_of
+
+BEGAN = datetime(2024, 5, 3, 23, 59, 58)
+RATE, ROWS = 20.0, 80
+AX = np.round(0.1 * np.sin(np.arange(ROWS)), 3)
+NAMES = ["ax", "ay", "az", "gx", "gy", "gz"]
+
+
+def when(row: int) -> datetime:
+    return BEGAN + timedelta(seconds=row / RATE)
+
+
+def values(row: int) -> list[str]:
+    return [f"{AX[row]:.3f}", "0.2", "9.8", "0.01", "-0.02", "0.03"]
+
+
+def read(folder: Path, text: str, **wanted: float) -> Block:
+    path = folder / "log.txt"
+    path.write_text(text, encoding="utf-8")
+    recording = open_recording(path, ReadOptions(**wanted))  # type: ignore[arg-type]
+    (stream,) = recording.streams()
+    return concat(list(recording.alone(stream.name).blocks(stream.name)))
+
+
+def text(stamp: Callable[[int], str], separator: str, heading: str = "") -> str:
+    head = [heading or separator.join(["time", *NAMES])]
+    rows = [separator.join([stamp(i), *values(i)]) for i in range(ROWS)]
+    return "\n".join(head + rows) + "\n"
+
+
+CLOCKS = {
+    "iso": lambda t: t.isoformat(timespec="milliseconds"),
+    "iso with a zone": lambda t: t.isoformat(timespec="microseconds") + "+02:00",
+    "time of day": lambda t: t.strftime("%H:%M:%S.%f")[:-3],
+    "American": lambda t: t.strftime("%m/%d/%Y %I:%M:%S.%f %p"),
+    "German": lambda t: t.strftime("%d.%m.%Y %H:%M:%S.%f")[:-3],
+    "month by name": lambda t: t.strftime("%d-May-%Y %H:%M:%S.%f")[:-3],
+    "quoted": lambda t: t.strftime('"%Y-%m-%d %H:%M:%S.%f"'),
+}
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("name", CLOCKS)
+def test_times_of_a_clock_are_seconds_also_over_midnight(
+    tmp_path: Path, name: str, separator: str
+) -> None:
+    got = read(tmp_path, text(lambda i: CLOCKS[name](when(i)), separator))
+    np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE, atol=2e-6)
+    np.testing.assert_array_equal(got.acc[:, 0], AX)
+
+
+@pytest.mark.parametrize("heading", ["stamp", "date time"])
+def test_a_date_and_a_time_that_a_space_parts(tmp_path: Path, heading: str) -> None:
+    lines = text(lambda i: str(when(i)), " ", " ".join([heading, *NAMES]))
+    lines = lines.replace(" 23:59:58 ", " 23:59:58.0 ")
+    np.testing.assert_allclose(
+        read(tmp_path, lines).t, np.arange(ROWS) / RATE, atol=2e-6
+    )
+
+
+def test_minutes_and_seconds_of_a_spreadsheet_begin_again_each_hour() -> None:
+    clock = ClockText()
+    got = [clock.seconds(one) for one in ("59:59.5", "00:00.0", "00:00.5")]
+    assert got == [3599.5, 3600.0, 3600.5]
+
+
+@given(st.datetimes(datetime(2001, 1, 1), datetime(2098, 1, 1)), st.integers(1, 10**6))
+def test_a_clock_reads_what_was_written(start: datetime, more_ms: int) -> None:
+    later = start + timedelta(milliseconds=more_ms)
+    for write in ("%Y-%m-%dT%H:%M:%S.%f", "%d.%m.%Y %H:%M:%S.%f"):
+        clock = ClockText()
+        first, last = (clock.seconds(t.strftime(write)) for t in (start, later))
+        assert first is not None and last is not None
+        assert last - first == pytest.approx(more_ms / 1e3, abs=1e-5)
+
+
+@given(st.text())
+def test_any_text_is_a_clock_or_is_not(cell: str) -> None:
+    assert is_clock(cell) == (ClockText().seconds(cell) is not None)
+
+
+@given(st.lists(st.text(), max_size=5))
+def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
+    lines = [line for line in lines if line.strip()]
+    for form in forms_of(lines, None):
+        lines = form.reader()(lines)
+        assert all(isinstance(line, str) for line in lines)
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "ax: {} ay: {} az: {} gx: {} gy: {} gz: {}",
+        "AcX = {} | AcY = {} | AcZ = {} | GyX = {} | GyY = {} | GyZ = {}",
+        "accel: {}, {}, {}  gyro: {}, {}, {}",
+        "Acceleration X: {}, Y: {}, Z: {} m/s^2\nRotation X: {}, Y: {}, Z: {} rad/s\n",
+        "12:00:00.0 -> Acceleration X: {} Y: {} Z: {} m/s^2 Gyro X: {} Y: {} Z: {}",
+    ],
+)
+def test_values_with_labels_need_no_columns(tmp_path: Path, row: str) -> None:
+    lines = "\n".join(row.format(*values(i)) for i in range(ROWS))
+    boot = "MPU6050 found!\n"
+    if "->" in row:
+        lines = "\n".join(
+            line.replace("12:00:00.0", when(i).strftime("%H:%M:%S.%f"))
+            for i, line in enumerate(lines.split("\n"))
+        )
+    got = read(tmp_path, boot + lines + "\n", rate_hz=RATE)
+    np.testing.assert_array_equal(got.acc[:, 0], AX)
+    np.testing.assert_allclose(got.gyr, [[0.01, -0.02, 0.03]] * ROWS)
+    np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE, atol=2e-6)
+
+
+def test_a_monitor_that_says_when_a_row_came(tmp_path: Path) -> None:
+    rows = [f"{when(i):%H:%M:%S.%f} -> {','.join(values(i))}" for i in range(ROWS)]
+    head = f"{when(0):%H:%M:%S.%f} -> {','.join(NAMES)}"
+    got = read(tmp_path, "\n".join([head, *rows]) + "\n")
+    np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE, atol=2e-6)
+    np.testing.assert_array_equal(got.acc[:, 0], AX)
+
+
+def test_quoted_numbers_with_decimal_commas(tmp_path: Path) -> None:
+    head = ",".join(f'"{name}"' for name in ["time", *NAMES])
+    rows = [
+        ",".join(f'"{x.replace(".", ",")}"' for x in [f"{i / RATE}", *values(i)])
+        for i in range(ROWS)
+    ]
+    got = read(tmp_path, "\n".join([head, *rows]))
+    np.testing.assert_array_equal(got.acc[:, 0], AX)
+    np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE)
+
+
+def test_what_is_no_label_is_left_alone() -> None:
+    assert labelled_values("Fs: 100 measured by a clock") == []
+    assert labelled_values("1.0,2.0,3.0") == []

@@ -13,30 +13,28 @@ broke or whose process was killed, is handed back at once and not asked for agai
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
-from fieldcal.core.errors import FieldcalError, Moved, Skipped, Stopped, WrongPosition
-from fieldcal.core.samples import Block, pieces
+from fieldcal.core.errors import FieldcalError, Moved, Skipped, WrongPosition
+from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Hold, Note, Plan, Step
 from fieldcal.run.gyro_unit import GyroUnitWatch
+from fieldcal.run.incoming import SAID, IncomingSamples
 from fieldcal.run.interruptions import (
-    GAP,
     THIN,
     Disturbed,
-    RepeatPosition,
     SamplesLost,
     Unlike,
     WindowWatch,
     kept_notice,
     restart_notice,
 )
-from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
-from fieldcal.run.operator.protocol import Display, Operator, Wish
+from fieldcal.run.link_marks import MarkedRecorder
+from fieldcal.run.operator.desk import OperatorDesk
+from fieldcal.run.operator.protocol import Display, Operator
 from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait, force
@@ -45,12 +43,6 @@ from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, PiecedWindow
 
 R = TypeVar("R")
-
-SAID = 2
-"""Silences of half a second after which the operator is told."""
-
-PIECE = 0.1
-"""Longest stretch of samples that is looked at as one, s."""
 
 
 class Engine:
@@ -93,7 +85,6 @@ class Engine:
         self._warm_up = warm_up
         self._lost_share = lost_share
         self._thin: dict[int, int] = {}
-        self._away, self._heard_s = 0, np.nan
         self._held: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
         self._noise: LearnedNoise | None = None
@@ -101,11 +92,10 @@ class Engine:
         self._before: int | None = None
         self._units = GyroUnitWatch(about.gravity)
         self._warned_of_unit = False
-        self._link = LinkMarks(driver, recorder)
-        self._silence, self._heard = 0, replace(driver.health)
-        driver.on_silence = self._silent
-        self._stream = self._record(driver)
+        self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver)
+        self._incoming = IncomingSamples(driver, recorder, self._heard, self._units.add)
+        driver.on_silence = self._silent
 
     def run(self, plan: Plan[R]) -> R:
         """Carry out a plan and return its result.
@@ -133,7 +123,7 @@ class Engine:
             result: R = done.value
             return result
         finally:
-            self._link.end()
+            self._incoming.end()
 
     def _do(self, step: Step) -> object:
         match step:
@@ -150,7 +140,7 @@ class Engine:
                 self._before = step.index
                 return average
             case Note(text):
-                self._tell(text)
+                self._desk.tell(text)
                 return None
 
     def _hold(self, hold: Hold) -> Average:
@@ -165,7 +155,7 @@ class Engine:
                 if self._give_up is not None:
                     raise
                 tries += 1
-                self._tell(restart_notice(moved, tries))
+                self._desk.tell(restart_notice(moved, tries))
                 continue
             if average is not None:
                 return average
@@ -175,63 +165,38 @@ class Engine:
 
         None if the operator wants to begin it again.
         """
-        pieces, same = PiecedWindow(self._noise, self._driver.grain), self._same
+        pieces, same = self._new_window(), self._incoming.same
         while True:
             self._arrive(hold)
-            if self._same != same:  # what it sends now is not what it sent before
-                pieces, same = PiecedWindow(self._noise, self._driver.grain), self._same
-            away = self._away
+            if self._incoming.same != same:  # what is sent now is not what was before
+                pieces, same = self._new_window(), self._incoming.same
+            away = self._incoming.breaks
             try:
                 return self._average(hold, pieces)
             except Disturbed as disturbed:
                 moved, kept = disturbed.moved, disturbed.kept
-                self._tell(kept_notice(moved, kept, hold.seconds, pieces.dropped))
-            if self._away != away:  # who knows how it stands by now
+                self._desk.tell(kept_notice(moved, kept, hold.seconds, pieces.dropped))
+            if self._incoming.breaks != away:  # who knows how it stands by now
                 self._operator.place(hold)
 
-    @property
-    def _same(self) -> tuple[int, int]:
-        """What changes when samples are no longer like those before."""
-        return self._driver.health.restarts, self._driver.readings.changed
+    def _new_window(self) -> PiecedWindow:
+        return PiecedWindow(self._noise, self._driver.grain)
 
-    def _tell(self, text: str) -> None:
-        self._recorder.mark("told", text=text)
-        self._operator.tell(text)
-
-    def _alarm(self, reason: WaitReason) -> None:
-        self._recorder.mark("told", text=reason.text)
-        self._operator.alarm(reason)
-
-    def _record(self, driver: Driver) -> Iterator[Block]:
-        for raw in driver.blocks():
-            self._silence, self._heard = 0, replace(driver.health)
-            block = self._recorder.append(raw)
-            self._away += bool(block.t[0] - self._heard_s > GAP)
-            self._heard_s = float(block.t[-1])
-            self._link.take(block)
-            self._display.heard(block)
-            if self._warm_up:
-                self._warm_up.add(block)
-            for piece in pieces(block, PIECE):
-                self._units.add(piece)
-                yield piece
+    def _heard(self, block: Block) -> None:
+        """Look at samples that have just been recorded."""
+        self._display.heard(block)
+        if self._warm_up:
+            self._warm_up.add(block)
 
     def _silent(self) -> None:
         """Report that no samples arrive, and what comes instead."""
-        self._silence += 1
-        if self._silence >= SAID:
-            why = self._driver.why_silent(self._heard)
-            if self._driver.health.received == self._heard.received:
-                why += "; it goes on by itself once they do"
-            reason = WaitReason(
-                WaitState.NO_SAMPLES, f"no samples come from {self._driver.name}: {why}"
-            )
+        reason = self._incoming.silent()
+        if reason:
             if self._hold_now:
                 self._display.silent(self._hold_now, reason)
-            if self._silence == SAID:
-                self._alarm(reason)
-        if self._operator.wish() == "stop":
-            raise Stopped("stopped by the operator")
+            if self._incoming.silence == SAID:
+                self._desk.alarm(reason)
+        self._desk.stop_if_wanted()
 
     def _arrive(self, hold: Hold) -> None:
         """Wait until the device rests where it should."""
@@ -239,22 +204,24 @@ class Engine:
         waiting = PositionWait(hold, self._about, self._held, left, self._units)
         asked = self._driver.host_time()
         insisted = warned = False
-        away = self._away
-        for block in self._stream:
-            if self._away != away:  # who knows how it stands by now
-                away = self._away
+        away = self._incoming.breaks
+        for block in self._incoming.pieces:
+            if self._incoming.breaks != away:  # who knows how it stands by now
+                away = self._incoming.breaks
                 self._operator.place(hold)
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before
             waiting.add(block, self._driver.host_time())
-            wish = self._wish(hold, averaging=False)
+            wish = self._desk.wish(hold)
+            if wish == "repeat":
+                self._desk.repeat(self._before)
             if wish == "confirm" and self._warm_up and self._warm_up.waits:
                 self._warm_up.waived = True
             elif wish == "confirm" and not waiting.arrived:
                 if insisted and waiting.usable:
-                    self._insist(hold, waiting)
+                    self._desk.insisted(hold, waiting.problem)
                     return
-                insisted = self._ask_back(waiting)
+                insisted = self._desk.ask_back(waiting)
             waits = self._warm_up is not None and self._warm_up.waits
             reason = waiting.reason
             if waiting.arrived and self._warm_up and self._warm_up.says and waits:
@@ -263,7 +230,7 @@ class Engine:
             self._warn_of_unit()
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
-                self._alarm(reason)
+                self._desk.alarm(reason)
             if waiting.arrived and not waits and wish != "wait":
                 return
             self._complain(hold, waiting, quiet=wish == "wait")
@@ -273,7 +240,7 @@ class Engine:
         """Say once that the gyroscopes are in another unit."""
         if self._units.says and not self._warned_of_unit:
             self._warned_of_unit = True
-            self._alarm(WaitReason(WaitState.WRONG_UNIT, self._units.says))
+            self._desk.alarm(WaitReason(WaitState.WRONG_UNIT, self._units.says))
 
     def _complain(self, hold: Hold, waiting: PositionWait, quiet: bool) -> None:
         """Say that it rests at a wrong place, and give up in the end."""
@@ -291,35 +258,6 @@ class Engine:
             )
             raise WrongPosition(f"{hold.position.name}: {what}")
 
-    def _ask_back(self, waiting: PositionWait) -> bool:
-        """Answer an operator who wants to go on at a wrong place."""
-        if waiting.usable and waiting.problem:
-            self._tell(
-                f"{waiting.problem}; press Enter once more to take it like this, and"
-                " the result is NO-GO"
-            )
-            return True
-        self._tell(f"not yet: {waiting.problem or waiting.reason.text}")
-        return False
-
-    def _insist(self, hold: Hold, waiting: PositionWait) -> None:
-        self._recorder.mark("insisted", position=hold.index, text=waiting.problem)
-
-    def _wish(self, hold: Hold, averaging: bool) -> Wish | None:
-        """What the operator wants; what ends the step is carried out at once."""
-        wish = self._operator.wish()
-        if wish == "stop":
-            raise Stopped("stopped by the operator")
-        if wish == "skip":
-            self._recorder.mark("skipped", position=hold.index)
-            raise Skipped(f"{hold.position.name} was left out by the operator")
-        if wish == "repeat" and not averaging:
-            if self._before is not None:
-                self._recorder.mark("repeated", position=self._before)
-                raise RepeatPosition(self._before)
-            self._operator.tell("nothing was taken yet that could be repeated")
-        return wish
-
     def _average(self, hold: Hold, pieces: PiecedWindow) -> Average | None:
         """Fill a window; None if the operator wants to begin it again."""
         try:
@@ -329,7 +267,7 @@ class Engine:
                 average = pieces.average()
                 if average is not None:
                     break
-                self._tell(kept_notice(None, 0.0, hold.seconds, pieces.dropped))
+                self._desk.tell(kept_notice(None, 0.0, hold.seconds, pieces.dropped))
         except Moved as moved:
             self._left = hold.index
             if isinstance(moved, SamplesLost):
@@ -355,12 +293,12 @@ class Engine:
         """Take samples until a window is long enough; False if it is to begin again."""
         share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
         watch = WindowWatch(self._driver, hold.seconds, share)
-        for block in self._stream:
+        for block in self._incoming.pieces:
             watch.check(block)
             pieces.add(block)
             if moved := pieces.moved:
                 raise moved
-            if self._wish(hold, averaging=True) == "repeat":
+            if self._desk.wish(hold) == "repeat":
                 self._recorder.mark("repeated", position=hold.index)
                 return False
             self._display.averaging(hold, pieces)
@@ -373,11 +311,11 @@ class Engine:
         """Have the device say that it did the same to all samples of a window."""
         self._driver.read_again()
         if self._driver.readings.pending:
-            for block in self._stream:
+            for block in self._incoming.pieces:
                 watch.check_same(float(block.t[-1]))
                 if not self._driver.readings.pending:
                     return
 
     def _say_if_cold(self) -> None:
         if self._warm_up and (said := self._warm_up.says):
-            self._tell(said)
+            self._desk.tell(said)

@@ -1,0 +1,85 @@
+"""Samples of a device as they come: each recorded, and handed on in short pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.samples import Block, pieces
+from fieldcal.drivers.driver import Driver
+from fieldcal.run.interruptions import GAP
+from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
+from fieldcal.run.wait_reason import WaitReason, WaitState
+
+SAID = 2
+"""Silences of half a second after which the operator is told."""
+
+PIECE = 0.1
+"""Longest stretch of samples that is looked at as one, s."""
+
+
+class IncomingSamples:
+    """What one device sends, from the first sample to the last.
+
+    Parameters
+    ----------
+    driver : the device
+    recorder : the session folder being written
+    heard : told of every block once it is recorded
+    seen : told of every piece before it is handed on
+
+    Attributes
+    ----------
+    pieces : an iterator over the samples, `PIECE` at a time
+    breaks : times that samples were missing for so long that nobody knows what was
+    silence : half seconds since the last sample
+
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        recorder: MarkedRecorder,
+        heard: Callable[[Block], None],
+        seen: Callable[[Block], None],
+    ) -> None:
+        self._driver, self._recorder = driver, recorder
+        self._heard, self._seen = heard, seen
+        self._link = LinkMarks(driver, recorder)
+        self._health, self._until_s = replace(driver.health), np.nan
+        self.breaks = self.silence = 0
+        self.pieces: Iterator[Block] = self._record()
+
+    @property
+    def same(self) -> tuple[int, int]:
+        """What changes when samples are no longer like those before."""
+        return self._driver.health.restarts, self._driver.readings.changed
+
+    def silent(self) -> WaitReason | None:
+        """Take note of half a second without samples; why, once it is to be said."""
+        self.silence += 1
+        if self.silence < SAID:
+            return None
+        why = self._driver.why_silent(self._health)
+        if self._driver.health.received == self._health.received:
+            why += "; it goes on by itself once they do"
+        text = f"no samples come from {self._driver.name}: {why}"
+        return WaitReason(WaitState.NO_SAMPLES, text)
+
+    def end(self) -> None:
+        """Mark what the link has lost to the last."""
+        self._link.end()
+
+    def _record(self) -> Iterator[Block]:
+        for raw in self._driver.blocks():
+            self.silence, self._health = 0, replace(self._driver.health)
+            block = self._recorder.append(raw)
+            self.breaks += bool(block.t[0] - self._until_s > GAP)
+            self._until_s = float(block.t[-1])
+            self._link.take(block)
+            self._heard(block)
+            for piece in pieces(block, PIECE):
+                self._seen(piece)
+                yield piece

@@ -1,0 +1,93 @@
+"""What is said to an operator and what is wanted, kept in the session."""
+
+from __future__ import annotations
+
+from fieldcal.core.errors import Skipped, Stopped
+from fieldcal.planning.steps import Hold
+from fieldcal.run.interruptions import RepeatPosition
+from fieldcal.run.link_marks import MarkedRecorder
+from fieldcal.run.operator.protocol import Operator, Wish
+from fieldcal.run.wait_reason import WaitReason
+from fieldcal.run.waiting import PositionWait
+
+
+class OperatorDesk:
+    """Speaks with whoever turns the device.
+
+    Parameters
+    ----------
+    operator : who that is
+    recorder : the session folder being written
+
+    """
+
+    def __init__(self, operator: Operator, recorder: MarkedRecorder) -> None:
+        self._operator, self._recorder = operator, recorder
+
+    def tell(self, text: str) -> None:
+        """Say a sentence that must not be missed."""
+        self._recorder.mark("told", text=text)
+        self._operator.tell(text)
+
+    def alarm(self, reason: WaitReason) -> None:
+        """Call the operator: something needs to be done."""
+        self._recorder.mark("told", text=reason.text)
+        self._operator.alarm(reason)
+
+    def ask_back(self, waiting: PositionWait) -> bool:
+        """Answer an operator who wants to go on at a wrong place."""
+        if waiting.usable and waiting.problem:
+            self.tell(
+                f"{waiting.problem}; press Enter once more to take it like this, and"
+                " the result is NO-GO"
+            )
+            return True
+        self.tell(f"not yet: {waiting.problem or waiting.reason.text}")
+        return False
+
+    def insisted(self, hold: Hold, problem: str) -> None:
+        """Keep that a position is taken although it is not where it should be."""
+        self._recorder.mark("insisted", position=hold.index, text=problem)
+
+    def stop_if_wanted(self) -> None:
+        """End the run if the operator wants that; other wishes are lost.
+
+        Raises
+        ------
+        Stopped
+            If so.
+
+        """
+        if self._operator.wish() == "stop":
+            raise Stopped("stopped by the operator")
+
+    def wish(self, hold: Hold) -> Wish | None:
+        """What the operator wants; what ends the step is carried out at once.
+
+        Raises
+        ------
+        Stopped, Skipped
+            If the run is to end, or this position to be left out.
+
+        """
+        wish = self._operator.wish()
+        if wish == "stop":
+            raise Stopped("stopped by the operator")
+        if wish == "skip":
+            self._recorder.mark("skipped", position=hold.index)
+            raise Skipped(f"{hold.position.name} was left out by the operator")
+        return wish
+
+    def repeat(self, before: int | None) -> None:
+        """Go back to the position taken before, None if there is none.
+
+        Raises
+        ------
+        RepeatPosition
+            If there is one.
+
+        """
+        if before is not None:
+            self._recorder.mark("repeated", position=before)
+            raise RepeatPosition(before)
+        self._operator.tell("nothing was taken yet that could be repeated")

@@ -244,7 +244,9 @@ class Engine:
 
     def _complain(self, hold: Hold, waiting: PositionWait, quiet: bool) -> None:
         """Say that it rests at a wrong place, and give up in the end."""
-        if not quiet and (waited := waiting.alarm()) is not None:
+        if quiet:
+            waiting.excuse()
+        elif (waited := waiting.alarm()) is not None:
             text = reminder(waited) + waiting.problem
             self._recorder.mark("wrong", position=hold.index, text=text)
             self._operator.alarm(waiting.reason, waited)

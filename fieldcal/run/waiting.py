@@ -188,6 +188,11 @@ class PositionWait:
         problem = self.arrival.problem if self.arrival else ""
         return said and f"{said}; else {problem}"
 
+    def excuse(self) -> None:
+        """Begin to count anew: whoever turns the device is still at work."""
+        self._began = self._last
+        self.waited = self.waited_host = 0.0
+
     def waited_enough(self, give_up: float) -> bool:
         """Whether it was waited for so many s, and whoever turns it had the time to."""
         return self.waited > give_up and self.waited_host > min(give_up, LEAST)

@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import TWO_POSITION, wait_for_samples
+from processes import TWO_POSITION, turned, wait_for_samples
 
 from fieldcal.commands.virtual import address
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session import sample_files
 from fieldcal.session.folder import Session
-from fieldcal.sim_device.remote import Remote
 
 LINKS = {
     "serial": "--serial xsens --port-link {0}/port",
@@ -36,6 +35,8 @@ every_link = pytest.mark.parametrize(
         pytest.param("text", marks=pytest.mark.thorough),
     ],
 )
+
+POSITIONS = [(0.0, 0.0), (45.0, 5.0)]
 
 SURVIVED: tuple[dict[str, float], ...] = (
     {"flip_bits": 5},
@@ -54,15 +55,22 @@ SURVIVED: tuple[dict[str, float], ...] = (
 
 
 class Run:
-    """A calibration of a virtual device in other processes, and what came of it."""
+    """A calibration of a virtual device in other processes, and what came of it.
 
-    def __init__(self, folder: Path, link: str, seconds: int = 10) -> None:
-        self.folder, self._control = folder / "session", folder / "control"
+    The device is turned when it is asked for, so that nothing is over before all that
+    should happen has happened, on a machine however slow.
+    """
+
+    def __init__(self, folder: Path, link: str) -> None:
+        self.folder = folder / "session"
         name, _, conceals = link.partition(" ")
-        virtual = f"{LINKS[name].format(folder)} {conceals} --control {self._control}"
+        options = f"{LINKS[name].format(folder)} --speed 20 {conceals}".split()
+        options += ["--latitude=50.45", "--height=0"]
+        self._device = VirtualMover(options, once=False)
+        self.truth = self._device.truth
         self._process = subprocess.Popen(
-            [*TWO_POSITION, "--seconds", str(seconds), "--json", "--speed", "20"]
-            + [f"--virtual={virtual}", "-o", str(self.folder)],
+            [*TWO_POSITION, "--seconds=10", "--latitude=50.45", "--json"]
+            + ["--device", address(options, self._device.port), "-o", str(self.folder)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -70,17 +78,30 @@ class Run:
         wait_for_samples(self.folder, self._process)
 
     def fault(self, *faults: dict[str, float]) -> None:
-        with Remote(self._control) as remote:
-            for fault in faults:
-                over = remote.ask(fault=fault)["until_s"] + 0.5
-                while over < 1e5 and remote.ask(status={})["time_s"] < over:
-                    sleep(0.01)
+        for fault in faults:
+            over = self._device.ask(fault=fault)["until_s"] + 0.5
+            while over < 1e5 and self._device.ask(status={})["time_s"] < over:
+                sleep(0.01)
 
     def end(self) -> tuple[int, Any, str]:
-        """Exit code, the result, and the last line of standard error."""
-        out, said = self._process.communicate()
-        lines = said.strip().splitlines()
-        return self._process.returncode, json.loads(out or "null"), lines[-1]
+        """Turn the device, then exit code, result, and last line of standard error."""
+        assert self._process.stdout and self._process.stderr
+        said = []
+        for line in self._process.stderr:
+            said.append(line.strip())
+            told = json.loads(line) if line.startswith("{") else {}
+            if told.get("event") == "place":
+                turned([self._device], *POSITIONS[told["position"]])
+        out = self._process.stdout.read()
+        return self._process.wait(), json.loads(out or "null"), said[-1]
+
+    def __enter__(self) -> Run:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._process.kill()  # if it is not over by itself
+        self._process.communicate()
+        self._device.close()
 
     def marks(self, event: str) -> list[dict[str, Any]]:
         return [m for m in Session.open(self.folder).marks() if m["event"] == event]
@@ -91,10 +112,9 @@ Ended = tuple[Run, int, Any, str]
 
 
 def stumbles(folder: Path, link: str) -> Ended:
-    # long enough for all faults on a machine that is slow to order them
-    run = Run(folder, link, 20)
-    run.fault(*SURVIVED)
-    return run, *run.end()
+    with Run(folder, link) as run:
+        run.fault(*SURVIVED)
+        return run, *run.end()
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +151,7 @@ def test_a_link_that_stumbles_costs_nothing_but_time(
     failed = [c["name"] for c in result["decision"]["checks"] if c["ok"] is False]
     assert failed and all(name.startswith("link: ") for name in failed), failed
     for group in ("acc_bias", "acc_scale", "gyr_bias"):
-        found, truth = result["parameters"][group], result["virtual"][group]
+        found, truth = result["parameters"][group], run.truth[group]
         if "installed" in result and group == "gyr_bias":
             # an autopilot averages them when it starts: what is left is not all of it
             parts = [result["install"][f"INS_GYROFFS_{axis}"] for axis in "XYZ"]
@@ -154,8 +174,8 @@ def test_a_link_that_stumbles_costs_nothing_but_time(
 
 
 def test_a_link_that_loses_all_the_time_is_marked_now_and_then(tmp_path: Path) -> None:
-    run = Run(tmp_path, "serial --with dropped:fraction=0.05")
-    code, result, said = run.end()
+    with Run(tmp_path, "serial --with dropped:fraction=0.05") as run:
+        code, result, said = run.end()
     assert code == 1 and "samples missing" in result["decision"]["reasons"][0], said
     marks, block = run.marks("link"), Session.open(run.folder).block
     lost = sum(mark["missing"] for mark in marks)

@@ -300,6 +300,32 @@ def test_a_mover_is_told_once_more_where_the_device_stands_wrong(bench: Bench) -
     assert events(bench) == ["asked", "window", "asked", "wrong", "wrong", "window"]
 
 
+class Slow(Turner):
+    """A table that takes three minutes, and says that it is at work."""
+
+    there: Position | None = None
+    due: float = 0.0
+
+    def place(self, hold: Hold) -> None:
+        self.there, self.due = hold.position, self.driver.device.time + 180.0
+
+    def wish(self) -> Wish | None:
+        time = self.driver.device.time
+        if self.there and time >= self.due:
+            self.due, self.there = self.driver.place(self.there), None
+        return "wait" if time < self.due else None
+
+
+def test_nobody_gives_up_on_a_mover_that_is_at_work(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner = Slow(InProcess(VirtualDevice(seed=3)))
+        engine = Engine(turner.driver, turner, ABOUT, recorder, give_up=60.0)
+        engine.run(hold_all(TWO, 10.0))
+    assert not turner.told
+    marks = Session.open(tmp_path / "s").marks()
+    assert [m["event"] for m in marks] == ["asked", "window", "asked", "window"]
+
+
 class Dead(Driver):
     """A device that says nothing."""
 

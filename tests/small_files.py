@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -68,6 +69,11 @@ def _phone(path: Path, block: Block) -> None:
             archive.writestr(name, text)
 
 
+def _json(path: Path, block: Block) -> None:
+    rows = [dict(zip(COLUMNS, row, strict=True)) for row in table(block).tolist()]
+    path.write_text("\n".join(json.dumps(row) for row in rows) + "\n")
+
+
 SMALL: dict[str, Callable[[Path, Block], object]] = {
     "ulog": lambda path, block: path.write_bytes(ulog({0: block}, {})),
     "dataflash": lambda path, block: path.write_bytes(dataflash({0: block}, {})),
@@ -77,6 +83,7 @@ SMALL: dict[str, Callable[[Path, Block], object]] = {
     "phone_zip": _phone,
     "arrays": _hdf5,
     "can_log": _candump,
+    "json_log": _json,
     "parquet": _parquet,
     "csv_like": lambda path, block: np.savetxt(path, table(block), delimiter=","),
 }
@@ -92,7 +99,7 @@ class Small:
         options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
         options = options if name == "can_log" else ""
         self.wanted = ReadOptions(COLUMNS, options=options)
-        if name in ("mcap", "rosbag", "phone_zip"):
+        if name in ("mcap", "rosbag", "phone_zip", "json_log"):
             self.wanted = ReadOptions()
         self.content = path.read_bytes()
         self.expected = whole(path, self.wanted)

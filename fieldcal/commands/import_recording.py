@@ -88,7 +88,7 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
     add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
     add("--acc-unit", default="", help="m/s^2, g, mg, V, count")
     add("--gyr-unit", default="", help="rad/s, deg/s, mrad/s, V, count")
-    add("--time-unit", default="", help="s, ms, us, ns")
+    add("--time-unit", default="", help="s, ms, 0.1ms, us, ns, d")
     add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--temp-unit", default="", help="degC, cdegC, K, count, none")

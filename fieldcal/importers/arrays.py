@@ -2,7 +2,8 @@
 
 What is in a file are arrays with names. ``--columns t,ax,ay,az`` names the columns of
 the only table in it; ``--columns t=time,ax=acc.0,ay=acc.1`` takes columns of several
-arrays, counted from 0. A table lies on its side where it is wider than long.
+arrays, counted from 0. A table lies on its side where it is wider than long. Fields of
+structures and of arrays of records are arrays too, with the name of both: ``imu/acc``.
 """
 
 from __future__ import annotations
@@ -209,7 +210,10 @@ class ArrayFile(ColumnRecording):
         file = stack.enter_context(h5py.File(path, "r"))
         if self._units is None:
             self._units = _units(file)
-        return {name: _table(file[name], unit) for name, unit in self._units.items()}
+        return {
+            name: table_of(_dataset(file, name), unit)
+            for name, unit in self._units.items()
+        }
 
 
 def _columns(tables: Mapping[str, ArrayTable]) -> list[Column]:
@@ -251,10 +255,13 @@ def _units(file: Any) -> dict[str, str]:
     found = {}
 
     def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf":
-            if item.ndim in DIMENSIONS and not name.startswith("#"):
-                said = item.attrs.get("units", item.attrs.get("unit", ""))
-                found[name] = said.decode() if isinstance(said, bytes) else str(said)
+        if not isinstance(item, h5py.Dataset) or name.startswith("#"):
+            return
+        said = item.attrs.get("units", item.attrs.get("unit", ""))
+        unit = said.decode() if isinstance(said, bytes) else str(said)
+        for field, kind in _fields(item.dtype).items():
+            if kind.base.kind in "iuf" and item.ndim + len(kind.shape) in DIMENSIONS:
+                found[f"{name}{field}"] = unit
 
     file.visititems(visit)
     return found
@@ -263,7 +270,7 @@ def _units(file: Any) -> dict[str, str]:
 def _matlab(path: Path) -> dict[str, ArrayTable]:
     from scipy.io import loadmat
 
-    return _of_arrays(loadmat(path))
+    return _of_arrays(loadmat(path, simplify_cells=True))
 
 
 def _numpy(path: Path) -> dict[str, ArrayTable]:
@@ -291,15 +298,55 @@ def _check_size(path: Path) -> None:
 
 def _of_arrays(arrays: Mapping[str, Any]) -> dict[str, ArrayTable]:
     return {
-        name: _table(array)
-        for name, array in arrays.items()
-        if isinstance(array, np.ndarray)
-        and array.dtype.kind in "iuf"
-        and array.ndim in DIMENSIONS
+        name: table_of(array)
+        for name, array in _leaves(arrays)
+        if array.dtype.kind in "iuf" and array.ndim in DIMENSIONS
     }
 
 
-def _table(array: Any, unit: str = "") -> ArrayTable:
+def _leaves(arrays: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Arrays and their names, also those within structures and arrays of records."""
+    for name, value in arrays.items():
+        if isinstance(value, Mapping):
+            yield from ((f"{name}/{inner}", one) for inner, one in _leaves(value))
+        elif isinstance(value, np.ndarray):
+            for field in _fields(value.dtype):
+                yield name + field, value[field[1:]] if field else value
+
+
+def _fields(kind: np.dtype[Any]) -> dict[str, np.dtype[Any]]:
+    """Kinds of what an array of records holds, by "/" and its name; "" of others."""
+    if kind.names is None:
+        return {"": kind}
+    return {f"/{name}": kind[name] for name in kind.names}
+
+
+def _dataset(file: Any, name: str) -> Any:
+    """A dataset of an HDF5 file, or a field of one."""
+    if name in file:
+        return file[name]
+    whole, _, field = name.rpartition("/")
+    return _Field(file[whole], field)
+
+
+class _Field:
+    """A field of a dataset of records, read as if it were an array of its own."""
+
+    def __init__(self, dataset: Any, name: str) -> None:
+        self._dataset, self._name = dataset, name
+        self.shape = dataset.shape + dataset.dtype[name].shape
+        self.ndim = len(self.shape)
+
+    def __len__(self) -> int:
+        return int(self.shape[0])
+
+    def __getitem__(self, rows: Any) -> Any:
+        first = rows[0] if isinstance(rows, tuple) else rows
+        read = self._dataset.fields(self._name)[first]
+        return read[:, rows[1]] if isinstance(rows, tuple) else read
+
+
+def table_of(array: Any, unit: str = "") -> ArrayTable:
     """Rows and columns of an array of one or two dimensions, in memory or in a file."""
     if array.ndim == 1:
         return ArrayTable((len(array), 1), lambda rows, _: [_floats(array[rows])], unit)

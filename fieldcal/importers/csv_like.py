@@ -32,6 +32,7 @@ from fieldcal.importing.headings import Column
 from fieldcal.importing.text_encoding import as_utf8, is_plain, wide
 from fieldcal.importing.text_forms import CLOCK, TextForm, forms_of
 from fieldcal.importing.text_lines import (
+    MISSING,
     TOP,
     behind,
     plain_numbers,
@@ -311,7 +312,8 @@ class TextColumns(ColumnRecording):
             if name == SKIP:
                 continue
             try:
-                row.append(float(cell.strip() or "nan"))
+                bare = cell.strip()
+                row.append(float("nan" if bare in MISSING else bare))
             except ValueError:
                 what = f"{cell.strip()[:20]!r} is not a number"
                 self.damaged(f"{self.place(number)}, column {name}", what)

@@ -9,7 +9,7 @@ that length.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import permutations
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.gravity_size import FEWEST_MEANS, Gravity, are_means, gravity_in
 from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.scales import ACC_OUT, ACC_SCALES, fitting
+from fieldcal.importing.scales import ACC_OUT, ACC_SCALES, FEWEST, fitting
 
 GROWS = 0.999
 """Share of steps of a time that are positive: a line may be damaged."""
@@ -83,6 +83,15 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     if all(known.get(i) == name for i, name in channels.items()):
         return None
     return Told(channels, why)
+
+
+def unnamed(table: Array, names: Sequence[str], known: Collection[int]) -> list[Three]:
+    """Columns that move and may be three axes, beside those that are known."""
+    if len(table) < FEWEST or table.shape[1] != len(names):
+        return []
+    without = {*known, *_growing(table)}
+    free = [i for i in range(table.shape[1]) if i not in without]
+    return _threes([i for i in free if _moves(table[:, i])], names)
 
 
 def _growing(table: Array) -> list[int]:

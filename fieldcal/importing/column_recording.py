@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,14 +13,25 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing import column_physics, columns, headings
-from fieldcal.importing.gravity_size import are_means, gravity_in
+from fieldcal.importing.column_times import coarse_question, rates_of_turns
+from fieldcal.importing.gravity_size import are_means
+from fieldcal.importing.heading_words import meaning
 from fieldcal.importing.headings import Column, HeadingMatch
 from fieldcal.importing.means import scatter_columns
-from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.recording import ImuStream, MeanScatter, ReadOptions, Recording
+from fieldcal.importing.recording import (
+    ImuStream,
+    MeanScatter,
+    ReadOptions,
+    Recording,
+)
+from fieldcal.importing.time_units import (
+    coarse_clock,
+    unit_by_rate,
+    unit_of_ticks,
+)
 
-SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
-"""Rates of logs, Hz."""
+TICK = "fine"
+"""Part of the name of times that count ticks: ``SampleTimeFine``."""
 
 
 class Heading(NamedTuple):
@@ -121,8 +133,10 @@ class ColumnRecording(Recording):
         return {n: places.index(p) for n, _, p in names if p in places}
 
     def _rated(self, wanted: ReadOptions) -> ReadOptions:
-        """Options with the rate that the file says, where no column is the time."""
-        if wanted.rate_hz or _has_time(wanted):
+        """Options with the rate that the file says, or with the unit of its times."""
+        if _has_time(wanted):
+            return self._ticked(wanted)
+        if wanted.rate_hz:
             return wanted
         said = self.rate_said()
         if said is None:
@@ -137,6 +151,35 @@ class ColumnRecording(Recording):
         self.says += [sentence] if sentence not in self.says else []
         return replace(wanted, rate_hz=rate)
 
+    def _ticked(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with the unit of times, where the rate or their name tells it.
+
+        Raises
+        ------
+        InputError
+            If its times are too coarse to say when a row was taken.
+
+        """
+        table, at = self.beginning(), self._numbers_of(wanted).get("t", -1)
+        if not 0 <= at < table.shape[1]:
+            return wanted
+        t = table[:, at]
+        if (coarse := coarse_clock(t)) is not None:
+            raise InputError(f"{self.path}: {coarse_question(wanted, coarse, t)}")
+        if wanted.time_unit:
+            return wanted
+        said = self.rate_said()
+        names = [c.name for way in self.heading() for c in way.columns[at : at + 1]]
+        unit, why = "", "its name says ticks"
+        if said is not None:
+            unit, why = unit_by_rate(t, said[0]), f"its top says the rate: {said[1]!r}"
+        elif any(TICK in name.lower() for name in names):
+            unit = unit_of_ticks(t)
+        if unit in ("", "s"):
+            return wanted
+        self.guessed["time"] = f"{unit}: {why}"
+        return replace(wanted, time_unit=unit)
+
     def _found(self) -> dict[str, ReadOptions]:
         if self.wanted.columns:
             return {"0": self.wanted}
@@ -147,6 +190,7 @@ class ColumnRecording(Recording):
             told = self._told(named, way or next((w for _, w in ways), None))
             if told is not None:
                 return {"0": told}
+            self._say_unnamed(named, way)
         if not named:
             raise InputError(self.ask())
         taken = {one.name: one.taken(self.wanted) for one in named}
@@ -178,6 +222,37 @@ class ColumnRecording(Recording):
         wanted = named[0].taken(self.wanted) if named else self.wanted
         return replace(wanted, columns=chosen)
 
+    def _say_unnamed(self, named: Sequence[HeadingMatch], way: Heading | None) -> None:
+        """Ask about axes that no name says where none are the accelerometers.
+
+        Raises
+        ------
+        InputError
+            With the columns both ways.
+
+        """
+        if not named or way is None:
+            return
+        known = _known(named, way)
+        others = {i for i, c in enumerate(way.columns) if meaning(c.name, c.unit)}
+        names = [c.name for c in way.columns]
+        threes = column_physics.unnamed(self.beginning(), names, {*known, *others})
+        if not threes:
+            return
+        which = " ".join(names[i] or f"column {i + 1}" for i in threes[0])
+        if "ax" in known.values():
+            self.says.append(f"{which}: nothing says what they are; they are left out")
+            return
+        axes = zip(threes[0], ("ax", "ay", "az"), strict=True)
+        places = [c.place for c in way.columns]
+        with_them = ",".join(_as_option(known | dict(axes), places, way.skip))
+        raise InputError(
+            f"{self.path}: the names of its columns say where the gyroscopes are, and"
+            f" nothing tells whether {which} are the accelerometers: add --columns"
+            f" {quote(with_them)} if they are, or --columns"
+            f" {quote(','.join(_as_option(known, places, way.skip)))}"
+        )
+
     def _check_time(self, wanted: ReadOptions) -> None:
         """Ask for the rate where no column is the time.
 
@@ -189,7 +264,7 @@ class ColumnRecording(Recording):
         """
         if _has_time(wanted) or wanted.rate_hz or not wanted.columns:
             return
-        turns = self._rate_of_turns(wanted)
+        turns = rates_of_turns(wanted, self.beginning())
         unit, about = next(iter(turns.items()), ("", 100.0))
         hint = f", which its turns say about, if rates are in {unit}" if unit else ""
         raise InputError(
@@ -197,27 +272,14 @@ class ColumnRecording(Recording):
             f" {about:.3g}{hint}"
         )
 
-    def _rate_of_turns(self, wanted: ReadOptions) -> dict[str, float]:
-        """Rates, Hz, at which the turns are those that gravity shows, by unit."""
-        at = {c.partition("=")[0]: i for i, c in enumerate(wanted.columns)}
-        table = self.beginning()
-        if not {"ax", "ay", "az", "gx", "gy", "gz"} <= set(at) or (
-            table.shape[1] != len(wanted.columns)
-        ):
-            return {}
-        acc, gyr = (table[:, [at[kind + axis] for axis in "xyz"]] for kind in "ag")
-        gravity = gravity_in(acc)
-        if gravity is None:
-            return {}
-        reads = rate_in(np.arange(len(table)) / 100.0, acc, gyr, gravity)
-        if reads is None:
-            return {}
-        fits = {"rad/s": 1.0, "deg/s": float(np.rad2deg(1.0)), "mrad/s": 1e3}
-        if wanted.gyr_unit:
-            fits = {wanted.gyr_unit: 1 / wanted.gyr_scale}
-        rates = {unit: 100 * reads / one for unit, one in fits.items()}
-        sane = {u: rate for u, rate in rates.items() if SLOWEST <= rate <= FASTEST}
-        return dict(sorted(sane.items(), key=lambda one: abs(np.log(one[1] / USUAL))))
+
+def _as_option(
+    channels: Mapping[int, str], places: Sequence[str], skip: str
+) -> list[str]:
+    """Columns as ``--columns`` names them."""
+    if skip:
+        return [channels.get(i, skip) for i in range(len(places))]
+    return [f"{channels[i]}={places[i]}" for i in sorted(channels)]
 
 
 def _has_time(wanted: ReadOptions) -> bool:

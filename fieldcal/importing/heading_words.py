@@ -43,7 +43,7 @@ SPELLINGS = {
     "ms": ("ms", "msec", "millis", "milliseconds"),
     "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
     "ns": ("ns", "nsec", "nanos", "nanoseconds"),
-    "deg C": ("c", "°c", "degc", "deg c", "celsius", "℃", "degrees c"),
+    "deg C": ("c", "°c", "°", "degc", "deg c", "celsius", "℃", "degrees c"),
 }
 """How each unit is written."""
 
@@ -89,13 +89,14 @@ _PHRASES = (
     (("linear", "accel"), "linear"),
 )
 _TIMES = ("t", "time", "timestamp", "stamp", "timestamps")
-_TEMPERATURES = ("temp", "temperature", "temps")
+_TEMPERATURES = ("temp", "temperature", "temps", "tmp")
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
 """Words that tell no IMU from another where all of one kind have them."""
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+")
 _BRACKETS = re.compile(r"(.*?)\s*[\[({](.*)[\])}]\s*")
+_BRACKETED_AXIS = re.compile(r"[\[(]([xyzXYZ])[\])]")
 _INDEX = re.compile(r"(.+)\[([012])\]")
 _WRITTEN = {text: unit for unit, texts in SPELLINGS.items() for text in texts}
 
@@ -140,7 +141,7 @@ def meaning(name: str, unit: str = "") -> Meaning | None:
     >>> meaning("imu1_GyroX (dps)")
     Meaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), weak=False)
     """
-    name = name.strip().strip('"').strip()
+    name = _BRACKETED_AXIS.sub(r" \1 ", name.strip().strip('"')).strip()
     if (whole := _WHOLE.get(name.lower())) is not None:
         return Meaning(whole, "", None)
     for bare, said in _ways(name, unit):
@@ -179,6 +180,8 @@ def _ways(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
 def _of_words(words: list[str], unit: str | None) -> Meaning | None:
     if not words:
         return None
+    if words == ["t"] and unit == "deg C":
+        return Meaning("temperature", "", unit)
     for phrase, kind in _PHRASES:
         if (at := _place(words, phrase)) is not None:
             rest = words[:at] + words[at + len(phrase) :]
@@ -191,6 +194,9 @@ def _of_words(words: list[str], unit: str | None) -> Meaning | None:
         apart = word in _SENSORS["g"] and bool(rest[i:]) and rest[i] in AXES
         if kind and word[-1] in "xyz" and not apart:
             return Meaning(kind, word[-1], unit, tuple(rest))
+        kind = next((k for k, names in _SENSORS.items() if word[1:] in names), "")
+        if kind and word[0] in "xyz" and len(word) > len("xg"):
+            return Meaning(kind, word[0], unit, tuple(rest))
     for i, word in enumerate(words):
         rest = words[:i] + words[i + 1 :]
         kind = next((k for k, names in _SENSORS.items() if word in names), "")

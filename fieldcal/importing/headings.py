@@ -21,7 +21,18 @@ SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "n
 
 MEAN = ("mean", "avg", "average")
 
-NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered")
+NOT_SAMPLES = (
+    *SCATTER,
+    "min",
+    "max",
+    "median",
+    "bias",
+    "offset",
+    "cov",
+    "filtered",
+    "low",
+    "lower",
+)
 """Words of columns that are no samples of a sensor."""
 
 FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air",

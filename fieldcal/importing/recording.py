@@ -35,7 +35,14 @@ TEMP_UNITS = {
 }
 """Kelvin in one of each, and deg C at its 0; "none" leaves it out."""
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+TIME_UNITS = {
+    "s": 1.0,
+    "ms": 1e-3,
+    "0.1ms": 1e-4,
+    "us": 1e-6,
+    "ns": 1e-9,
+    "d": 86400.0,
+}
 
 
 class MeanScatter(NamedTuple):

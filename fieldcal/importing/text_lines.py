@@ -5,6 +5,9 @@ from __future__ import annotations
 from fieldcal.core.samples import Array
 from fieldcal.session.arrow_stream import numbers
 
+MISSING = ("", "null", "NULL", "None", "NA", "N/A", "n/a", "#N/A", "NaN", "nan", "-")
+"""What stands in a cell that holds no value."""
+
 TOP = 1000
 """Lines at the top among which the first of numbers is looked for."""
 
@@ -63,7 +66,7 @@ def plain_numbers(
                 column_types=dict.fromkeys(wanted, pa.float64()),
                 decimal_point="," if comma else ".",
                 include_columns=wanted,
-                null_values=[""],
+                null_values=[*MISSING],
             ),
         )
     except (pa.ArrowInvalid, ValueError):

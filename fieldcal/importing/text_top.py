@@ -27,9 +27,12 @@ ABOVE = 4
 NUMBERS = 0.5
 """Share of the cells of a line that are numbers, where names of columns are not."""
 
+_AXIS = re.compile(r"(.*[^\W_].*?|.*\(|[A-Za-z])([xyzXYZ])(\)?\s*(?:[\[({].*[\])}])?)")
+"""A name that ends with an axis, and maybe a unit."""
+
 _RATE = re.compile(
     r"[#%/\s\"]*(?:fs|(?:sample|sampling|output|update|data|logging)[ _]*"
-    r"(?:rate|frequency|freq)|frequency|odr)\b[ _]*(?:\(?hz\)?)?\s*[:=,;\t ]\s*\"?"
+    r"(?:rate|frequency|freq)|frequency|odr)\b[ _]*(?:\(?hz\)?)?\s*[:=,;\t ]+\s*\"?"
     r"([0-9]+(?:\.[0-9]+)?)\s*(?:hz)?\W*",
     re.IGNORECASE,
 )
@@ -50,8 +53,8 @@ def is_number(cell: str, comma: bool) -> bool:
 
 
 def cells(line: str, separator: str | None) -> list[str]:
-    """Cells of a line, without the spaces about them."""
-    return [cell.strip() for cell in line.split(separator)]
+    """Cells of a line, without spaces and quotes about them."""
+    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
 
 
 def first_numbers(lines: Sequence[str], separator: str | None) -> int:
@@ -82,6 +85,8 @@ def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]
 def _ways(rows: Sequence[Sequence[str]]) -> Iterator[list[Column]]:
     for i, row in enumerate(rows):
         yield [Column("", name) for name in row]
+        if (filled := _filled(row)) != [*row]:
+            yield [Column("", name) for name in filled]
         if i + 1 == len(rows) or len(rows[i + 1]) != len(row):
             continue
         below = rows[i + 1]
@@ -95,6 +100,22 @@ def _ways(rows: Sequence[Sequence[str]]) -> Iterator[list[Column]]:
             above = name or above
             joined.append(Column("", f"{above} {under}"))
         yield joined
+
+
+def _filled(row: Sequence[str]) -> list[str]:
+    """Names of which an axis alone belongs to the one before: ``acc_x,y,z``.
+
+    >>> _filled(["t", "Accel (z) [g]", "(x)", "(y)", "gx", "y", "z"])
+    ['t', 'Accel (z) [g]', 'Accel (x) [g]', 'Accel (y) [g]', 'gx', 'gy', 'gz']
+    """
+    found: list[str] = []
+    for name in row:
+        bare = re.fullmatch(r"\(?([xyzXYZ])\)?", name)
+        before = _AXIS.fullmatch(found[-1]) if found else None
+        if bare and before:
+            name = f"{before[1]}{bare[1]}{before[3]}"
+        found.append(name)
+    return found
 
 
 def rate_above(lines: Sequence[str], separator: str | None) -> tuple[float, str] | None:

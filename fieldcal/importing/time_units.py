@@ -1,13 +1,17 @@
 """Units that the times of a file may be in.
 
-A logger writes 1 to 8000 samples a second, which tells s, ms, us and ns apart.
+A logger writes 1 to 8000 samples a second, which tells s, ms, us, ns and the days of a
+spreadsheet apart. Where the file says the rate, that tells its ticks.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.importing.recording import TIME_UNITS
 from fieldcal.importing.scales import FEWEST
 
 RATES_HZ = (1.0, 8000.0)
@@ -16,7 +20,10 @@ RATES_HZ = (1.0, 8000.0)
 SHORTEST = 5.0
 """Shortest recording, s, where another unit of time makes it longer."""
 
-TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "d": 1 / 86400}
+
+SHARED = 0.5
+"""Part of the rows whose time is that of the row before, of a clock too coarse."""
 
 UNIX = (1e9, 4e9)
 """Times of day since 1970, s: 2001 to 2096."""
@@ -37,3 +44,66 @@ def time_units(t: Array) -> list[str]:
         return both
     span = float(steps.sum())
     return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST] or usual
+
+
+TICKS = ("0.1ms", "us")
+"""Units of what is called ``SampleTimeFine``, by the device."""
+
+TICKED_HZ = (4.0, 2000.0)
+"""Rates of the devices that count them: of two units, one alone is within."""
+
+NEAR = 0.1
+"""Part by which a rate that is said and that of the times differ."""
+
+
+def unit_by_rate(t: Array, rate_hz: float) -> str:
+    """Unit in which times (n,) come at a rate; nothing if in none.
+
+    >>> unit_by_rate(np.arange(100) * 100.0, 100.0)
+    '0.1ms'
+    """
+    step = _step(t)
+    near = [u for u, size in TIME_UNITS.items()
+            if step and abs(np.log(rate_hz * step * size)) < NEAR]  # fmt: skip
+    return near[0] if near else ""
+
+
+def unit_of_ticks(t: Array) -> str:
+    """Unit of ticks (n,) that make a rate that loggers have; nothing if none does."""
+    low, high = TICKED_HZ
+    step = _step(t)
+    usual = [u for u in TICKS if step and low <= 1 / (step * TIME_UNITS[u]) <= high]
+    return usual[0] if len(usual) == 1 else ""
+
+
+class CoarseClock(NamedTuple):
+    """Times that many rows share.
+
+    Attributes
+    ----------
+    step : of the times, in their unit
+    rows : that share one
+
+    """
+
+    step: float
+    rows: float
+
+
+def coarse_clock(t: Array) -> CoarseClock | None:
+    """What times (n,) are that most rows share with the one before; None of others."""
+    t = t[np.isfinite(t)]
+    steps = np.diff(t)
+    if len(steps) < FEWEST or (steps == 0).mean() <= SHARED:
+        return None
+    begins = np.flatnonzero(steps > 0)
+    if len(begins) < len("12"):
+        return None
+    return CoarseClock(_step(t), float(np.median(np.diff(begins))))
+
+
+def _step(t: Array) -> float:
+    """Usual distance of times that differ; 0 of none."""
+    steps = np.diff(t[np.isfinite(t)])
+    steps = steps[steps > 0]
+    return float(np.median(steps)) if len(steps) else 0.0

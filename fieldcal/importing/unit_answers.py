@@ -9,14 +9,14 @@ from fieldcal.importing.scales import GYR_SCALES, Scale
 
 
 def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
-    """Options to paste: those that fit, or examples."""
+    """Options to paste: those that fit; else counts, about `lsb` in a unit."""
     lines = [
         f"--{kind}-unit {s.unit}" + (f" --{kind}-lsb {s.lsb:.6g}" if s.lsb != 1 else "")
         for s in fits
     ]
     return lines or [
-        f"--{kind}-unit {unit} --{kind}-lsb {lsb:g} (counts in one {unit}, as its data"
-        " sheet says)",
+        f"--{kind}-unit {unit} --{kind}-lsb {lsb:.3g} (about so many counts in one"
+        f" {unit}; its data sheet says the number)",
         f"--{kind}-unit {unit}",
     ]
 

@@ -181,7 +181,7 @@ class _Guess:
             self._ask(
                 f"{shows}, which is gravity in"
                 f" {' or '.join(map(str, fits)) or 'no usual unit'}",
-                answers("acc", fits, "g", 2048),
+                answers("acc", fits, "g", gravity.size),
             )
         if fits[0].unit != "m/s^2":
             self.found["acceleration"] = f"{fits[0]}: {shows}"
@@ -220,7 +220,7 @@ class _Guess:
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
-                answers("gyr", fits, "deg/s", 16.4),
+                answers("gyr", fits, "deg/s", np.deg2rad(reads)),
             )
         if fits[0].unit != "rad/s":
             self.found["angular_rate"] = f"{fits[0]}: {shows}"

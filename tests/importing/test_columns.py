@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,8 @@ def test_columns_without_names_are_told_whatever_their_order(
      "Time [s],Accelerometer [m/s^2],,,Gyroscope [rad/s],,\n,X,Y,Z,X,Y,Z",
      "%time,field.linear_acceleration.x,field.linear_acceleration.y,"
      "field.linear_acceleration.z,field.angular_velocity.x,field.angular_velocity.y,"
-     "field.angular_velocity.z", "a,b,c,d,e,f,g"],
+     "field.angular_velocity.z", "a,b,c,d,e,f,g", "t,ax,y,z,gx,y,z",
+     '"cts","Accelerometer (x) [m/s²]","(y)","(z)","Gyro (x) [rad/s]","(y)","(z)"'],
 )  # fmt: skip
 def test_headings_as_they_come_need_no_option(tmp_path: Path, heading: str) -> None:
     rows = turned(2, 50.0)
@@ -156,3 +158,75 @@ def test_several_imus_go_into_folders_of_their_own(tmp_path: Path) -> None:
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
     same(Session.open(tmp_path / "out" / "0"), rows[:n])
     same(Session.open(tmp_path / "out" / "1"), np.c_[rows[:n, :1], other[:n, 1:]])
+
+
+@pytest.mark.parametrize("ticks", [1e4, 1e6])
+@pytest.mark.parametrize("said", [True, False])
+def test_ticks_of_a_device_are_told_by_the_rate_or_by_their_name(
+    tmp_path: Path, ticks: float, said: bool
+) -> None:
+    rows = turned(4, 50.0)
+    log = rows * [ticks, *[1.0] * 6]
+    log[:, 0] = np.round(log[:, 0])
+    name = "Time" if said else "SampleTimeFine"
+    heading = f"{name},Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z"
+    top = "// Update Rate: 50.0Hz\n" if said else ""
+    session = imported(write(tmp_path, log, heading=top + heading))
+    same(session, rows)
+    assert session.about.raw["guessed"]["time"].startswith(
+        "0.1ms" if ticks == 1e4 else "us"
+    )
+
+
+def test_days_of_a_spreadsheet_are_seconds(tmp_path: Path) -> None:
+    rows = turned(5, 50.0)
+    days = np.column_stack([45415.9 + rows[:, 0] / 86400, rows[:, 1:]])
+    lines = [",".join([f"{r[0]:.11f}", *(f"{x:.9g}" for x in r[1:])]) for r in days]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["Time,ax,ay,az,gx,gy,gz", *lines]))
+    session = imported(path)
+    np.testing.assert_allclose(session.block.t, rows[:, 0], atol=1e-5)
+
+
+def test_a_clock_of_whole_seconds_is_asked_about_with_its_rate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(6, 50.0)
+    coarse = np.column_stack([np.floor(rows[:, 0]), rows[:, 1:]])
+    path = write(tmp_path, coarse, heading="time,ax,ay,az,gx,gy,gz")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    asks = "about 50 rows in each.*add --columns _,ax,ay,az,gx,gy,gz --rate 50"
+    assert re.search(asks, capsys.readouterr().err)
+    answer = ("--columns", "_,ax,ay,az,gx,gy,gz", "--rate", "50")
+    same(imported(path, *answer), rows)
+
+
+def test_axes_without_a_name_beside_gyroscopes_are_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(7, 50.0)
+    rng = np.random.default_rng(7)
+    # raw, about a zero far away, and hardly turned: physics cannot tell what they are
+    still = np.round([33000, 33000, 35048] + rng.normal(0, 9, (len(rows), 3)))
+    log = np.column_stack([rows[:, 0], still, rng.normal(0, 1e-3, (len(rows), 3))])
+    path = write(tmp_path, log, heading="t,u1,u2,u3,gx,gy,gz")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "whether u1 u2 u3 are the accelerometers" in said
+    assert "add --columns t,ax,ay,az,gx,gy,gz if they are" in said
+    assert "or --columns t,_,_,_,gx,gy,gz" in said
+    session = imported(path, "--columns", "t,_,_,_,gx,gy,gz")
+    assert np.isnan(session.block.acc).all()
+
+
+def test_words_for_nothing_are_missing_numbers(tmp_path: Path) -> None:
+    rows = turned(8, 50.0)
+    path = write(tmp_path, rows, heading="t,ax,ay,az,gx,gy,gz")
+    lines = path.read_text().split("\n")
+    for i, word in enumerate(("null", "NaN", "N/A", "None", "-"), 40):
+        cells = lines[i].split(",")
+        lines[i] = ",".join([*cells[:4], *[word] * 3])
+    path.write_text("\n".join(lines))
+    session = imported(path)
+    assert len(session.block) == len(rows)
+    assert np.isnan(session.block.gyr).any(axis=1).sum() == 5

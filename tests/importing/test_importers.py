@@ -442,3 +442,31 @@ def test_bytes_of_a_port_are_named_by_their_wire_format(
     assert main(["import", str(path), "--format", "morse"]) == 2
     said = capsys.readouterr().err
     assert "no format 'morse'" in said and "witmotion" in said and "csv_like" in said
+
+
+@pytest.mark.parametrize("ending", ["mat", "h5", "npy"])
+def test_fields_of_structures_are_arrays(tmp_path: Path, ending: str) -> None:
+    block = imu(0, 40)
+    records = np.zeros(
+        len(block), [("time", "f8"), ("accel", "f8", 3), ("gyro", "f8", 3)]
+    )
+    records["time"], records["accel"], records["gyro"] = block.t, block.acc, block.gyr
+    path = tmp_path / f"log.{ending}"
+    if ending == "mat":
+        from scipy.io import savemat
+
+        inner = {name: records[name] for name in records.dtype.names or ()}
+        savemat(path, {"device": {"imu": inner, "name": "left"}, "fs": 100.0})
+    elif ending == "h5":
+        import h5py
+
+        with h5py.File(path, "w") as file:
+            file["device/imu"] = records
+    else:
+        np.save(path, records)
+    recording = open_recording(path, ReadOptions())
+    (stream,) = recording.streams()
+    got = concat(list(recording.blocks(stream.name)))
+    np.testing.assert_allclose(got.t, block.t)
+    np.testing.assert_allclose(got.acc, block.acc)
+    np.testing.assert_allclose(got.gyr, block.gyr)

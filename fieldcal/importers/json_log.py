@@ -1,0 +1,72 @@
+"""JSON: a record a line, a list of records, or lists side by side.
+
+    {"t": 0.01, "acc": [0.1, 0.2, 9.8], "gyro": {"x": 0, "y": 0, "z": 0}}
+    [{"time": "2024-05-03T12:00:00.01Z", "ax": 0.1, ...}, ...]
+    {"t": [0.01, ...], "ax": [0.1, ...], ...}
+    {"data": [{"imu6": {"Timestamp": 10, "ArrayAcc": [{"x": ...}, ...]}}, ...]}
+
+What lies within is named with what it lies in, ``acc/x``. Records that hold the samples
+of some time say when it began; the samples lie evenly until the next begins.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from fieldcal.importers.arrays import ArrayFile, ArrayTable, table_of
+from fieldcal.importing.json_lists import json_lists
+from fieldcal.importing.text_encoding import as_utf8
+
+WHAT = "JSON: records or lists"
+
+BEGINS = re.compile(rb"\s*(?:\xef\xbb\xbf)?\s*(?:\{\s*\"|\[\s*[\[{])")
+
+
+def recognises(head: bytes, path: Path) -> bool:
+    """Whether a file begins like JSON."""
+    return BEGINS.match(head) is not None
+
+
+class JsonLog(ArrayFile):
+    """Numbers in JSON, with one IMU in them or several."""
+
+    def needs(self) -> tuple[tuple[str, ...], str]:
+        """Return what reading it takes: nothing."""
+        return (), ""
+
+    @contextmanager
+    def _opened(self) -> Iterator[dict[str, ArrayTable]]:
+        """Every list of numbers in the file."""
+        if self._loaded is None:
+            text = b"".join(as_utf8(self.pieces())).decode(errors="replace")
+            lists = json_lists(self._document(text))
+            self._loaded = {name: table_of(values) for name, values in lists}
+        yield self._loaded
+
+    def _document(self, text: str) -> Any:
+        """What the text holds; lines of records as a list.
+
+        Raises
+        ------
+        InputError
+            If it is not whole.
+
+        """
+        try:
+            return json.loads(text)
+        except (ValueError, RecursionError):
+            pass
+        found = []
+        for number, line in enumerate(text.splitlines(), 1):
+            if not line.strip():
+                continue
+            try:
+                found.append(json.loads(line))
+            except (ValueError, RecursionError) as error:
+                self.damaged(f"line {number}", f"is no JSON: {error}"[:80])
+        return found

@@ -1,0 +1,174 @@
+"""Lists of numbers in a JSON document, each with the name of what it lies in.
+
+A list of records becomes a list for each of their fields: ``{"acc": {"x": 1}}`` gives
+``acc_x``, three numbers in a list are axes, and texts that are times of a clock become
+seconds. Records that hold several samples each say when the first of them was taken;
+the others lie evenly until the next record begins. Where the texts or the fields of
+records differ, such as the name of a sensor, each kind has lists of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.clock_text import ClockText, is_clock
+from fieldcal.importing.heading_words import meaning
+
+AXES = "xyz"
+
+DEEPEST = 20
+"""Records within records that are looked at."""
+
+
+class Record(NamedTuple):
+    """A record, without records within it.
+
+    Attributes
+    ----------
+    numbers : by name; nan where there is none
+    clocks : times of a clock by name
+    texts : other texts by name
+    samples : records of several samples by name
+
+    """
+
+    numbers: dict[str, float]
+    clocks: dict[str, str]
+    texts: dict[str, str]
+    samples: dict[str, Sequence[Any]]
+
+
+def json_lists(document: Any, name: str = "") -> Iterator[tuple[str, Array]]:
+    """Lists (n,) or (n, k) of a document, with their names.
+
+    >>> [(n, v.tolist()) for n, v in json_lists([{"t": 0, "a": {"x": 1}}, {"t": 1}])]
+    [('t', [0.0, 1.0]), ('a_x', [1.0, nan])]
+    """
+    if isinstance(document, Mapping):
+        for key, value in document.items():
+            if name.count("/") < DEEPEST:
+                full = f"{name}/{key}" if name else key
+                yield from json_lists(value, full or "value")
+    elif not isinstance(document, list) or len(document) <= 1:
+        return
+    elif all(_is_number(one) for one in document):
+        yield name or "list", _floats(document)
+    elif all(isinstance(one, list) for one in document):
+        if len({len(one) for one in document}) == 1 and document[0]:
+            rows = [_floats(one) for one in document if all(map(_is_number, one))]
+            if len(rows) == len(document):
+                yield name or "list", np.array(rows)
+    else:
+        records = [_record(one) for one in document if isinstance(one, Mapping)]
+        for prefix, alike in _kinds(records).items():
+            for key, values in _lists(alike).items():
+                bare = f"{prefix}_{key}" if prefix else key
+                yield (f"{name}/{bare}" if name else bare), values
+
+
+def _is_number(value: Any) -> bool:
+    return value is None or (
+        isinstance(value, (int, float)) and not isinstance(value, bool)
+    )
+
+
+def _floats(values: Sequence[Any]) -> Array:
+    return np.array([_float(value) for value in values])
+
+
+def _float(value: Any) -> float:
+    try:
+        return float("nan" if value is None else value)
+    except OverflowError:
+        return float("inf")
+
+
+def _record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> Record:
+    """A record, with the names of what lies within it joined."""
+    found = Record({}, {}, {}, {})
+    for key, inner in value.items():
+        full = f"{name}_{key}".strip("_") or "value"
+        if isinstance(inner, Mapping) and depth < DEEPEST:
+            within = _record(inner, full, depth + 1)
+            found.numbers.update(within.numbers)
+            found.clocks.update(within.clocks)
+            found.texts.update(within.texts)
+            found.samples.update(within.samples)
+        elif _is_number(inner):
+            found.numbers[full] = _float(inner)
+        elif isinstance(inner, str) and is_clock(inner):
+            found.clocks[full] = inner
+        elif isinstance(inner, str):
+            found.texts[full] = inner
+        elif isinstance(inner, list) and all(_is_number(one) for one in inner):
+            axes = AXES if len(inner) == len(AXES) else range(len(inner))
+            pairs = zip(axes, inner, strict=True)
+            found.numbers.update({f"{full}_{a}": _float(v) for a, v in pairs})
+        elif isinstance(inner, list) and inner:
+            found.samples[full] = inner
+    return found
+
+
+def _kinds(records: Sequence[Record]) -> dict[str, list[Record]]:
+    """Records that are alike, by the texts in which they differ from others."""
+    names = {name for one in records for name in one.texts}
+    differ = [
+        name
+        for name in sorted(names)
+        if 1 < len({one.texts.get(name) for one in records}) <= len(records) / 2
+    ]
+    found: dict[str, list[Record]] = {}
+    for one in records:
+        found.setdefault("_".join(one.texts.get(n, "") for n in differ), []).append(one)
+    return found
+
+
+def _lists(records: Sequence[Record]) -> dict[str, Array]:
+    """Values of each field, (n,), in the order of the records."""
+    if any(one.samples for one in records):
+        return _of_samples([one for one in records if one.samples])
+    found = {
+        name: np.array([one.numbers.get(name, np.nan) for one in records])
+        for name in dict.fromkeys(name for one in records for name in one.numbers)
+    }
+    return found | {
+        f"utc {name} [s]": _seconds([one.clocks.get(name, "") for one in records])
+        for name in dict.fromkeys(name for one in records for name in one.clocks)
+    }
+
+
+def _seconds(texts: Sequence[str]) -> Array:
+    clock = ClockText()
+    read = (clock.seconds(text) for text in texts)
+    return np.array([np.nan if since is None else since for since in read])
+
+
+def _of_samples(records: Sequence[Record]) -> dict[str, Array]:
+    """Values of each field of samples, several of which a record holds."""
+    many = [min(len(inner) for inner in one.samples.values()) for one in records]
+    bare = [one._replace(samples={}) for one in records]
+    whole = [
+        _record({name: inner[i] for name, inner in one.samples.items()})
+        for one, m in zip(records, many, strict=True)
+        for i in range(m)
+    ]
+    found = _lists(whole) if not any(one.samples for one in whole) else {}
+    for name, values in _lists(bare).items():
+        said = meaning(name)
+        is_time = said is not None and said.kind == "t"
+        spread = _evenly(values, many) if is_time else np.repeat(values, many)
+        found[name] = spread
+    return found
+
+
+def _evenly(begins: Array, many: Sequence[int]) -> Array:
+    """Times of samples that lie evenly from the beginning of a record to the next."""
+    steps = [b - a for a, b in pairwise(begins)] or [0.0]
+    last = steps[-1] * many[-1] / max(many[-2] if len(many) > 1 else 1, 1)
+    parts = zip(begins, [*steps[: len(begins) - 1], last], many, strict=True)
+    return np.concatenate([b + s * np.arange(m) / m for b, s, m in parts])

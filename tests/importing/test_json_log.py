@@ -1,0 +1,113 @@
+"""JSON as programs write it: records, lists, and records of several samples each."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block, concat
+from fieldcal.importers import open_recording
+from fieldcal.importing.json_lists import json_lists
+from fieldcal.importing.recording import ReadOptions
+
+ROWS = 60
+T = np.arange(ROWS) / 50
+ACC = np.column_stack([0.1 * np.sin(T), 0.2 + 0 * T, 9.8 + 0 * T])
+GYR = np.column_stack([0.01 * np.cos(T), 0 * T, 0.02 + 0 * T])
+
+
+def axes(row: np.ndarray) -> dict[str, float]:
+    return dict(zip("xyz", row.tolist(), strict=True))
+
+
+def nested(i: int) -> dict[str, Any]:
+    return {"t": T[i], "acc": axes(ACC[i]), "gyro": axes(GYR[i])}
+
+
+def flat(i: int) -> dict[str, Any]:
+    row: dict[str, Any] = {"time": f"2024-05-03T12:00:{T[i]:09.6f}Z", "on": True}
+    for name, values in (("a", ACC[i]), ("g", GYR[i])):
+        row |= {name + x: v for x, v in axes(values).items()}
+    return row
+
+
+def blocks(size: int) -> dict[str, Any]:
+    some = [slice(i, i + size) for i in range(0, ROWS, size)]
+    return {
+        "data": [
+            {
+                "imu6": {
+                    "Timestamp": int(1000 * T[s.start]),
+                    "ArrayAcc": [axes(row) for row in ACC[s]],
+                    "ArrayGyro": [axes(row) for row in GYR[s]],
+                }
+            }
+            for s in some
+        ]
+    }
+
+
+DOCUMENTS = {
+    "lines": "\n".join(json.dumps(nested(i)) for i in range(ROWS)),
+    "list": json.dumps([flat(i) for i in range(ROWS)], indent=1),
+    "columns": json.dumps({"t": T.tolist(), "acc": ACC.tolist(), "gyr": GYR.tolist()}),
+    "blocks": json.dumps(blocks(10)),
+    "vectors": "\n".join(
+        json.dumps({"t": t, "accel": a, "gyro": g})
+        for t, a, g in zip(T.tolist(), ACC.tolist(), GYR.tolist(), strict=True)
+    ),
+}
+
+
+def read(path: Path, repair: bool = False) -> Block:
+    unit = "ms" if "imu6" in path.read_text() else "s"
+    wanted = ReadOptions(time_unit=unit)
+    recording = open_recording(path, wanted, repair=repair)
+    return concat(list(recording.blocks(recording.streams()[0].name)))
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_records_and_lists_are_samples(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "log.json"
+    path.write_text(DOCUMENTS[name])
+    got = read(path)
+    np.testing.assert_allclose(got.acc, ACC)
+    np.testing.assert_allclose(got.gyr, GYR)
+    np.testing.assert_allclose(got.t - got.t[0], T, atol=1e-6)
+
+
+def test_a_line_that_is_cut_off_is_refused_or_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    path.write_text(DOCUMENTS["lines"][:-20])
+    with pytest.raises(InputError, match=f"line {ROWS}: is no JSON.*--repair"):
+        read(path)
+    assert len(read(path, repair=True)) == ROWS - 1
+
+
+def test_records_of_different_sensors_are_not_mixed() -> None:
+    lines = [
+        {"sensor": s, "x": x, "t": i} for i in range(3) for s, x in (("a", 1), ("g", 2))
+    ]
+    got = {name: values.tolist() for name, values in json_lists(lines)}
+    assert got["a_x"] == [1, 1, 1] and got["g_x"] == [2, 2, 2]
+
+
+DEEP = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=9),
+    lambda one: (
+        st.lists(one, max_size=4)
+        | st.dictionaries(st.text(max_size=4), one, max_size=4)
+    ),
+    max_leaves=20,
+)
+
+
+@given(st.lists(DEEP, min_size=2, max_size=6) | DEEP)
+def test_any_document_has_lists_or_none(document: Any) -> None:
+    for name, values in json_lists(document):
+        assert name and values.ndim in (1, 2) and values.dtype == float

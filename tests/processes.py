@@ -23,6 +23,19 @@ TWO_POSITION = [*RUN, "two_position", "--headless", "--level=0.001", "--angles=0
 """Two positions on a base that is level, set exactly, and no operator."""
 
 
+def steady(folder: Path) -> list[str]:
+    """Options of a virtual device that stays what it is, however long it waits.
+
+    A device that is many times as fast as the clock waits for hours on a slow machine,
+    and its instability would rightly be in what is known of it.
+    """
+    file = folder / "steady.toml"
+    lines = ["format = 1", "[noise]", "acc_instability = 0.0", "gyr_instability = 0.0"]
+    lines += ["[temperature]", "self_heating_k = 0.0", "[effects.earth_rate]"]
+    file.write_text("\n".join(lines) + "\n")
+    return ["--profile", str(file)]
+
+
 @contextmanager
 def simulated(*options: str) -> Iterator[tuple[str, str]]:
     """A virtual device while it is needed: where it is, and its control socket."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import TWO_POSITION, turned, wait_for_samples
+from processes import TWO_POSITION, steady, turned, wait_for_samples
 
 from fieldcal.commands.virtual import address
 from fieldcal.run.movers import VirtualMover
@@ -65,7 +65,7 @@ class Run:
         self.folder = folder / "session"
         name, _, conceals = link.partition(" ")
         options = f"{LINKS[name].format(folder)} --speed 20 {conceals}".split()
-        options += ["--latitude=50.45", "--height=0"]
+        options += ["--latitude=50.45", "--height=0", *steady(folder)]
         self._device = VirtualMover(options, once=False)
         self.truth = self._device.truth
         self._process = subprocess.Popen(
@@ -82,6 +82,11 @@ class Run:
             over = self._device.ask(fault=fault)["until_s"] + 0.5
             while over < 1e5 and self._device.ask(status={})["time_s"] < over:
                 sleep(0.01)
+            if "reboot_s" in fault:  # what is on the way is lost when it hangs up
+                wait_for_samples(self.folder, self._process, self._recorded() + 4000)
+
+    def _recorded(self) -> int:
+        return (self.folder / "samples.arrows").stat().st_size
 
     def end(self) -> tuple[int, Any, str]:
         """Turn the device, then exit code, result, and last line of standard error."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import RUN, turned
+from processes import RUN, steady, turned
 
 from fieldcal.commands.virtual import address
 from fieldcal.core.samples import Block
@@ -55,11 +55,11 @@ def led(
 
 
 def started(
-    stack: ExitStack, speed: str, *last: str, once: bool = True
+    stack: ExitStack, folder: Path, *last: str, once: bool = True
 ) -> tuple[list[VirtualMover], list[str]]:
     devices, urls = [], []
     for link, bias in zip(LINKS, BIASES, strict=True):
-        options = [*link.split(), "--speed", speed, f"--acc-bias={bias}"]
+        options = [*link.split(), *steady(folder), "--speed=20", f"--acc-bias={bias}"]
         options += ["--latitude=50.45", "--height=0"]
         options += last if link == LINKS[-1] else ()
         devices.append(stack.enter_context(VirtualMover(options, once)))
@@ -72,7 +72,7 @@ def test_three_devices_on_three_links_have_a_session_and_a_result_each(
 ) -> None:
     """And each is decided about by itself."""
     with ExitStack() as stack:
-        devices, urls = started(stack, "20", "--gyr-noise=0.02,0.02,0.02")
+        devices, urls = started(stack, tmp_path, "--gyr-noise=0.02,0.02,0.02")
         serials = ["--serial", "A1", "--serial", "B1", "--history", str(tmp_path / "h")]
         code, result, said = led(devices, urls, *serials, "-o", str(tmp_path / "s"))
         truths = [device.truth for device in devices]
@@ -91,7 +91,7 @@ def test_three_devices_on_three_links_have_a_session_and_a_result_each(
 
 def test_all_devices_are_gone_on_with_after_a_kill(tmp_path: Path) -> None:
     with ExitStack() as stack:
-        devices, urls = started(stack, "20", once=False)
+        devices, urls = started(stack, tmp_path, once=False)
         session = tmp_path / "s"
         led(devices, urls, "-o", str(session), killed_at=1)
         folder = session / "device-2"
@@ -135,7 +135,7 @@ def check(
 
 def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) -> None:
     with ExitStack() as stack:
-        devices, urls = started(stack, "20")
+        devices, urls = started(stack, tmp_path)
         urls[1] += "&reconnect=0"
         devices[1].ask(fault={"silence_s": 1e6})
         code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))

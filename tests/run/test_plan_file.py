@@ -15,7 +15,7 @@ import tomlkit
 from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
-from processes import script
+from processes import script, steady
 
 from fieldcal import procedures
 from fieldcal.cli import main
@@ -187,7 +187,8 @@ def test_a_night_without_an_operator(
 ) -> None:
     """A plan, a turntable's command, a result and what CI reads of it."""
     junit = tmp_path / "run.xml"
-    with VirtualMover(["--serial", "witmotion", "--speed", "20"], False) as device:
+    sim = ["--serial", "witmotion", "--speed", "20", "--acc-noise=0.005,0.005,0.005"]
+    with VirtualMover([*sim, *steady(tmp_path)], False) as device:
         assert run(tmp_path, device, "", junit) == 0
         said = capsys.readouterr()
         truth = device.truth

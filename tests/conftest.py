@@ -114,7 +114,9 @@ def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="session")
 def recalibrated(tmp_path_factory: pytest.TempPathFactory) -> Recalibrated:
     """A run of five positions on a tilted base."""
-    return recalibrate(tmp_path_factory.mktemp("run") / "session")
+    base = tmp_path_factory.getbasetemp()
+    shared_by_all = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    return recalibrate(shared_by_all / "recalibrated")
 
 
 @pytest.fixture

@@ -14,6 +14,8 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
+from filelock import FileLock
+
 if TYPE_CHECKING:
     from fieldcal.run.movers import RunningDevice
 
@@ -94,12 +96,20 @@ class Recalibrated:
 
 
 def recalibrate(folder: Path) -> Recalibrated:
-    """Five positions of a virtual device on a tilted base."""
+    """Five positions of a virtual device on a tilted base, once for all processes.
+
+    `folder` is where to; what another process of the tests has made there is taken.
+    """
+    session, said = folder / "session", folder / "said.json"
     call = [*RUN, "five_position", "--headless", "--virtual=--base-tilt=1,-1"]
-    call += ["--speed", "max", "--seed", "5", "--json", "-o", str(folder)]
-    done = subprocess.run(call, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return Recalibrated(folder, json.loads(done.stdout), done.stderr)
+    call += ["--speed", "max", "--seed", "5", "--json", "-o", str(session)]
+    with FileLock(folder.with_suffix(".lock")):
+        folder.mkdir(exist_ok=True)
+        if not said.exists():
+            done = subprocess.run(call, capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+            said.write_text(json.dumps([json.loads(done.stdout), done.stderr]))
+    return Recalibrated(session, *json.loads(said.read_text()))
 
 
 def script(folder: Path, body: str) -> list[str]:

@@ -236,9 +236,10 @@ def _held(position: Position, rng: np.random.Generator, cross: float = 0.0) -> A
     return Average(mean, covariance, 21.0, 3000, 0.0, 30.0)
 
 
-def test_a_position_not_fitted_is_predicted_within_its_uncertainty() -> None:
+@pytest.mark.parametrize("runs", [50, pytest.param(150, marks=pytest.mark.thorough)])
+def test_a_position_not_fitted_is_predicted_within_its_uncertainty(runs: int) -> None:
     rng, position, chances = np.random.default_rng(8), proposed(FIVE), []
-    for _ in range(150):
+    for _ in range(runs):
         windows = [_held(p, rng) for p in FIVE]
         found = solve(Observations.of(FIVE, windows, G))
         chances.append(verify(found, ABOUT, position, _held(position, rng)).chance)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import signal
 import subprocess
 import threading
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import RUN, Recalibrated, wait_for_samples
+from processes import RUN, Recalibrated, steady, wait_for_samples
 from talking import talking
 
 from fieldcal.cli import main
@@ -69,8 +70,9 @@ def test_solving_the_recorded_session_gives_the_same_numbers(
 
 def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
     done = run(
-        *("two_position", "--headless", "--virtual", "--speed", "60", "--json"),
+        *("two_position", "--headless", f"--virtual={shlex.join(steady(tmp_path))}"),
         *("--no-report", "-o", str(tmp_path / "s"), "--level=0.001", "--angles=0.001"),
+        *("--speed", "60", "--json"),
     )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -84,8 +86,9 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Unsaid it is NO-GO, and said it is in the uncertainty, without a second turn."""
+    virtual = shlex.join(["--base-tilt=0.5,-0.3", *steady(tmp_path)])
     done = run(
-        *("two_position", "--headless", "--virtual=--base-tilt=0.5,-0.3", "--json"),
+        *("two_position", "--headless", f"--virtual={virtual}", "--json"),
         *("--speed", "60", "--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"),
     )
     assert done.returncode == 1, done.stderr

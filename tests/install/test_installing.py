@@ -1,6 +1,7 @@
 """A recalibration on top of the one an autopilot has: composed, shown, given back."""
 
 import json
+import shlex
 import shutil
 import signal
 import subprocess
@@ -15,7 +16,7 @@ import pytest
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
 
-from processes import TWO_POSITION, simulated, wait_for_samples
+from processes import TWO_POSITION, simulated, steady, wait_for_samples
 
 from fieldcal.cli import main
 from fieldcal.drivers.driver import open_driver
@@ -27,7 +28,9 @@ HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
 
 
 def recalibrated(folder: Path, has: str) -> tuple[int, Any]:
-    virtual = f"--virtual=--mavlink tcpin:127.0.0.1:0?{has} --rate 200"
+    folder.parent.mkdir(exist_ok=True)
+    device = ["--mavlink", f"tcpin:127.0.0.1:0?{has}", "--rate", "200"]
+    virtual = f"--virtual={shlex.join([*device, *steady(folder.parent)])}"
     run = [*TWO_POSITION, "--seconds", "10", "--speed", "20", "--json"]
     run += ["-o", str(folder), virtual]
     done = subprocess.run(run, capture_output=True, text=True, check=False)

@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
 
-from processes import TWO_POSITION, simulated
+from processes import TWO_POSITION, simulated, steady
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
@@ -58,6 +58,7 @@ def restarted(
     session, truth = folder / "s", folder / "truth.json"
     sim = ["--mavlink", "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5", "--speed", "20"]
     sim += ["--rate", "200", "--gravity=9.81", "--truth", str(truth)]
+    sim += steady(folder)
     with simulated(*sim) as (place, control):
         url = f"mavlink:{place}"
         run = [*TWO_POSITION, "--gravity=9.81", "--seconds", "20", "--json"]

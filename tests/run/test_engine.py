@@ -301,13 +301,13 @@ def test_a_mover_is_told_once_more_where_the_device_stands_wrong(bench: Bench) -
 
 
 class Slow(Turner):
-    """A table that takes three minutes, and says that it is at work."""
+    """A table that takes a minute, and says that it is at work."""
 
     there: Position | None = None
     due: float = 0.0
 
     def place(self, hold: Hold) -> None:
-        self.there, self.due = hold.position, self.driver.device.time + 180.0
+        self.there, self.due = hold.position, self.driver.device.time + 60.0
 
     def wish(self) -> Wish | None:
         time = self.driver.device.time
@@ -319,7 +319,7 @@ class Slow(Turner):
 def test_nobody_gives_up_on_a_mover_that_is_at_work(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         turner = Slow(InProcess(VirtualDevice(seed=3)))
-        engine = Engine(turner.driver, turner, ABOUT, recorder, give_up=60.0)
+        engine = Engine(turner.driver, turner, ABOUT, recorder, give_up=20.0)
         engine.run(hold_all(TWO, 10.0))
     assert not turner.told
     marks = Session.open(tmp_path / "s").marks()

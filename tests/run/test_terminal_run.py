@@ -13,6 +13,7 @@ import numpy as np
 import pexpect
 import pyte
 import pytest
+from processes import steady
 
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import read_marks
@@ -25,7 +26,8 @@ SIM += ["--base-tilt=1,-0.5", "--latitude=50.45", "--height=170"]
 @pytest.fixture
 def device(tmp_path: Path) -> Iterator[VirtualMover]:
     link = tmp_path / "port"
-    with VirtualMover([*SIM, "--port-link", str(link)], once=False) as made:
+    sim = [*SIM, *steady(tmp_path), "--port-link", str(link)]
+    with VirtualMover(sim, once=False) as made:
         made.port = str(link)
         yield made
 

@@ -359,6 +359,7 @@ def test_as_printed_everything_is_as_in_print() -> None:
     two = solve(observe(NOT_45, outputs(NOT_45)), as_printed=True)
     assert two.method == "two_position"
     assert two.value("acc_scale.z") == pytest.approx(-SCALE[2])
+    assert any("the sign of (5) makes" in w for w in two.warnings)
 
 
 @pytest.mark.parametrize("method", ["two_position", "joint"])

@@ -20,7 +20,9 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.positions import FIVE, SIX_FACES, TWO, WIDE, Position
 from fieldcal.core.samples import Array
+from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.solve import Observations, choose, rank, solve
+from fieldcal.solve.estimation import scatter_of
 from fieldcal.solve.given import Tilt
 from fieldcal.windows import Average
 
@@ -212,6 +214,41 @@ def test_where_the_models_of_the_tilt_cannot_be_told_apart_both_are_covered() ->
         pulls.append((result.values[:6] - [*BIAS, *SCALE]) / result.sigma[:6])
     rms = np.sqrt((np.array(pulls) ** 2).mean(axis=0))
     assert (rms < 1.2).all() and rms.mean() > 0.7
+
+
+def test_the_other_model_is_covered_by_its_weight() -> None:
+    """Covariance C + w d d^T, d from one model to the other, w = 1 / (1 + e^ahead)."""
+    u = outputs(FIVE, offset_deg=(0.02, -0.03))
+    seen = observe(FIVE, u + 3e-4 * np.random.default_rng(2).standard_normal((5, 3)))
+    both = solve(seen)
+    (note,) = [w for w in both.warnings if "cannot tell it from" in w]
+    ahead = float(note.partition("chi2 differs by ")[2].partition(")")[0]) / 2
+    one, other = (solve(seen, tilt=t) for t in ("base_tilt", "angle_offset"))
+    if "angle_offset" in both.groups:
+        one, other = other, one
+    order = [*one.names[:6]] + ["base_tilt.about_z_deg", "base_tilt.about_x_deg"]
+    names = dict(zip(order, [*one.names[:6], "angle_offset.alpha0_deg",
+                             "angle_offset.beta0_deg"], strict=True))  # fmt: skip
+    names |= {b: a for a, b in names.items()}
+    apart = [
+        other.value(n if n in other.names else names[n]) - one.value(n)
+        for n in one.names
+    ]
+    np.testing.assert_allclose(both.values, one.values)
+    more = np.outer(apart, apart) / (1 + np.exp(ahead))
+    assert (np.sqrt(np.diag(more)) > 0.05 * one.sigma).sum() > 4, "it shows"
+    # the difference in chi2 is printed to a tenth
+    np.testing.assert_allclose(
+        both.covariance - one.covariance, more, rtol=0.06, atol=1e-9
+    )
+
+
+def test_what_windows_scatter_by_is_an_rms_of_a_triad() -> None:
+    none = np.empty(0)
+    scatter = np.array([3e-3, 4e-3, 5e-3, 1e-4, 2e-4, 2e-4, 0.0])
+    mixture = Mixture(none.astype(int), none, none, none, none, scatter, 0.0)
+    assert scatter_of(mixture, (0, 1, 2)) == pytest.approx(1e-3 * np.sqrt(50 / 3))
+    assert scatter_of(mixture, (3, 4, 5)) == pytest.approx(1e-4 * np.sqrt(3))
 
 
 def test_a_base_known_to_be_nearly_level_helps() -> None:

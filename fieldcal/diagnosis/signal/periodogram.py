@@ -9,16 +9,16 @@ Source: D. Percival, A. Walden, Spectral Analysis for Physical Applications, cha
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft
 
 from fieldcal.core.frames import turn
 from fieldcal.core.samples import Array
+from fieldcal.diagnosis.signal.pieces import Pieces
 from fieldcal.model import thresholds
-from fieldcal.model.rows.reduce import Rows, RowSource, rate_of, spans
-from fieldcal.physics.experience import Experience
 from fieldcal.physics.recording import medians
 
 Complex = NDArray[np.complexfloating]
@@ -41,6 +41,12 @@ STEEP = 4.0
 SLOPE = 0.3
 """Part of the power at a frequency that is below it on a slope; beside a line, less."""
 
+HUMP = 2.0
+"""Times the floor down to which the power about a peak belongs to it."""
+
+FINER = 4
+"""Places on the grid of samples to a sampling period: what is out of place by an eighth
+of a period loses 3 % of its power at most below 0.4 of the rate, by a half a third."""
 
 NEAR = 2.0
 """Distance between two lines, in cycles of the shortest window."""
@@ -54,9 +60,6 @@ TRIADS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
 AT_ONCE = 1 << 16
 """Samples that a line is taken out of at once."""
 
-SHORTEST = 64
-"""Samples of a window from which it is looked at."""
-
 COHERENT = 1 << 18
 """Samples up to which windows are put together with one phase."""
 
@@ -64,68 +67,6 @@ COHERENT = 1 << 18
 GRID = 1 << 20
 """Periods from the first sample to the last up to which that is done: over longer
 pauses no clock keeps the phase of a line."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pieces:
-    """Samples of each window about their mean, and where the device was in it."""
-
-    x: Experience
-    samples: tuple[Array, ...]
-    times: tuple[Array, ...]
-    noise: Array
-    rate: float
-
-
-def held_in(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
-    """Windows that are long enough: the first of their rows, and their bounds."""
-    first = {int(p): i for i, p in reversed(list(enumerate(rows.x.position)))}
-    bounds = enumerate(spans(source.block, source.about))
-    return [
-        (first[p], int(a), int(b))
-        for p, (a, b) in bounds
-        if b - a >= SHORTEST and p in first
-    ]
-
-
-def pieces_of(source: RowSource, rows: Rows) -> Pieces:
-    """Windows of a recording that are long enough.
-
-    Outputs of which rows say nothing, as of gravity on a table that turns, are zero.
-    """
-    block, held = source.block, held_in(source, rows)
-    times = tuple(block.t[a:b] for _, a, b in held)
-    samples = []
-    for (row, a, b), t in zip(held, times, strict=True):
-        usable = source.usable[a:b] & rows.used[row]
-        samples.append(_flat(t, block.acc[a:b], block.gyr[a:b], usable))
-    x = places_of(rows, held)
-    return Pieces(x, tuple(samples), times, rows.noise, rate_of(block))
-
-
-def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
-    """Where the device is in windows that `held_in` gives."""
-    x, some = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
-    return Experience.at_rest(
-        x.alpha[some], x.beta[some], x.gravity, f=x.f[some], mounting=x.mounting
-    )
-
-
-def _flat(t: Array, acc: Array, gyr: Array, usable: NDArray[np.bool_]) -> Array:
-    """Samples without mean and slope, (n, 6); zero where not usable."""
-    s = (t - t.mean()) / max(np.ptp(t), 1e-9)
-    out = np.empty((len(t), 6))
-    for c in range(6):
-        values = (acc if c < 3 else gyr)[:, c % 3]
-        known = usable[:, c] & np.isfinite(values)
-        column = np.where(known, values, 0.0)
-        column -= column.sum() / max(int(known.sum()), 1)
-        column *= known
-        slope = (s @ column) / max(float((s * s) @ known), 1e-12)
-        column -= slope * s
-        column *= known
-        out[:, c] = column
-    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,37 +88,88 @@ class Spectrum:
     together: tuple[tuple[int, ...], ...]
 
 
-def highest(
-    pieces: Pieces, spectra: Sequence[Spectrum], taken: Sequence[float]
-) -> float | None:
-    """Frequency of the line that stands out most, None if none does.
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """Where the power stands out, Hz.
 
-    Near one that is taken already, what is left belongs to it.
+    Attributes
+    ----------
+    hz : where it is highest
+    low, high : between which it is above the floor; a line's own are its frequency
+    noise : (6,) standard deviation of a sample of white noise as strong as what is
+        beside it: filters and bearings make noise that is not white
+
+    """
+
+    hz: float
+    low: float
+    high: float
+    noise: Array
+
+
+def highest(
+    pieces: Pieces, spectra: Sequence[Spectrum], taken: Sequence[Peak]
+) -> Peak | None:
+    """What stands out most, None if nothing does.
+
+    Near a peak that is taken already, what is left belongs to it.
     """
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     low = max(0.05, CYCLES / shortest)
-    best, near = np.log(thresholds.LINE_BY_CHANCE), None
+    best, peak = np.log(thresholds.LINE_BY_CHANCE), None
     for spectrum in spectra:
-        hz, count = spectrum.hz, spectrum.count
-        band = hz >= low
+        band, count = spectrum.hz >= low, spectrum.count
+        hz = spectrum.hz[band]
+        free = np.ones(len(hz), dtype=bool)
         for other in taken:
-            band &= np.abs(hz - other) > NEAR / shortest
-        if band.sum() < 4 * BESIDE:
+            reach = NEAR / shortest
+            free &= (hz < other.low - reach) | (hz > other.high + reach)
+        if free.sum() < 4 * BESIDE:
             continue
         stands = {}
         for c in sorted({c for some in spectrum.together for c in some}):
             power = spectrum.power[c, band]
-            # median of Gamma(W) over its mean, by Wilson and Hilferty
-            level = _floor(power) / (1 - 1 / (9 * count)) ** 3
-            stands[c] = power / _on_a_slope(power, level) * count
+            stands[c] = power / _level(power, count) * count
         for some in spectrum.together:
             total = np.sum([stands[c] for c in some], axis=0)
-            at = int(np.argmax(total))
+            at = int(np.argmax(np.where(free, total, 0.0)))
             odds = _beyond(float(total[at]), count * len(some))
             odds += np.log(LOOKS * len(total))
             if odds < best:
-                best, near = odds, float(hz[band][at])
-    return near
+                best, peak = odds, _about(hz, total / (count * len(some)), at)
+    return peak and replace(peak, noise=_beside(spectra[0], peak.hz, pieces.noise))
+
+
+def _level(power: Array, count: int) -> Array:
+    """Mean power of noise at each frequency, of the sum of some periodograms (m,)."""
+    # median of Gamma(W) over its mean, by Wilson and Hilferty
+    return _on_a_slope(power, _floor(power) / (1 - 1 / (9 * count)) ** 3)
+
+
+def _beside(spectrum: Spectrum, hz: float, white: Array) -> Array:
+    """White noise as strong as what is beside a frequency, (6,).
+
+    Not stronger than that of the samples: a line in short windows is beside itself.
+    """
+    noise, at = white.copy(), int(np.argmin(np.abs(spectrum.hz - hz)))
+    for c in sorted({c for some in spectrum.together for c in some}):
+        level = _level(spectrum.power[c], spectrum.count)[at]
+        noise[c] = min(noise[c], np.sqrt(level / spectrum.count))
+    return noise
+
+
+def _about(hz: Array, power: Array, at: int) -> Peak:
+    """The peak about a frequency, of power (m,) in terms of the floor.
+
+    What is no line, as of a machine whose speed wanders, is as broad as its power,
+    smoothed, stays above the floor.
+    """
+    kernel = np.ones(2 * FAR + 1) / (2 * FAR + 1)
+    low = np.flatnonzero(np.convolve(power, kernel, "same") < HUMP)
+    below, above = low[low < at], low[low > at]
+    first = int(below[-1]) if len(below) else 0
+    last = int(above[0]) if len(above) else len(hz) - 1
+    return Peak(float(hz[at]), float(hz[first]), float(hz[last]), np.zeros(6))
 
 
 def spectra_of(pieces: Pieces) -> list[Spectrum]:
@@ -205,14 +197,14 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
 
 def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, int, Array]:
     """Of the whole recording, with windows turned into a frame, as in `Spectrum`."""
-    start, end = pieces.times[0][0], pieces.times[-1][-1]
-    whole = np.zeros((6, int(round((end - start) * pieces.rate)) + 1))
-    for samples, t, to_frame in zip(pieces.samples, pieces.times, frame, strict=True):
-        at = np.round((t - start) * pieces.rate).astype(np.intp)
-        tapered = (np.hanning(len(t))[:, None] * samples).T
-        whole[:3, at], whole[3:, at] = to_frame @ tapered[:3], to_frame @ tapered[3:]
-    n = 2 << (whole.shape[1] - 1).bit_length()
-    return _square(np.fft.rfft(whole, n)), 1, np.fft.rfftfreq(n, 1 / pieces.rate)
+    turned = []
+    for samples, to_frame in zip(pieces.samples, frame, strict=True):
+        tapered = (np.hanning(len(samples))[:, None] * samples).T
+        turned.append(np.vstack([to_frame @ tapered[:3], to_frame @ tapered[3:]]))
+    t = np.concatenate(pieces.times)
+    n = next_fast_len(2 * round((t[-1] - t[0]) * pieces.rate) + 2, real=True)
+    spectrum = _transformed(np.hstack(turned), t, pieces.rate, n)
+    return _square(spectrum), 1, np.fft.rfftfreq(n, 1 / pieces.rate)
 
 
 def _power(pieces: Pieces) -> tuple[Array, int, Array]:
@@ -220,13 +212,29 @@ def _power(pieces: Pieces) -> tuple[Array, int, Array]:
     length = min(LONGEST, max(map(len, pieces.samples)))
     n = 1 << (length - 1).bit_length()
     total, count = np.zeros((6, n // 2 + 1)), 0
-    for samples in pieces.samples:
+    for samples, t in zip(pieces.samples, pieces.times, strict=True):
         parts = max(1, len(samples) // LONGEST)
-        for part in np.array_split(samples, parts):
+        for part in np.array_split(np.arange(len(t)), parts):
             taper = np.hanning(len(part))
-            total += _square(np.fft.rfft(part.T * taper, n)) / (taper @ taper)
+            tapered = samples[part].T * taper
+            spectrum = _transformed(tapered, t[part], pieces.rate, n)
+            total += _square(spectrum) / (taper @ taper)
             count += 1
     return total, count, np.fft.rfftfreq(n, 1 / pieces.rate)
+
+
+def _transformed(values: Array, t: Array, rate: float, n: int) -> Complex:
+    """Fourier sums of samples (c, m) at the multiples of rate / n up to its half.
+
+    At the times that they have: a log's samples come late, or are missing.
+    """
+    at = (t - t[0]) * rate
+    if len(at) <= n and np.ptp(at - np.arange(len(at))) < 0.5 / FINER:
+        return np.fft.rfft(values, n)
+    place = np.round(at * FINER).astype(np.intp) % (n * FINER)
+    grid = [np.bincount(place, row, n * FINER) for row in values]
+    whole: Complex = rfft(np.array(grid))
+    return whole[:, : n // 2 + 1]
 
 
 def _square(spectrum: Complex) -> Array:

@@ -16,16 +16,14 @@ from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.line import Remains, Tone, remains, tuned
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
 from fieldcal.diagnosis.signal.periodogram import (
-    Pieces,
-    held_in,
+    Peak,
     highest,
     line_of,
-    pieces_of,
-    places_of,
     spectra_of,
     stretches,
     take_out,
 )
+from fieldcal.diagnosis.signal.pieces import Pieces, held_in, pieces_of, places_of
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.physics.effect import Line
@@ -47,19 +45,20 @@ def tones(source: RowSource, rows: Rows) -> list[tuple[Tone, Remains]]:
     """Lines in a recording, the strongest first, with what is left of them."""
     pieces = pieces_of(source, rows)
     found: list[tuple[Tone, Remains]] = []
-    looked: list[float] = []
+    looked: list[Peak] = []
     spectra = spectra_of(pieces) if pieces.samples else []
     while spectra and len(found) < MOST and len(looked) < LOOKS + len(found):
-        near = highest(pieces, spectra, looked)
-        if near is None:
+        peak = highest(pieces, spectra, looked)
+        if peak is None:
             break
-        looked.append(near)
-        if (tone := _explained(pieces, near)) is None:
+        looked.append(peak)
+        heard = replace(pieces, noise=peak.noise)
+        if (tone := _explained(heard, peak.hz)) is None:
             continue  # something else has much power there, and may hide a line
-        left = remains(pieces, tone)
+        left = remains(heard, tone)
         if left.predictive_score[tone.clear].sum() > 0:
             found.append((tone, left))
-            looked[-1] = tone.hz
+            looked[-1] = replace(peak, hz=tone.hz, low=tone.hz, high=tone.hz)
             _lessen(pieces, tone)
             spectra = spectra_of(pieces)
     return found

@@ -1,8 +1,8 @@
 """The temperature that the device reports, smoothed, and its rate.
 
 Over a span of some seconds about each instant a straight line is fitted to the means
-over a second, and its value is taken; the rate is the slope of a parabola, over the
-longest span that flattens nothing. So little of the noise and the steps of a
+over a second, and its value is taken; the rate is the slope of a parabola. Both over
+the longest span that flattens nothing. So little of the noise and the steps of a
 thermometer do not enter the hypotheses as if they were temperature.
 """
 
@@ -15,8 +15,12 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 
-VALUE_S = 12.0
-"""Half span of the line for the value."""
+VALUES_S = (12.0, 8.0, 5.0, 3.0)
+"""Half spans of the line for the value, the longest first; where each of them flattens
+the course, the means themselves are taken."""
+
+FLAT = 1.3
+"""Times the noise of the means that a line may leave of them; more is flat."""
 
 SLOPES_S = (6.0, 10.0, 16.0, 25.0, 40.0)
 """Half spans of the line for the rate: a longer one has less noise, and flattens what
@@ -69,11 +73,11 @@ class Thermometer:
             return cls(t, np.array([np.nan]), np.array([np.nan]), np.nan, np.nan)
         t, mean, count = _means(block.t[known], block.temperature[known])
         step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-        line = _line(t, mean, count, max(VALUE_S, 4 * step))
-        noise = float(np.std(mean - line[0]))
+        allowed = FLAT * _scatter(mean, block.temperature[known])
+        value, trend, noise = _course(t, mean, count, allowed, step)
         slope = _rate(t, mean, count, noise)
-        start = line[0][0] - line[1][0] * (t[0] - block.t[0])
-        return cls(t, line[0] - start, slope, float(start), noise)
+        start = value[0] - trend * (t[0] - block.t[0])
+        return cls(t, value - start, slope, float(start), noise)
 
     @property
     def changes(self) -> bool:
@@ -85,6 +89,32 @@ class Thermometer:
     def at(self, t: Array) -> tuple[Array, Array]:
         """Warming and heating at some instants, (n,) each."""
         return np.interp(t, self.t, self.warming), np.interp(t, self.t, self.heating)
+
+
+def _scatter(mean: Array, values: Array) -> float:
+    """Standard deviation of the means about any course: of their noise and the grain.
+
+    >>> noise = np.random.default_rng(1).standard_normal(4000)
+    >>> round(_scatter(np.sin(np.arange(4000) / 30) + 0.1 * noise, noise), 2)
+    0.1
+    """
+    bend = np.diff(mean, 2)
+    gaps = np.diff(np.unique(values))
+    grain = float(gaps.min(initial=np.inf)) if len(gaps) else 0.0
+    white = float((bend**2).mean()) / 6 if len(bend) else 0.0
+    return float(np.sqrt(white + grain**2 / 12))
+
+
+def _course(
+    t: Array, mean: Array, count: Array, allowed: float, step: float
+) -> tuple[Array, float, float]:
+    """Values over the longest span that flattens nothing; slope at the start; noise."""
+    for half in VALUES_S:
+        value, slope = _line(t, mean, count, max(half, 4 * step))
+        noise = float(np.std(mean - value))
+        if noise <= allowed:
+            return value, float(slope[0]), noise
+    return mean, float(slope[0]), allowed / FLAT
 
 
 def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:

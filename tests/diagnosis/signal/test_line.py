@@ -5,7 +5,8 @@ import pytest
 
 from fieldcal.diagnosis.signal.line import Remains, remains, tuned
 from fieldcal.diagnosis.signal.moments import moments_of
-from fieldcal.diagnosis.signal.periodogram import LONGEST, Pieces
+from fieldcal.diagnosis.signal.periodogram import LONGEST
+from fieldcal.diagnosis.signal.pieces import Pieces
 from fieldcal.effects.hum import Hum
 from fieldcal.effects.sway import Sway
 from fieldcal.physics.experience import Experience

@@ -30,3 +30,37 @@ def test_what_goes_up_and_down_is_not_flattened(seed: int) -> None:
     course = 3 * np.sin(2 * np.pi * T / 240)
     spread = 3 * 2 * np.pi / 240 / 2**0.5
     assert rate_error(course, seed) < 0.05 * spread
+
+
+def value_error(seen: Array, course: Array) -> tuple[float, Thermometer]:
+    """Rms of what the temperature is off by, K, and the thermometer."""
+    still = np.zeros((len(T), 3))
+    found = Thermometer.of(Block.of(T, still, still, 25 + seen))
+    truth = np.interp(found.t, T, course)
+    off = found.start_c + found.warming - 25 - truth
+    return float(np.sqrt(np.mean(off**2))), found
+
+
+@pytest.mark.parametrize("period", [10.0, 20.0, 60.0, 300.0])
+def test_a_course_of_seconds_is_seen_as_it_is(period: float) -> None:
+    """Wind on a small box: a line of 24 s would leave nothing of it."""
+    course = 2 * np.sin(2 * np.pi * T / period)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(len(T))
+    off, found = value_error(course + noise, course)
+    assert off < 0.03
+    assert found.changes
+
+
+def test_the_steps_of_a_coarse_thermometer_are_no_course() -> None:
+    """Whole kelvins: half a step off at most is what a line through them leaves."""
+    course = T / 90
+    off, found = value_error(np.round(course), course)
+    assert off < 0.25
+    assert np.abs(np.diff(found.warming)).max() < 0.2
+
+
+def test_noise_alone_is_smoothed_and_no_change() -> None:
+    noise = 0.05 * np.random.default_rng(2).standard_normal(len(T))
+    off, found = value_error(noise, np.zeros(len(T)))
+    assert off < 0.01
+    assert not found.changes

@@ -1,0 +1,78 @@
+"""Samples of the windows at rest, as the search for lines looks at them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array
+from fieldcal.model.rows.reduce import Rows, RowSource, rate_of, spans
+from fieldcal.physics.experience import Experience
+
+SHORTEST = 64
+"""Samples of a window from which it is looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """Samples of each window about their mean, and where the device was in it."""
+
+    x: Experience
+    samples: tuple[Array, ...]
+    times: tuple[Array, ...]
+    noise: Array
+    rate: float
+
+
+def held_in(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
+    """Windows that are long enough: the first of their rows, and their bounds."""
+    first = {int(p): i for i, p in reversed(list(enumerate(rows.x.position)))}
+    bounds = enumerate(spans(source.block, source.about))
+    return [
+        (first[p], int(a), int(b))
+        for p, (a, b) in bounds
+        if b - a >= SHORTEST and p in first
+    ]
+
+
+def pieces_of(source: RowSource, rows: Rows) -> Pieces:
+    """Windows of a recording that are long enough.
+
+    Outputs of which rows say nothing, as of gravity on a table that turns, are zero.
+    """
+    block, held = source.block, held_in(source, rows)
+    times = tuple(block.t[a:b] for _, a, b in held)
+    samples = []
+    for (row, a, b), t in zip(held, times, strict=True):
+        usable = source.usable[a:b] & rows.used[row]
+        samples.append(_flat(t, block.acc[a:b], block.gyr[a:b], usable))
+    x = places_of(rows, held)
+    return Pieces(x, tuple(samples), times, rows.noise, rate_of(block))
+
+
+def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
+    """Where the device is in windows that `held_in` gives."""
+    x, some = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
+    return Experience.at_rest(
+        x.alpha[some], x.beta[some], x.gravity, f=x.f[some], mounting=x.mounting
+    )
+
+
+def _flat(t: Array, acc: Array, gyr: Array, usable: NDArray[np.bool_]) -> Array:
+    """Samples without mean and slope, (n, 6); zero where not usable."""
+    s = (t - t.mean()) / max(np.ptp(t), 1e-9)
+    out = np.empty((len(t), 6))
+    for c in range(6):
+        values = (acc if c < 3 else gyr)[:, c % 3]
+        known = usable[:, c] & np.isfinite(values)
+        column = np.where(known, values, 0.0)
+        column -= column.sum() / max(int(known.sum()), 1)
+        column *= known
+        slope = (s @ column) / max(float((s * s) @ known), 1e-12)
+        column -= slope * s
+        column *= known
+        out[:, c] = column
+    return out

@@ -19,6 +19,9 @@ from filelock import FileLock
 if TYPE_CHECKING:
     from fieldcal.run.movers import RunningDevice
 
+HANGS = 600.0
+"""No machine is so busy that what is waited for takes longer, s: it hangs."""
+
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
 RUN, SIM = [*FIELDCAL, "run"], [*FIELDCAL, "sim"]
 TWO_POSITION = [*RUN, "two_position", "--headless", "--level=0.001", "--angles=0.001"]
@@ -54,7 +57,7 @@ def wait_for_samples(
     folder: Path, run: subprocess.Popen[Any] | None, size: int = 20_000
 ) -> None:
     """Until a run has recorded so many bytes of samples."""
-    file, deadline = folder / "samples.arrows", monotonic() + 30
+    file, deadline = folder / "samples.arrows", monotonic() + HANGS
     while not (file.exists() and file.stat().st_size > size):
         assert monotonic() < deadline and (run is None or run.poll() is None)
         sleep(0.02)

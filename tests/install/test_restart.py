@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
 
-from processes import TWO_POSITION, simulated, steady
+from processes import HANGS, TWO_POSITION, simulated, steady
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
@@ -40,7 +40,7 @@ def events(folder: Path, event: str) -> list[dict[str, Any]]:
 
 
 def wait(run: subprocess.Popen[str], reached: Callable[[], bool]) -> None:
-    deadline = monotonic() + 60
+    deadline = monotonic() + HANGS
     while not reached():
         assert run.poll() is None and monotonic() < deadline
         sleep(0.02)

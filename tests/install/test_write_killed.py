@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
 
-from processes import FIELDCAL, simulated
+from processes import FIELDCAL, HANGS, simulated
 
 from benchmarks.write_undo import OLD, WRITTEN, session, trial
 from fieldcal.cli import main
@@ -38,7 +38,7 @@ def test_after_a_kill_it_is_given_back_or_finished(
         url = f"mavlink:{place}?system=1&component=1"
         to = [str(recorded), "--device", url, "--yes"]
         writing = subprocess.Popen([*FIELDCAL, "write", *to])
-        deadline = monotonic() + 60
+        deadline = monotonic() + HANGS
         while not any(recorded.glob(f"{SAVED}*")):
             assert writing.poll() is None and monotonic() < deadline
             sleep(0.001)

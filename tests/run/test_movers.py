@@ -9,7 +9,7 @@ from time import monotonic, sleep
 from typing import Any
 
 import pytest
-from processes import script
+from processes import HANGS, script
 
 from fieldcal.core.errors import MoverFailed, MoverGone
 from fieldcal.core.positions import FIVE, Position
@@ -21,7 +21,7 @@ from fieldcal.sim_device.control import Control
 
 
 def wait(mover: CommandMover) -> None:
-    deadline = monotonic() + 20.0
+    deadline = monotonic() + HANGS
     while mover.busy():
         assert monotonic() < deadline
         sleep(0.01)

@@ -13,7 +13,7 @@ import numpy as np
 import pexpect
 import pyte
 import pytest
-from processes import steady
+from processes import HANGS, steady
 
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import read_marks
@@ -43,7 +43,7 @@ class Console:
         call += ["--seconds", "14", "--latitude", "50.45", "--height", "170"]
         call += ["-o", str(folder), *more]
         self.child = pexpect.spawn(
-            sys.executable, call, dimensions=(24, 80), encoding="utf-8", timeout=60
+            sys.executable, call, dimensions=(24, 80), encoding="utf-8", timeout=HANGS
         )
         self._screen = pyte.Screen(80, 24)
         self._stream = pyte.Stream(self._screen)
@@ -64,9 +64,9 @@ class Console:
             self.seen.append(text)
         return text
 
-    def wait(self, *words: str, seconds: float = 40.0) -> str:
+    def wait(self, *words: str) -> str:
         """Look until all words stand there; the text."""
-        deadline = monotonic() + seconds
+        deadline = monotonic() + HANGS
         while monotonic() < deadline:
             text = self.look()
             if all(word in text for word in words):
@@ -80,7 +80,7 @@ class Console:
     def averaging(self) -> None:
         """Wait until a window has begun."""
         self.wait("H O L D S T I L L")
-        deadline = monotonic() + 40
+        deadline = monotonic() + HANGS
         while monotonic() < deadline:
             if (found := re.search(r"\] +(\d+)%", self.look())) and int(found[1]) > 5:
                 return

@@ -100,6 +100,23 @@ def test_scatter_beyond_the_windows_widens_the_intervals(n: int) -> None:
     assert 0.9 < np.mean(inside) < 0.98
 
 
+@pytest.mark.parametrize(
+    ("n", "says"),
+    [
+        (6, "no degree of freedom: "),
+        (7, "one degree of freedom: "),
+        (8, "two degrees of freedom: "),
+        (9, ""),
+    ],
+)
+def test_how_little_so_few_windows_check_is_said(n: int, says: str) -> None:
+    f = spread_over_the_sphere(n, 3)
+    found = solve(observe(by_hand(n), shown(f, 0 * UPPER), sigma=1e-6))
+    assert found.dof == n - 6
+    about = [w for w in found.warnings if "of freedom" in w]
+    assert len(about) == bool(says) and all(w.startswith(says) for w in about)
+
+
 def test_six_faces_cannot_show_non_orthogonality() -> None:
     found = solve(observe(by_hand(6), shown(G * FACES)), cross=True)
     assert not any(n.startswith("cross") for n in found.names)

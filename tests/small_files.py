@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from bags import bag
+from blackbox_logs import of_block
 from logs import CAN_MAP, arrays, can_log, dataflash, dbc, imu, table, tlog, ulog
 
 from fieldcal.core.samples import Block, concat
@@ -84,6 +85,7 @@ SMALL: dict[str, Callable[[Path, Block], object]] = {
     "arrays": _hdf5,
     "can_log": _candump,
     "json_log": _json,
+    "blackbox": lambda path, block: path.write_bytes(of_block(block)),
     "parquet": _parquet,
     "csv_like": lambda path, block: np.savetxt(path, table(block), delimiter=","),
 }
@@ -99,7 +101,7 @@ class Small:
         options = f"dbc={path.parent / 'imu.dbc'}&map={CAN_MAP}"
         options = options if name == "can_log" else ""
         self.wanted = ReadOptions(COLUMNS, options=options)
-        if name in ("mcap", "rosbag", "phone_zip", "json_log"):
+        if name in ("mcap", "rosbag", "phone_zip", "json_log", "blackbox"):
             self.wanted = ReadOptions()
         self.content = path.read_bytes()
         self.expected = whole(path, self.wanted)

@@ -1,0 +1,75 @@
+"""Blackbox logs: frames written here as the firmware's documentation says."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from blackbox_logs import FIELDS, ROWS, counts, frames, header
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Block, concat
+from fieldcal.importers import open_recording
+from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.validation import RowValidator
+
+pytest.importorskip("orangebox", reason="the extra betaflight is not installed")
+
+
+def flights(path: Path, repair: bool = False) -> dict[str, Block]:
+    recording = open_recording(path, ReadOptions(), repair=repair)
+    found = {}
+    for one in recording.streams():
+        judge = RowValidator(str(path), recording.place, repair)
+        found[one.name] = concat([judge.good(b) for b in recording.blocks(one.name)])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("firmware", "scale", "unit"),
+    [("Cleanflight", 1.0, np.pi / 180), ("INAV", 0.061, 0.061 * np.pi / 180),
+     ("Baseflight", 1.064e-9, 1.064e-3)],
+)  # fmt: skip
+def test_counts_become_si(
+    tmp_path: Path, firmware: str, scale: float, unit: float
+) -> None:
+    path, table = tmp_path / "LOG.BFL", counts(1)
+    path.write_bytes(header(scale, firmware) + frames(table))
+    (got,) = flights(path).values()
+    n = len(got)
+    # the last frame stands before the end, which the reader looks at
+    assert n >= ROWS - 1
+    np.testing.assert_allclose(got.t, table[:n, 1] * 1e-6)
+    np.testing.assert_allclose(got.acc, table[:n, 5:] * G0 / 2048)
+    np.testing.assert_allclose(got.gyr, table[:n, 2:5] * unit, rtol=1e-6)
+
+
+def test_flights_behind_each_other_are_apart(tmp_path: Path) -> None:
+    path = tmp_path / "LOG.BFL"
+    logs = [header(1.0) + frames(counts(seed)) for seed in (1, 2)]
+    path.write_bytes(b"".join(logs))
+    got = flights(path)
+    assert list(got) == ["log.1", "log.2"]
+    assert not np.allclose(got["log.1"].acc[:100], got["log.2"].acc[:100])
+
+
+def test_a_log_without_accelerations_says_what_to_set(tmp_path: Path) -> None:
+    path = tmp_path / "LOG.BFL"
+    names = ",".join(name.replace("accSmooth", "debug") for name in FIELDS)
+    path.write_bytes(header(1.0, fields=names) + frames(counts(1)))
+    with pytest.raises(InputError, match="blackbox_disable_acc = OFF"):
+        flights(path)
+
+
+@pytest.mark.parametrize("at", [3, 200, 900, 1500])
+def test_damaged_logs_end_in_words(tmp_path: Path, at: int) -> None:
+    data = bytearray(header(1.0) + frames(counts(1)))
+    data[at : at + 7] = b"\xff" * 7
+    path = tmp_path / "LOG.BFL"
+    path.write_bytes(bytes(data))
+    try:
+        got = flights(path, repair=True)
+    except InputError as error:
+        assert "LOG.BFL" in str(error)
+        return
+    assert sum(map(len, got.values())) <= ROWS

@@ -51,7 +51,7 @@ PUBLISHED = (
     *(Published("mikoff_mpu9150_x5", (f"imu{i}.log.gz",), ("--rate 100",), HAND)
       for i in range(5)),
     Published("imucal_ferraris", ("example_ferraris_session.csv.gz",),
-              ("--rate 204.8", "--gyr-unit deg/s"), HAND),
+              ("--rate 102.4",), HAND),
     Published("mpu9150_array", ("exp2_imu1.csv.gz",), (), HAND),
     Published("mpu9150_array", ("exp6_imu5.csv.gz",), (), f"{HAND} warm_up bias_drift"),
     Published("tomisuarez_mpu6050", ("example_data_calibration.csv.gz",), (), "?"),

@@ -5,15 +5,14 @@ What is drawn is also what a user would know who is asked: `Log.answers`.
 
 from __future__ import annotations
 
-import gzip
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.awkward.motion import Floats, G, Handling, Moved, moved, outputs
+from benchmarks.awkward.written import Columns, write
 from fieldcal.core.samples import Block
 from fieldcal.sim_device.wire import open_wire
 
@@ -27,14 +26,10 @@ TIME = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 WARM: Mapping[str, tuple[float, float]] = {
     "degC": (1, 0), "cdegC": (100, 0), "K": (1, 273.15), "count": (256, -256 * 25),
 }  # fmt: skip
-FORMS = ("csv", "csv", "csv", "semicolon", "tab", "gz", "npz", "parquet")
 WIRES = ("witmotion", "vectornav", "mip", "xsens", "ubx")
 HEADS = ("none", "bare", "units", "second line", "txwx", "axis (unit)", "grouped")
 JUMP = 1.7e9
 """What a clock jumps by when it hears the time of day, s."""
-
-Columns = list[tuple[str, str, Floats]]
-"""Name, unit and values of each column."""
 
 KINDS = ("samples",) * 7 + ("means", "wire", "several")
 
@@ -184,7 +179,7 @@ def _as_text(log: Log, folder: Path, rng: np.random.Generator) -> Log:
     warm = None
     if rng.random() < 0.4 and head not in ("grouped", "axis (unit)", "txwx"):
         warm = _thermometer(log, columns, rng)
-    path = _written(folder, columns, head, rng, log)
+    path = write(folder, columns, head, rng, log.said)
     log.answers.update(_answers(log, columns, head))
     kept = None if head == "none" else warm
     return replace(log, path=path, warm=kept, timed=timed)
@@ -239,68 +234,3 @@ def _option(kind: str, unit: str) -> list[str]:
     lsb, _, bare = unit.rpartition(" in ")
     scale = [f"--{kind}-lsb", lsb] if lsb else []
     return [f"--{kind}-unit", bare, *scale]
-
-
-def _heading(head: str, columns: Columns) -> list[list[str]]:
-    names = [name for name, _, _ in columns]
-    units = [unit if "in" not in unit else "LSB" for _, unit, _ in columns]
-    bracketed = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
-    forms: dict[str, Callable[[], list[list[str]]]] = {
-        "none": list,
-        "bare": lambda: [names],
-        "units": lambda: [bracketed],
-        "second line": lambda: [names, units],
-        "txwx": lambda: [[n.replace("a", "T").replace("g", "w").lower()
-                          if len(n) == 2 else n for n in names]],  # fmt: skip
-        "axis (unit)": lambda: [
-            [f"{n[-1]} ({u})" for n, u in zip(names, units, strict=True)]
-        ],
-        "grouped": lambda: [
-            [{"t": "Time", "ax": "Accelerometer", "gx": "Gyroscope"}.get(n, "")
-             for n in names],
-            [n[-1].upper() if n != "t" else "" for n in names],
-        ],
-    }  # fmt: skip
-    return forms[head]()
-
-
-def _written(
-    folder: Path,
-    columns: Columns,
-    head: str,
-    rng: np.random.Generator,
-    log: Log,
-) -> Path:
-    """Write columns as one of the usual files."""
-    form = str(rng.choice(FORMS))
-    named = head in ("bare", "units", "txwx") and len({n for n, _, _ in columns})
-    log.said["form"] = form if named or form not in ("npz", "parquet") else "csv"
-    if log.said["form"] == "npz":
-        path = folder / "log.npz"
-        (names,) = _heading("bare" if head == "units" else head, columns)
-        arrays: dict[str, Any] = {
-            n: v for n, (_, _, v) in zip(names, columns, strict=True)
-        }
-        np.savez(path, **arrays)
-        return path
-    if log.said["form"] == "parquet":
-        import pyarrow as pa
-        import pyarrow.parquet
-
-        (names,) = _heading(head, columns)
-        pyarrow.parquet.write_table(
-            pa.table([v for _, _, v in columns], names=names), folder / "log.parquet"
-        )
-        return folder / "log.parquet"
-    separator = {"semicolon": ";", "tab": "\t"}.get(form, ",")
-    lines = [separator.join(row) for row in _heading(head, columns)]
-    table = np.column_stack([v for _, _, v in columns])
-    whole = [bool((v == np.round(v)).all()) for _, _, v in columns]
-    for row in table:
-        pairs = zip(row, whole, strict=True)
-        text = separator.join(f"{x:.0f}" if w else f"{x:.16g}" for x, w in pairs)
-        lines.append(text.replace(".", ",") if form == "semicolon" else text)
-    data = ("\n".join(lines) + "\n").encode()
-    path = folder / ("log.csv.gz" if form == "gz" else "log.csv")
-    path.write_bytes(gzip.compress(data, 1) if form == "gz" else data)
-    return path

@@ -1,5 +1,7 @@
 """Logs of a CAN bus: candump (.log), Vector .asc and .blf, PEAK .trc; python-can.
 
+Lines of canboat, for a bus of NMEA 2000, hold frames as well.
+
 ``--options "dbc=imu.dbc&map=ax=Accel.X,…"`` says what is in the frames, as in a
 device's address, see `can_map`. Where the frames carry no time, that of the bus counts,
 as it was logged. A log of several buses, of which more than one has such frames, is of
@@ -17,6 +19,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO, cast
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.options import Options
+from fieldcal.importing.clock_text import ClockText
 from fieldcal.importing.gzip_stream import head, open_unpacked
 from fieldcal.importing.recording import ImuStream, Recording
 
@@ -49,9 +52,23 @@ KINDS = (
         re.compile(rb"\s*(date [^\n]*\d{4}|base (hex|dec))", re.IGNORECASE),
         "ASCReader",
     ),
+    CanLogKind(
+        "canboat",
+        re.compile(
+            rb"\s*\d{4}-\d\d-\d\d[T-]\d\d:\d\d:\d\d[.,]\d+Z?,[0-7],\d+,\d+,\d+,\d+,"
+            rb"[0-9A-Fa-f]{2}"
+        ),
+        "",
+    ),
     CanLogKind("blf", re.compile(rb"LOGG"), "BLFReader"),
     CanLogKind("trc", re.compile(rb"\s*;(\$FILEVERSION|#+)"), "TRCReader"),
 )
+
+BROADCAST = 240
+"""First group of SAE J1939 that goes to all."""
+
+MOST = 8
+"""Bytes of a frame; canboat joins those of longer messages, which are no frames."""
 
 PRINTED = re.compile(rb"\s*(\([\d. :-]+\))?\s*\w+\s+[0-9A-Fa-f]+\s+\[\d+\]\s")
 """A line as candump shows it on a terminal."""
@@ -153,8 +170,10 @@ class CanLog(Recording):
                     yield from reader
                 return
             text = io.TextIOWrapper(file, encoding="utf-8", errors="replace")
-            if kind.name == "candump":
-                yield from _candump(self, text)
+            if kind.name in ("candump", "canboat"):
+                yield from (_candump if kind.name == "candump" else _canboat)(
+                    self, text
+                )
                 return
             with getattr(can, kind.reader)(text) as reader:
                 yield from reader
@@ -172,6 +191,35 @@ def _candump(recording: CanLog, text: io.TextIOWrapper) -> Iterator[Any]:
                 return
             except (ValueError, IndexError, AttributeError, TypeError) as error:
                 recording.damaged(f"line {lines.number}", f"is no frame ({error})")
+
+
+def _canboat(recording: CanLog, text: io.TextIOWrapper) -> Iterator[Any]:
+    """Frames of a bus of NMEA 2000 as canboat writes them.
+
+    Time, priority, group (PGN), source, destination, length, and the bytes; the
+    identifier is put together as SAE J1939-21 says.
+    """
+    import can
+
+    lines, clock = _Lines(text, recording), ClockText()
+    for line in lines:
+        cells = line.strip().split(",")
+        try:
+            since = clock.seconds(f"{cells[0][:10]} {cells[0][11:]}")
+            priority, group, source, destination, many = map(int, cells[1:6])
+            data = bytes(int(cell, 16) for cell in cells[6:])
+            if since is None or len(data) != many:
+                raise ValueError(line[:40])
+        except ValueError:
+            if line.strip():
+                recording.damaged(f"line {lines.number}", "is no frame of canboat")
+            continue
+        # a group that goes to one device has its address in place of the last byte
+        to_one = (group >> 8) & 0xFF < BROADCAST
+        last = destination if to_one else 0
+        identifier = priority << 26 | (group | last) << 8 | source
+        if many <= MOST:
+            yield can.Message(since, identifier, is_extended_id=True, data=data)
 
 
 class _Lines:

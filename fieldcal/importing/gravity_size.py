@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.scales import FEWEST
+from fieldcal.importing.scales import FEW, FEWEST
 
 FEWEST_MEANS, MOST_MEANS = 3, 200
 """Rows of a table of means, one for each position."""
@@ -78,9 +78,10 @@ def gravity_in(acc: Array) -> Gravity | None:
     acc = acc[np.isfinite(acc).all(axis=1)]
     if are_means(acc):
         return _gravity_of(acc)
-    if len(acc) < FEWEST:
+    if len(acc) < FEW:
         return None
-    return _gravity_of(_quiet_means(acc))
+    # of so few, no part is quieter than the others
+    return _gravity_of(_quiet_means(acc) if len(acc) >= FEWEST else acc[:FEW])
 
 
 def _quiet_means(acc: Array) -> Array:

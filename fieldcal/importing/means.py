@@ -33,6 +33,10 @@ SPARE = 3
 """Degrees of freedom that tell a scatter."""
 
 
+ROUNDED = 1e-9
+"""Part of a mean below which a scatter is no noise of a sensor."""
+
+
 class Spread(NamedTuple):
     """How well means are known.
 
@@ -70,6 +74,8 @@ def spread(means: Array, scatter: Array, count: Array | None, gravity: float) ->
     gravity : m/s^2
 
     """
+    # values that never change have the rounding of a computer for a scatter
+    scatter = np.where(scatter > ROUNDED * np.abs(means), scatter, np.nan)
     told = np.isfinite(scatter)
     if count is not None and told.any():
         return Spread(scatter / np.sqrt(np.maximum(count, 1.0))[:, None], "")

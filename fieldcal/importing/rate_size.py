@@ -3,7 +3,8 @@
     d(u)/dt = u x w,   u = a / |a|                                                 (1)
 
 As gravity turns in device axes while the device is turned, this gives the scale of the
-rates w.
+rates w. Where the hand that turns it jerks so much that (1) holds only roughly, the
+rests at both ends of the turns give it.
 """
 
 from __future__ import annotations
@@ -14,12 +15,16 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 from fieldcal.importing.gravity_size import Gravity
 from fieldcal.importing.scales import FEWEST
+from fieldcal.importing.turn_closure import closing_scale
 
 _TURNED = 0.5
 """Turn of gravity that all of a recording must have for (1), rad."""
 
 _AGREES = 0.9
 """Correlation of both sides of (1) from which on it is believed."""
+
+_ROUGHLY = 0.3
+"""Correlation from which on the turns from rest to rest are looked at instead."""
 
 _SWUNG = 0.3
 """Part by which |a| is not g: then a hand is felt, and (1) does not hold."""
@@ -67,9 +72,12 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
     if not power or moved < _TURNED**2 * lag:
         return None
     both = float(left @ right)
-    if both < _AGREES * np.sqrt(power * moved):
+    agrees = both / np.sqrt(power * moved)
+    if agrees >= _AGREES:
+        return power / both
+    if agrees < _ROUGHLY or clipped.any():
         return None
-    return power / both
+    return closing_scale(t, (acc - gravity.offset) / gravity.size, gyr, power / both)
 
 
 def _at_rails(gyr: Array) -> NDArray[np.bool_]:

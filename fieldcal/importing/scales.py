@@ -8,6 +8,9 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 
+FEW = 8
+"""Rows whose length tells a unit, if nothing else."""
+
 FEWEST = 50
 """Rows that tell anything."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.recording import TIME_UNITS
-from fieldcal.importing.scales import FEWEST
+from fieldcal.importing.scales import FEW, FEWEST
 
 RATES_HZ = (1.0, 8000.0)
 """What a logger of an IMU writes in a second."""
@@ -34,7 +34,7 @@ def time_units(t: Array) -> list[str]:
     t = t[np.isfinite(t)]
     steps = np.diff(t)
     steps = steps[steps > 0]
-    if len(steps) < FEWEST:
+    if len(steps) < FEW:
         return []
     day = [u for u, n in TIME_SIZES.items() if UNIX[0] <= t[-1] / n < UNIX[1]]
     step = float(np.median(steps))

@@ -15,14 +15,14 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.gravity_size import Gravity, gravity_in, with_length
+from fieldcal.importing.gravity_size import Gravity, are_means, gravity_in, with_length
 from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.scales import (
     ACC_OUT,
     ACC_SCALES,
-    FEWEST,
+    FEW,
     GYR_OUT,
     GYR_SCALES,
     fitting,
@@ -125,7 +125,7 @@ class _Guess:
         self.doubts: list[str] = []
         self._name, self.said, self._read = name, said, said
         if not (said.time_unit or said.rate_hz):
-            self._time(block.t)
+            self._time(block.t, are_means(block.acc))
         gravity = gravity_in(block.acc)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
@@ -156,8 +156,9 @@ class _Guess:
             wanted = replace(wanted, temp_unit=found.temp_unit)
         return wanted
 
-    def _time(self, t: Array) -> None:
-        fits = time_units(t)
+    def _time(self, t: Array, means: bool) -> None:
+        # of means, the pauses between them say nothing
+        fits = [] if means else time_units(t)
         steps = np.diff(t[np.isfinite(t)])
         step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
         if len(fits) == 1 and fits != ["s"]:
@@ -196,7 +197,7 @@ class _Guess:
 
     def _rates(self, block: Block, gravity: Gravity | None) -> None:
         gyr = block.gyr[np.isfinite(block.gyr).all(axis=1)]
-        if len(gyr) < FEWEST:
+        if len(gyr) < FEW:
             return
         reads = gravity and rate_in(block.t, block.acc, block.gyr, gravity)
         if reads is None or gravity is None:

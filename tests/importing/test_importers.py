@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import struct
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +151,41 @@ def test_can_logs(tmp_path: Path, ending: str) -> None:
     same(found.block, imu(1), atol=6e-4)
 
 
+@pytest.mark.parametrize(
+    "time", ["%Y-%m-%d-%H:%M:%S.{:03d}", "%Y-%m-%dT%H:%M:%S.{:03d}Z"]
+)
+def test_frames_of_canboat(tmp_path: Path, time: str) -> None:
+    can_log(tmp_path / "drive.log", imu(1))
+    text, groups = dbc(), {16: 65305, 17: 126208}
+    for number, group in groups.items():
+        # 126208 goes to one device, here 47, whose address is in the identifier
+        to = 47 if group == 126208 else 0
+        whole = 0x80000000 | 2 << 26 | (group | to) << 8 | 35
+        text = text.replace(f"BO_ {number} ", f"BO_ {whole} ")
+        text = text.replace(f" {number} ", f" {whole} ")
+    (tmp_path / "imu.dbc").write_text(text)
+    lines = []
+    for line in (tmp_path / "drive.log").read_text().splitlines():
+        stamp, _, frame = line.split()[:3]
+        number, data = frame.split("#")
+        ms = round(1000 * float(stamp.strip("()")))
+        when = datetime.fromtimestamp(ms // 1000, UTC)
+        group = groups[int(number, 16)]
+        cells = [data[i : i + 2].lower() for i in range(0, len(data), 2)]
+        to = 47 if group == 126208 else 255
+        head = f"{when.strftime(time).format(ms % 1000)},2,{group},35,{to},{len(cells)}"
+        lines.append(",".join([head, *cells]))
+    path = tmp_path / "bus.txt"
+    path.write_text("\n".join(lines) + "\n")
+    options = f"dbc={tmp_path / 'imu.dbc'}&map={CAN_MAP}"
+    found = session(tmp_path / "s", str(path), "--options", options)
+    np.testing.assert_allclose(found.block.acc, imu(1).acc, atol=6e-4)
+    np.testing.assert_allclose(found.block.gyr, imu(1).gyr, atol=6e-4)
+    path.write_text("\n".join([*lines[:4], lines[4][:-3], *lines[5:]]) + "\n")
+    call = ["import", str(path), "--options", options, "-o", str(tmp_path / "bad")]
+    assert main(call) == 2
+
+
 def test_can_logs_of_several_buses_are_never_mixed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -238,7 +274,14 @@ def test_bad_rows_are_refused_or_left_out_and_told(
 ) -> None:
     rows = np.column_stack([BAD, BAD[:, 1], BAD[:, 1]])
     np.savetxt(tmp_path / "log.csv", rows, delimiter=",")
-    call = ["import", str(tmp_path / "log.csv"), "--columns", "t,ax,ay,az"]
+    call = [
+        "import",
+        str(tmp_path / "log.csv"),
+        "--columns",
+        "t,ax,ay,az",
+        "--acc-unit",
+        "m/s^2",
+    ]
     call += ["-o", str(tmp_path / "s")]
     assert main(call) == 2
     said = capsys.readouterr().err

@@ -105,3 +105,11 @@ def test_samples_are_no_means() -> None:
     angle = np.deg2rad(np.arange(60.0))
     slow = G * np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])
     assert not are_means(slow) and not are_means(slow[:2]) and not are_means(0 * slow)
+
+
+def test_a_scatter_that_is_only_rounding_is_none() -> None:
+    means = np.array([[0.0, 0, 9.8, 1e-2, 2e-3, -3e-3]] * 9)
+    scatter = np.array([[0.1, 0.1, 0.1, 1e-17, 9e-18, 5e-18]] * 9)
+    sigma = spread(means, scatter, np.full(9, 100.0), 9.8).sigma
+    np.testing.assert_allclose(sigma[:, :3], 0.01)
+    assert np.isnan(sigma[:, 3:]).all()

@@ -1,0 +1,131 @@
+"""The scale of rates by which turns lead from one rest to the next.
+
+    u_B = u_A carried along du/dt = u x w / s                                      (1)
+
+A hand that turns a device in jerks adds its own forces on the way, but not at the ends:
+gravity at rest before a turn and behind it says what the turn was. The scale s at which
+the turns close is looked for about one that is roughly known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+
+GROUP_S, REST_S, TURN_S = 0.1, 0.5, 20.0
+"""Parts of a rest, the shortest rest and the longest turn, s."""
+
+NEAR_G = 0.1
+"""Part by which |a| at rest is not g."""
+
+CALM = 0.2, 2.0
+"""Calmest part of the groups, and how many times its spread a rest has at most."""
+
+LEAST = np.deg2rad(30.0)
+"""Turn of gravity from rest to rest that counts, rad."""
+
+FEWEST_TURNS = 3
+
+CLOSES, OPENS = np.deg2rad(8.0), 3.0
+"""What turns that close miss by, rad, and how much more others do."""
+
+ABOUT, TRIED = 1.7, 61
+"""Factor about the rough scale that is tried, in so many steps."""
+
+STEP_S = 0.02
+"""Time over which a rate is taken as one, s."""
+
+
+class Turned(NamedTuple):
+    """A turn between two rests.
+
+    Attributes
+    ----------
+    before, behind : (3,) direction of the force at rest
+    angles : (m, 3) rates times their durations, numbers of the file times s
+
+    """
+
+    before: Array
+    behind: Array
+    angles: Array
+
+
+def closing_scale(t: Array, up: Array, gyr: Array, rough: float) -> float | None:
+    """Scale of rates at which the turns close, by (1); None where they do at none.
+
+    Parameters
+    ----------
+    t : (n,) s
+    up : (n, 3) force over gravity, device axes
+    gyr : (n, 3) numbers of the file
+    rough : about what 1 rad/s reads
+
+    """
+    turns = list(_turns(t, up, gyr))
+    if len(turns) < FEWEST_TURNS:
+        return None
+    scales = rough * np.geomspace(1 / ABOUT, ABOUT, TRIED)
+    missed = np.array([_missed(one, scales) for one in turns])
+    # one of the turns may have gone on beyond what a rest was taken for
+    usual = np.median(missed, axis=0)
+    best = int(usual.argmin())
+    inside = 0 < best < TRIED - 1
+    if not inside or usual[best] > CLOSES or usual.max() < OPENS * usual[best]:
+        return None
+    return float(scales[best])
+
+
+def _turns(t: Array, up: Array, gyr: Array) -> Iterator[Turned]:
+    step = float(np.median(np.diff(t)))
+    rests = _rests(up, max(4, round(GROUP_S / step)), step)
+    for (a, b), (c, d) in zip(rests, rests[1:], strict=False):
+        before, behind = (_direction(up[i:j]) for i, j in ((a, b), (c, d)))
+        turned = np.arccos(np.clip(before @ behind, -1, 1))
+        steps = np.diff(t[b - 1 : c + 1])
+        if turned < LEAST or t[c] - t[b] > TURN_S or (steps > GROUP_S).any():
+            continue
+        zero = (gyr[a:b].mean(axis=0) + gyr[c:d].mean(axis=0)) / 2
+        angles = (gyr[b : c + 1] - zero) * steps[:, None]
+        many = max(1, round(STEP_S / step))
+        starts = np.arange(0, len(angles), many)
+        yield Turned(before, behind, np.add.reduceat(angles, starts, axis=0))
+
+
+def _rests(up: Array, group: int, step: float) -> list[tuple[int, int]]:
+    """First and one past the last row of each rest."""
+    groups = up[: len(up) // group * group].reshape(-1, group, 3)
+    spread = groups.std(axis=1).max(axis=1)
+    length = np.linalg.norm(groups.mean(axis=1), axis=1)
+    share, times = CALM
+    calm = spread <= times * np.quantile(spread, share)
+    calm &= np.abs(length - 1) < NEAR_G
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], calm.astype(int), [0]])))
+    pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    least = REST_S / (group * step)
+    return [(group * a, group * b) for a, b in pairs if b - a >= least]
+
+
+def _direction(up: Array) -> Array:
+    mean = up.mean(axis=0)
+    unit: Array = mean / np.linalg.norm(mean)
+    return unit
+
+
+def _missed(turn: Turned, scales: Array) -> Array:
+    """Angle by which a turn does not close at each of the scales (k,), rad."""
+    u = np.tile(turn.before, (len(scales), 1))
+    for angle in turn.angles:
+        size = float(np.linalg.norm(angle))
+        if not size:
+            continue
+        axis, by = angle / size, size / scales[:, None]
+        along = (u @ axis)[:, None] * axis
+        # (1): the force turns against the device
+        u = along + (u - along) * np.cos(by) + np.cross(u, axis) * np.sin(by)
+    missed: Array = np.arccos(np.clip(u @ turn.behind, -1, 1))
+    return missed

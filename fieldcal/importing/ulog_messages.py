@@ -229,7 +229,9 @@ class UlogMessages:
         if kind in b"FIPQM" and not self._ids:
             self._head += message
         elif kind == ord("B"):
-            offsets = np.frombuffer(message[19:43], "<u8")
+            # a damaged message may end within an offset
+            whole = message[19:43]
+            offsets = np.frombuffer(whole[: len(whole) // 8 * 8], "<u8")
             self._appended = sorted(int(o) for o in offsets if o)
         elif kind == ord("A") and len(message) > 6:
             number = message[4] | message[5] << 8

@@ -167,10 +167,10 @@ def test_frames_of_canboat(tmp_path: Path, time: str) -> None:
     lines = []
     for line in (tmp_path / "drive.log").read_text().splitlines():
         stamp, _, frame = line.split()[:3]
-        number, data = frame.split("#")
+        named, data = frame.split("#")
         ms = round(1000 * float(stamp.strip("()")))
         when = datetime.fromtimestamp(ms // 1000, UTC)
-        group = groups[int(number, 16)]
+        group = groups[int(named, 16)]
         cells = [data[i : i + 2].lower() for i in range(0, len(data), 2)]
         to = 47 if group == 126208 else 255
         head = f"{when.strftime(time).format(ms % 1000)},2,{group},35,{to},{len(cells)}"
@@ -423,6 +423,16 @@ def test_a_nan_that_signals_is_a_missing_number(tmp_path: Path) -> None:
     found = whole(small.path, small.wanted, small.name, repair=False)
     assert len(found) == len(small.expected)
     assert np.isnan(found.temperature).sum() == 1
+
+
+def test_flags_of_a_px4_log_that_end_too_early_are_read_as_far_as_they_go(
+    tmp_path: Path,
+) -> None:
+    data = ulog({0: imu(1, 40)}, {})
+    flags = struct.pack("<HB", 25, ord("B")) + bytes(25)
+    path = tmp_path / "log.ulg"
+    path.write_bytes(data[:16] + flags + data[16:])
+    same(whole(path, ReadOptions()), imu(1, 40))
 
 
 def test_every_format_is_tried() -> None:

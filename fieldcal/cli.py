@@ -19,20 +19,11 @@ from importlib import import_module
 from typing import Protocol, TextIO, cast
 
 from fieldcal.commands import found
+from fieldcal.commands.help import EXIT_CODES, CommandParser
 from fieldcal.commands.spelling import spell_out
 
 COMMANDS = found()
 """Name, what it does, module."""
-
-EXIT_CODES = """\
-exit codes:
-  0    good
-  1    the calibration or the verdict is bad
-  2    wrong usage or input
-  3    the device failed
-  70   fieldcal itself broke; a file to send in is named
-  130  interrupted
-"""
 
 INTERRUPTED = 130
 BROKEN = 70
@@ -68,11 +59,11 @@ def _top(version: str) -> argparse.ArgumentParser:
 
 
 def _command_parser(name: str, command: CommandModule) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
+        command.EXAMPLE,
+        getattr(command, "RARE", ()),
         prog=f"fieldcal {name}",
         description=COMMANDS[name][0][0].upper() + COMMANDS[name][0][1:] + ".",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog=f"example:\n{command.EXAMPLE.rstrip()}\n\n{EXIT_CODES}",
     )
     command.add_arguments(parser)
     return parser

@@ -2,7 +2,8 @@
 
 To add one, write commands/<name>.py with ``EXAMPLE``, ``add_arguments`` and ``run``. It
 is found by the first line of its docstring, "`fieldcal <name>`: what it does.", without
-being loaded. Nothing is calculated here, and only here anything is printed.
+being loaded. ``RARE`` may name what the options are kept under that only ``--help-all``
+tells. Nothing is calculated here, and only here anything is printed.
 """
 
 from __future__ import annotations

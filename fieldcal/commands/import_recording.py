@@ -24,6 +24,11 @@ if TYPE_CHECKING:
         Recording,
     )
 
+RARE = (
+    *("join", "options", "sigma", "skip", "separator", "acc_lsb", "gyr_lsb"),
+    *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
+)
+
 EXAMPLE = """\
   fieldcal import log.csv --columns t,ax,ay,az,gx,gy,gz --acc-unit g --gyr-unit deg/s
   fieldcal import imu0.log.gz --columns ax,ay,az,gx,gy,gz --rate 100 -o imu0

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from fieldcal.planning.aliasing import Aliases
     from fieldcal.planning.planner import Grade
 
+RARE = ("name", "serial", "grade", "gravity", "mounting")
+
 EXAMPLE = """\
   fieldcal plan --noise tactical --positions 5 --minutes 5 -o plan.toml
   fieldcal plan --set five

@@ -31,6 +31,12 @@ EXAMPLE = """\
   fieldcal sim --base-tilt=-1,0.5 --with cross_coupling:k12=0.003,k21=-0.002
 """
 
+RARE = (
+    *("baud", "port_link", "control", "duration", "steps", "height", "gravity"),
+    *("mounting", "turn_time", "angle_offset", "acc_scale", "gyr_scale"),
+    *("acc_noise", "gyr_noise", "grade", "latitude", "truth"),
+)
+
 INTERRUPTED = 130
 
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from fieldcal.evaluation.observations import Rests
     from fieldcal.session.folder import Session
 
+RARE = ("as_printed", "method", "heading", "history")
+
 EXAMPLE = """\
   fieldcal solve bench-7/2026-03-01
   fieldcal solve imu0 --cross --json > imu0.json

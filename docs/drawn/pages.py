@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from pathlib import Path
 
-from drawn import architecture
+from drawn import architecture, installations
 from drawn.effects import given, picture
 from drawn.positions import drawings
 from drawn.screens import screens
@@ -27,6 +27,8 @@ def make(folder: Path) -> None:
     _write(folder / "architecture.html", architecture.drawing())
     for name, positions in SETS.items():
         _write(folder / f"positions_{name}.html", drawings(positions))
+    for name, one in installations.INSTALLATIONS.items():
+        _write(folder / f"installation_{name}.html", installations.drawings(one))
     for effect in catalogue().values():
         _write(folder / "effects" / f"{effect.id}.svg", picture(effect))
     for name, shown in screens().items():

@@ -42,16 +42,16 @@ def _figure(number: int, position: Position) -> str:
 
 def _svg(position: Position, name: str) -> str:
     base = turn(position.alpha or 0.0, position.beta or 0.0).T
-    away = _seen(base.T)[1] > 0
-    hidden, seen = ([a for a in range(3) if away[a] == side] for side in (True, False))
-    parts = [_ground(), *_axes(base, hidden), *_faces(base), *_axes(base, seen)]
+    away = seen(base.T)[1] > 0
+    hidden, shown = ([a for a in range(3) if away[a] == side] for side in (True, False))
+    parts = [_ground(), *axes(base, hidden), *_faces(base), *axes(base, shown)]
     return (
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(name)}"'
         f' xmlns="http://www.w3.org/2000/svg">{"".join(parts)}</svg>'
     )
 
 
-def _seen(points: Array) -> tuple[Array, Array]:
+def seen(points: Array) -> tuple[Array, Array]:
     """Points (n, 3) of the base on the page, (n, 2), and their distance, (n,)."""
     east, up, north = points[:, 0], -points[:, 1], points[:, 2]
     right = east * np.cos(AZIMUTH) + north * np.sin(AZIMUTH)
@@ -61,14 +61,15 @@ def _seen(points: Array) -> tuple[Array, Array]:
     return page, away * np.cos(ELEVATION) - up * np.sin(ELEVATION)
 
 
-def _polygon(page: Array, style: str) -> str:
+def polygon(page: Array, style: str) -> str:
+    """A polygon of points on the page, (n, 2)."""
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in page)
     return f'<polygon points="{points}" {style}/>'
 
 
 def _ground() -> str:
     corners = np.array([[-1.5, 1, -1.2], [1.5, 1, -1.2], [1.5, 1, 1.2], [-1.5, 1, 1.2]])
-    return _polygon(_seen(corners)[0], 'fill="currentColor" opacity="0.08"')
+    return polygon(seen(corners)[0], 'fill="currentColor" opacity="0.08"')
 
 
 def _faces(base: Array) -> list[str]:
@@ -80,22 +81,23 @@ def _faces(base: Array) -> list[str]:
             corners = np.zeros((4, 3))
             corners[:, axis] = side
             corners[:, one], corners[:, two] = [-1, 1, 1, -1], [-1, -1, 1, 1]
-            page, away = _seen((corners * SIZE) @ base.T)
-            centre = _seen((base[:, axis] * side)[None])[1][0]
+            page, away = seen((corners * SIZE) @ base.T)
+            centre = seen((base[:, axis] * side)[None])[1][0]
             if centre < 0:
                 shade = 0.45 + 0.14 * axis
                 style = f'fill="#8aa0b8" fill-opacity="{shade}" stroke="currentColor"'
-                drawn.append((away.mean(), _polygon(page, style)))
+                drawn.append((away.mean(), polygon(page, style)))
     return [text for _, text in sorted(drawn, reverse=True)]
 
 
-def _axes(base: Array, wanted: Sequence[int]) -> list[str]:
+def axes(base: Array, wanted: Sequence[int]) -> list[str]:
+    """Arrows along some of the axes of a box."""
     out = []
     for axis in wanted:
         name, colour = AXES[axis]
         start = base[:, axis] * SIZE[axis]
         end = base[:, axis] * (SIZE[axis] + 0.75)
-        (x0, y0), (x1, y1) = _seen(np.array([start, end]))[0]
+        (x0, y0), (x1, y1) = seen(np.array([start, end]))[0]
         along = np.array([x1 - x0, y1 - y0])
         length = float(np.hypot(*along)) or 1.0
         u = along / length
@@ -108,7 +110,7 @@ def _axes(base: Array, wanted: Sequence[int]) -> list[str]:
         out.append(
             f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}"'
             f' stroke="{colour}" stroke-width="2.2"/>'
-            + _polygon(head, f'fill="{colour}"')
+            + polygon(head, f'fill="{colour}"')
             + f'<text x="{x1 + 9 * u[0]:.1f}" y="{y1 + 9 * u[1] + 4:.1f}"'
             f' text-anchor="middle" font-size="13" fill="{colour}">{name}</text>'
         )

@@ -175,8 +175,10 @@ class Driver(ABC):
             left = max(0.0, deadline - monotonic())
             block = self._receive(min(left, LOOK) if self.on_silence else left)
             if block is not None and len(block):
-                deadline, before = monotonic() + timeout, replace(self.health)
+                before = replace(self.health)
                 yield block
+                # what is done with a block meanwhile is no silence
+                deadline = monotonic() + timeout
                 continue
             if self.on_silence:
                 self.on_silence()

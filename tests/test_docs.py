@@ -5,6 +5,7 @@ import doctest
 import re
 import sys
 import tomllib
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import get_args
@@ -143,6 +144,27 @@ def test_the_picture_of_each_effect_is_one_the_virtual_device_can_make() -> None
     for name in ("cross_coupling", "quantisation", "clock_skew"):
         svg = effects.picture(catalogue()[name])
         assert svg.lstrip().startswith("<?xml") and svg.count("<path") > 10
+
+
+@pytest.mark.usefixtures("drawn")
+def test_drawings_of_installations_turn_as_the_page_says() -> None:
+    """α > 0 lets the east side go down, β > 0 the north end up."""
+    made = import_module("drawn.installations")
+    page = (DOCS / "installing.md").read_text()
+    assert set(re.findall(r"installation_(\w+)\.html", page)) == set(made.INSTALLATIONS)
+
+    def ends(alpha: float, beta: float) -> dict[str, float]:
+        one = replace(made.INSTALLATIONS["bare"], turned=(alpha, beta))
+        home, turned = re.findall(r"<figure.*?</figure>", made.drawings(one))
+        label = r'<text x="[\d.-]+" y="([\d.-]+)"[^>]*>(\w)<'
+        heights = (
+            {n: float(y) for y, n in re.findall(label, f)} for f in (home, turned)
+        )
+        before, then = heights
+        return {name: then[name] - before[name] for name in before}
+
+    assert ends(20, 0)["x"] > 10, "down on the page is further down"
+    assert ends(0, 20)["z"] < -10
 
 
 CODE = Path(fieldcal.__file__).parent

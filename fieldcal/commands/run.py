@@ -27,12 +27,17 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import Task
 
 EXAMPLE = """\
-  fieldcal run five_position --latitude 50.45
+  fieldcal run adaptive --latitude 50.45
   fieldcal run five_position --device "serial:/dev/ttyUSB0?format=witmotion"
   fieldcal run five_position --virtual --speed 20
   fieldcal run plan.toml --headless --json --junit run.xml > result.json
   fieldcal run --resume sessions/2026-03-01T09-30-00-five_position
 """
+
+RARE = (
+    *("seed", "patience", "sigma", "history", "limits", "junit", "no_report"),
+    *("name", "grade", "gravity"),
+)
 
 GIVE_UP, GIVE_UP_UNTURNED = 90.0, 600.0
 """Device time after which a script gives a position up, s: with and without a mover."""
@@ -207,17 +212,28 @@ def _broken_off(
 def _write_junit(
     path: Path, task: Task, folder: Path, result: Any, said: str = ""
 ) -> None:
+    from fieldcal.acceptance.verification import planned
+    from fieldcal.core.positions import Position
     from fieldcal.run import junit
-    from fieldcal.session.folder import MARKS, read_marks
+    from fieldcal.session.description import with_more
+    from fieldcal.session.folder import ADDED, MARKS, read_marks
 
     marks = list(read_marks(folder / MARKS))
-    junit.write(path, task.procedure, task.positions, marks, result, said)
+    about = task.about
+    more = [m for m in marks if m.get("event") == ADDED]
+    about = with_more(about, [
+        Position.deg(m["alpha_deg"], m["beta_deg"], m["name"])
+        for m in more if int(m["position"]) >= len(about.positions)
+    ])  # fmt: skip
+    positions = [*about.positions, *filter(None, [planned(about)])]
+    junit.write(path, task.procedure, positions, marks, result, said)
 
 
 def _record(
     args: argparse.Namespace, task: Task, folder: Path, bounds: GradeLimits
 ) -> tuple[Calibration, dict[str, Any] | None, Sequence[Companion]]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
+    from fieldcal import procedures
     from fieldcal.acceptance.level import level_unknown
     from fieldcal.acceptance.site import gravity_unknown
     from fieldcal.commands.run_device import device
@@ -241,14 +257,18 @@ def _record(
         turns = PatientMover(mover, _patience(args))
         operator = stack.enter_context(_operator(args, task, turns, folder))
         turns.tell = recorder.tell = operator.tell
-        for unseen in (level_unknown(task.about), gravity_unknown(task.about)):
-            if unseen:
-                operator.tell(unseen)
+        unseen = [gravity_unknown(task.about)]
+        if procedures.most(task.about, task.procedure) is None:
+            unseen.insert(0, level_unknown(task.about))
+        for sentence in filter(None, unseen):
+            operator.tell(sentence)
         if known:
             _take_besides(recorder, task, len(known.positions), args.again, taken)
             recorder.mark("resumed", taken=sorted(taken))
         how_long = (_patience(args), _give_up(args, task))
-        running = SessionRun(task, operator, recorder, opened, bounds, *how_long, taken)
+        running = SessionRun(
+            task, operator, recorder, opened, bounds, *how_long, taken, _asks(args)
+        )
         try:
             found = running.run(driver)
         except (FieldcalError, KeyboardInterrupt) as error:
@@ -292,6 +312,13 @@ def _give_up(args: argparse.Namespace, task: Task) -> float | None:
     return GIVE_UP
 
 
+def _asks(args: argparse.Namespace) -> bool:
+    """Whether somebody is there who can be asked for more, and can leave it out."""
+    from fieldcal.run.operator.keyboard import Keyboard
+
+    return not args.headless and Keyboard().there
+
+
 @contextlib.contextmanager
 def _operator(
     args: argparse.Namespace, task: Task, mover: Mover, folder: Path
@@ -301,17 +328,20 @@ def _operator(
 
         yield ScriptOperator(mover)
         return
+    from fieldcal import procedures
     from fieldcal.commands.console import ShownConsole
     from fieldcal.run.operator.keyboard import Keyboard
     from fieldcal.run.operator.terminal import ConsoleOperator
 
+    most = procedures.most(task.about, task.procedure)
     with ConsoleOperator(
         f"fieldcal · {task.procedure} · {folder}",
-        task.positions,
+        task.about.positions if most else task.positions,
         mover,
         ShownConsole(stderr=args.json),
         args.plain,
         Keyboard(),
-        len(task.about.positions) if task.verification else None,
+        len(task.about.positions) if task.verification and most is None else None,
+        most,
     ) as operator:
         yield operator

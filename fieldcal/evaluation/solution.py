@@ -95,6 +95,11 @@ class Laid:
         """The recording, checked and reduced; None where it cannot be."""
         return self.examined[0]
 
+    @cached_property
+    def explanation(self) -> Explanation | None:
+        """What the recording shows to be there; None where it cannot be examined."""
+        return None if self.prepared is None else explain(self.prepared)
+
     @property
     def unexamined(self) -> list[str]:
         """Sentence where nothing but the means of the windows was looked at."""
@@ -147,13 +152,18 @@ def solved(
         If nothing is determined, or turns are insisted on and there are none.
 
     """
-    laid, about = Laid(session, still), session.about
+    return solved_as(Laid(session, still), turns, **asked)
+
+
+def solved_as(laid: Laid, turns: Turns = "auto", **asked: Any) -> Calibration:
+    """The same of windows that were laid out already; raises as `solved` does."""
+    session, still, about = laid.session, laid.still, laid.session.about
     if asked.get("level_sigma_deg") is None:
         asked["level_sigma_deg"] = about.level_deg
     if asked.get("angle_sigma_deg") is None:
         asked["angle_sigma_deg"] = angle_setting(about)
     printed = bool(asked.get("as_printed"))
-    shown = None if printed or laid.prepared is None else explain(laid.prepared)
+    shown = None if printed else laid.explanation
     notes = [] if printed else laid.unexamined
     recorded = None if printed else laid.recorded(turns != "no", shown)
     found = solve(laid.observations, recorded=recorded, **asked)

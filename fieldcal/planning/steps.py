@@ -44,7 +44,38 @@ class Note:
     text: str
 
 
-Step = Hold | Note
+@dataclass(frozen=True, slots=True)
+class Add:
+    """Take one more position into the session; the reply is its number.
+
+    Attributes
+    ----------
+    position : where, with known angles
+
+    """
+
+    position: Position
+
+
+@dataclass(frozen=True, slots=True)
+class Repeat:
+    """Forget what was taken in a position, and begin the plan again.
+
+    Attributes
+    ----------
+    index : the number of the position in the session
+
+    """
+
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class Judge:
+    """Say what the windows taken so far are good for; the reply is the judgement."""
+
+
+Step = Hold | Note | Add | Repeat | Judge
 Plan = Generator[Step, Any, R]
 
 
@@ -53,6 +84,12 @@ def hold(
 ) -> Plan[Average]:
     """Yield a `Hold`; the reply is its average."""
     reply: Average = yield Hold(index, position, seconds, sigma)
+    return reply
+
+
+def add(position: Position) -> Plan[int]:
+    """Yield an `Add`; the reply is the number that the position has."""
+    reply: int = yield Add(position)
     return reply
 
 

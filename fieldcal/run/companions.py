@@ -27,7 +27,7 @@ from fieldcal.core.errors import FieldcalError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
 from fieldcal.run.link_marks import LinkMarks
-from fieldcal.session.folder import DESCRIPTION
+from fieldcal.session.folder import ADDED, DESCRIPTION
 from fieldcal.session.recorder import Recorder
 
 BATCHES = 1 << 17
@@ -137,12 +137,14 @@ class LeadRecorder:
 
     Attributes
     ----------
+    folder : session of the first device
     tell : called once with a sentence for each companion that fails
 
     """
 
     def __init__(self, recorder: Recorder, others: Sequence[Companion]) -> None:
         self._recorder, self.others = recorder, others
+        self.folder = recorder.folder
         self._times = Times()
         self._told: set[Path] = set()
         self.tell: Callable[[str], None] = lambda text: None
@@ -168,7 +170,7 @@ class LeadRecorder:
         whenever the process is killed.
         """
         for other in self.others:
-            if event in ("asked", "insisted"):
+            if event in ("asked", "insisted", ADDED):
                 other.mark(event, **what)
             elif event == "window":
                 host = self._times.host

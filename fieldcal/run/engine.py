@@ -13,14 +13,16 @@ broke or whose process was killed, is handed back at once and not asked for agai
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
 
 from fieldcal.core.errors import FieldcalError, Moved, Skipped, WrongPosition
+from fieldcal.core.positions import Position
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver
-from fieldcal.planning.steps import Hold, Note, Plan, Step
+from fieldcal.planning.steps import Add, Hold, Judge, Note, Plan, Repeat, Step
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.incoming import SAID, IncomingSamples
 from fieldcal.run.interruptions import (
@@ -40,6 +42,7 @@ from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait, force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import Description
+from fieldcal.session.folder import ADDED
 from fieldcal.windows import Average, LearnedNoise, PiecedWindow
 
 R = TypeVar("R")
@@ -62,6 +65,9 @@ class Engine:
     warm_up : judges whether the device is still warming up; None does not ask
     lost_share : share of a window's samples that may be missing; with more it is taken
         again, if that helps
+    judge : says what the windows taken so far are good for
+    added : positions that were taken into the session behind the planned ones; what is
+        added is appended
 
     """
 
@@ -75,6 +81,8 @@ class Engine:
         taken: dict[int, Average] | None = None,
         warm_up: WarmUpWatch | None = None,
         lost_share: float = np.inf,
+        judge: Callable[[], object] = lambda: None,
+        added: list[Position] | None = None,
     ) -> None:
         self._driver = driver
         self._operator = operator
@@ -84,6 +92,8 @@ class Engine:
         self._taken = {} if taken is None else taken
         self._warm_up = warm_up
         self._lost_share = lost_share
+        self._judge = judge
+        self._added = [] if added is None else added
         self._thin: dict[int, int] = {}
         self._held: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
@@ -142,6 +152,22 @@ class Engine:
             case Note(text):
                 self._desk.tell(text)
                 return None
+            case Add(position):
+                return self._add(position)
+            case Repeat(index):
+                self._desk.repeat(index)
+                return None
+            case Judge():
+                return self._judge()
+
+    def _add(self, position: Position) -> int:
+        """Take a position into the session; back comes its number."""
+        number = len(self._about.positions) + len(self._added)
+        alpha, beta = position.degrees or (0.0, 0.0)
+        angles = {"alpha_deg": alpha, "beta_deg": beta}
+        self._recorder.mark(ADDED, position=number, name=position.name, **angles)
+        self._added.append(position)
+        return number
 
     def _hold(self, hold: Hold) -> Average:
         self._hold_now, tries = hold, 0

@@ -27,19 +27,26 @@ from fieldcal.core.errors import (
     Skipped,
     Stopped,
 )
+from fieldcal.core.positions import Position
 from fieldcal.drivers.driver import Driver
 from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.so_far import SoFar
 from fieldcal.planning.holding import hold_until_still
-from fieldcal.planning.steps import Plan, note
+from fieldcal.planning.steps import Judge, Plan, Repeat, add, note
 from fieldcal.run.companions import LeadRecorder
 from fieldcal.run.engine import Engine
 from fieldcal.run.interruptions import RepeatPosition
+from fieldcal.run.judging import judged
 from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, Task
 from fieldcal.run.warm_up import WarmUpWatch
+from fieldcal.session.description import with_more
 from fieldcal.session.folder import ADDED, RESULT, Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average, average
+
+REMEDIES = 3
+"""Times that what a NO-GO wants is asked for: more is another run."""
 
 RETRY = 0.5
 """Time between two attempts to open the device again, s."""
@@ -58,6 +65,7 @@ class SessionRun:
     patience : how long to try to open a device that is gone, s
     give_up : as of `Engine`
     taken : averages of positions taken before, by number
+    until_go : whether what a NO-GO wants is asked for at once
 
     """
 
@@ -71,13 +79,16 @@ class SessionRun:
         patience: float,
         give_up: float | None,
         taken: dict[int, Average] | None = None,
+        until_go: bool = False,
     ) -> None:
         self._task, self._operator, self._recorder = task, operator, recorder
         self._opened, self._patience, self._give_up = opened, patience, give_up
         self._taken = {} if taken is None else taken
         self._lost: tuple[float, DeviceError] | None = None
         wait = float(task.run.get("warm_up_s", WARM_UP))
-        self._lost_share = limits.lost_share
+        self._limits, self._until_go = limits, until_go
+        self._added: list[Position] = []
+        self._remedies = 0
         self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
 
     def run(self, driver: Driver) -> Calibration:
@@ -118,7 +129,9 @@ class SessionRun:
             self._give_up,
             self._taken,
             self._warm_up,
-            self._lost_share,
+            self._limits.lost_share,
+            lambda: judged(self._recorder.folder, self._limits),
+            self._added,
         )
         while True:
             try:
@@ -127,18 +140,49 @@ class SessionRun:
                 self._taken.pop(again.index, None)
 
     def _plan(self) -> Plan[Calibration]:
-        task = self._task
-        plan = procedures.procedure(task.procedure).plan
-        found = yield from plan(task.about, task.seconds, task.sigma)
-        if task.verification is not None:
-            number = len(task.about.positions)
-            try:
-                yield from hold_until_still(
-                    number, task.verification, task.seconds, task.sigma
-                )
-            except Skipped as skipped:
-                yield from note(str(skipped))
+        task, about = self._task, with_more(self._task.about, self._added)
+        name = task.procedure
+        if self._added and procedures.most(about, name) is None:
+            name = "positions"  # whatever set it was, it has more now
+        plan = procedures.procedure(name).plan
+        found = yield from plan(about, task.seconds, task.sigma)
+        about = with_more(task.about, self._added)
+        verification = planned(about)
+        if verification is not None:
+            yield from self._verified(len(about.positions), verification)
+        elif self._until_go:
+            yield from self._remedied()
         return found
+
+    def _verified(self, number: int, position: Position) -> Plan[None]:
+        """Hold the position that is not fitted."""
+        task = self._task
+        if procedures.most(task.about, task.procedure) is not None:
+            yield from note("one more position, which is not fitted but predicted")
+        try:
+            yield from hold_until_still(number, position, task.seconds, task.sigma)
+        except Skipped as skipped:
+            yield from note(str(skipped))
+
+    def _remedied(self) -> Plan[None]:
+        """Take what would make a NO-GO a GO, as long as there is such a thing."""
+        while self._remedies < REMEDIES:
+            so_far: SoFar = yield Judge()
+            remedy = so_far.remedy
+            if remedy is None:
+                return
+            self._remedies += 1
+            yield from note(f"NO-GO so far: {so_far.reasons[0]}. {remedy['says']}")
+            for number in remedy["again"]:
+                yield Repeat(number)
+            for place in remedy["positions"]:
+                one = Position.deg(place["alpha_deg"], place["beta_deg"])
+                number = yield from add(one)
+                try:
+                    yield from hold_until_still(number, one, remedy["seconds"], None)
+                except Skipped as skipped:
+                    yield from note(str(skipped))
+                    return
 
     def _wait_for_device(self, lost: DeviceError, deadline: float) -> Driver:
         """Open the device again, or give up with the error that it was lost by."""
@@ -216,7 +260,8 @@ def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
         again = tuple(int(i) for i in remedy["again"])
         tables["position"] = [*tables.get("position", ()), *remedy["positions"]]
         run["seconds"] = float(remedy["seconds"])
-    if len(tables.get("position", ())) > _planned(marks, session):
+    fixed = procedures.most(session.about, str(run.get("procedure", ""))) is None
+    if fixed and len(tables.get("position", ())) > _planned(marks, session):
         run["procedure"] = "positions"  # whatever set it was, it has more now
     return session, {**tables, "run": run}, again
 

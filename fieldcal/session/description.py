@@ -237,6 +237,17 @@ def parse(raw: Mapping[str, Any]) -> Description:
     )
 
 
+def with_more(about: Description, positions: Iterable[Position]) -> Description:
+    """The same with positions of known angles behind those that it has."""
+    more = []
+    for position in positions:
+        alpha, beta = position.degrees or (0.0, 0.0)
+        more.append({"name": position.name, "alpha_deg": alpha, "beta_deg": beta})
+    if not more:
+        return about
+    return parse({**about.raw, "position": [*about.raw.get("position", ()), *more]})
+
+
 def _known(value: float | None) -> float | None:
     return None if value is None else float(value)
 

@@ -192,12 +192,10 @@ def _left_out(block: Block, marks: Iterable[Mapping[str, Any]]) -> Block:
 def _with_added(about: Description, marks: list[dict[str, Any]]) -> Description:
     """With the positions that were added while it was recorded, behind the planned."""
     added = [mark for mark in marks if mark.get("event") == ADDED]
-    if not added:
-        return about
-    keys = ("name", "alpha_deg", "beta_deg")
-    tables = [{k: m[k] for k in keys if k in m} for m in added]
-    planned = about.raw.get("position", ())
-    return description.parse({**about.raw, "position": [*planned, *tables]})
+    return description.with_more(
+        about,
+        [Position.deg(m["alpha_deg"], m["beta_deg"], m.get("name", "")) for m in added],
+    )
 
 
 def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:

@@ -3,12 +3,14 @@
 import subprocess
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from processes import FIELDCAL
 
 from fieldcal.cli import COMMANDS, main
+from fieldcal.commands.help import CommandParser
 
 ZERO_G = "[site]\ngravity = 0.0\n"
 
@@ -27,7 +29,26 @@ def test_every_command_has_help_with_an_example_and_the_exit_codes(
     assert end.value.code == 0
     said = capsys.readouterr().out
     assert f"fieldcal {name}" in said.split("example", 1)[1]
+    assert "0 good, 1 bad" in said and len(said.splitlines()) <= 48
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_all_of_the_help_has_every_option(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = import_module(f"fieldcal.commands.{COMMANDS[name][1]}")
+    whole = CommandParser(module.EXAMPLE, getattr(module, "RARE", ()), prog="x")
+    module.add_arguments(whole)
+    said = whole.whole_help()
     assert "130  interrupted" in said
+    rare = {a.dest: a.option_strings for a in whole._actions if a.option_strings}
+    for dest in getattr(module, "RARE", ()):  # each is an option, and told of there
+        line = f"\n  {rare[dest][0]}"
+        assert line in said and line not in whole.format_help()
+    if getattr(module, "RARE", ()):
+        with pytest.raises(SystemExit) as end:
+            main([name, "--help-all"])
+        assert end.value.code == 0 and "130  interrupted" in capsys.readouterr().out
 
 
 def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -109,7 +130,7 @@ def test_a_session_that_cannot_be_solved_is_said_so_in_one_sentence(
         ("[run]\nseconds = -1\n", "[run] seconds = -1 cannot be: give the averaging"),
         (
             "[run]\nprocedure = 'magic'\n",
-            '[run] procedure = "magic" cannot be: write one of five_position, ',
+            '[run] procedure = "magic" cannot be: write one of adaptive, ',
         ),
         ("run = 3\n", "write [run]"),
         ("x = [", "is no plan file"),

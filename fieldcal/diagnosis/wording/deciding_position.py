@@ -11,15 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.frames import turn
 from fieldcal.core.positions import Position, ladder
-from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
+from fieldcal.model.causes.planned import late
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
-from fieldcal.physics.experience import Experience
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +72,7 @@ def deciding_position(
     held = [p.degrees for p in about.positions]
     best: DecidingPosition | None = None
     for alpha, beta in ladder(about.positions):
-        place = _place(x, alpha, beta)
+        place = late(x, *np.deg2rad([[alpha], [beta]]))
         seen = [s.output(s.experienced(place), since) for s in states]
         apart = float(np.nanmax(np.abs(seen[0] - seen[1]) / sd))
         if best is None or apart > best.apart * 1.2:
@@ -88,30 +86,6 @@ def _state(explanation: Explanation, found: Set) -> State:
     """The state at a set's estimates, orientations as they are."""
     state, _ = explanation.inferred.inference.moved(found)
     return replace(state, small_rotation=np.zeros_like(state.small_rotation))
-
-
-def _place(x: Experience, alpha: float, beta: float) -> Experience:
-    """One row in a position, late in the session and in its window."""
-    a, b = np.deg2rad([[alpha], [beta]])
-    last = slice(len(x) - 1, len(x))
-    force: Array = x.mounting.T @ turn(a, b) @ x.base_force
-    return Experience.at_rest(
-        a,
-        b,
-        x.gravity,
-        f=force,
-        t=x.t[last],
-        since_start=x.since_start[last],
-        since_turn=x.since_turn[last],
-        warming=x.warming[last],
-        heating=x.heating[last],
-        variance=x.variance[last],
-        position=np.array([-1]),
-        base_force=x.base_force,
-        base_rate=x.base_rate,
-        mounting=x.mounting,
-        latitude=x.latitude,
-    )
 
 
 def decided_by(name: str) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.calibration.names import ParameterName, group_of
-from fieldcal.core.frames import force_home
+from fieldcal.core.frames import force_home, turn
 from fieldcal.core.positions import Position, angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
@@ -69,6 +69,19 @@ def predicted(
         parts[term.effect.id] = columns.of_effect(term.effect, {}, 0).of(view)
     slope = np.stack([_column(parts, n)[:, :3] for n in names], axis=2)
     return state.output(view.x, view.since)[:, :3], slope
+
+
+def late(x: Experience, alpha: Array, beta: Array) -> Experience:
+    """Rows in further positions, (n,) rad, as late in the session as its last row."""
+    last = np.full(len(alpha), len(x) - 1)
+    force: Array = turn(alpha, beta) @ x.base_force @ x.mounting
+    return Experience.at_rest(
+        alpha, beta, x.gravity, f=force, t=x.t[last], since_start=x.since_start[last],
+        since_turn=x.since_turn[last], warming=x.warming[last],
+        heating=x.heating[last], variance=x.variance[last],
+        position=np.full(len(alpha), -1), base_force=x.base_force,
+        base_rate=x.base_rate, mounting=x.mounting, latitude=x.latitude,
+    )  # fmt: skip
 
 
 def state_of(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,6 +43,7 @@ class Shown:
     positions : all that will be asked for
     verification : number of the position that is not fitted, None without one
     keys : whether there are keys to press
+    most : positions that there are at most, None where `positions` has them all
     taken : standard error of each position taken, m/s^2, by number
     said : sentences that must not be missed
     reminder : what stands before the reason for waiting
@@ -52,14 +53,23 @@ class Shown:
     """
 
     title: str
-    positions: Sequence[Position]
+    positions: list[Position]
     verification: int | None
     keys: Callable[[], bool]
+    most: int | None = None
     taken: dict[int, float] = field(default_factory=dict)
     said: list[str] = field(default_factory=list)
     reminder: str = ""
     view: OperatorView | None = None
     hold: Hold | None = None
+
+    @property
+    def number(self) -> str:
+        """Number of the position asked for, and how many there are."""
+        many = str(len(self.positions))
+        if self.most is not None:
+            many = f"at most {max(self.most, len(self.positions))}"
+        return f"position {self.hold.index + 1} of {many}" if self.hold else ""
 
 
 class Screen:
@@ -114,7 +124,9 @@ class Screen:
         """Instruction, reason, seconds and keys, and nothing else."""
         view, hold = self._shown.view, self._shown.hold
         words, detail, colour = self._words()
-        number = f"  {hold.index + 1}/{len(self._shown.positions)}" if hold else ""
+        number = f"  {hold.index + 1}" if hold else ""
+        if hold and self._shown.most is None:
+            number += f"/{len(self._shown.positions)}"
         style = f"bold reverse {colour}".strip()
         width = self._console.width
         lines: list[RenderableType] = [Text(f" {words}{number}".ljust(width), style)]
@@ -172,7 +184,7 @@ class Screen:
         )
         if hold is None:
             return "WAIT", "for the device", ""
-        number = f"position {hold.index + 1} of {len(self._shown.positions)}"
+        number = self._shown.number
         if view is None or view.phase == "turning":
             if view is None or view.arrival is None or not view.arrival.ok:
                 wrong = view is not None and alert(view)

@@ -43,6 +43,7 @@ class ConsoleOperator:
     plain : write lines although it is one
     keyboard : where keys come from; none are read unless given
     verification : number of the position that is not fitted, if there is one
+    most : positions that there are at most, where they are found on the way
 
     """
 
@@ -55,11 +56,12 @@ class ConsoleOperator:
         plain: bool = False,
         keyboard: Keyboard | None = None,
         verification: int | None = None,
+        most: int | None = None,
     ) -> None:
         self._mover = mover
         self._console = console
         self._keyboard = keyboard
-        self._shown = Shown(title, tuple(positions), verification, self._has_keys)
+        self._shown = Shown(title, list(positions), verification, self._has_keys, most)
         self._screen = Screen(console, self._shown)
         self._said_before: list[str] = []
         self._skips = -ASKED_AGAIN
@@ -89,6 +91,8 @@ class ConsoleOperator:
     def place(self, hold: Hold) -> None:
         """Ask for a position."""
         self._shown.hold = hold
+        if hold.index >= len(self._shown.positions):  # found on the way
+            self._shown.positions.append(hold.position)
         self._shown.said = self._said_before = self._shown.said[-1:]
         self._lines.clear()
         self._shown.taken.pop(hold.index, None)

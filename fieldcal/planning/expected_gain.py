@@ -1,0 +1,321 @@
+"""What a further position is worth, before it is taken.
+
+What is asked for are numbers q: each parameter over the uncertainty that it may have,
+and of each cause whether it is there (0 or 2, so that a toss-up has a variance of 1).
+An explanation E of the recording, of probability P(E), has its own mean and covariance
+of them, and of the mean y that a window in a further position c would have,
+
+    y_E = h(s, c) + T (u_E - u_s),   Cov_E(y) = T C_E T^T + R                       (1)
+
+with h what the model predicts in state s, T its columns in c, u_E and C_E the columns'
+values with their covariance, R noise, instability and how well angles are set. Part of
+y is by what the gyroscopes' turn to c misses it: a turn phi is a rate phi for a second.
+Over all explanations
+
+    C_qy = sum_E P(E) [Cov_E(q, y) + (q_E - q) (y_E - y)^T],   C_qq, C_yy likewise  (2)
+    C_qq' = C_qq - C_qy C_yy^-1 C_yq                                                (3)
+    gain = 1/2 sum_i ln (1 + C_qq,ii) / (1 + C_qq',ii)                              (4)
+
+so that it counts alike what brings a parameter within its limit and what tells causes
+apart, and what is known well enough counts no more. Causes that the recording does not
+show are explanations as well, as likely as before and as large as it leaves them.
+Source: Lindley 1956 for the gain; Goldstein and Wooff, Bayes Linear Statistics, 2007,
+3.1, for (3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.calibration.names import ParameterName
+from fieldcal.core.frames import turn, way
+from fieldcal.core.positions import Position, angles
+from fieldcal.core.samples import GYR, Array, Index
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import CLOSURE, Basis, Cause
+from fieldcal.model.causes.columns import Course, RowView
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.planned import late
+from fieldcal.model.evidence.gram import Eliminated, Weighed, gains
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sizing import DENSITY
+from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.search.inference import Inferred
+from fieldcal.model.state import State
+
+LEAST = 1e-3
+"""Probability below which an explanation decides no position."""
+
+STEP = 1e-4
+"""Change of an angle by which outputs move, rad."""
+
+COMMON = {"base_tilt": 30.0, "gyro_scale": 1.0, "gyro_cross_coupling": 1.0}
+"""Causes that every explanation has, as a calibration finds them, with their size in
+typical ones: the tilt of the base is anything."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """One explanation.
+
+    Attributes
+    ----------
+    names : of its causes
+    chance : that it is the right one
+    state : its columns, eliminated; those that every explanation has come first
+
+    """
+
+    names: frozenset[str]
+    chance: float
+    state: Eliminated
+
+
+@dataclass(frozen=True, slots=True)
+class Worth:
+    """What is not known yet, and what a further window in each position tells of it.
+
+    Attributes
+    ----------
+    asked : names of what is asked for: parameters by full name, causes by id
+    variance : (q,) of each now
+    left : (n, q) of each, expected after a window in each of n positions
+    gain : (n,) by (4)
+
+    """
+
+    asked: tuple[str, ...]
+    variance: Array
+    left: Array
+    gain: Array
+
+    def foremost(self, i: int) -> str:
+        """Name of what a position tells most of."""
+        fall = np.log1p(self.variance) - np.log1p(self.left[i])
+        return self.asked[int(np.argmax(fall))]
+
+
+class ExpectedGain:
+    """The worth of further positions.
+
+    Parameters
+    ----------
+    rows : of the windows
+    found : what was inferred of them
+    likely : sets that were looked at, with their probabilities
+    allowed : uncertainty that is allowed of each parameter, SI, by its full name
+    angles : how well angles are set, rad
+
+    """
+
+    def __init__(
+        self,
+        rows: Rows,
+        found: Inferred,
+        likely: Iterable[tuple[Set, float]],
+        allowed: Mapping[str, float],
+        angles: float,
+    ) -> None:
+        self.rows, self.found, self.angles = rows, found, angles
+        self.dictionary: Dictionary = found.inference.dictionary
+        self.asked = dict(self._asked(allowed))
+        self.explained = self._explained(likely)
+
+    def of(self, positions: Sequence[Position]) -> Worth:
+        """The worth of each of some positions, with known angles."""
+        limit = np.array([s for s, _ in self.asked.values()])
+        at = np.array([c for _, c in self.asked.values()])
+        names = sorted(set().union(*(e.names for e in self.explained)))
+        chance = np.array([e.chance for e in self.explained])
+        there = np.array(
+            [[2.0 * (n in e.names) for n in names] for e in self.explained]
+        )
+        table, off, noise = self._windows(positions)
+        q_mean, y_mean, q_cov, qy_cov, y_cov = [], [], [], [], []
+        for one, causes in zip(self.explained, there, strict=True):
+            columns, cov = one.state.columns, one.state.inverse
+            picked = (columns == at[:, None]) / limit[:, None]
+            design = table[:, :, columns]
+            moved = cov @ np.swapaxes(design, 1, 2)
+            y_mean.append(design @ one.state.estimate + off)  # (1)
+            y_cov.append(design @ moved + noise)
+            own = np.zeros((len(positions), len(names), y_cov[-1].shape[1]))
+            qy_cov.append(np.concatenate([picked @ moved, own], axis=1))
+            q_mean.append(np.append(picked @ one.state.estimate, causes))
+            inner = np.einsum("qi,ij,qj->q", picked, cov, picked)
+            q_cov.append(np.append(inner, np.zeros(len(names))))
+        q_off = np.array(q_mean) - chance @ np.array(q_mean)
+        y_off = np.array(y_mean) - np.einsum("e,enc->nc", chance, np.array(y_mean))
+        c_qq = chance @ (np.array(q_cov) + q_off**2)  # (2)
+        c_qy = np.einsum("e,enqc->nqc", chance, np.array(qy_cov))
+        c_qy += np.einsum("e,eq,enc->nqc", chance, q_off, y_off)
+        c_yy = np.einsum("e,encd->ncd", chance, np.array(y_cov))
+        c_yy += np.einsum("e,enc,end->ncd", chance, y_off, y_off)
+        told = np.linalg.solve(c_yy, np.swapaxes(c_qy, 1, 2))
+        left = np.maximum(c_qq - np.einsum("nqc,ncq->nq", c_qy, told), 0.0)  # (3)
+        gain = 0.5 * (np.log1p(c_qq) - np.log1p(left)).sum(axis=1)  # (4)
+        return Worth((*self.asked, *names), c_qq, left, gain)
+
+    # -- explanations
+
+    def _explained(self, likely: Iterable[tuple[Set, float]]) -> list[Explained]:
+        """Those that were looked at, and causes that nothing shows beside the best."""
+        out = [self._with_common(s) for s, p in likely if p > LEAST]
+        best = max(out, key=lambda pair: pair[1])
+        known = set().union(*(one.names for one, _ in out))
+        for cause in self.dictionary.causes:
+            if cause.kind == "effect" and cause.name not in {*known, *COMMON}:
+                out.append(self._beside(best, cause))
+        score = np.array([s for _, s in out])
+        share = np.exp(score - np.logaddexp.reduce(score))
+        return [
+            replace(one, chance=float(p))
+            for (one, _), p in zip(out, share, strict=True)
+            if p > LEAST
+        ]
+
+    def _with_common(self, one: Set) -> tuple[Explained, float]:
+        """A set with tilt and angles beside its causes, and its weight, ln."""
+        columns, sizes = self._common()
+        at = np.concatenate([columns, one.state.columns])
+        wide = np.concatenate([sizes, one.state.sizes])
+        state = Eliminated.of(self._rows(one), at, wide)
+        names = frozenset(c.name for c, _ in one.members) - COMMON.keys()
+        return Explained(names, 0.0, state), one.score - one.state.score + state.score
+
+    def _beside(
+        self, best: tuple[Explained, float], cause: Cause
+    ) -> tuple[Explained, float]:
+        """The best explanation with one more cause, as large as it may be."""
+        one, score = best
+        group = cause.variants[0]
+        inner, pull = one.state.rest(group.columns, group.typical)
+        rows = one.state.rows
+        own = float((np.diag(rows.matrix(group.columns, group.columns))
+                     * group.typical**2).max())  # fmt: skip
+        profile = gains(inner[None], pull[None], np.array([own]))[0] + DENSITY
+        evidence = float(np.logaddexp.reduce(profile))
+        v = float(np.sqrt(np.exp(profile - evidence) @ priors.SIZES**2))
+        state = Eliminated.of(
+            rows,
+            np.concatenate([one.state.columns, group.columns]),
+            np.concatenate([one.state.sizes, group.sizes(v)]),
+        )
+        more = score + evidence + float(np.log(cause.chance))
+        return Explained(one.names | {cause.name}, 0.0, state), more
+
+    def _common(self) -> tuple[Index, Array]:
+        """Columns with sizes that every explanation has, angles among them."""
+        d = self.dictionary
+        at = [(d.small_rotation + 2 * d.held[:, None] + [0, 1]).ravel()]
+        wide = [np.full(len(at[0]), max(self.angles, 1e-9))]
+        for cause in d.causes:
+            if cause.name in COMMON:
+                at.append(cause.variants[0].columns)
+                wide.append(cause.variants[0].sizes(COMMON[cause.name]))
+        return np.concatenate(at), np.concatenate(wide)
+
+    def _rows(self, one: Set) -> Weighed:
+        return self.found.search.weighed(one.sizes.instability)
+
+    # -- what is asked for, and where
+
+    def _asked(
+        self, allowed: Mapping[str, float]
+    ) -> Iterator[tuple[str, tuple[float, int]]]:
+        """By full name what is allowed of a parameter, and the column that it has."""
+        d = self.dictionary
+        turned = [c for c in d.causes if c.name == "gyro_scale"]
+        for name, limit in allowed.items():
+            parameter = ParameterName.of(name)
+            c = parameter.channel
+            if c not in d.observed or not limit < np.inf:
+                continue
+            if not parameter.is_scale:
+                yield name, (limit, d.bias + c)
+            elif c < GYR.start:
+                yield name, (limit, d.scale + c)
+            elif turned:
+                yield name, (limit, int(turned[0].variants[0].columns[c - GYR.start]))
+
+    def _windows(self, positions: Sequence[Position]) -> tuple[Array, Array, Array]:
+        """T (n, m, k), h(s) - T u_s (n, m) and R (n, m, m) of windows and turns."""
+        d, values, seen = self.dictionary, self.found.values, self.dictionary.observed
+        state = replace(
+            self.found.state,
+            small_rotation=np.zeros_like(self.found.state.small_rotation),
+        )
+        alpha, beta = angles(positions)
+        since = np.repeat(d.since[:, -1:], len(positions), axis=1)
+        view = RowView.of(late(self.rows.x, alpha, beta), since, state)
+        used = values != 0
+        for one in self.explained:
+            used[one.state.columns] = True
+        table = _table(d, view, used)
+        off = state.output(view.x, since) - table @ values
+        noise = self._noise(state, since, alpha, beta)
+        table, off, noise = table[:, seen], off[:, seen], noise[:, seen][:, :, seen]
+        info = np.concatenate([np.zeros(0), *(t.info for t in self.found.turned)])
+        if not (info > 0).any():
+            return table, off, noise
+        felt = replace(view, x=replace(view.x, w=view.x.w + self._turned(alpha, beta)))
+        turned = (_table(d, felt, used) - _table(d, view, used))[:, GYR]
+        size = priors.SIZES[self.found.best.sizes.instability[CLOSURE]]
+        miss = 1 / np.median(info[info > 0]) + (size * d.unstable[CLOSURE]) ** 2
+        both = np.zeros((len(positions), len(seen) + 3, len(seen) + 3))
+        both[:, : len(seen), : len(seen)] = noise
+        both[:, len(seen) :, len(seen) :] = (miss + 2 * self.angles**2) * np.eye(3)
+        return (
+            np.concatenate([table, turned], axis=1),
+            np.concatenate([off, -turned @ values], axis=1),
+            both,
+        )
+
+    def _turned(self, alpha: Array, beta: Array) -> Array:
+        """Turn from the last position to each of some, (n, 3) rad in device axes."""
+        x = self.rows.x
+        phi: Array = way(turn(x.alpha[-1], x.beta[-1]), alpha, beta) @ x.mounting
+        return phi
+
+    def _noise(self, state: State, since: Array, alpha: Array, beta: Array) -> Array:
+        """R of windows, (n, 6, 6): noise of a mean, what windows are off by, angles."""
+        rows, d = self.rows, self.dictionary
+        sd = np.nanmedian(rows.sd, axis=0) / np.sqrt(len(rows.x) / len(d.held))
+        tau = priors.SIZES[list(self.found.best.sizes.instability)] * d.unstable
+        own = sd**2 + np.nanmedian(rows.common, axis=0) ** 2 + tau[:6] ** 2
+
+        def output(a: float, b: float) -> Array:
+            x = state.experienced(late(rows.x, alpha + a, beta + b))
+            return state.output(x, since)
+
+        moved = [output(a, b) - output(-a, -b) for a, b in ((STEP, 0.0), (0.0, STEP))]
+        t = np.stack(moved, axis=2) / (2 * STEP)
+        out: Array = np.diag(own) + self.angles**2 * t @ np.swapaxes(t, 1, 2)
+        return out
+
+
+def _table(d: Dictionary, view: RowView, used: Array) -> Array:
+    """The columns that are used in some rows, (n, 6, k); zero elsewhere."""
+    n = len(view.x)
+    out = np.zeros((n, 6, d.width))
+    for first, end, basis in _bases(d):
+        if not used[first:end].any():
+            continue
+        row = basis.of(view)
+        if isinstance(basis, Course):
+            width = row.shape[1]
+            for c in range(6):
+                out[:, c, first + c * width : first + (c + 1) * width] = row
+        else:
+            out[:, :, first:end] = row
+    return np.where(used, out, 0.0)
+
+
+def _bases(d: Dictionary) -> Iterator[tuple[int, int, Basis]]:
+    """Every basis with its first column, and the first of the next one."""
+    ends = [*(first for first, _ in d.bases[1:]), d.width]
+    for (first, basis), end in zip(d.bases, ends, strict=True):
+        yield first, end, basis

@@ -1,0 +1,50 @@
+"""Judges a session while it is being recorded, for procedures that go by it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fieldcal.acceptance.assessment import assess
+from fieldcal.acceptance.uncertainty import UNCERTAINTY
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.core.errors import FieldcalError
+from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.so_far import SoFar
+from fieldcal.evaluation.solution import Laid, solved_as
+from fieldcal.session.folder import Session
+
+MENDED = ("fit", "positions", "witnesses", "turns", "level")
+"""Checks beside those of uncertainties that further positions may mend. The place, the
+temperature, the link, what the operator insisted on and how the device was at earlier
+calibrations stay as they are."""
+
+
+def judged(folder: Path, limits: GradeLimits) -> SoFar:
+    """What the windows that a session has are good for.
+
+    Raises
+    ------
+    FieldcalError
+        If no window can be used.
+
+    """
+    session = Session.open(folder)
+    still = rests(session)
+    laid = Laid(session, still)
+    try:
+        found = assess(solved_as(laid), session, still, limits, None)
+    except FieldcalError as error:
+        return SoFar(laid, limits, None, str(error))
+    return SoFar(laid, limits, found, failed=tuple(_failed(found)))
+
+
+def _failed(found: Calibration) -> list[str]:
+    """Checks that failed and may be mended, or could not be made as yet."""
+    checks = found.info["decision"]["checks"]
+    return [
+        c["name"]
+        for c in checks
+        if (c["ok"] is False or (c["ok"] is None and c["name"] == "fit"))
+        and (c["name"] in MENDED or c["name"].endswith(UNCERTAINTY))
+    ]

@@ -1,0 +1,152 @@
+"""What a further position is expected to tell, against what it then does tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fieldcal.core.positions import Position
+from fieldcal.diagnosis.explain import Explanation, explain
+from fieldcal.diagnosis.prepare import prepare
+from fieldcal.planning.expected_gain import ExpectedGain
+from fieldcal.session import description
+from fieldcal.sim_device.profile import Profile
+from fieldcal.sim_device.replay import simulate
+from fieldcal.sim_device.vocabulary import effect
+
+LADDER = [Position.deg(a, b) for a in (-45, 0, 45) for b in (-5, 0, 5)]
+ALLOWED = {"acc_bias.x": 0.02, "acc_bias.y": 0.02, "acc_bias.z": 0.02}
+ALLOWED |= {"acc_scale.x": 2e-3, "acc_scale.y": 2e-3, "acc_scale.z": 2e-3}
+SECONDS = 15.0
+ANGLE = float(np.deg2rad(0.003))
+
+
+def explained(
+    positions: Sequence[Position], more: Sequence[tuple[str, dict[str, float]]] = ()
+) -> Explanation:
+    """Windows of a device on the ladder, explained."""
+    starts = 5.0 + 25.0 * np.arange(len(positions))
+    windows = [
+        (p.alpha or 0.0, p.beta or 0.0, float(s), float(s) + SECONDS)
+        for p, s in zip(positions, starts, strict=True)
+    ]
+    effects = tuple(effect(name, given) for name, given in more)
+    block = simulate(Profile(effects=effects), windows, seed=4)
+    tables = []
+    for p, w in zip(positions, windows, strict=True):
+        alpha, beta = p.degrees or (0.0, 0.0)
+        angles = {"alpha_deg": alpha, "beta_deg": beta}
+        tables.append({**angles, "start_s": w[2], "end_s": w[3]})
+    about = description.parse(
+        {"site": {"latitude_deg": 45.0}, "position": tables, "format": 1}
+    )
+    return explain(prepare(block, about))
+
+
+def gain_of(found: Explanation) -> ExpectedGain:
+    likely = found.posterior.weights
+    return ExpectedGain(found.rows, found.inferred, likely, ALLOWED, ANGLE)
+
+
+def alone(gain: ExpectedGain) -> ExpectedGain:
+    """The same where the likeliest explanation is certain."""
+    out = copy(gain)
+    best = max(out.explained, key=lambda e: e.chance)
+    out.explained = [replace(best, chance=1.0)]
+    return out
+
+
+START = [Position.deg(0, 0), Position.deg(45, 5), Position.deg(-45, 5)]
+
+
+@pytest.fixture(scope="module")
+def three() -> ExpectedGain:
+    return gain_of(explained(START))
+
+
+@pytest.mark.parametrize("place", [(-45.0, -5.0), (0.0, 0.0), (0.0, -5.0)])
+def test_a_window_tells_what_was_expected_of_it(
+    three: ExpectedGain, place: tuple[float, float]
+) -> None:
+    one = Position.deg(*place)
+    before = alone(three).of([one])
+    then = alone(gain_of(explained([*START, one]))).of([one])
+    expected = np.sqrt(before.left[0, : len(ALLOWED)])
+    came = np.sqrt(then.variance[: len(ALLOWED)])
+    np.testing.assert_allclose(came, expected, rtol=0.35)
+
+
+def test_what_is_expected_of_bias_and_scale_is_that_of_least_squares(
+    three: ExpectedGain,
+) -> None:
+    """A dense fit of nine numbers, its derivatives by the forces themselves."""
+    one = Position.deg(45, -5)
+    told = alone(three).of([one]).left[0, : len(ALLOWED)]
+    noise = three.rows.noise[:3] / np.sqrt(SECONDS * 100.0)
+    weighed = []
+    for place in [*START, one]:
+        rows, angle = _row(place), _by_angles(place) * ANGLE
+        cov = np.diag(noise**2) + angle @ angle.T
+        weighed.append(np.linalg.solve(np.linalg.cholesky(cov), rows))
+    whole = np.vstack(weighed)
+    limits = np.array(list(ALLOWED.values()))
+    variance = np.diag(np.linalg.inv(whole.T @ whole))[:6] / limits**2
+    np.testing.assert_allclose(told, variance, rtol=0.3)
+
+
+def _force(place: Position, tilt: Sequence[float] = (0.0, 0.0)) -> np.ndarray:
+    """Force on a base that is turned by a little, m/s^2; small angles add."""
+    a, b = (place.alpha or 0.0) + tilt[0], (place.beta or 0.0) + tilt[1]
+    down = np.array([-np.sin(a), -np.cos(a), 0.0]) * 9.806
+    return np.array([down[0], np.cos(b) * down[1], -np.sin(b) * down[1]])
+
+
+def _row(place: Position) -> np.ndarray:
+    """Derivatives by biases, scale factors and a tilt of the base, (3, 8)."""
+    f, step = _force(place), 1e-5
+    along_x = np.array([1.0, 0.0, 0.0])
+    a, b = place.alpha or 0.0, place.beta or 0.0
+    tilts = []
+    for axis in (along_x, np.array([0.0, 0.0, 1.0])):
+        base = np.array([0.0, -9.806, 0.0])
+        off = np.cross(axis * step, base)
+        x = np.cos(a) * off[0] + np.sin(a) * off[1]
+        y = np.cos(a) * off[1] - np.sin(a) * off[0]
+        turned = [x, np.cos(b) * y + np.sin(b) * off[2]]
+        turned.append(np.cos(b) * off[2] - np.sin(b) * y)
+        tilts.append(np.array(turned) / step)
+    return np.column_stack([np.eye(3), np.diag(f), *tilts])
+
+
+def _by_angles(place: Position) -> np.ndarray:
+    step = 1e-6
+    sides = [(step, 0.0), (0.0, step)]
+    return np.column_stack([(_force(place, s) - _force(place)) / step for s in sides])
+
+
+def test_the_position_that_is_worth_most_is_where_nothing_was_yet(
+    three: ExpectedGain,
+) -> None:
+    worth = three.of(LADDER)
+    best = LADDER[int(np.argmax(worth.gain))]
+    assert (best.beta or 0.0) < 0, "no position has turned that joint back"
+    assert worth.gain.min() >= 0
+    again = [LADDER.index(p) for p in LADDER if p.degrees in {s.degrees for s in START}]
+    assert worth.gain[again].max() < worth.gain.max() / 2
+
+
+def test_a_cause_is_told_where_it_differs_from_what_stands_in_its_place() -> None:
+    """A square and a difference between up and down are alike on one side."""
+    start = [Position.deg(a, b) for a, b in ((0, 0), (45, 5), (22.5, -5), (35, 2))]
+    gain = gain_of(explained(start, [("quadratic", {"x": 1e-3})]))
+    sides = [Position.deg(40, 0), Position.deg(-40, 0)]
+    worth = gain.of(sides)
+    open_ = [i for i, n in enumerate(worth.asked) if worth.variance[i] > 0.2]
+    causes = [i for i in open_ if worth.asked[i] not in ALLOWED]
+    assert {"quadratic", "scale_asymmetry"} & {worth.asked[i] for i in causes}
+    same, other = worth.left[:, causes].sum(axis=1)
+    assert other < 0.85 * same and worth.gain[1] > worth.gain[0]

@@ -1,0 +1,182 @@
+"""Runs whose positions are found on the way, in a closed loop with the device."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fieldcal import procedures
+from fieldcal.calibration import Calibration, limits
+from fieldcal.core.errors import Stopped
+from fieldcal.core.positions import Position
+from fieldcal.planning.steps import Hold
+from fieldcal.run import plan_file
+from fieldcal.run.judging import judged
+from fieldcal.run.operator.protocol import OperatorView, Wish
+from fieldcal.run.session_run import SessionRun, recorded_averages, resume
+from fieldcal.run.wait_reason import WaitReason
+from fieldcal.session.folder import Session
+from fieldcal.session.recorder import Recorder
+from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device.in_process import InProcess
+from fieldcal.sim_device.profile import Profile, Sampling
+from fieldcal.sim_device.vocabulary import effect
+from fieldcal.windows import Average
+
+BOUNDS = limits.read("tactical")
+TILT = effect("base_tilt", {"about_x_deg": 0.7, "about_z_deg": -0.4})
+
+
+@dataclass
+class Hand:
+    """Turns the device, and wants something while some positions are asked for."""
+
+    driver: InProcess
+    wants: dict[int, Wish] = field(default_factory=dict)
+    asked: list[tuple[int, Position]] = field(default_factory=list)
+    told: list[str] = field(default_factory=list)
+
+    def place(self, hold: Hold) -> None:
+        self.asked.append((hold.index, hold.position))
+        self.driver.place(hold.position)
+
+    def tell(self, text: str) -> None:
+        self.told.append(text)
+
+    def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+        self.told.append(reason.text)
+
+    def show(self, view: OperatorView) -> None:
+        pass
+
+    def wish(self) -> Wish | None:
+        return self.wants.pop(self.asked[-1][0], None) if self.asked else None
+
+
+@dataclass
+class Bench:
+    """A device with all that a run needs."""
+
+    folder: Path
+    hand: Hand
+
+    def run(
+        self, run: Mapping[str, Any], until_go: bool = False, **more: Any
+    ) -> Calibration:
+        site = {"latitude_deg": 45.0, "angle_setting_deg": 0.003}
+        tables = {"site": site, "run": {"seconds": 12.0, **run}, **more}
+        task = plan_file.task(tables, "the test")
+        with Recorder(self.folder, task.tables) as recorder:
+            return self._going(task, recorder, {}, until_go)
+
+    def _going(
+        self,
+        task: plan_file.Task,
+        recorder: Recorder,
+        taken: dict[int, Average],
+        until_go: bool = False,
+    ) -> Calibration:
+        driver = self.hand.driver
+        one = SessionRun(
+            task, self.hand, recorder, lambda: driver, BOUNDS, 1.0, 60.0, taken,
+            until_go,
+        )  # fmt: skip
+        return one.run(driver)
+
+    def resumed(self) -> Calibration:
+        session, tables, _ = resume(self.folder)
+        task = plan_file.task(tables, "the test")
+        taken = recorded_averages(session, task)
+        with Recorder(self.folder, None) as recorder:
+            return self._going(task, recorder, taken)
+
+    @property
+    def marks(self) -> list[dict[str, Any]]:
+        return list(Session.open(self.folder).marks())
+
+    @property
+    def numbers(self) -> list[int]:
+        return [number for number, _ in self.hand.asked]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    noise = replace(Profile().noise, gyr=(1e-4,) * 3)
+    profile = replace(Profile(), sampling=Sampling(50.0), effects=(TILT,), noise=noise)
+    return Bench(tmp_path / "s", Hand(InProcess(VirtualDevice(profile, seed=5))))
+
+
+ADAPTIVE = {"procedure": "adaptive"}
+
+
+def test_it_ends_at_go_in_fewer_positions_than_the_paper_and_finds_the_tilt(
+    bench: Bench,
+) -> None:
+    found = bench.run(ADAPTIVE)
+    assert found.info["decision"]["go"] and len(bench.numbers) <= 5
+    assert bench.numbers == list(range(len(bench.numbers)))
+    assert found.value("base_tilt.about_x_deg") == pytest.approx(0.7, abs=0.2)
+    told = [t for t in bench.hand.told if "the next position tells" in t]
+    assert len(told) == len(bench.numbers) - 2
+    assert (
+        bench.hand.told[-1] == f"after {len(bench.numbers)} positions all is known"
+        " that was asked for"
+    )
+    session = Session.open(bench.folder)
+    assert [p.degrees for p in session.positions] == [
+        p.degrees for _, p in bench.hand.asked
+    ]
+    assert judged(bench.folder, BOUNDS).enough
+
+
+def test_a_run_that_was_stopped_goes_on_where_it_was(bench: Bench) -> None:
+    """What cannot be reached is not chosen again; what is taken again is the same."""
+    bench.hand.wants = {2: "repeat", 3: "stop"}
+    with pytest.raises(Stopped):
+        bench.run(ADAPTIVE)
+    assert bench.numbers == [0, 1, 2, 1, 2, 3]
+    bench.hand.asked.clear()
+    bench.hand.wants = {3: "skip"}
+    found = bench.resumed()
+    places = [p.degrees for _, p in bench.hand.asked]
+    assert bench.numbers[0] == 3 and places.count(places[0]) == 1
+    assert found.info["decision"]["go"]
+    assert any("left out by the operator" in w for w in found.warnings)
+    added = [m["position"] for m in bench.marks if m["event"] == "added"]
+    assert added == list(range(2, max(bench.numbers) + 1))
+
+
+def test_it_takes_no_more_positions_than_it_may_and_those_of_its_ladder(
+    bench: Bench,
+) -> None:
+    ladder = {"alpha_deg": [-10, 0, 10], "beta_deg": [-10, 0, 10]}
+    start = [{"alpha_deg": 0, "beta_deg": 0}, {"alpha_deg": 10, "beta_deg": 10}]
+    bench.run({**ADAPTIVE, "most": 3, "ladder": ladder}, position=start)
+    places = [p.degrees for _, p in bench.hand.asked]
+    assert len(places) == 3 and all(p and max(map(abs, p)) == 10 for p in places[1:])
+    assert (
+        bench.hand.told[-1] == "after 3 positions, the most that were asked for,"
+        " it ends"
+    )
+
+
+def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -> None:
+    two = {"procedure": "positions"}
+    start = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
+    bench.run(two, until_go=True, position=start)
+    assert max(bench.numbers) >= 3 and judged(bench.folder, BOUNDS).enough
+    said = [t for t in bench.hand.told if t.startswith("NO-GO so far")]
+    assert len(said) == max(bench.numbers) - 2
+    assert all("one position more" in t and "then GO is expected" in t for t in said)
+
+
+def test_only_a_plan_that_finds_its_positions_says_how_many_there_are_at_most() -> None:
+    about = plan_file.task({"run": ADAPTIVE}, "the test").about
+    assert procedures.most(about, "adaptive") == 9
+    assert procedures.most(about, "five_position") is None
+    more = plan_file.task({"run": {**ADAPTIVE, "most": 6}}, "the test").about
+    assert procedures.most(more, "adaptive") == 6

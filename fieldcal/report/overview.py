@@ -11,7 +11,9 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.names import ParameterName
 from fieldcal.calibration.wording import number, pretty, title
+from fieldcal.core.chances import chi2_tail
 from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
 from fieldcal.report.blocks import (
     Block,
     Cell,
@@ -24,6 +26,7 @@ from fieldcal.report.blocks import (
     table,
 )
 from fieldcal.report.gather import Material
+from fieldcal.report.gravity_norm import norm_errors
 from fieldcal.report.loose import list_at, objects_at, table_at
 
 WIDEST = 30.0
@@ -57,22 +60,52 @@ def head(material: Material) -> Head:
     serial = about.device.get("serial")
     under = [folder] if folder != name else []
     under += [f"serial {serial}"] if serial else []
-    verdict, tone, says = _verdict(found)
+    verdict, tone, says = _verdict(found, "nominal" in about.raw, about.nominal)
     return Head(name, " · ".join(under), verdict, tone, says, _facts(material))
 
 
-def _verdict(found: Calibration | None) -> tuple[str, Tone, str]:
-    """Verdict, its tone and a sentence; a decision by limits goes before."""
+def _verdict(
+    found: Calibration | None, known: bool, nominal: Mapping[str, Array]
+) -> tuple[str, Tone, str]:
+    """Verdict, its tone, and what to do; a decision by limits goes before.
+
+    `known` says that `nominal` is the calibration in use, and not that of any device.
+    """
     if found is None:
         return "not solved", "warn", "fieldcal solve has not been run yet."
     decision = table_at(found.info, "decision")
     reasons = " ".join(str(r) for r in list_at(decision, "reasons"))
     if decision.get("go") is False:
-        return "no-go", "bad", reasons or "A limit is not kept."
+        remedy = str(table_at(decision, "remedy").get("says", ""))
+        do = f"{remedy[:1].upper()}{remedy[1:]}." if remedy else "Do not apply it."
+        return "no-go", "bad", f"{do} {reasons or 'A limit is not kept.'}"
     if not found.good:
         return "bad", "bad", "Do not use these numbers."
-    says = "The calibration can be used within its uncertainties."
+    says = "Apply it: the numbers hold within their ±."
+    if known:
+        says = _compared(found, nominal)
     return "go" if decision.get("go") is True else "good", "good", says
+
+
+def _compared(found: Calibration, nominal: Mapping[str, Array]) -> str:
+    """Whether the calibration in use has to be changed, and by what most of all."""
+    names = [n for n in found.names if ParameterName.of(n).group in nominal]
+    at = [found.names.index(n) for n in names]
+    old = [nominal[p.group][p.axis] for p in map(ParameterName.of, names)]
+    change, cov = found.values[at] - np.array(old), found.covariance[np.ix_(at, at)]
+    chi2 = float(change @ np.linalg.lstsq(cov, change, rcond=None)[0])
+    if chi2_tail(chi2, len(names)) >= thresholds.BEYOND_NOISE:
+        return (
+            "No change is needed: the calibration in use agrees with this one within"
+            f" the ± (χ² = {chi2:.0f} of {len(names)} parameters)."
+        )
+    most = int(np.argmax(np.abs(change) / np.sqrt(np.diag(cov))))
+    unit = pretty(found.units[at[most]])
+    value, error = number(float(change[most]), float(np.sqrt(cov[most, most])))
+    return (
+        f"Apply it: {title(names[most])} differs from the calibration in use by"
+        f" {value} ± {error}{' ' + unit if unit else ''}, the most of all."
+    )
 
 
 def _facts(material: Material) -> NameValues:
@@ -94,6 +127,9 @@ def _facts(material: Material) -> NameValues:
         facts.append(("χ² / degrees of freedom", f"{found.chi2:.1f} / {found.dof}"))
     if found is not None and np.isfinite(found.rms):
         facts.append(("rms residual", f"{found.rms:.2g} m/s²"))
+    if (norm := norm_errors(material)) is not None:
+        before, after = norm.rms
+        facts.append(("|a| − g, before → after", f"{before:.2g} → {after:.2g} m/s²"))
     if material.diagnosis is not None:
         said = str(material.diagnosis.get("verdict", "")).replace("_", " ")
         facts.append(("diagnosis", said))

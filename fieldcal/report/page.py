@@ -17,6 +17,7 @@ from fieldcal.report.agreement import agreement, correlation
 from fieldcal.report.blocks import Section
 from fieldcal.report.diagnosis import diagnosis
 from fieldcal.report.gather import Material
+from fieldcal.report.gravity_norm import gravity_norm
 from fieldcal.report.history import history
 from fieldcal.report.noise import noise
 from fieldcal.report.overview import calibration, head
@@ -63,6 +64,7 @@ def sections(material: Material, made: datetime) -> list[Section]:
     """All sections that the session has something to say for."""
     found = [
         calibration(material),
+        gravity_norm(material),
         diagnosis(material),
         places(material),
         recording(material),

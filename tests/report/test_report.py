@@ -19,12 +19,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from fieldcal.cli import main
+from fieldcal.core.positions import FIVE
 from fieldcal.core.samples import Array
 from fieldcal.report import EarlierCalibration, Material, gather, packing, render
 from fieldcal.report.agreement import correlations
 from fieldcal.report.blocks import Figure
+from fieldcal.report.gravity_norm import norm_errors
 from fieldcal.report.packing import MISSING, PIECE, Columns, pack, quantised
 from fieldcal.report.residuals import reached, residuals
+from fieldcal.sim_device.profile import Profile
 
 HOSTILE = "</script><script>hacked=1</script><img src=x onerror=hacked=1>\"'&{{7*7}}"
 
@@ -158,7 +161,7 @@ def test_the_page_has_every_section_and_needs_nothing_from_elsewhere(
     page = Tags(render(gather(session, earlier)))
     ids = [a["id"] for a in page.named("section")]
     assert ids == [
-        *("calibration", "diagnosis", "positions", "recording", "residuals"),
+        *("calibration", "gravity", "diagnosis", "positions", "recording", "residuals"),
         *("correlation", "stillness", "noise", "history", "provenance"),
     ]
     assert not [a for t, a in page.tags if t in ("link", "img", "iframe", "base")]
@@ -244,6 +247,49 @@ def test_a_decision_by_limits_stands_on_top(bench: Path, tmp_path: Path) -> None
     text = Tags(render(gather(session))).text
     assert "no-go" in text and "Too much bias." in text
     assert "not kept" in text and "not checked" in text
+    result["decision"]["remedy"] = {"says": "take position 3 again: it disagrees"}
+    (session / "result.json").write_text(json.dumps(result))
+    text = Tags(render(gather(session))).text
+    assert "Take position 3 again: it disagrees. Too much bias." in text
+
+
+def test_the_page_opens_with_what_to_do(material: Material) -> None:
+    found = material.calibration
+    assert found is not None
+    assert "Apply it: the numbers hold" in Tags(render(material)).text
+    for off, says in (
+        (0.0, "No change is needed"),
+        (0.2, "Apply it: acc bias y differs"),
+    ):
+        nominal = {
+            g: found.vector(g)[0]
+            + (off * (np.arange(3) == 1) if g == "acc_bias" else 0)
+            for g in ("acc_bias", "acc_scale", "gyr_bias")
+        }
+        about = material.session.about
+        about = replace(
+            about,
+            nominal={**about.nominal, **nominal},
+            raw={**about.raw, "nominal": {}},
+        )
+        session = replace(material.session, about=about)
+        assert says in Tags(render(replace(material, session=session))).text
+
+
+def test_the_norm_misses_gravity_by_bias_and_scale_before(material: Material) -> None:
+    """The virtual device's own numbers, along the force that it was given."""
+    errors = norm_errors(material)
+    assert errors is not None
+    truth, g = Profile().truth, material.session.gravity
+    alpha, beta = np.deg2rad(np.array([p.degrees for p in FIVE]) + TILT).T
+    f = np.column_stack(
+        [-np.sin(alpha), -np.cos(alpha) * np.cos(beta), np.cos(alpha) * np.sin(beta)]
+    )
+    output = np.array(truth.acc_bias) + np.array(truth.acc_scale) * g * f
+    expected = np.linalg.norm(output, axis=1) - g
+    np.testing.assert_allclose(errors.before, expected, atol=3e-3)
+    assert np.abs(errors.after).max() < 5 * errors.sigma.max() < 0.01
+    assert "Gravity, before and after" in Tags(render(material)).text
 
 
 def _earlier(session: Path) -> tuple[EarlierCalibration, ...]:

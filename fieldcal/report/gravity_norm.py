@@ -1,0 +1,98 @@
+"""The norm of the specific force less gravity, before and after the calibration.
+
+At rest |f| = g wherever the device points, so that nobody needs to know its angles:
+
+    before = |(<U> - b_0) / k_0| - g,   after = |M^-1 (<U> - b)| - g              (1)
+
+with b_0, k_0 the calibration that it came with. m/s^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.evaluation.observations import observations
+from fieldcal.report.blocks import Block as Shown
+from fieldcal.report.blocks import Figure, Section, Text
+from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.gather import Material
+
+
+@dataclass(frozen=True, slots=True)
+class NormErrors:
+    """Norms less gravity of the windows at rest.
+
+    Attributes
+    ----------
+    rows : (n,) number of each window's position
+    before, after : (n,) m/s^2
+    sigma : (n,) standard error of each, of the window's mean
+
+    """
+
+    rows: tuple[int, ...]
+    before: Array
+    after: Array
+    sigma: Array
+
+    @property
+    def rms(self) -> tuple[float, float]:
+        """Root mean squares of before and after, m/s^2."""
+        before, after = np.sqrt([np.mean(self.before**2), np.mean(self.after**2)])
+        return float(before), float(after)
+
+
+def norm_errors(material: Material) -> NormErrors | None:
+    """What the norms miss gravity by; None without accelerometers or a calibration."""
+    found = material.calibration
+    if found is None or material.still is None or "acc_bias" not in found.groups:
+        return None
+    still = material.still.at_rest(material.session)
+    seen = observations(material.session.about, still.averages, still.rows)
+    if not seen.has_acc or not len(seen):
+        return None
+    nominal = (seen.mean[:, :3] - seen.nominal.acc_bias) / seen.nominal.acc_scale
+    recorded = Block.of(seen.time, seen.mean[:, :3], seen.mean[:, 3:])
+    true = found.apply(recorded, seen.nominal).acc
+    along = true / np.linalg.norm(true, axis=1, keepdims=True)
+    spread = np.einsum("ni,nij,nj->n", along, seen.covariance[:, :3, :3], along)
+    before, after = (
+        np.linalg.norm(f, axis=1) - seen.gravity for f in (nominal, true)
+    )  # (1)
+    return NormErrors(still.rows, before, after, np.sqrt(spread))
+
+
+def gravity_norm(material: Material) -> Section | None:
+    """A chart of both, by position."""
+    errors = norm_errors(material)
+    if errors is None or not np.isfinite([*errors.before, *errors.after]).all():
+        return None
+    x = np.arange(len(errors.rows), dtype=float)
+    series = tuple(
+        Series(name, x + place, values, colour, low=values - errors.sigma,
+               high=values + errors.sigma)
+        for name, place, values, colour in (
+            ("before", -0.12, errors.before, 6), ("after", 0.12, errors.after, 1)
+        )
+    )  # fmt: skip
+    before, after = errors.rms
+    said = f"rms {before:.2g} m/s² before, {after:.2g} m/s² after"
+    chart = Chart(
+        "norm",
+        "|a| − g before and after",
+        f"The norm of the specific force misses gravity by {said}.",
+        Axis("position", names=tuple(str(r + 1) for r in errors.rows)),
+        Axis("|a| − g", "m/s²"),
+        series,
+    )
+    blocks: tuple[Shown, ...] = (
+        Text(
+            "At rest the accelerometers feel gravity and nothing else, wherever they"
+            f" point. Their norm misses it by {said}."
+        ),
+        Figure(chart, "± is one standard error of the window's mean."),
+    )
+    return Section("gravity", "Gravity, before and after", blocks)

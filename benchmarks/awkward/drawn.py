@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.awkward.motion import Floats, G, Handling, Moved, moved, outputs
-from benchmarks.awkward.written import Columns, write
+from benchmarks.awkward.written import NAMED, Columns, heading, write
 from fieldcal.core.samples import Block
 from fieldcal.sim_device.wire import open_wire
 
@@ -189,6 +189,11 @@ def _answers(log: Log, columns: Columns, head: str) -> dict[str, list[str]]:
     channels = {f"{k}{x}" for k in "ag" for x in "xyz"} | {"t"}
     thermal = "_" if head == "none" else "temperature"
     named = [n if n in channels else thermal for n, _, _ in columns]
+    if log.said["form"] in NAMED:
+        # where columns have names, they are asked for by these
+        (over,) = heading("bare" if head == "units" else head, columns)
+        pairs = zip(named, over, strict=True)
+        named = [f"{n}={name}" for n, name in pairs if n in channels]
     return {
         "--acc-unit": _option("acc", str(log.said["acc"])),
         "--gyr-unit": _option("gyr", str(log.said["gyr"])),

@@ -24,7 +24,8 @@ Columns = list[tuple[str, str, Floats]]
 """Name, unit and values of each column."""
 
 
-def _heading(head: str, columns: Columns) -> list[list[str]]:
+def heading(head: str, columns: Columns) -> list[list[str]]:
+    """Lines of names over the columns."""
     names = [name for name, _, _ in columns]
     units = [unit if "in" not in unit else "LSB" for _, unit, _ in columns]
     bracketed = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
@@ -61,17 +62,21 @@ def write(
     form = "csv" if form in ("clock", "monitor") and not timed else form
     said["form"] = form
     if form in NAMED:
-        (names,) = _heading("bare" if head == "units" else head, columns)
+        (names,) = heading("bare" if head == "units" else head, columns)
         if form == "parquet":
-            (names,) = _heading(head, columns)
+            (names,) = heading(head, columns)
         return _with_names(folder, form, names, [v for _, _, v in columns])
     separator = SEPARATORS.get(form, ",")
-    rows = [*_heading(head, columns), *_cells(columns, form)]
+    rows = [*heading(head, columns), *_cells(columns, form)]
     if form == "quoted":
         rows = [[f'"{cell}"' for cell in row] for row in rows]
     lines = [separator.join(row) for row in rows]
     if form == "monitor":
-        lines = [f"{row[0]} -> {separator.join(row[1:])}" for row in rows]
+        # the monitor writes when a line came before each, also before the names
+        first = rows[-1][0]
+        stamps = [row[0] if row[0][:1].isdigit() else first for row in rows]
+        pairs = zip(stamps, rows, strict=True)
+        lines = [f"{stamp} -> {separator.join(row[1:])}" for stamp, row in pairs]
     data = ("\n".join(lines) + "\n").encode("utf-16" if form == "utf-16" else "utf-8")
     path = folder / ("log.csv.gz" if form == "gz" else "log.csv")
     path.write_bytes(gzip.compress(data, 1) if form == "gz" else data)

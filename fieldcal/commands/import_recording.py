@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
@@ -116,23 +117,47 @@ def run(args: argparse.Namespace) -> int:
         opened = [MergedFiles(opened)]
     if args.list:
         return _list(opened)
-    for recording in opened:
-        name = recording.path.name.split(".")[0]
-        folder = args.output or Path(name)
-        if args.output and len(opened) > 1:
-            folder = args.output / name
-        names = _chosen(recording, args.instance)
-        rests: dict[str, Array] = {}
-        inner = folders_of([stream.name for stream in names])
-        for stream in names:
-            # what was said of one IMU of the file is no matter of another
-            one = recording.alone(stream.name)
-            there = folder / inner[stream.name] if len(names) > 1 else folder
-            imported = _bring(args, one, stream, there)
-            rests[stream.name] = imported.rests
-        if len(names) > 1:
-            _say_instances(folder, rests, float(args.gravity or G0))
+    written: list[Path] = []
+    try:
+        for recording in opened:
+            _bring_all(args, recording, len(opened) > 1, written)
+    except InputError:
+        # the same command with the answer must find its folders free
+        for folder in written:
+            rmtree(folder)
+            sys.stderr.write(f"{folder}: removed again, for this is not all\n")
+        raise
     return 0
+
+
+def _bring_all(
+    args: argparse.Namespace, recording: Recording, among: bool, written: list[Path]
+) -> None:
+    """Make a session of each IMU that is wanted, and note the folders.
+
+    Parameters
+    ----------
+    args, recording : what is wanted of which
+    among : whether it is one of several files
+    written : folders, grows
+
+    """
+    name = recording.path.name.split(".")[0]
+    folder = args.output or Path(name)
+    if args.output and among:
+        folder = args.output / name
+    names = _chosen(recording, args.instance)
+    rests: dict[str, Array] = {}
+    inner = folders_of([stream.name for stream in names])
+    for stream in names:
+        # what was said of one IMU of the file is no matter of another
+        one = recording.alone(stream.name)
+        there = folder / inner[stream.name] if len(names) > 1 else folder
+        imported = _bring(args, one, stream, there)
+        rests[stream.name] = imported.rests
+        written.append(there)
+    if len(names) > 1:
+        _say_instances(folder, rests, float(args.gravity or G0))
 
 
 def _wanted(args: argparse.Namespace, i: int) -> ReadOptions:

@@ -119,9 +119,23 @@ class TextColumns(ColumnRecording):
                 found = [Heading([Column("", name) for name in form.names], SKIP)]
             if form.clock is not None:
                 found = [_clocked(one, form.clock) for one in found]
+        found = [one for way in found if (one := self._fitted(way)) is not None]
         if not self.sensor:
             return found
         return [Heading([self._of(c) for c in way.columns], way.skip) for way in found]
+
+    def _fitted(self, way: Heading) -> Heading | None:
+        """A heading as wide as the rows; None if its names stand over other columns.
+
+        Lines may end with a separator, those of names or those of numbers.
+        """
+        table, names = self._numbers, [*way.columns]
+        width = table.shape[1]
+        while len(names) > width and not names[-1].name and width:
+            names.pop()
+        if len(names) == width - 1 and np.isnan(table[:, -1]).all():
+            names.append(Column("", ""))
+        return Heading(names, way.skip) if len(names) == width or not width else None
 
     def _of(self, column: Column) -> Column:
         """Column of which a bare axis is one of the sensor's."""

@@ -230,3 +230,39 @@ def test_words_for_nothing_are_missing_numbers(tmp_path: Path) -> None:
     session = imported(path)
     assert len(session.block) == len(rows)
     assert np.isnan(session.block.gyr).any(axis=1).sum() == 5
+
+
+def test_a_question_about_the_second_imu_leaves_nothing_of_the_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows, other = turned(9, 50.0), turned(10, 50.0)
+    # nothing turns the second one, and its numbers are no rad/s at rest
+    other[:, 4:] = np.random.default_rng(9).normal(40.0, 0.5, (len(other), 3))
+    n = min(len(rows), len(other))
+    names = [f"imu{i}_{kind}{x}" for i in (0, 1) for kind in "ag" for x in "xyz"]
+    log = np.column_stack([rows[:n], other[:n, 1:]])
+    path = write(tmp_path, log, heading=",".join(["t", *names]))
+    out = tmp_path / "out"
+    assert main(["import", str(path), "-o", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert "--gyr-unit deg/s" in said and "removed again" in said
+    assert not list(out.iterdir())
+    answer = ("--gyr-unit", "rad/s")
+    assert main(["import", str(path), "-o", str(out), *answer]) == 0
+    assert sorted(one.name for one in out.iterdir()) == ["0", "1"]
+
+
+@pytest.mark.parametrize(
+    ("heading", "before", "behind"),
+    [("t,ax,ay,az,gx,gy,gz,", "", ""), ("t,ax,ay,az,gx,gy,gz", "", ","),
+     ("t,ax,ay,az,gx,gy,gz", "7,", "")],
+)  # fmt: skip
+def test_names_are_never_put_over_other_columns(
+    tmp_path: Path, heading: str, before: str, behind: str
+) -> None:
+    rows = turned(11, 50.0)
+    lines = (",".join(f"{x:.10g}" for x in row) for row in rows)
+    path = tmp_path / "log.csv"
+    text = "\n".join([heading, *(f"{before}{line}{behind}" for line in lines)])
+    path.write_text(text + "\n")
+    same(imported(path), rows)

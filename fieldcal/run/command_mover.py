@@ -7,6 +7,7 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from string import Formatter
 from time import monotonic, sleep
 from typing import IO, Self
@@ -102,7 +103,13 @@ class CommandMover:
 
     @staticmethod
     def _code(process: subprocess.Popen[str]) -> int | None:
-        """Exit code; its number stays that of its process group until `close`."""
+        """Exit code; its number stays that of its process group until `close`.
+
+        Where a system cannot look without reaping, as macOS and Windows, the number is
+        free from then on, and what is left of its group has it all the same.
+        """
+        if not hasattr(os, "waitid"):
+            return process.poll()
         how = os.WEXITED | os.WNOHANG | os.WNOWAIT
         ended = os.waitid(os.P_PID, process.pid, how)
         if ended is None:
@@ -113,11 +120,11 @@ class CommandMover:
         """End it with all that it has started; safe to call twice."""
         if self._process is not None:
             if self._code(self._process) is None:
-                os.killpg(self._process.pid, signal.SIGTERM)
+                _signal(self._process, "SIGTERM")
             deadline = monotonic() + LAST
             while self._code(self._process) is None and monotonic() < deadline:
                 sleep(LAST / 20)
-            os.killpg(self._process.pid, signal.SIGKILL)
+            _signal(self._process, "SIGKILL")
             self._process.wait()
             self._process = None
         if self._said is not None:
@@ -152,3 +159,15 @@ class CommandMover:
                     f" {', '.join(PLACES)}; write a brace that is meant as {{{{"
                 )
         return [part.format(**known) for part in self._template]
+
+
+def _signal(process: subprocess.Popen[str], name: str) -> None:
+    """End a command with all that it has started, by a signal where there are any."""
+    if hasattr(os, "killpg"):
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, getattr(signal, name))
+        return
+    tree = ["taskkill", "/T", "/F", "/PID", str(process.pid)]
+    with suppress(OSError):
+        subprocess.run(tree, capture_output=True, check=False)
+    process.kill()

@@ -20,6 +20,16 @@ from fieldcal.run.patient_mover import PatientMover
 from fieldcal.sim_device.control import Control
 
 
+@pytest.fixture(params=["posix", "macos", "windows"])
+def system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Systems that cannot look without reaping, or know no groups of processes."""
+    for name in {"macos": ["waitid"], "windows": ["waitid", "killpg"]}.get(
+        request.param, []
+    ):
+        monkeypatch.delattr(os, name)
+    return str(request.param)
+
+
 def wait(mover: CommandMover) -> None:
     deadline = monotonic() + HANGS
     while mover.busy():
@@ -27,6 +37,7 @@ def wait(mover: CommandMover) -> None:
         sleep(0.01)
 
 
+@pytest.mark.usefixtures("system")
 def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
     out = tmp_path / "said"
     call = script(tmp_path, f"import sys; open({str(out)!r}, 'w').write(str(sys.argv))")
@@ -37,6 +48,7 @@ def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
     assert "'4', '45', '2.5', 'α = 45°, β = 2.5°'" in out.read_text()
 
 
+@pytest.mark.usefixtures("system")
 @pytest.mark.parametrize(
     ("body", "timeout", "says"),
     [
@@ -61,6 +73,8 @@ def test_a_command_that_is_not_there_is_said() -> None:
         mover.turn(FIVE[0], 0)
 
 
+@pytest.mark.parametrize("system", ["posix", "macos"], indirect=True)
+@pytest.mark.usefixtures("system")
 def test_all_that_a_command_has_started_ends_with_it(tmp_path: Path) -> None:
     """Also what outlives the command itself, such as a controller in the background."""
     pipe = tmp_path / "alive"

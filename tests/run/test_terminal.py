@@ -96,6 +96,21 @@ def test_turning_says_where_to_where_it_is_and_what_it_waits_for(
     assert "100 Hz" in said and "24.5 °C" in said
 
 
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (40, 15)])
+def test_positions_that_are_found_on_the_way_are_counted_as_they_come(
+    width: int, height: int
+) -> None:
+    console = Console(file=io.StringIO(), width=width, height=height)
+    made = ConsoleOperator("adaptive", FIVE[:2], ManualMover(), console, most=9)
+    made.place(HOLD)
+    made.place(Hold(2, FIVE[4], 30.0))
+    said = screen(made, width, height)
+    assert "α = 45°, β = 5°" in said and "/2" not in said
+    assert "position 3 of at most 9" in said or width < 80
+    made.place(HOLD)  # once more
+    assert "α = 45°, β = 5°" in screen(made) or width < 80
+
+
 def test_averaging_says_hold_still_time_left_and_what_is_reached(
     operator: ConsoleOperator,
 ) -> None:

@@ -13,6 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.introduce import introduce
 from fieldcal.commands.run_task import make_task
+from fieldcal.commands.run_waits import (
+    PATIENCE,
+    PATIENCE_HEADLESS,
+    asks,
+    give_up,
+    patience,
+)
 from fieldcal.commands.several import StoreSeveral
 from fieldcal.commands.site import add_site
 from fieldcal.core.errors import FieldcalError
@@ -39,14 +46,8 @@ RARE = (
     *("name", "grade", "gravity"),
 )
 
-GIVE_UP, GIVE_UP_UNTURNED = 90.0, 600.0
-"""Device time after which a script gives a position up, s: with and without a mover."""
-
 INTERRUPTED = 130
 """Exit code of a run that was stopped."""
-
-PATIENCE, PATIENCE_HEADLESS = 120.0, 20.0
-"""How long a device that is gone is waited for, s."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -254,7 +255,7 @@ def _record(
         recorder = stack.enter_context(
             record_companions(task.further, own, task.tables)
         )
-        turns = PatientMover(mover, _patience(args))
+        turns = PatientMover(mover, patience(args))
         operator = stack.enter_context(_operator(args, task, turns, folder))
         turns.tell = recorder.tell = operator.tell
         unseen = [gravity_unknown(task.about)]
@@ -265,9 +266,9 @@ def _record(
         if known:
             _take_besides(recorder, task, len(known.positions), args.again, taken)
             recorder.mark("resumed", taken=sorted(taken))
-        how_long = (_patience(args), _give_up(args, task))
+        how_long = (patience(args), give_up(args, task))
         running = SessionRun(
-            task, operator, recorder, opened, bounds, *how_long, taken, _asks(args)
+            task, operator, recorder, opened, bounds, *how_long, taken, asks(args)
         )
         try:
             found = running.run(driver)
@@ -292,31 +293,6 @@ def _take_besides(
         alpha, beta = position.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
         recorder.mark(ADDED, position=number, name=position.name, **angles)
-
-
-def _patience(args: argparse.Namespace) -> float:
-    """How long a device that is gone is waited for, s."""
-    if args.patience is not None:
-        return float(args.patience)
-    return PATIENCE_HEADLESS if args.headless else PATIENCE
-
-
-def _give_up(args: argparse.Namespace, task: Task) -> float | None:
-    """How long a position is waited for; for a person, for ever."""
-    given = task.run.get("give_up_s")
-    unturned = task.mover["kind"] == "nothing"
-    if given is not None:
-        return float(given)
-    if unturned:
-        return GIVE_UP_UNTURNED if args.headless else None
-    return GIVE_UP
-
-
-def _asks(args: argparse.Namespace) -> bool:
-    """Whether somebody is there who can be asked for more, and can leave it out."""
-    from fieldcal.run.operator.keyboard import Keyboard
-
-    return not args.headless and Keyboard().there
 
 
 @contextlib.contextmanager

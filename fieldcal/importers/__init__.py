@@ -57,6 +57,8 @@ def open_recording(
     if name and name not in formats():
         known = (*formats(), *codec.formats())
         raise InputError(f"no format {name!r}: there are {', '.join(known)}")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name the recording in it")
     if path.is_char_device():
         raise InputError(f"{path}: is a device and has no end; name a file")
     first = head(path)

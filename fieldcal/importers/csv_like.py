@@ -115,6 +115,7 @@ class TextColumns(ColumnRecording):
         """What stands above its numbers."""
         found = headings_above(self._lines, self.wanted.separator)
         for form in self._forms:
+            self.says += [form.says] if form.says not in ("", *self.says) else []
             if form.names:
                 found = [Heading([Column("", name) for name in form.names], SKIP)]
             if form.clock is not None:

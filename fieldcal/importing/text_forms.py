@@ -27,6 +27,8 @@ CLOCK = "utc time [s]"
 
 _ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*->\s*")
 
+_DEFINED = re.compile(r"FMT,\s*\d+,\s*\d+,\s*IMU,\s*\w+,\s*(.*)")
+
 Reader = Callable[[Sequence[str]], list[str]]
 """Turns lines into lines; called with one piece of a text after the other."""
 
@@ -38,13 +40,15 @@ class TextForm(ABC):
     ----------
     names : of its columns, where its lines say them; else empty
     clock : number of the column whose clock is read, or None
-    gathers : whether several lines make a row
+    gathers : whether rows are not simply lines
+    says : what the user must know, or nothing
 
     """
 
     names: tuple[str, ...] = ()
     clock: int | None = None
     gathers = False
+    says = ""
 
     @abstractmethod
     def reader(self) -> Reader:
@@ -61,7 +65,9 @@ def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
 
     """
     found: list[TextForm] = []
-    for form in (QuotedCells, LabelledValues, ArrivalPrefix, ClockColumn):
+    for form in (
+        DataflashText, QuotedCells, LabelledValues, ArrivalPrefix, ClockColumn
+    ):  # fmt: skip
         one = form.of(lines, separator)
         if one is not None:
             found.append(one)
@@ -71,6 +77,45 @@ def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
 
 def _most(lines: Sequence[str], is_so: Callable[[str], bool]) -> bool:
     return sum(map(is_so, lines)) > MOSTLY * len(lines)
+
+
+class DataflashText(TextForm):
+    """A dataflash log as text: of its messages, those of the first IMU."""
+
+    gathers = True
+    says = (
+        "it is the text of a dataflash log, of which the first IMU alone is read: its"
+        " .bin has all of them, with what was installed"
+    )
+
+    def __init__(self, fields: Sequence[str], separator: str | None) -> None:
+        self._instance = fields.index("I") if "I" in fields else None
+        named = ["temperature" if name == "T" else name for name in fields]
+        self.names, self._separator = tuple(named), separator
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> DataflashText | None:
+        """The form, if it begins with what defines a message."""
+        if not lines or not lines[0].startswith("FMT,"):
+            return None
+        said = next((m for line in lines if (m := _DEFINED.match(line))), None)
+        return cls(["", *cells(said[1], ",")], separator) if said else None
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+        first: list[str] = []
+
+        def is_wanted(line: str) -> bool:
+            row = cells(line, ",")
+            if row[0] != "IMU" or len(row) != len(self.names):
+                return False
+            if self._instance is None:
+                return True
+            if not first:
+                first.append(row[self._instance])
+            return row[self._instance] == first[0]
+
+        return lambda lines: [line for line in lines if is_wanted(line)]
 
 
 class QuotedCells(TextForm):

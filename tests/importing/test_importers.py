@@ -523,3 +523,8 @@ def test_fields_of_structures_are_arrays(tmp_path: Path, ending: str) -> None:
     np.testing.assert_allclose(got.t, block.t)
     np.testing.assert_allclose(got.acc, block.acc)
     np.testing.assert_allclose(got.gyr, block.gyr)
+
+
+def test_a_folder_is_no_recording(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is a folder; name the recording in it"):
+        open_recording(tmp_path, ReadOptions())

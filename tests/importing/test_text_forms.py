@@ -30,7 +30,7 @@ def values(row: int) -> list[str]:
     return [f"{AX[row]:.3f}", "0.2", "9.8", "0.01", "-0.02", "0.03"]
 
 
-def read(folder: Path, text: str, **wanted: float) -> Block:
+def read(folder: Path, text: str, **wanted: float | str) -> Block:
     path = folder / "log.txt"
     path.write_text(text, encoding="utf-8")
     recording = open_recording(path, ReadOptions(**wanted))  # type: ignore[arg-type]
@@ -149,3 +149,24 @@ def test_quoted_numbers_with_decimal_commas(tmp_path: Path) -> None:
 def test_what_is_no_label_is_left_alone() -> None:
     assert labelled_values("Fs: 100 measured by a clock") == []
     assert labelled_values("1.0,2.0,3.0") == []
+
+
+def test_the_text_of_a_dataflash_log_is_read_for_its_first_imu(tmp_path: Path) -> None:
+    fields = "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz"
+    lines = [
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+        f"FMT, 140, 60, IMU, QBffffffIIfBBHH, {fields}",
+        "FMT, 141, 30, ATT, QccccCC, TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw",
+    ]
+    for i in range(ROWS):
+        a, g = values(i)[:3], values(i)[3:]
+        us = round(1e6 * i / RATE)
+        for imu, more in ((0, a), (1, ["7", "7", "7"])):
+            row = ["IMU", us, imu, *g, *more, 0, 0, 31.5, 1, 1, 1000, 1000]
+            lines.append(", ".join(map(str, row)))
+        lines.append(f"ATT, {us}, 0, 1.5, 0, 2.5, 10, 11")
+    got = read(tmp_path, "\n".join(lines) + "\n", time_unit="us")
+    np.testing.assert_array_equal(got.acc[:, 0], AX)
+    np.testing.assert_allclose(got.gyr, [[0.01, -0.02, 0.03]] * ROWS)
+    np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE)
+    np.testing.assert_allclose(got.temperature, 31.5)

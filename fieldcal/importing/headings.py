@@ -30,8 +30,6 @@ NOT_SAMPLES = (
     "offset",
     "cov",
     "filtered",
-    "low",
-    "lower",
 )
 """Words of columns that are no samples of a sensor."""
 

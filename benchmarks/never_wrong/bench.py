@@ -34,6 +34,16 @@ SETTING = {"two": 5e-3, "five": 5e-3, "wide": 1e-2, "six_faces": 5e-2, "twelve":
 """How well angles are set at worst, deg: a fixture that turns by 5 degrees gives a
 scale factor within the limits of the grade only where it sets them so well."""
 
+FACES = ((180, 0), (90, 0), (0, 90), (-90, 0), (0, -90))
+"""Where a device is laid by hand beside a fixture that turns it a little: gravity is
+the witness of what angles cannot prove, and these need not be known."""
+
+BY_HAND = 2.0
+"""How well it then lies, deg."""
+
+WITNESSES = {"two": 5, "five": 3, "wide": 3}
+"""How many of them sets of positions need that nothing else bears witness to."""
+
 MOUNTINGS = (
     ("+x", "+y", "+z"),
     ("+x", "-z", "+y"),
@@ -49,6 +59,7 @@ class Bench:
     Attributes
     ----------
     places : positions, a name of `SETS`
+    faces : positions behind these in which the device is laid by hand
     latitude, height : of the site, deg and m
     tilt : about z and about x, rad
     joints : whether that is what the joints' angles are off by, and not the base
@@ -65,6 +76,7 @@ class Bench:
     """
 
     places: str
+    faces: int
     latitude: float
     height: float
     tilt: tuple[float, float]
@@ -88,7 +100,12 @@ class Bench:
     @property
     def angles(self) -> Floats:
         """Angles that are asked for, (n, 2) deg."""
-        return np.array(SETS[self.places], float)
+        return np.array([*SETS[self.places], *FACES[: self.faces]], float)
+
+    @property
+    def stated(self) -> int:
+        """How many positions have angles that are written down."""
+        return 0 if self.imported else len(SETS[self.places])
 
     @property
     def windows(self) -> Floats:
@@ -134,21 +151,24 @@ def drawn(rng: np.random.Generator) -> Bench:
     """A sound bench: everything that is written down is so."""
     places = str(rng.choice(list(SETS)))
     imported = places == "twelve"
-    angles = np.array(SETS[places], float)
+    faces = WITNESSES.get(places, 0)
     most = SETTING[places]
     said = float(np.exp(rng.uniform(np.log(most / 10), np.log(most))))
     level = float(np.exp(rng.uniform(np.log(0.003), np.log(0.05))))
     wide = 0.5 if places in ("five", "wide", "six_faces") else level
     acc_noise = float(np.exp(rng.uniform(np.log(3e-4), np.log(2e-2))))
+    off = rng.normal(0, said, (len(SETS[places]), 2))
+    off = np.vstack([off, rng.normal(0, BY_HAND, (faces, 2))])
     return Bench(
         places=places,
+        faces=faces,
         latitude=float(rng.uniform(-65, 65)),
         height=float(rng.uniform(0, 1500)),
         tilt=tuple(np.deg2rad(rng.normal(0, wide, 2)).tolist()),
         joints=places != "two" and bool(rng.integers(2)),
         level_deg=level if places == "two" else None,
         angles_deg=said,
-        off=np.deg2rad(rng.normal(0, said, angles.shape)),
+        off=np.deg2rad(off),
         hold=float(rng.uniform(15, 30)),
         way=float(rng.uniform(4, 10)),
         rate=float(rng.choice([50.0, 100.0])),

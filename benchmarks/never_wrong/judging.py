@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
@@ -22,6 +23,10 @@ from fieldcal.cli import main
 
 WRONG = 5.0
 """Standard uncertainties from which a parameter is wrong."""
+
+LIMITS = {"acc_bias": 0.02, "acc_scale": 2e-3, "gyr_bias": 1.5e-4}
+"""Standard uncertainty up to which a parameter of tactical grade may be GO, m/s^2, 1
+and rad/s; docs/runs.md."""
 
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
 
@@ -34,6 +39,7 @@ class Judged:
     ----------
     go : whether it may be used
     off : standard uncertainties that the worst parameter is off by, and its name
+    beyond : whether a parameter is not known as well as its limit asks for
     caught : name of the check that refused it, or the first of several
     says : its sentence
     verdict : of `diagnose`, or its exit code
@@ -44,12 +50,18 @@ class Judged:
 
     go: bool
     off: float
+    beyond: bool
     worst: str
     caught: str
     says: str
     verdict: str
     leaked: int
     late: bool = False
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it is GO and must not be."""
+        return self.go and (self.off > WRONG or self.beyond)
 
 
 def write(folder: Path, written: Written) -> None:
@@ -110,7 +122,7 @@ def judged(
             return _judged(folder, truth, diagnose)
     except Late:
         says = f"no answer within {limit:g} s of processor time"
-        return Judged(False, 0.0, "", "late", says, "", 0, True)
+        return Judged(False, 0.0, False, "", "late", says, "", 0, True)
 
 
 def _judged(folder: Path, truth: dict[str, float], diagnose: bool) -> Judged:
@@ -119,6 +131,12 @@ def _judged(folder: Path, truth: dict[str, float], diagnose: bool) -> Judged:
         ["solve", str(folder), "--json", "--history", history]
     )
     off, worst = 0.0, ""
+    known = {name: sigma for name, _, sigma in _parameters(found)}
+    beyond = any(
+        not known.get(f"{group}.{axis}", np.inf) <= limit
+        for group, limit in LIMITS.items()
+        for axis in "xyz"
+    )
     for name, value, sigma in _parameters(found):
         if name in truth:
             far = abs(value - truth[name]) / sigma
@@ -133,7 +151,7 @@ def _judged(folder: Path, truth: dict[str, float], diagnose: bool) -> Judged:
         answer, what, _, more = said(["diagnose", str(folder), "--json"])
         leaked += more
         verdict = str(what.get("verdict", f"exit {answer}"))
-    return Judged(code == 0, off, worst, caught, says, verdict, leaked)
+    return Judged(code == 0, off, beyond, worst, caught, says, verdict, leaked)
 
 
 def _parameters(found: dict[str, Any]) -> list[tuple[str, float, float]]:

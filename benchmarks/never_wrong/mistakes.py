@@ -40,7 +40,8 @@ def _one(bench: Bench, rng: Rng) -> int:
 def repeated_angle(bench: Bench, rng: Rng) -> Bench:
     """One angle of the fixture is off by 0.02 to 0.2 degrees wherever it is set."""
     off, joint = np.zeros_like(bench.off), int(rng.integers(2))
-    values = bench.angles[:, joint]
+    values = bench.angles[:, joint].copy()
+    values[bench.stated or len(values) :] = 0.0  # laid by hand
     one = rng.choice(np.unique(values[values != 0]))
     off[values == one, joint] = np.deg2rad(
         np.exp(rng.uniform(np.log(0.02), np.log(0.2)))
@@ -50,7 +51,9 @@ def repeated_angle(bench: Bench, rng: Rng) -> Bench:
 
 def gauge_long(bench: Bench, rng: Rng) -> Bench:
     """The gauge that sets the angles is 0.05 to 0.5 % long."""
-    return wrongly_set(bench, np.deg2rad(bench.angles) * rng.uniform(5e-4, 5e-3))
+    off = np.deg2rad(bench.angles) * rng.uniform(5e-4, 5e-3)
+    off[bench.stated or len(off) :] = 0.0  # laid by hand
+    return wrongly_set(bench, off)
 
 
 def position_off(bench: Bench, rng: Rng) -> Bench:
@@ -59,6 +62,12 @@ def position_off(bench: Bench, rng: Rng) -> Bench:
     size = np.deg2rad(np.exp(rng.uniform(np.log(0.3), np.log(10))))
     off[_one(bench, rng), rng.integers(2)] = size * rng.choice([-1, 1])
     return wrongly_set(bench, off)
+
+
+def no_witness(bench: Bench, rng: Rng) -> Bench:
+    """The device is not laid on its faces, though angles need a witness."""
+    known = len(bench.angles) - bench.faces
+    return replace(bench, faces=0, off=bench.off[:known])
 
 
 def table_tilted(bench: Bench, rng: Rng) -> Bench:
@@ -70,7 +79,7 @@ def table_tilted(bench: Bench, rng: Rng) -> Bench:
 def swapped(written: Written, bench: Bench, rng: Rng) -> Written:
     """Two positions are written down in the wrong order."""
     rows = [dict(row) for row in written.about["position"]]
-    i, j = rng.choice(len(rows), 2, replace=False)
+    i, j = rng.choice(bench.stated or len(rows), 2, replace=False)
     for key in ("alpha_deg", "beta_deg"):
         if key in rows[i]:
             rows[i][key], rows[j][key] = rows[j][key], rows[i][key]
@@ -223,6 +232,7 @@ BEFORE: dict[str, Before] = {
     "gauge long": gauge_long,
     "a position off": position_off,
     "table tilted": table_tilted,
+    "faces left out": no_witness,
 }
 
 AFTER: dict[str, After] = {
@@ -255,10 +265,10 @@ def tables(bench: Bench) -> dict[str, Any]:
         site["level_deg"] = bench.level_deg
     if bench.angles_deg is not None and not bench.imported:
         site["angle_setting_deg"] = bench.angles_deg
-    rows = []
+    rows: list[dict[str, float]] = []
     for (alpha, beta), (start, end) in zip(bench.angles, bench.windows, strict=True):
         row = {"start_s": float(start), "end_s": float(end)}
-        if not bench.imported:
+        if len(rows) < bench.stated:
             row |= {"alpha_deg": float(alpha), "beta_deg": float(beta)}
         rows.append(row)
     about: dict[str, Any] = {

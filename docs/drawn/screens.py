@@ -43,7 +43,12 @@ CONCEALED = ("base_tilt:about_x_deg=1,about_z_deg=-1", "earth_rate:")
 
 TABLES = {
     "format": 1,
-    "site": {"latitude_deg": 50.45, "height_m": 170.0, "angle_setting_deg": 0.001},
+    "site": {
+        "latitude_deg": 50.45,
+        "height_m": 170.0,
+        "angle_setting_deg": 0.001,
+        "angles_from": "certificate 4711",
+    },
     "position": [
         {"alpha_deg": round(p.degrees[0], 6), "beta_deg": round(p.degrees[1], 6)}
         for p in FIVE

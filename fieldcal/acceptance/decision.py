@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.acceptance.angles import unwitnessed
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.check import Check
 from fieldcal.acceptance.conditions import check_link, check_temperature
@@ -28,9 +29,13 @@ from fieldcal.acceptance.witnesses import has_witnesses, left_out, witnesses
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.chances import chi2_tail
+from fieldcal.core.shown import one_line
 from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.windows import Average
+
+ANGLES = "angles"
+"""Name of the check that something would contradict wrong angles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +92,8 @@ def decide(
         _fit(found, limits),
         *_odd_positions(found, verification.ok is True),
         *_turns(found, limits),
-        *check_uncertainty(found, limits),
+        *_angles(found, about, limits, circumstances),
+        *check_uncertainty(found, about, limits),
         *_site(found, about),
         *_level(found, about),
         *check_change(found, limits, circumstances.family),
@@ -113,9 +119,12 @@ def _remedy(
     circumstances: Circumstances,
     checks: Sequence[Check],
 ) -> Remedy | None:
-    """The cheapest remedy, where windows tell what one is worth."""
+    """The cheapest remedy, where windows tell what one is worth.
+
+    More positions of the same fixture bear no witness to its angles.
+    """
     windows = circumstances.windows
-    if not windows:
+    if not windows or any(c.name == ANGLES and c.ok is False for c in checks):
         return None
     known = [w.sigma[:3][np.isfinite(w.sigma[:3])] for w in windows]
     sigma = float(np.median([s.max() for s in known if len(s)] or [np.nan]))
@@ -176,6 +185,23 @@ def _turns(found: Calibration, limits: GradeLimits) -> list[Check]:
     """Whether the gyroscopes were turned as the positions say."""
     apart = turns_disagree(found, limits)
     return [Check("turns", False, apart)] if apart else []
+
+
+def _angles(
+    found: Calibration,
+    about: Description,
+    limits: GradeLimits,
+    circumstances: Circumstances,
+) -> list[Check]:
+    """Whether anything would contradict angles that are not as stated."""
+    given = (circumstances.verification, circumstances.family)
+    unseen = unwitnessed(found, about, limits, *given)
+    if unseen:
+        return [Check(ANGLES, False, unseen)]
+    if about.angles_from:
+        says = f"the angles are vouched for by {one_line(about.angles_from)}"
+        return [Check(ANGLES, True, says)]
+    return []
 
 
 def _first(found: Calibration) -> str:

@@ -33,6 +33,14 @@ def gravity_unknown(about: Description) -> str:
     )
 
 
+def place_wanted(about: Description) -> str:
+    """Remedy where the place would say gravity better; empty where it is said."""
+    site = about.raw.get("site", {})
+    if "latitude_deg" not in site:
+        return "; nothing checks the gravity that is stated: say the place (--latitude)"
+    return "" if "height_m" in site else "; say the height of the place (--height)"
+
+
 def gravity_contradicted(about: Description) -> str:
     """Sentence where the gravity that is stated cannot be that of the place."""
     site = about.raw.get("site", {})

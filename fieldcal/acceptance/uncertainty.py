@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.acceptance.check import Check, shown_unit
+from fieldcal.acceptance.site import place_wanted
 from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
+from fieldcal.session.description import Description
 
 UNCERTAINTY = " uncertainty"
 """Behind the name of a group, of the check that its parameters are well known."""
@@ -16,7 +18,9 @@ REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
 """Groups whose uncertainty must be known and small; a sensor not read is excused."""
 
 
-def check_uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
+def check_uncertainty(
+    found: Calibration, about: Description, limits: GradeLimits
+) -> list[Check]:
     """Whether each group that has a limit is known well enough."""
     checks = []
     for group in COMPONENTS:
@@ -39,10 +43,15 @@ def check_uncertainty(found: Calibration, limits: GradeLimits) -> list[Check]:
                 f"{group} {'xyz'[worst]} is known to ± {_apart(sigma[worst], limit)}"
                 f"{shown}, {'within' if ok else 'more than'} {limit:.2g}{shown}"
             )
+            if not ok and group == "acc_scale":
+                says += place_wanted(about)
             if not ok and sensor_of(group) == "acc":
                 says += _by_angles(found, limits)
+            stands: bool | None = ok
+            if not ok and group not in REQUIRED:
+                stands, says = None, f"{says}: it counts as not determined"
             value = float(sigma[worst])
-            checks.append(Check(group + UNCERTAINTY, ok, says, value, limit, unit))
+            checks.append(Check(group + UNCERTAINTY, stands, says, value, limit, unit))
     return checks
 
 

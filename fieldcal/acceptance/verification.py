@@ -12,7 +12,7 @@ m/s^2 tells whether it matters.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -23,7 +23,11 @@ from fieldcal.core.positions import Position, forces
 from fieldcal.core.samples import ACC, Array
 from fieldcal.model.causes.planned import parameters, predicted
 from fieldcal.session.description import Description
+from fieldcal.solve.reliability import WrongAngles
 from fieldcal.windows import Average
+
+STEP = 1e-6
+"""Of numerical derivatives, rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +40,9 @@ class Verification:
     residual : (3,) measured less predicted, m/s^2, device axes
     sigma : (3,) standard uncertainty of that
     chance : probability of such a residual if the calibration holds
+    covariance : (3, 3) of the residual, S
+    slope : (3,) m/s^2 by each parameter, full name
+    turned : (3, 2) m/s^2 by the position's alpha and beta, rad
 
     """
 
@@ -43,11 +50,24 @@ class Verification:
     residual: Array
     sigma: Array
     chance: float
+    covariance: Array
+    slope: Mapping[str, Array]
+    turned: Array
 
     @property
     def largest(self) -> float:
         """Length of the residual, m/s^2."""
         return float(np.linalg.norm(self.residual))
+
+    def shows(self, wrong: WrongAngles) -> float:
+        """Non-centrality by which wrong angles of the session show here, r^T S^-1 r."""
+        if self.position.alpha is None or self.position.beta is None:
+            return 0.0
+        off = wrong.off_at(self.position.alpha, self.position.beta)
+        moved: Array = self.turned @ off
+        for name, by in wrong.moves.items():
+            moved = moved - by * self.slope.get(name, 0.0)
+        return float(moved @ np.linalg.solve(self.covariance, moved))
 
 
 def verify(
@@ -76,7 +96,24 @@ def verify(
     s = j[0] @ covariance @ j[0].T + average.covariance[ACC, ACC] + setting
     chi2 = float(residual @ np.linalg.solve(s, residual))
     chance = chi2_tail(chi2, 3)
-    return Verification(position, residual, np.sqrt(np.diag(s)), chance)
+    slope = {name: j[0, :, i] for i, name in enumerate(names)}
+    turned = np.column_stack([
+        (forces([moved], about.gravity) - forces([position], about.gravity))[0]
+        @ about.mounting / STEP
+        for moved in (_turned(position, STEP, 0.0), _turned(position, 0.0, STEP))
+    ])  # fmt: skip
+    return Verification(
+        position, residual, np.sqrt(np.diag(s)), chance, s, slope, turned
+    )
+
+
+def _turned(position: Position, alpha: float, beta: float) -> Position:
+    """A position with other angles, rad more."""
+    return replace(
+        position,
+        alpha=(position.alpha or 0.0) + alpha,
+        beta=(position.beta or 0.0) + beta,
+    )
 
 
 def _parameters(

@@ -118,6 +118,11 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
         metavar="DEG",
         help="how well each position's angles are set, 1σ (default: the grade's limit)",
     )
+    add(
+        "--angles-from",
+        metavar="TEXT",
+        help="who vouches for the angles: the certificate of the fixture",
+    )
     add("--verify", action="store_true", help="one more position, which is not fitted")
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
     add("--history", type=Path, metavar="FILE", help="instead of the usual history")

@@ -97,7 +97,11 @@ def _site(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
     angles = args.angles
     if angles is None and args.virtual is not None and OFF not in args.virtual:
         angles = EXACT_DEG
-    said = {"level_deg": args.level, "angle_setting_deg": angles}
+    said = {
+        "level_deg": args.level,
+        "angle_setting_deg": angles,
+        "angles_from": args.angles_from,
+    }
     site = {key: value for key, value in said.items() if value is not None}
     return {"site": site} if site else {}
 

@@ -31,6 +31,7 @@ from fieldcal.evaluation.observations import (
     observations,
     with_provenance,
 )
+from fieldcal.evaluation.rounding_mode import RoundingMode, rounding_mode
 from fieldcal.evaluation.unsaid import with_unsaid
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
@@ -83,6 +84,11 @@ class Laid:
         return observations(self.about, averages, range(len(averages)))
 
     @cached_property
+    def rounding(self) -> RoundingMode:
+        """What is not known of how the device rounds."""
+        return rounding_mode(self.session, grain_of(self.session))
+
+    @cached_property
     def examined(self) -> tuple[Prepared | None, str]:
         """The recording, checked and reduced, or why it cannot be."""
         try:
@@ -126,11 +132,17 @@ class Laid:
         for c in np.flatnonzero(measured):
             sd[:, 3 * c : 3 * c + 3] = rows.sd[:, 3 * c : 3 * c + 3]
         rows = replace(rows, sd=sd)
-        rows = widened(rows, variances(self.observations))
-        if shown is None:
-            return Recorded(rows, origins(source, rows), source if turns else None)
-        likely = tuple(Shown(s.members, p) for s, p in shown.posterior.weights)
-        return Recorded(rows, origins(source, rows), source if turns else None, likely)
+        known = variances(self.observations)
+        known[:, :3] += self.rounding.around_zero(self.observations.mean[:, :3])
+        rows = widened(rows, known)
+        likely = () if shown is None else shown.posterior.weights
+        return Recorded(
+            rows,
+            origins(source, rows),
+            source if turns else None,
+            tuple(Shown(s.members, p) for s, p in likely),
+            tuple(self.rounding.toward_zero.tolist()),
+        )
 
 
 def solved(
@@ -178,7 +190,7 @@ def solved_as(laid: Laid, turns: Turns = "auto", **asked: Any) -> Calibration:
     found = replace(found, warnings=(*ahead, *still.warnings, *notes, *behind))
     found = _listed(with_provenance(found, about), laid.order)
     if not printed:
-        found = with_unsaid(found, session, grain_of(session))
+        found = with_unsaid(found, about, laid.rounding.down)
     if shown is None:
         return found
     return misread(shown.prepared, with_not_carried(found, uncarried(shown, found)))

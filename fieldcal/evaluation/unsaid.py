@@ -1,17 +1,22 @@
-"""What nobody said of a recording, in the uncertainties.
+"""What nobody said of a recording, or what nothing checks, in the uncertainties.
 
-Scale factors are measured by gravity, which grows from the equator to the poles:
+Scale factors are measured by gravity, which grows from the equator to the poles, and
+falls with height h:
 
     k = U / g,   dk_i = -k_i dg / g   of all axes together                         (1)
 
-Values on a grid of steps q that were cut toward zero, as a conversion to integers does,
-are q / 2 too small in size. Of an axis that is held up and down that is a scale factor,
-of one that is not it is a bias:
+dg is what is not known of gravity: all of its range where no place is said, though
+somebody may have written a number down (9.81 mostly, which nothing checks); the heights
+at which people live where a latitude is; the usual anomaly where both are, and where
+gravity is stated beside them, what the two differ by.
 
-    db_i = q_i / 2,   dk_i = q_i / (2 g)                                           (2)
+Values on a grid of steps q that were rounded down are q / 2 too small,
 
-Where the step does not come from whoever knows how values are rounded, (2) is there
-with some probability P, and P times its square is added to the variance.
+    db_i = q_i / 2                                                                 (2)
+
+which is there with some probability P where the step does not come from whoever knows
+how values are rounded; P times its square is added to the variance. What values cut
+toward zero do hangs on the signs of the means, and is in the model (`solve.given`).
 """
 
 from __future__ import annotations
@@ -22,52 +27,51 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.gravity import gravity
-from fieldcal.core.samples import Array, Grain
-from fieldcal.physics.recording import lsb_of
-from fieldcal.session.folder import Session
+from fieldcal.core.samples import Array
+from fieldcal.session.description import Description
 
-CUT = 0.3
-"""Probability P that values of an unknown rounding were cut toward zero."""
+ANYWHERE = (gravity(90.0) - gravity(0.0)) / np.sqrt(12.0)
+"""What is not known of gravity where no place is, 1 sigma, m/s^2."""
+
+LIVES = 700.0
+"""Height at which people live, 1 sigma, m: half of them below 200, some at 2000
+(Cohen and Small, Hypsographic demography, 1998)."""
+
+ANOMALY = 3e-4
+"""How far gravity usually is from the normal one, 1 sigma, m/s^2 (Torge and Mueller,
+Geodesy, 4th edition: free-air anomalies of 30 mGal)."""
 
 
-def with_unsaid(found: Calibration, session: Session, grain: Grain) -> Calibration:
+def gravity_sigma(about: Description) -> float:
+    """What is not known of gravity, 1 sigma, m/s^2."""
+    site = about.raw.get("site", {})
+    if "latitude_deg" not in site:
+        return float(ANYWHERE)
+    if "height_m" not in site:
+        fall = gravity(about.latitude_deg) - gravity(about.latitude_deg, LIVES)
+        return float(np.hypot(fall, ANOMALY))
+    normal = gravity(about.latitude_deg, about.height_m)
+    return abs(about.gravity - normal) if site.get("gravity") else ANOMALY
+
+
+def with_unsaid(found: Calibration, about: Description, floored: Array) -> Calibration:
     """The calibration with (1) and (2) where they are not known.
 
     Parameters
     ----------
     found : calibration of the session
-    session : the recording
-    grain : what is known of its rounding
+    about : where it was made
+    floored : (3,) m/s^2, (2) of each accelerometer times the root of P
 
     """
-    about, more = session.about, np.zeros_like(found.covariance)
-    names = found.names
-    scale = [(names.index(n), n) for n in _of("acc_scale", names)]
-    rows = [row for row, _ in scale]
-    if not about.gravity_said and rows:
-        spread = (gravity(90.0) - gravity(0.0)) / np.sqrt(12.0)
-        k = found.values[rows] * spread / about.gravity  # (1)
-        more[np.ix_(rows, rows)] += np.outer(k, k)
-    half = _half_steps(session, grain)
-    for group, size in (("acc_bias", 1.0), ("acc_scale", 1 / about.gravity)):
-        for name in _of(group, names):
-            row, axis = names.index(name), "xyz".index(name[-1])
-            more[row, row] += CUT * (half[axis] * size) ** 2  # (2)
-    if not more.any():
-        return found
+    names, more = found.names, np.zeros_like(found.covariance)
+    rows = _rows("acc_scale", names)
+    k = found.values[rows] * gravity_sigma(about) / about.gravity  # (1)
+    more[np.ix_(rows, rows)] += np.outer(k, k)
+    for row in _rows("acc_bias", names):
+        more[row, row] += floored["xyz".index(names[row][-1])] ** 2  # (2)
     return replace(found, covariance=found.covariance + more)
 
 
-def _of(group: str, names: tuple[str, ...]) -> list[str]:
-    return [name for name in names if name.startswith(f"{group}.")]
-
-
-def _half_steps(session: Session, grain: Grain) -> Array:
-    """Half of the step that the values of each accelerometer show, (3,) m/s^2.
-
-    0 where they show none, or somebody knows how they are rounded.
-    """
-    known = grain.step[:3] > 0
-    steps = np.array([lsb_of(column) for column in session.block.acc.T])
-    half: Array = np.where(known, 0.0, steps / 2)
-    return half
+def _rows(group: str, names: tuple[str, ...]) -> list[int]:
+    return [i for i, name in enumerate(names) if name.startswith(f"{group}.")]

@@ -109,6 +109,11 @@ class Description:
         return bool({"latitude_deg", "gravity"} & set(self.raw.get("site", {})))
 
     @property
+    def angles_from(self) -> str:
+        """Who vouches for the angles; empty where nobody does."""
+        return str(self.raw.get("site", {}).get("angles_from", ""))
+
+    @property
     def means_only(self) -> bool:
         """Whether samples are means, one for each position."""
         return "means" in self.raw

@@ -178,7 +178,7 @@ class _Session:
         if len(usable) == 1:
             name = next(iter(usable))
             return self._with(name), [f"the tilt is taken as {name}"]
-        ahead = usable["angle_offset"].found.score - usable["base_tilt"].found.score
+        ahead = usable["angle_offset"].score - usable["base_tilt"].score
         best, other = TILTED if ahead >= 0 else TILTED[::-1]
         ahead = abs(ahead)
         if ahead > thresholds.BETTER_TILT:

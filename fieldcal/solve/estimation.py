@@ -28,6 +28,7 @@ from fieldcal.model.turns.turn import Turning
 from fieldcal.solve.agreement import Fit, agreement
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask
+from fieldcal.solve.reliability import WrongAngles, wrong_angles
 from fieldcal.solve.shown import Shown
 from fieldcal.solve.variants import variants
 
@@ -53,6 +54,8 @@ class Recorded:
     since : (o, n) s since the turn
     source : the samples of turns that are to be followed
     shown : explanations of the recording
+    cut : m/s^2, 1 sigma, what each accelerometer's values may have lost in size where
+        they were cut toward zero
 
     """
 
@@ -60,6 +63,7 @@ class Recorded:
     since: Array
     source: RowSource | None = None
     shown: tuple[Shown, ...] = ()
+    cut: tuple[float, ...] = ()
 
     def turning(self) -> Turning | None:
         """Whoever follows the turns, if there are any."""
@@ -80,11 +84,14 @@ class Estimated:
     values, covariance : (k,), (k, k)
     missing : parameters that they do not determine
     found : the mixture of the likeliest explanation
+    score : ln of the evidence of the set from all windows, before any is left out:
+        sets that leave out others have nothing to compare
     moved : by how many sigmas what is carried moves each parameter, (k,)
     acc, gyr : how well the windows agree
     turns : rows of the turns
     contradicted : windows that count, between which the gyroscopes say that the device
         went elsewhere
+    wrong_angles : what wrong angles would do without being noticed
 
     """
 
@@ -94,11 +101,13 @@ class Estimated:
     covariance: Array
     missing: tuple[str, ...]
     found: Mixture
+    score: float
     moved: Array
     acc: Fit
     gyr: Fit
     turns: tuple[TurnRows, ...]
     contradicted: tuple[tuple[int, int], ...] = ()
+    wrong_angles: tuple[WrongAngles, ...] = ()
 
     def mixed_with(self, one: Estimated, other: Estimated, weight: float) -> Estimated:
         """The same, with what another model of the tilt differs by in the uncertainty.
@@ -179,10 +188,12 @@ def estimated(
     """
     rows, since = recorded.rows, recorded.since
     given = Given(
-        rows, np.abs(nominal.scale), since, turning is not None, wanted, recorded.shown
-    )
+        rows, np.abs(nominal.scale), since, turning is not None, wanted,
+        recorded.shown, recorded.cut,
+    )  # fmt: skip
     turns = None if turning is None else Turns(turning, given, False)
     likely, bad = given.explanations[0], np.zeros(len(given.held), dtype=bool)
+    score = np.nan
     # one bad window of six can be told from scatter, two of six cannot
     for _ in range(1 + max(1, len(bad) // 6)):
         inference = Inference(System(_without(rows, given, bad), given), nominal, turns)
@@ -195,21 +206,26 @@ def estimated(
             beside = Inference(others, nominal, turns)
             gram = inference.gram(*_settled(beside, given), None)
             found = _mixed(given, Search(given, gram), likely.members)
+        if not bad.any():
+            score = found.score
         worst &= (found.bad > thresholds.CERTAIN) & ~bad
         if not worst.any() or bad.sum() >= max(1, len(bad) // 6):
             break
         bad |= worst
     found = replace(found, bad=np.where(bad, 1.0, found.bad))
     parameters = _parameters(given, gram, found, nominal, averaged)
+    picked, _ = _picked(given, found, nominal)
     names, values, covariance, moved, missing = _determined(given, parameters)
+    at = [given.names.index(name) for name in names]
     elsewhere = turning.contradicted if turning else ()
     counts = set(given.held[found.bad <= thresholds.CERTAIN].tolist())
     return Estimated(
-        given, names, values, covariance, missing, found, moved,
+        given, names, values, covariance, missing, found, score, moved,
         agreement(gram, given, found, (0, 1, 2)),
         agreement(gram, given, found, (3, 4, 5)),
         tuple(inference.turned),
         tuple(pair for pair in elsewhere if counts.issuperset(pair)),
+        tuple(wrong_angles(given, found, names, picked[at])),
     )  # fmt: skip
 
 
@@ -293,6 +309,12 @@ def _parameters(
 
 def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
     """Parameters of one explanation at the end of the recording, (2) of `shown`."""
+    picked, before = _picked(given, found, nominal)
+    return before + picked @ found.mean, picked @ found.covariance @ picked.T
+
+
+def _picked(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
+    """Parameters by the columns of an estimate, (k, c), and what they are without."""
     picked = np.zeros((len(given.names), len(found.columns)))
     before = np.zeros(len(given.names))
     for i, name in enumerate(given.names):
@@ -302,7 +324,7 @@ def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
             scale, c = parameter.is_scale, parameter.channel
             picked[i] += given.ending[int(scale)][c, found.columns]
             before[i] = (nominal.scale if scale else nominal.bias)[c]
-    return before + picked @ found.mean, picked @ found.covariance @ picked.T
+    return picked, before
 
 
 def _determined(

@@ -24,7 +24,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
-from fieldcal.model.causes.columns import General
+from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import effect_columns, unit_of
 from fieldcal.model.causes.wander import Wander
@@ -77,6 +77,7 @@ class Given(Dictionary):
     turns : whether the way between positions is seen
     wanted : what the set is made of
     shown : explanations of the recording, of which the set takes what it lacks
+    cut : what each accelerometer's values may have lost in size, 1 sigma
 
     Attributes
     ----------
@@ -92,8 +93,10 @@ class Given(Dictionary):
         turns: bool,
         wanted: Wanted,
         shown: Sequence[Shown] = (),
+        cut: Sequence[float] = (),
     ) -> None:
-        self.wanted = wanted
+        self.wanted, self.cut = wanted, np.array(cut, dtype=float)
+        self.sign = _signs(rows, self.cut)
         held = np.unique(rows.x.position)
         common = np.array([rows.common[rows.x.position == p][0] for p in held])
         wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
@@ -152,6 +155,9 @@ class Given(Dictionary):
             yield self._earth(np.array(w.earth))
         if w.angles_deg:
             yield from self._angles(float(np.deg2rad(w.angles_deg)))
+        if (lost := np.flatnonzero(self.cut)).size:
+            at = self.add(General("cut", self._shorter), 3) + lost
+            yield _given(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
 
     def _estimated(
         self,
@@ -187,6 +193,13 @@ class Given(Dictionary):
         return _given(
             Group("earth", "", self.earth + kept, size[kept], fixed=1.0, in_state=True)
         )
+
+    def _shorter(self, view: RowView) -> Array:
+        """Outputs of accelerometers whose size is less by one, (n, 6, 3)."""
+        out = np.zeros((len(view.x), 6, 3))
+        for c in range(3):
+            out[:, c, c] = -self.sign[view.x.position, c]
+        return out
 
     def _angles(self, sigma: float) -> Iterator[Cause]:
         """How well angles are set: anew in each position, and wherever repeated."""
@@ -248,6 +261,19 @@ class Given(Dictionary):
 
 def _given(group: Group) -> Cause:
     return Cause(group.cause, group.part, 1.0, (group,), "given")
+
+
+def _signs(rows: Rows, cut: Array) -> Array:
+    """Sign of each accelerometer's mean by position, (p + 1, 3); none on the way.
+
+    Less near zero, where values of both signs come.
+    """
+    held = rows.x.position
+    out = np.zeros((int(held.max()) + 2, 3))
+    for p in np.unique(held) if cut.any() else ():
+        mean = np.nan_to_num(rows.y[held == p, :3]).mean(axis=0)
+        out[p] = np.clip(mean / np.where(cut > 0, cut, np.inf), -1.0, 1.0)
+    return out
 
 
 def repeated(x: Experience, oriented: Sequence[int]) -> Array:

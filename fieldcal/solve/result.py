@@ -20,6 +20,7 @@ from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import ladder_remedy
+from fieldcal.solve.reliability import WrongAngles
 
 UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
 UNITS |= {"angle_offset": "deg", "base_tilt": "deg"}
@@ -256,6 +257,15 @@ def _turns(found: Estimated) -> tuple[float, int]:
     return chi2, max(0, count - spent)
 
 
+def _harms(wrong: WrongAngles, found: Estimated) -> bool:
+    """Whether wrong angles could move a parameter beyond its uncertainty."""
+    sigma = np.sqrt(np.diag(found.covariance))
+    return any(
+        abs(wrong.moves[name]) > thresholds.MOVED_WRONG * s
+        for name, s in zip(found.names, sigma, strict=True)
+    )
+
+
 def _carried(observations: Observations, found: Estimated) -> dict[str, Any]:
     """What the set has that was not asked for, and what that does."""
     moved = dict(zip(found.names, found.moved.tolist(), strict=True))
@@ -301,6 +311,8 @@ def _info(
             "rms": gyr.rms if np.isfinite(gyr.rms) else None,
             "extra_scatter": scatter_of(found.found, (3, 4, 5)),
         }  # fmt: skip
+    if harmful := [w for w in found.wrong_angles if _harms(w, found)]:
+        out["wrong_angles"] = [w.to_json() for w in harmful]
     if found.causes:
         out["carried"] = _carried(observations, found)
     if found.turns:

@@ -302,6 +302,25 @@ def test_a_wrong_file_of_limits_names_file_key_and_remedy(
     assert says in str(error.value) and "limits.toml" in str(error.value)
 
 
+@pytest.mark.parametrize("sigma", [1e-3, 7e-3, 5e-2])
+def test_a_gyroscopes_scale_that_is_loosely_known_is_not_worse_than_none(
+    sigma: float,
+) -> None:
+    found = calibration()
+    covariance = np.diag([*found.sigma**2, *[sigma**2] * 3])
+    more = replace(
+        found,
+        names=(*found.names, *(f"gyr_scale.{a}" for a in "xyz")),
+        values=np.append(found.values, np.ones(3)),
+        covariance=covariance,
+        units=(*found.units, "1", "1", "1"),
+    )
+    made = decided(more)
+    check = next(c for c in made.checks if c.name == "gyr_scale uncertainty")
+    assert made.go and check.ok is (True if sigma < 5e-3 else None)
+    assert ("counts as not determined" in check.says) is (sigma > 5e-3)
+
+
 def test_gravity_that_nobody_said_is_no_go_and_one_that_was_is_not() -> None:
     known = {"temperatures": [21.0], "link": LINK}
     seen = Circumstances(**known)  # type: ignore[arg-type]

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.gravity import gravity
-from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.evaluation.unsaid import with_unsaid
-from fieldcal.session.description import parse
-from fieldcal.session.folder import Session
+from fieldcal.evaluation.unsaid import gravity_sigma, with_unsaid
+from fieldcal.session.description import Description, parse
 
 NAMES = tuple(f"{g}.{a}" for g in ("acc_bias", "acc_scale") for a in "xyz")
 SMALL = 1e-6
+EXACTLY = np.zeros(3)
 
 
 def calibration() -> Calibration:
@@ -25,28 +22,22 @@ def calibration() -> Calibration:
     )  # fmt: skip
 
 
-def session(acc: Array, **site: float) -> Session:
-    made = Session(Path("unsaid"), parse({"site": site}))
-    t = np.arange(len(acc)) / 100.0
-    made.__dict__["block"] = Block.of(t, acc, np.zeros_like(acc))
-    return made
+def at(**site: float) -> Description:
+    return parse({"site": site})
 
 
-def samples() -> Array:
-    out: Array = np.random.default_rng(1).normal(0.0, 0.5, (3000, 3))
-    return out
-
-
-def test_nothing_is_added_where_all_is_known() -> None:
-    known = session(samples(), latitude_deg=50.0)
-    coarse = session(np.round(samples(), 1), latitude_deg=50.0)
-    for recorded, grain in ((known, Grain()), (coarse, Grain(0.1, 0.01))):
-        assert (with_unsaid(calibration(), recorded, grain).sigma == SMALL).all()
+def test_a_place_says_gravity_but_for_its_anomaly() -> None:
+    found = with_unsaid(calibration(), at(latitude_deg=50.0, height_m=200.0), EXACTLY)
+    assert found.uncertainty("acc_bias.x") == SMALL
+    assert 1e-5 < found.uncertainty("acc_scale.x") < 5e-5
 
 
 @pytest.mark.parametrize("latitude", [-90.0, -60.0, 0.0, 30.0, 75.0])
-def test_the_scale_of_any_place_is_within_what_is_said(latitude: float) -> None:
-    found = with_unsaid(calibration(), session(samples()), Grain())
+@pytest.mark.parametrize("site", [{}, {"gravity": gravity(45.0)}])
+def test_the_scale_of_any_place_is_within_what_is_said(
+    latitude: float, site: dict[str, float]
+) -> None:
+    found = with_unsaid(calibration(), at(**site), EXACTLY)
     # of gravity taken as that of 45 degrees
     off = found.value("acc_scale.x") * (gravity(latitude) / gravity(45.0) - 1)
     sigma = found.uncertainty("acc_scale.x")
@@ -57,14 +48,22 @@ def test_the_scale_of_any_place_is_within_what_is_said(latitude: float) -> None:
     assert found.uncertainty("acc_bias.x") == SMALL
 
 
-def test_values_cut_toward_zero_are_within_what_is_said() -> None:
-    step, g = 0.1, gravity(50.0)
-    up, down = (sign * g + 0.02 * samples() for sign in (1.0, -1.0))
-    cut = [np.trunc(some / step) * step for some in (up, down)]
-    off = (cut[0].mean() - cut[1].mean()) / (2 * g) - 1
-    acc = np.trunc(samples() / step) * step
-    found = with_unsaid(calibration(), session(acc, latitude_deg=50.0), Grain())
-    sigma = found.uncertainty("acc_scale.z")
-    assert off < -2e-3 and abs(off) < 3 * sigma < 0.02
-    bias = found.uncertainty("acc_bias.z")
-    assert bias == pytest.approx(np.sqrt(0.3) * step / 2, rel=0.01)
+@pytest.mark.parametrize("height", [0.0, 500.0, 1600.0, 2240.0])
+def test_a_height_that_is_not_said_is_within_what_is_said(height: float) -> None:
+    about = at(latitude_deg=40.0)
+    assert abs(gravity(40.0, height) - about.gravity) < 3.5 * gravity_sigma(about)
+
+
+def test_gravity_beside_its_place_is_known_to_what_the_two_differ_by() -> None:
+    normal = gravity(50.0, 100.0)
+    for off in (0.0, 5e-4, -3e-3):
+        about = at(latitude_deg=50.0, height_m=100.0, gravity=normal + off)
+        assert gravity_sigma(about) == pytest.approx(abs(off), abs=1e-12)
+
+
+def test_values_rounded_down_are_in_the_bias() -> None:
+    found = with_unsaid(
+        calibration(), at(latitude_deg=50.0, height_m=0.0), np.array([0.0, 0.01, 0.0])
+    )
+    assert found.uncertainty("acc_bias.y") == pytest.approx(0.01, rel=1e-6)
+    assert found.uncertainty("acc_bias.x") == SMALL

@@ -1,0 +1,118 @@
+"""How a device rounds, where nobody knows: to the nearest, toward zero, or down.
+
+Values on a grid of steps q are right on average where they are rounded to the nearest;
+cut toward zero, as a conversion to integers does, they are q / 2 too small in size;
+rounded down, as a shift of bits does, q / 2 too small. A mean of v shows no
+difference, but zero does: cut toward zero it is all between -q and q, twice as wide as
+any other value. An output that passes from -2 q to 2 q or back without resting rests on
+zero for n0 samples and on its neighbours for n1 in the mean, and
+
+    ln (n0 / n1) ~ N(ln 2, s^2) if cut, N(0, s^2) if not,   s^2 = S^2 + 2 / n1     (1)
+
+over all passes of all outputs, where S is how unsteadily a turn passes. The device has
+one firmware, so it is one mode for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array, Grain
+from fieldcal.physics.recording import grids_of
+from fieldcal.session.folder import Session
+
+CUT, DOWN = 0.3, 0.1
+"""Chance that values of unknown rounding were cut toward zero, and rounded down."""
+
+UNSTEADY = 0.3
+"""S of (1): how much faster or slower a turn passes one value than the next, ln."""
+
+EVEN = 2.0
+"""Times that one neighbour of zero may show for as long as the other: a device that
+comes to rest beside zero, or on it, does not pass it."""
+
+PASSED = 2
+"""Samples of each neighbour from which a pass counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoundingMode:
+    """What is not known of the rounding of the accelerometers.
+
+    Attributes
+    ----------
+    step : (3,) m/s^2; 0 where there is none, or somebody knows how it is rounded
+    cut : probability that values were cut toward zero
+
+    """
+
+    step: Array
+    cut: float
+
+    @property
+    def toward_zero(self) -> Array:
+        """What values are too small by in size, 1 sigma, (3,) m/s^2."""
+        out: Array = np.sqrt(self.cut) * self.step / 2
+        return out
+
+    @property
+    def down(self) -> Array:
+        """What values are too small by, 1 sigma, (3,) m/s^2."""
+        chance = DOWN / (1 - CUT) * (1 - self.cut)
+        out: Array = np.sqrt(chance) * self.step / 2
+        return out
+
+    def around_zero(self, mean: Array) -> Array:
+        """Variance of a mean that is zero because values were cut, (n, 3)."""
+        there = np.abs(np.nan_to_num(mean)) < self.step / 2
+        out: Array = np.where(there, self.cut * self.step**2 / 3, 0.0)
+        return out
+
+
+def rounding_mode(session: Session, grain: Grain) -> RoundingMode:
+    """What the samples of a session tell of it; `grain` is what is known."""
+    acc = session.block.acc
+    seen = np.zeros(3) if session.about.means_only else grids_of(session.block)[:3]
+    step = np.where(grain.step[:3] > 0, 0.0, seen)
+    shown = [
+        ratio
+        for values, q in zip(acc.T, step, strict=True)
+        if q > 0
+        for ratio in passes(np.rint(values[np.isfinite(values)] / q).astype(np.intp))
+    ]
+    return RoundingMode(step, cut_toward_zero(shown))
+
+
+def cut_toward_zero(shown: list[tuple[int, float]]) -> float:
+    """Probability that values were cut, by (n0, n1) of passes, (1).
+
+    >>> round(cut_toward_zero([]), 3)
+    0.3
+    >>> cut_toward_zero([(80, 40.0)] * 4) > 0.99
+    True
+    >>> cut_toward_zero([(40, 40.0)] * 4) < 0.01
+    True
+    """
+    log_odds = float(np.log(CUT / (1 - CUT)))
+    for zero, beside in shown:
+        variance = UNSTEADY**2 + 2 / beside
+        off = float(np.log(max(zero, 0.5) / beside))
+        log_odds += (off**2 - (off - np.log(2.0)) ** 2) / (2 * variance)
+    return float(1 / (1 + np.exp(-log_odds)))
+
+
+def passes(value: NDArray[np.intp]) -> Iterator[tuple[int, float]]:
+    """How long values, in steps, are zero, and one beside it, in each pass, (1)."""
+    out = np.flatnonzero(np.abs(value) >= 2)
+    for first, last in zip(out[:-1].tolist(), out[1:].tolist(), strict=True):
+        if value[first] * value[last] >= 0 or last == first + 1:
+            continue
+        between = value[first + 1 : last]
+        below, zero, above = (int((between == k).sum()) for k in (-1, 0, 1))
+        less, more = sorted((below, above))
+        if less >= PASSED and more <= EVEN * less and zero <= 2 * EVEN * more:
+            yield zero, (below + above) / 2

@@ -1,0 +1,145 @@
+"""What wrong angles would do to a result without being noticed.
+
+The angles of a set that were stated are off by u, which nobody meant: a detent is worn,
+a gauge is long, two positions are exchanged. With V the variance that is stated of the
+angles, P the covariance of the estimate, a for the angles and t for a parameter,
+
+    l^2 = u^T (V^-1 - V^-1 P_aa V^-1) u,     d t = -P_ta V^-1 u                    (1)
+
+l^2 is the non-centrality of chi-squared, by which the mistake shows, and d t what it
+moves a parameter by. Source: W. Baarda, A testing procedure for use in geodetic
+networks, 1968: internal and external reliability.
+
+Mistakes are looked at one kind at a time, with the largest size that hands make: a
+position by itself, an angle wherever it is repeated, all angles of a joint in
+proportion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.posterior.mixture import Mixture
+from fieldcal.solve.given import Given
+
+ALONE_DEG, REPEATED_DEG, GAUGE = 10.0, 0.2, 5e-3
+"""Largest usual mistake of one position, deg, of an angle that is repeated, deg, and of
+a gauge that all angles come from, as a part of them."""
+
+JOINTS = ("α", "β")
+
+
+@dataclass(frozen=True, slots=True)
+class WrongAngles:
+    """A mistake of its largest size.
+
+    Attributes
+    ----------
+    joint : index of the joint
+    angle_deg : that is wrong wherever it is set; None of a position alone or a gauge
+    position : number of the one that is wrong, from 0; None of several
+    shows : l of (1)
+    moves : d t of (1) by full name
+
+    """
+
+    joint: int
+    angle_deg: float | None
+    position: int | None
+    shows: float
+    moves: Mapping[str, float]
+
+    @property
+    def says(self) -> str:
+        """The mistake in words."""
+        name = JOINTS[self.joint]
+        if self.position is not None:
+            return f"position {self.position + 1} with a wrong {name}"
+        if self.angle_deg is not None:
+            return f"{name} = {self.angle_deg:.4g}° set {REPEATED_DEG:g}° off each time"
+        return f"every {name} set {GAUGE:.1%} too far"
+
+    def off_at(self, alpha: float, beta: float) -> tuple[float, float]:
+        """What the same mistake makes of another position's angles, rad."""
+        angle = (alpha, beta)[self.joint]
+        off = 0.0
+        if self.position is None and self.angle_deg is None:
+            off = GAUGE * angle
+        elif self.angle_deg is not None and _same(angle, np.deg2rad(self.angle_deg)):
+            off = float(np.deg2rad(REPEATED_DEG))
+        return (off, 0.0) if self.joint == 0 else (0.0, off)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of result.json."""
+        return {
+            "joint": self.joint,
+            "angle_deg": self.angle_deg,
+            "position": self.position,
+            "shows": self.shows,
+            "moves": dict(self.moves),
+        }
+
+    @classmethod
+    def from_json(cls, value: Mapping[str, Any]) -> WrongAngles:
+        """Read what `to_json` wrote."""
+        return cls(**value)
+
+
+def wrong_angles(
+    given: Given, found: Mixture, names: tuple[str, ...], picked: Array
+) -> list[WrongAngles]:
+    """Mistakes of the angles of a set.
+
+    Parameters
+    ----------
+    given, found : the set and its estimate
+    names : (k,) parameters
+    picked : (k, c) each of them by the columns of the estimate
+
+    """
+    own = [g for _, g in given.asked if g.cause == "angle_setting" and g.part == "own"]
+    if not own:
+        return []
+    order = np.argsort(found.columns)
+    at = order[np.searchsorted(found.columns, own[0].columns, sorter=order)]
+    weight = 1 / found.sizes[at] ** 2
+    told = found.covariance[np.ix_(at, at)]
+    shown = np.diag(weight) - weight[:, None] * told * weight
+    moved = -picked @ found.covariance[:, at] * weight
+    places: Index = (own[0].columns[::2] - given.small_rotation) // 2
+    out = []
+    for joint, angle, position, u in _mistakes(given, places):
+        shows = max(float(u @ shown @ u), 0.0) ** 0.5
+        moves = dict(zip(names, (moved @ u).tolist(), strict=True))
+        out.append(WrongAngles(joint, angle, position, shows, moves))
+    return out
+
+
+def _mistakes(
+    given: Given, places: Index
+) -> Iterator[tuple[int, float | None, int | None, Array]]:
+    """Joint, angle, position and what each angle is off by, (2 p,) rad."""
+    x = given.x
+    rows = [int(np.argmax(x.position == p)) for p in places]
+    for joint, angles in enumerate((x.alpha[rows], x.beta[rows])):
+        for i, place in enumerate(places.tolist()):
+            u = np.zeros(2 * len(places))
+            u[2 * i + joint] = np.deg2rad(ALONE_DEG)
+            yield joint, None, int(place), u
+        for value in np.unique(np.round(angles, 9)).tolist():
+            u = np.zeros(2 * len(places))
+            u[joint::2] = np.deg2rad(REPEATED_DEG) * _same(angles, value)
+            yield joint, float(np.rad2deg(value)), None, u
+        u = np.zeros(2 * len(places))
+        u[joint::2] = GAUGE * angles
+        if u.any():
+            yield joint, None, None, u
+
+
+def _same(angle: Any, value: float) -> Any:
+    return np.abs(angle - value) < 1e-8

@@ -1,0 +1,99 @@
+"""Angles that nothing would contradict, and what bears witness to them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from observed import force, observe
+
+from fieldcal.acceptance.angles import unwitnessed
+from fieldcal.acceptance.verification import Verification, verify
+from fieldcal.calibration import Calibration, limits
+from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.samples import Array
+from fieldcal.session.description import Description, parse
+from fieldcal.solve import solve
+from fieldcal.windows import Average
+
+G, SIGMA = 9.81, 1e-4
+BOUNDS = limits.read("tactical")
+FACES: list[tuple[float, float]] = [
+    (0, 0),
+    (180, 0),
+    (90, 0),
+    (-90, 0),
+    (0, 90),
+    (0, -90),
+]
+
+
+def about(**run: Any) -> Description:
+    return parse({"site": {"gravity": G}, "run": run})
+
+
+def read(angles: list[tuple[float, float]]) -> Array:
+    joints = np.deg2rad(angles).tolist()
+    return np.array([force(alpha, beta, g=G) for alpha, beta in joints])
+
+
+def calibrated(angles: list[tuple[float, float]], unknown: int = 0) -> Calibration:
+    """By positions of which the last ones have no angles."""
+    places = [Position.deg(*pair) for pair in angles]
+    known = len(places) - unknown
+    free = [Position(f"face {i}") for i in range(unknown)]
+    return solve(
+        observe([*places[:known], *free], read(angles), sigma=SIGMA, gravity=G),
+        angle_sigma_deg=0.003,
+    )  # fmt: skip
+
+
+def five() -> list[tuple[float, float]]:
+    return [p.degrees for p in FIVE if p.degrees is not None]
+
+
+def held(found: Calibration, alpha: float, beta: float) -> Verification:
+    mean = np.concatenate([read([(alpha, beta)])[0], np.zeros(3)])
+    window = Average(mean, np.diag([SIGMA**2] * 6), 21.0, 3000, 0.0, 30.0)
+    there = Position.deg(alpha, beta)
+    return verify(found, about(), there, window, float(np.deg2rad(0.05)))
+
+
+def test_a_small_ladder_has_no_witness_and_names_the_remedy() -> None:
+    said = unwitnessed(calibrated(five()), about(), BOUNDS, None, None)
+    assert said.startswith("nothing would contradict wrong angles")
+    assert "three or more other faces" in said and "--verify" in said
+
+
+@pytest.mark.parametrize("more", [FACES[1:4] + FACES[4:5], FACES[1:]])
+def test_gravity_on_other_faces_bears_witness(more: list[tuple[float, float]]) -> None:
+    found = calibrated([*five(), *more], unknown=len(more))
+    assert unwitnessed(found, about(), BOUNDS, None, None) == ""
+
+
+def test_faces_that_are_stated_need_no_witness() -> None:
+    assert unwitnessed(calibrated(FACES), about(), BOUNDS, None, None) == ""
+
+
+def test_a_position_to_verify_bears_witness_where_it_is_another_one() -> None:
+    found = calibrated(five())
+    same = held(found, 45.0, 0.0)
+    assert unwitnessed(found, about(), BOUNDS, same, None)
+    other = held(found, -135.0, 45.0)
+    assert unwitnessed(found, about(), BOUNDS, other, None) == ""
+
+
+def test_a_certificate_is_taken_at_its_word() -> None:
+    site = {"gravity": G, "angles_from": "certificate 4711"}
+    assert (
+        unwitnessed(calibrated(five()), parse({"site": site}), BOUNDS, None, None) == ""
+    )
+
+
+def test_what_a_program_turned_is_nobodys_statement() -> None:
+    found = calibrated(five())
+    virtual = about(mover={"kind": "virtual"})
+    assert unwitnessed(found, virtual, BOUNDS, None, None) == ""
+    command = about(mover={"kind": "command", "command": ["turn"]})
+    assert unwitnessed(found, command, BOUNDS, None, None)

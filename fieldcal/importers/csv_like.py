@@ -29,6 +29,7 @@ from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.gzip_stream import PIECE
 from fieldcal.importing.headings import Column
+from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.text_encoding import as_utf8, is_plain, wide
 from fieldcal.importing.text_forms import CLOCK, TextForm, forms_of
 from fieldcal.importing.text_lines import (
@@ -124,6 +125,34 @@ class TextColumns(ColumnRecording):
         if not self.sensor:
             return found
         return [Heading([self._of(c) for c in way.columns], way.skip) for way in found]
+
+    def imus(self) -> dict[str, ReadOptions]:
+        """Options of each IMU by its name; columns may be chosen by their names."""
+        if any("=" in column for column in self.wanted.columns):
+            self.wanted = replace(self.wanted, columns=self._by_names())
+        return super().imus()
+
+    def _by_names(self) -> tuple[str, ...]:
+        """Columns in their order, of those that the user says as ``ax=name``.
+
+        Raises
+        ------
+        InputError
+            If no line above the numbers has these names.
+
+        """
+        pairs = (c.partition("=") for c in self.wanted.columns if c != SKIP)
+        channels = {name or channel: channel for channel, _, name in pairs}
+        ways = [[c.name for c in way.columns] for way in self.heading()]
+        for names in ways:
+            if set(channels) <= set(names):
+                return tuple(channels.get(name, SKIP) for name in names)
+        there = ", ".join(max(ways, key=len, default=[])[:30])
+        raise InputError(
+            f"{self.path}: no line above its numbers has the names"
+            f" {', '.join(channels)}; there are {there or 'none'}: say what each column"
+            " is in its order, such as --columns t,ax,ay,az,_"
+        )
 
     def _fitted(self, way: Heading) -> Heading | None:
         """A heading as wide as the rows; None if its names stand over other columns.

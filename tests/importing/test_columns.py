@@ -266,3 +266,16 @@ def test_names_are_never_put_over_other_columns(
     text = "\n".join([heading, *(f"{before}{line}{behind}" for line in lines)])
     path.write_text(text + "\n")
     same(imported(path), rows)
+
+
+def test_columns_of_a_text_are_chosen_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(12, 50.0)
+    path = write(tmp_path, rows, heading="clock,u1,u2,u3,v1,v2,v3")
+    named = "t=clock,ax=u1,ay=u2,az=u3,gx=v1,gy=v2,gz=v3"
+    same(imported(path, "--columns", named), rows)
+    out = str(tmp_path / "other")
+    wrong = ["--columns", named.replace("u1", "w1"), "-o", out]
+    assert main(["import", str(path), *wrong]) == 2
+    assert "there are clock, u1, u2" in capsys.readouterr().err

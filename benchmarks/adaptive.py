@@ -58,6 +58,9 @@ APART = ((30.0, -3.0), (-30.0, 1.0), (12.0, 4.0), (-12.0, -4.0), (38.0, 1.5))
 MOVING = ("base_tilt", "angle_offset", "angle_scale")
 """Effects that change the force, and not what the sensors make of it."""
 
+TILTS = {"base_tilt", "angle_offset"}
+"""Models of a tilt that every device has, and that a calibration finds."""
+
 SHOWN = tuple(
     name
     for name in draws.EQUATIONS
@@ -150,7 +153,7 @@ def drawn(number: int, rng: np.random.Generator) -> Bench:
     concealed = dict(session.concealed)
     rate = min(session.profile.sampling.rate_hz, FASTEST)
     profile = replace(session.profile, sampling=device.Sampling(rate))
-    if not {"base_tilt", "angle_offset"} & set(concealed):
+    if not TILTS & set(concealed):
         about_x, about_z = rng.normal(0.0, 0.5, 2)
         tilt = effect("base_tilt", {"about_x_deg": about_x, "about_z_deg": about_z})
         profile = replace(profile, effects=(*profile.effects, tilt))
@@ -220,12 +223,14 @@ def _named(session: Session, end: SoFar) -> bool:
     """Whether what is concealed is named, or an alias of it, and nothing else."""
     if end.explanation is None:
         return False
+    tilted = {e.id for e in session.profile.effects} & TILTS
     truth = set(session.concealed)
     standing = end.explanation.standing
     every = (
         set().union(*({s.name, *s.aliases} for s in standing)) if standing else set()
     )
-    extra = [s for s in standing if not truth & {s.name, *s.aliases}]
+    there = truth | (TILTS if tilted else set())  # a tilt has two models
+    extra = [s for s in standing if not there & {s.name, *s.aliases}]
     return truth <= every and not extra
 
 

@@ -86,9 +86,13 @@ def remedy(
 
 
 def ladder_remedy(observations: Observations, names: Sequence[str]) -> list[str]:
-    """Names of the fewest positions of `LADDER` that would determine parameters."""
+    """Names of the fewest positions of `LADDER` that would determine parameters.
+
+    Positions without angles say nothing that is linear in the parameters.
+    """
+    known = [p for p in observations.positions if p.oriented]
 
     def rows(places: Sequence[Position]) -> Array:
         return design(names, places, observations.gravity, observations.mounting)
 
-    return [p.name for p in remedy(rows, observations.positions, LADDER)]
+    return [p.name for p in remedy(rows, known, LADDER)]

@@ -74,3 +74,11 @@ def test_the_proposed_positions_mend_what_solve_leaves_open() -> None:
     assert len(more) == len(places) + len(extra)
     found = solve(observe(more, outputs(more)), tilt="none")
     np.testing.assert_allclose(found.values, [*BIAS, *SCALE], atol=1e-5)
+
+
+def test_positions_without_angles_are_no_part_of_what_a_ladder_determines() -> None:
+    names = parameters("angle_offset")
+    mean = np.tile([0.1, -9.8, 0.2], (5, 1))
+    mixed = observe([*FIVE[:2], Position("face")], mean[:3])
+    alone = observe(FIVE[:2], mean[:2])
+    assert ladder_remedy(mixed, names) == ladder_remedy(alone, names)

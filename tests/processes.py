@@ -25,7 +25,6 @@ HANGS = 600.0
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
 RUN, SIM = [*FIELDCAL, "run"], [*FIELDCAL, "sim"]
 TWO_POSITION = [*RUN, "two_position", "--headless", "--level=0.001", "--angles=0.001"]
-TWO_POSITION += ["--angles-from=the virtual fixture"]
 """Two positions on a base that is level, set exactly, and no operator."""
 
 

@@ -8,8 +8,9 @@ to be seen. If every size u up to the largest, 1, is as likely as another, that 
     part = max(0, min(1, L / l) - 5 s / d)                                         (1)
 
 of all cases, L being what shows. Further witnesses add to l: a position that was not
-fitted, and earlier calibrations of the device. Whoever names the certificate of the
-fixture takes its word for the angles.
+fitted, and earlier calibrations of the device. Whoever says how well the angles are
+set, or names the certificate of the fixture, is taken at that word, and the decision
+says that it relies on it.
 """
 
 from __future__ import annotations
@@ -31,6 +32,14 @@ SHOWN = 5.0
 """L of (1): with ten degrees of freedom, chi-squared of 25 above its mean is rarer than
 1e-4, which is NO-GO."""
 
+REMEDY = (
+    "say how well they are set (--angles, or [site] angle_setting_deg in session.toml),"
+    " or let something that needs no angle bear witness: three or more other faces"
+    " (each a [[position]] without angles, gravity is known), or a position to verify"
+    " in which all axes feel gravity (--verify, [verification] alpha_deg = -135,"
+    " beta_deg = 45)"
+)
+
 UNSEEN = 0.1
 """Part of the mistakes of a kind that may be harmful and unseen."""
 
@@ -45,7 +54,7 @@ def unwitnessed(
     verification: Verification | None,
     family: Sequence[Calibration] | None,
 ) -> str:
-    """Sentence where wrong angles would go unseen, with the remedy; else empty."""
+    """Sentence where wrong angles would go unseen; else empty."""
     if about.angles_from or _told(about):
         return ""
     worst, part, most, sigmas = None, UNSEEN, "", 0.0
@@ -73,13 +82,14 @@ def unwitnessed(
         return ""
     return (
         f"nothing would contradict wrong angles: {worst.says} could move {most} by up"
-        f" to {sigmas:.0f} σ and not be seen; let something that needs no angle bear"
-        " witness: lay the device on three or more other faces as well (each a"
-        " [[position]] without angles, gravity is known), let a position verify in"
-        " which all axes feel gravity (--verify, [verification] alpha_deg = -135,"
-        " beta_deg = 45), or name the certificate of the fixture (--angles-from, or"
-        " [site] angles_from in session.toml)"
+        f" to {sigmas:.0f} σ and not be seen"
     )
+
+
+def stated(found: Calibration, about: Description, limits: GradeLimits) -> bool:
+    """Whether somebody said how well the angles are set, in the session or to solve."""
+    used = float(found.info.get("angle_sigma_deg") or 0.0)
+    return about.angle_setting_deg is not None or used < limits.angle_setting_deg
 
 
 def _told(about: Description) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.acceptance.angles import unwitnessed
+from fieldcal.acceptance.angles import REMEDY, stated, unwitnessed
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.check import Check
 from fieldcal.acceptance.conditions import check_link, check_temperature
@@ -195,13 +195,17 @@ def _angles(
 ) -> list[Check]:
     """Whether anything would contradict angles that are not as stated."""
     given = (circumstances.verification, circumstances.family)
-    unseen = unwitnessed(found, about, limits, *given)
-    if unseen:
-        return [Check(ANGLES, False, unseen)]
     if about.angles_from:
         says = f"the angles are vouched for by {one_line(about.angles_from)}"
         return [Check(ANGLES, True, says)]
-    return []
+    unseen = unwitnessed(found, about, limits, *given)
+    if not unseen:
+        return []
+    if not stated(found, about, limits):
+        return [Check(ANGLES, False, f"{unseen}; {REMEDY}")]
+    said = found.info.get("angle_sigma_deg") or 0.0
+    relied = f"this relies on angles set to ± {said:.2g}°, as stated: {unseen}"
+    return [Check(ANGLES, None, relied)]
 
 
 def _first(found: Calibration) -> str:

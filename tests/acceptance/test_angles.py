@@ -9,6 +9,7 @@ import pytest
 from observed import force, observe
 
 from fieldcal.acceptance.angles import unwitnessed
+from fieldcal.acceptance.decision import ANGLES, Circumstances, Decision, decide
 from fieldcal.acceptance.verification import Verification, verify
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.positions import FIVE, Position
@@ -38,14 +39,20 @@ def read(angles: list[tuple[float, float]]) -> Array:
     return np.array([force(alpha, beta, g=G) for alpha, beta in joints])
 
 
-def calibrated(angles: list[tuple[float, float]], unknown: int = 0) -> Calibration:
+def decided(found: Calibration, said: Description) -> Decision:
+    return decide(found, said, BOUNDS, Circumstances())
+
+
+def calibrated(
+    angles: list[tuple[float, float]], unknown: int = 0, used: float = 0.003
+) -> Calibration:
     """By positions of which the last ones have no angles."""
     places = [Position.deg(*pair) for pair in angles]
     known = len(places) - unknown
     free = [Position(f"face {i}") for i in range(unknown)]
     return solve(
         observe([*places[:known], *free], read(angles), sigma=SIGMA, gravity=G),
-        angle_sigma_deg=0.003,
+        angle_sigma_deg=used,
     )  # fmt: skip
 
 
@@ -63,7 +70,23 @@ def held(found: Calibration, alpha: float, beta: float) -> Verification:
 def test_a_small_ladder_has_no_witness_and_names_the_remedy() -> None:
     said = unwitnessed(calibrated(five()), about(), BOUNDS, None, None)
     assert said.startswith("nothing would contradict wrong angles")
-    assert "three or more other faces" in said and "--verify" in said
+    two = calibrated([(0, 0), (45, 5)], used=BOUNDS.angle_setting_deg)
+    made = decided(two, about())
+    (check,) = [c for c in made.checks if c.name == ANGLES]
+    assert check.ok is False and not made.go
+    assert "three or more other faces" in check.says and "--verify" in check.says
+    assert "--angles" in check.says
+
+
+@pytest.mark.parametrize("site", [{}, {"angle_setting_deg": 0.003}])
+def test_a_word_on_the_angles_is_relied_on_and_repeated(site: dict[str, Any]) -> None:
+    """Said to `solve` or in the session."""
+    said = parse({"site": {"gravity": G, **site}})
+    made = decided(calibrated(five(), used=0.003), said)
+    (check,) = [c for c in made.checks if c.name == ANGLES]
+    assert check.ok is None
+    assert "relies on angles set to ± 0.003°" in check.says
+    assert "could move" in check.says
 
 
 @pytest.mark.parametrize("more", [FACES[1:4] + FACES[4:5], FACES[1:]])

@@ -33,8 +33,8 @@ def decided(
         for i, (a, b) in enumerate(angles)
     ]
     block = recorded(Profile(noise=QUIET), positions)
-    site: dict[str, float | str] = {"latitude_deg": 50.45, "height_m": 170.0}
-    site |= {"angle_setting_deg": 0.05, "angles_from": "certificate 4711"}
+    site: dict[str, float] = {"latitude_deg": 50.45, "height_m": 170.0}
+    site |= {"angle_setting_deg": 0.05}
     session = Session.open(write_session(folder, block, positions, site=site))
     still = rests(session)
     return assess(solved(session, still), session, still, bounds, None)

@@ -67,8 +67,7 @@ class Bench:
     def run(
         self, run: Mapping[str, Any], until_go: bool = False, **more: Any
     ) -> Calibration:
-        site: dict[str, Any] = {"latitude_deg": 45.0, "angle_setting_deg": 0.003}
-        site["angles_from"] = "the virtual fixture"
+        site = {"latitude_deg": 45.0, "angle_setting_deg": 0.003}
         tables = {"site": site, "run": {"seconds": 12.0, **run}, **more}
         task = plan_file.task(tables, "the test")
         with Recorder(self.folder, task.tables) as recorder:

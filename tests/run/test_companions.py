@@ -32,7 +32,7 @@ def led(
     """A run of two positions in which somebody turns all devices when told to."""
     run = [*RUN, "--headless", "--json", *options]
     if "--resume" not in options:
-        run += ["two_position", "--level=0.001", "--angles=0.001", "--angles-from=us"]
+        run += ["two_position", "--level=0.001", "--angles=0.001"]
         run += ["--seconds=30", "--latitude=50.45"]
     for url in urls:
         run += ["--device", url]

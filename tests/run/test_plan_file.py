@@ -165,7 +165,6 @@ def run(folder: Path, device: VirtualMover, fails: str, junit: Path, *more: str)
             "height_m": 170.0,
             "level_deg": 0.001,
             "angle_setting_deg": 0.001,
-            "angles_from": "the table that we simulate",
         },
         **plan(
             seconds=8.0,

@@ -39,7 +39,7 @@ class Console:
         self.device, self.folder = device, folder
         url = f"serial:{device.port}?format=witmotion"
         call = ["-m", "fieldcal", "run", "five_position", "--device", url]
-        call += ["--angles", "0.001", "--angles-from", "the virtual fixture"]
+        call += ["--angles", "0.001"]
         call += ["--seconds", "14", "--latitude", "50.45", "--height", "170"]
         call += ["-o", str(folder), *more]
         self.child = pexpect.spawn(

@@ -52,7 +52,10 @@ def test_progress_is_json_lines_on_standard_error(
 
 def test_a_run_leaves_its_report(recalibrated: Recalibrated) -> None:
     page = (recalibrated.folder / "report.html").read_text(encoding="utf-8")
-    assert "The calibration can be used" in page and "base tilt about x" in page
+    assert (
+        "Apply it: the numbers hold within their ±." in page
+        and "base tilt about x" in page
+    )
 
 
 def test_solving_the_recorded_session_gives_the_same_numbers(

@@ -16,8 +16,8 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
-from fieldcal.diagnosis.signal.periodogram import LONGEST, Complex
-from fieldcal.diagnosis.signal.pieces import Pieces
+from fieldcal.diagnosis.signal.periodogram import LONGEST
+from fieldcal.diagnosis.signal.pieces import Complex, Pieces
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Line
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.signal.periodogram import LONGEST, Complex
-from fieldcal.diagnosis.signal.pieces import Pieces
+from fieldcal.diagnosis.signal.periodogram import LONGEST
+from fieldcal.diagnosis.signal.pieces import Complex, Pieces
 
 PARTS, LEAST = 15, 4
 """Parts of a window, or of as much of it as a periodogram has, whose sums are kept, so

@@ -8,20 +8,17 @@ Source: D. Percival, A. Walden, Spectral Analysis for Physical Applications, cha
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
 
 from fieldcal.core.frames import turn
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.signal.pieces import Pieces
+from fieldcal.diagnosis.signal.pieces import Complex, Pieces
 from fieldcal.model import thresholds
 from fieldcal.physics.recording import medians
-
-Complex = NDArray[np.complexfloating]
 
 LONGEST = 32_768
 """Samples of one periodogram."""
@@ -41,6 +38,10 @@ STEEP = 4.0
 SLOPE = 0.3
 """Part of the power at a frequency that is below it on a slope; beside a line, less."""
 
+BURST, BURSTS = 0.5, 0.01
+"""Sampling periods, less than which no device takes from sample to sample, and part of
+the steps that are as short where stamps are those of arrival."""
+
 HUMP = 2.0
 """Times the floor down to which the power about a peak belongs to it."""
 
@@ -56,9 +57,6 @@ LOOKS = 10
 
 TRIADS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
 """Channels of one phase that are looked at together."""
-
-AT_ONCE = 1 << 16
-"""Samples that a line is taken out of at once."""
 
 COHERENT = 1 << 18
 """Samples up to which windows are put together with one phase."""
@@ -178,13 +176,14 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
     Channel by channel window by window; and triads with one phase throughout, in
     the device's axes and, where the angles are known, in the base's. Windows are
     tapered: what settles at the start of each is no line, though it comes as often.
+    Stamps of arrival keep no phase.
     """
     power, count, hz = _power(pieces)
     used = np.flatnonzero(power.any(axis=1)).tolist()
     out = [Spectrum(power, count, hz, tuple((c,) for c in used))]
     lasts = pieces.times[-1][-1] - pieces.times[0][0]
-    long = lasts * pieces.rate > GRID
-    if long or sum(map(len, pieces.samples)) > COHERENT:
+    long = lasts * pieces.rate > GRID or sum(map(len, pieces.samples)) > COHERENT
+    if long or any(_in_bursts(t, pieces.rate) for t in pieces.times):
         return out
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
@@ -226,15 +225,22 @@ def _power(pieces: Pieces) -> tuple[Array, int, Array]:
 def _transformed(values: Array, t: Array, rate: float, n: int) -> Complex:
     """Fourier sums of samples (c, m) at the multiples of rate / n up to its half.
 
-    At the times that they have: a log's samples come late, or are missing.
+    At the times that they have: a log's samples come late, or are missing. As if they
+    came evenly where the times are those of arrival.
     """
     at = (t - t[0]) * rate
-    if len(at) <= n and np.ptp(at - np.arange(len(at))) < 0.5 / FINER:
+    even = np.ptp(at - np.arange(len(at))) < 0.5 / FINER
+    if len(at) <= n and (even or _in_bursts(t, rate)):
         return np.fft.rfft(values, n)
     place = np.round(at * FINER).astype(np.intp) % (n * FINER)
     grid = [np.bincount(place, row, n * FINER) for row in values]
     whole: Complex = rfft(np.array(grid))
     return whole[:, : n // 2 + 1]
+
+
+def _in_bursts(t: Array, rate: float) -> bool:
+    """Whether times are those of arrival: many follow faster than a device samples."""
+    return bool(np.mean(np.diff(t) * rate < BURST) > BURSTS)
 
 
 def _square(spectrum: Complex) -> Array:
@@ -288,23 +294,3 @@ def _beyond(x: float, count: int) -> float:
     )
     top = terms.max()
     return float(min(0.0, -x + top + np.log(np.exp(terms - top).sum())))
-
-
-def line_of(t: Array, hz: float, amplitude: Complex) -> Array:
-    """Line of some complex amplitudes, Re(amplitude exp(2 pi i hz t)), (n, c)."""
-    turned = 2 * np.pi * hz * t
-    both = np.array([amplitude.real, -amplitude.imag])
-    line: Array = np.column_stack([np.cos(turned), np.sin(turned)]) @ both
-    return line
-
-
-def take_out(values: Array, t: Array, hz: float, amplitude: Complex) -> None:
-    """Take a line out of samples, (n, c), in place."""
-    for some in stretches(0, len(t)):
-        values[some] -= line_of(t[some], hz, amplitude)
-
-
-def stretches(first: int, last: int) -> Iterator[slice]:
-    """Samples a part at a time: what is made of them takes memory, too."""
-    for start in range(first, last, AT_ONCE):
-        yield slice(start, min(start + AT_ONCE, last))

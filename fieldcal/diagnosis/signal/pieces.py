@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,11 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 from fieldcal.model.rows.reduce import Rows, RowSource, rate_of, spans
 from fieldcal.physics.experience import Experience
+
+Complex = NDArray[np.complexfloating]
+
+AT_ONCE = 1 << 16
+"""Samples that a line is taken out of at once."""
 
 SHORTEST = 64
 """Samples of a window from which it is looked at."""
@@ -76,3 +81,23 @@ def _flat(t: Array, acc: Array, gyr: Array, usable: NDArray[np.bool_]) -> Array:
         column *= known
         out[:, c] = column
     return out
+
+
+def line_of(t: Array, hz: float, amplitude: Complex) -> Array:
+    """Line of some complex amplitudes, Re(amplitude exp(2 pi i hz t)), (n, c)."""
+    turned = 2 * np.pi * hz * t
+    both = np.array([amplitude.real, -amplitude.imag])
+    line: Array = np.column_stack([np.cos(turned), np.sin(turned)]) @ both
+    return line
+
+
+def take_out(values: Array, t: Array, hz: float, amplitude: Complex) -> None:
+    """Take a line out of samples, (n, c), in place."""
+    for some in stretches(0, len(t)):
+        values[some] -= line_of(t[some], hz, amplitude)
+
+
+def stretches(first: int, last: int) -> Iterator[slice]:
+    """Samples a part at a time: what is made of them takes memory, too."""
+    for start in range(first, last, AT_ONCE):
+        yield slice(start, min(start + AT_ONCE, last))

@@ -15,15 +15,16 @@ import numpy as np
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.line import Remains, Tone, remains, tuned
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
-from fieldcal.diagnosis.signal.periodogram import (
-    Peak,
-    highest,
+from fieldcal.diagnosis.signal.periodogram import Peak, highest, spectra_of
+from fieldcal.diagnosis.signal.pieces import (
+    Pieces,
+    held_in,
     line_of,
-    spectra_of,
+    pieces_of,
+    places_of,
     stretches,
     take_out,
 )
-from fieldcal.diagnosis.signal.pieces import Pieces, held_in, pieces_of, places_of
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.physics.effect import Line

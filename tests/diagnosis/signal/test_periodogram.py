@@ -49,6 +49,19 @@ def test_samples_out_of_step_are_summed_at_their_own_times() -> None:
     assert min(alike) > 0.95
 
 
+def test_stamps_of_arrival_in_bursts_are_no_times_of_samples() -> None:
+    """Packets of eight samples: a line stands out as if they came evenly."""
+    rng = np.random.default_rng(8)
+    n, hz = 4000, 31.7
+    even = np.arange(n) / RATE
+    stamps = np.floor(even * RATE / 8) * 8 / RATE + 1e-4 * (np.arange(n) % 8)
+    six = noise(rng, n)
+    six[:, 2] += 3e-4 * np.sin(2 * np.pi * hz * even)
+    line = highest(p := pieces([stamps], [six]), spectra_of(p), [])
+    assert line is not None
+    assert line.hz == pytest.approx(hz, abs=0.03)
+
+
 def test_evenly_sampled_windows_keep_their_whole_power_with_one_phase() -> None:
     """A window may begin between the samples of another one, half a period off."""
     hz, size = 67.3, 1.0

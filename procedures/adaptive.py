@@ -116,15 +116,8 @@ def _worth(
 
 
 def _allowed(so_far: SoFar) -> dict[str, float]:
-    """Uncertainty that is allowed of each parameter that has a limit.
-
-    The scale factors of gyroscopes are judged where turns determine them, and turns
-    are asked for if they do so too badly.
-    """
-    found = so_far.found.names if so_far.found else ()
+    """Uncertainty that is allowed of each parameter that has to be known."""
     names = [f"{g}.{a}" for g in REQUIRED for a in "xyz"]
-    if any(name.startswith("gyr_scale") for name in so_far.failed):
-        names += [n for n in found if n.startswith("gyr_scale")]
     return {n: so_far.limits.sigma(group_of(n)) or np.inf for n in names}
 
 

@@ -6,9 +6,8 @@ Of an uncertainty that is too large: positions held besides. What n positions te
 
 with J_p how the means there move with the parameters, s the error of a mean, a how well
 angles are set and t_1, t_2 how the force moves with them. What a calibration has beyond
-that (a drift, a walk) it keeps: each sigma falls in the proportion that (1) says. Of
-the scale factor of a gyroscope: turns about its axis, which tell it by the sum of their
-squares. Of a position that disagrees with the others: the same once more.
+that (a drift, a walk) it keeps: each sigma falls in the proportion that (1) says. Of a
+position that disagrees with the others: the same once more.
 """
 
 from __future__ import annotations
@@ -21,10 +20,9 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.calibration.names import ParameterName, group_of, sensor_of
+from fieldcal.calibration.names import group_of, sensor_of
 from fieldcal.calibration.wording import title
-from fieldcal.core.frames import turn, way
-from fieldcal.core.positions import Position, angles, forces, ladder
+from fieldcal.core.positions import Position, forces, ladder
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design, parameters
 from fieldcal.planning.planner import sigma_of
@@ -39,9 +37,6 @@ SURE = 0.9
 
 LONGEST = 600.0
 """Longest time that is asked for at one position, s."""
-
-SMALL = 0.02
-"""Turn that tells nothing of a scale factor, rad."""
 
 STEP = 1e-4
 """Change of an angle by which (1) has its t, rad."""
@@ -105,9 +100,6 @@ def cheapest(
     over = _over(found, limits, failed)
     if not over or not all(p.oriented for p in about.positions):
         return None
-    turned = {n: r for n, r in over.items() if group_of(n) == "gyr_scale"}
-    if turned := {n: r for n, r in turned.items() if np.isfinite(r)}:
-        return _turns(about, turned, seconds)  # what is not determined is not judged
     if all(sensor_of(group_of(name)) == "gyr" for name in over):
         return _longer(about, over, seconds)
     return _besides(found, about, limits, over, sigma, seconds)
@@ -140,29 +132,6 @@ def _longer(
     number = len(about.positions)
     says = f"{more:.0f} s more at position {number}, as it stands: then GO is expected"
     return Remedy(says, positions=(last,), seconds=max(more, seconds))
-
-
-def _turns(about: Description, over: dict[str, float], seconds: float) -> Remedy | None:
-    """The widest turns of the ladder about the axis that wants them, to and fro."""
-    worst = max(over, key=lambda name: over[name])
-    axis = ParameterName.of(worst).axis
-    held = turn(*angles(about.positions))
-    back = way(held[:-1], *(joint[1:] for joint in angles(about.positions)))
-    before = float(((back @ about.mounting)[:, axis] ** 2).sum())
-    if before < SMALL**2:
-        return None
-    places = [Position.deg(a, b) for a, b in ladder(about.positions)]
-    chosen: list[Position] = []
-    last, total = held[-1], before
-    while total * SURE**2 < before * over[worst] ** 2:
-        squares = (way(last, *angles(places)) @ about.mounting)[:, axis] ** 2
-        best = int(np.argmax(squares))
-        if len(chosen) == MOST or squares[best] < SMALL**2:
-            return None
-        total += float(squares[best])
-        chosen.append(places[best])
-        last = turn(*(joint[0] for joint in angles(chosen[-1:])))
-    return _told(chosen, over, seconds)
 
 
 def _besides(

@@ -77,18 +77,6 @@ def about(tmp_path: Path, angles: list[tuple[float, float]]) -> Session:
     return Session.open(tmp_path)
 
 
-def test_the_scale_of_a_gyroscope_needs_turns_about_its_axis(tmp_path: Path) -> None:
-    five = [p.degrees or (0.0, 0.0) for p in FIVE]
-    told = about(tmp_path / "s", five).about
-    found = found_with(("gyr_scale.z",), [1.2 * LIMITS.gyr_scale_sigma])
-    remedy = cheapest(found, told, LIMITS, ["gyr_scale"], 1e-3, 30.0)
-    assert remedy is not None and remedy.positions[0][0] == -45.0, "from +45"
-    assert "one position more" in remedy.says and "gyro scale factor z" in remedy.says
-    level = about(tmp_path / "level", [(0.0, 0.0), (22.5, 0.0), (45.0, 0.0)]).about
-    worse = found_with(("gyr_scale.y",), [9 * LIMITS.gyr_scale_sigma])
-    assert cheapest(worse, level, LIMITS, ["gyr_scale"], 1e-3, 30.0) is None
-
-
 def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:
     five = [p.degrees or (0.0, 0.0) for p in FIVE]
     names = tuple(f"gyr_bias.{a}" for a in "xyz")

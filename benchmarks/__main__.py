@@ -1,4 +1,7 @@
-"""Run benchmarks: all of them, or those named; numbers and --options are theirs."""
+"""Run benchmarks: all of them, or those named; numbers and --options are theirs.
+
+`--help` tells what they measure and how they are called.
+"""
 
 import sys
 from importlib import import_module
@@ -12,5 +15,9 @@ wanted = named or available
 if unknown := set(wanted) - set(available):
     sys.exit(f"no benchmark {', '.join(sorted(unknown))}; there are {available}")
 for name in wanted:
+    module = import_module(f"benchmarks.{name}")
+    if "--help" in sys.argv[1:]:
+        print(f"{name}: {module.__doc__}")
+        continue
     print(f"== {name}", flush=True)
-    import_module(f"benchmarks.{name}").main()
+    module.main()

@@ -25,7 +25,7 @@ DEEPEST = 20
 """Records within records that are looked at."""
 
 
-class Record(NamedTuple):
+class JsonRecord(NamedTuple):
     """A record, without records within it.
 
     Attributes
@@ -88,9 +88,9 @@ def _float(value: Any) -> float:
         return float("inf")
 
 
-def _record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> Record:
+def _record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> JsonRecord:
     """A record, with the names of what lies within it joined."""
-    found = Record({}, {}, {}, {})
+    found = JsonRecord({}, {}, {}, {})
     for key, inner in value.items():
         full = f"{name}_{key}".strip("_") or "value"
         if isinstance(inner, Mapping) and depth < DEEPEST:
@@ -114,7 +114,7 @@ def _record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> Record:
     return found
 
 
-def _kinds(records: Sequence[Record]) -> dict[str, list[Record]]:
+def _kinds(records: Sequence[JsonRecord]) -> dict[str, list[JsonRecord]]:
     """Records that are alike, by the texts in which they differ from others."""
     names = {name for one in records for name in one.texts}
     differ = [
@@ -122,13 +122,13 @@ def _kinds(records: Sequence[Record]) -> dict[str, list[Record]]:
         for name in sorted(names)
         if 1 < len({one.texts.get(name) for one in records}) <= len(records) / 2
     ]
-    found: dict[str, list[Record]] = {}
+    found: dict[str, list[JsonRecord]] = {}
     for one in records:
         found.setdefault("_".join(one.texts.get(n, "") for n in differ), []).append(one)
     return found
 
 
-def _lists(records: Sequence[Record]) -> dict[str, Array]:
+def _lists(records: Sequence[JsonRecord]) -> dict[str, Array]:
     """Values of each field, (n,), in the order of the records."""
     if any(one.samples for one in records):
         return _of_samples([one for one in records if one.samples])
@@ -148,7 +148,7 @@ def _seconds(texts: Sequence[str]) -> Array:
     return np.array([np.nan if since is None else since for since in read])
 
 
-def _of_samples(records: Sequence[Record]) -> dict[str, Array]:
+def _of_samples(records: Sequence[JsonRecord]) -> dict[str, Array]:
     """Values of each field of samples, several of which a record holds."""
     many = [min(len(inner) for inner in one.samples.values()) for one in records]
     bare = [one._replace(samples={}) for one in records]

@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import observations
-from fieldcal.report.blocks import Block as Shown
+from fieldcal.report.blocks import Block as ReportBlock
 from fieldcal.report.blocks import Figure, Section, Text
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
@@ -88,7 +88,7 @@ def gravity_norm(material: Material) -> Section | None:
         Axis("|a| − g", "m/s²"),
         series,
     )
-    blocks: tuple[Shown, ...] = (
+    blocks: tuple[ReportBlock, ...] = (
         Text(
             "At rest the accelerometers feel gravity and nothing else, wherever they"
             f" point. Their norm misses it by {said}."

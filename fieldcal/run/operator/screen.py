@@ -34,7 +34,7 @@ FEWEST = 3
 
 
 @dataclass(slots=True)
-class Shown:
+class ScreenContent:
     """What there is to show.
 
     Attributes
@@ -82,7 +82,7 @@ class Screen:
 
     """
 
-    def __init__(self, console: Console, shown: Shown) -> None:
+    def __init__(self, console: Console, shown: ScreenContent) -> None:
         self._console, self._shown = console, shown
 
     def drawn(self) -> RenderableType:

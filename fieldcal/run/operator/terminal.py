@@ -20,7 +20,7 @@ from fieldcal.run.movers import Mover
 from fieldcal.run.operator import widgets
 from fieldcal.run.operator.keyboard import Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Wish
-from fieldcal.run.operator.screen import Screen, Shown
+from fieldcal.run.operator.screen import Screen, ScreenContent
 from fieldcal.run.operator.widgets import alert
 from fieldcal.run.wait_reason import WaitReason, reminder
 
@@ -61,7 +61,9 @@ class ConsoleOperator:
         self._mover = mover
         self._console = console
         self._keyboard = keyboard
-        self._shown = Shown(title, list(positions), verification, self._has_keys, most)
+        self._shown = ScreenContent(
+            title, list(positions), verification, self._has_keys, most
+        )
         self._screen = Screen(console, self._shown)
         self._said_before: list[str] = []
         self._skips = -ASKED_AGAIN

@@ -4,21 +4,15 @@ Columns, rate and units come from the command line, from the lines above the num
 from physics, which is said; the separator and lines at the top that are no numbers are
 found by themselves. Times are made from the rate where the file has none; otherwise
 they count from the first line.
-
-Arrow reads what is plain, a piece at a time; lines that it does not understand are read
-again one by one, so that each that is none can be named.
 """
 
 from __future__ import annotations
 
 import re
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
@@ -27,20 +21,19 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.columns import SKIP
-from fieldcal.importing.gzip_stream import PIECE
 from fieldcal.importing.headings import Column
+from fieldcal.importing.number_table import NumberTable
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.text_encoding import as_utf8, is_plain, wide
+from fieldcal.importing.text_encoding import is_plain, wide
 from fieldcal.importing.text_forms import CLOCK, TextForm, forms_of
 from fieldcal.importing.text_lines import (
-    MISSING,
     TOP,
     behind,
-    plain_numbers,
     split_lines,
     top_lines,
     width_of,
 )
+from fieldcal.importing.text_source import TextSource
 from fieldcal.importing.text_top import (
     headings_above,
     is_number,
@@ -96,21 +89,6 @@ class TextColumns(ColumnRecording):
         """Name a line; empty ones are not counted."""
         gathered = any(form.gathers for form in self._forms)
         return f"{'record' if gathered else 'line'} {self._skip + row + 1}"
-
-    def pieces(self, size: int = PIECE) -> Iterator[bytes]:
-        """Bytes of the text, unpacked."""
-        if not self.member:
-            yield from super().pieces(size)
-            return
-        try:
-            with ZipFile(self.path) as archive, archive.open(self.member) as file:
-                while data := file.read(size):
-                    yield data
-        except (BadZipFile, OSError, RuntimeError, zlib.error, EOFError) as error:
-            raise InputError(
-                f"{self.path}: {self.member} cannot be read: {error}; copy it again"
-                " from where it came"
-            ) from error
 
     def heading(self) -> list[Heading]:
         """What stands above its numbers."""
@@ -210,11 +188,11 @@ class TextColumns(ColumnRecording):
         columns.check(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != SKIP]
-        samples, separator, seen = columns.ColumnReader(self.wanted), None, 0
-        begun, t0, first_lines = False, None, [""]
+        samples, t0, first_lines = columns.ColumnReader(self.wanted), None, [""]
+        table: NumberTable | None = None
         for data in self._pieces():
-            if not begun:
-                first_lines, begun = self._begin(data, use), True
+            if table is None:
+                first_lines = self._begin(data, use)
                 if not 0 <= self._skip < len(first_lines):
                     break
                 data, first = behind(data, self._skip), first_lines[self._skip]
@@ -222,11 +200,11 @@ class TextColumns(ColumnRecording):
                 self._check_width(first, separator)
                 if separator != "," and "," in first:
                     self.says.append("its numbers have decimal commas")
-            table = self._table(data, use, separator, seen)
-            n = len(table[0])
-            seen += n
+                table = NumberTable(names, separator, self.place, self.damaged)
+            found = table.read(data)
+            n = len(found[0])
             block = samples.block(
-                {names[i]: c for i, c in zip(use, table, strict=True)}, n
+                {names[i]: c for i, c in zip(use, found, strict=True)}, n
             )
             if not n:
                 continue
@@ -234,7 +212,7 @@ class TextColumns(ColumnRecording):
             with np.errstate(invalid="ignore"):  # a time beyond all is no time
                 since = block.t - t0 if self.from_first else block.t
             yield replace(block, t=since)
-        if not seen:
+        if table is None or not table.seen:
             number, line = list(enumerate(first_lines[:2], 1))[-1]
             raise InputError(
                 f"{self.path}: no line has numbers in the columns {','.join(names)};"
@@ -252,17 +230,14 @@ class TextColumns(ColumnRecording):
                 break
         return lines
 
+    @property
+    def _text(self) -> TextSource:
+        """The lines of the file."""
+        return TextSource(self, self.member)
+
     def _pieces(self) -> Iterator[bytes]:
-        """Whole lines of the file, many at a time."""
-        readers = [form.reader() for form in self._forms]
-        for data in self._whole_lines():
-            if not readers:
-                yield data
-                continue
-            lines = split_lines(data)
-            for read in readers:
-                lines = read(lines)
-            yield ("\n".join(lines) + "\n").encode()
+        """Whole lines of the file, many at a time, in columns."""
+        return self._text.pieces(self._forms)
 
     @cached_property
     def _forms(self) -> list[TextForm]:
@@ -272,24 +247,7 @@ class TextColumns(ColumnRecording):
     @cached_property
     def _top(self) -> list[str]:
         """First lines, as they stand in the file."""
-        return next((top_lines(data) for data in self._whole_lines()), [])
-
-    def _whole_lines(self) -> Iterator[bytes]:
-        """Whole lines of the file as UTF-8, many at a time."""
-        rest = b""
-        for data in as_utf8(self.pieces()):
-            end = data.rfind(b"\n") + 1
-            if not end:
-                rest += data
-                continue
-            # one copy: there may be gigabytes of them
-            whole, rest = b"".join((rest, memoryview(data)[:end])), data[end:]
-            if not whole.isspace():
-                yield whole
-        # a number that was cut off is another number
-        if rest.strip() and not self.ends_early:
-            # a file without a line feed may have the other kind of ends of lines
-            yield rest.replace(b"\r", b"\n")
+        return self._text.top()
 
     def _heading(self, lines: Sequence[str], use: Sequence[int]) -> int:
         """How many lines at the top hold something else than numbers; -1 if all do."""
@@ -319,50 +277,6 @@ class TextColumns(ColumnRecording):
                 f"{self.path}: has {width} columns, {named} are named;"
                 f" its line {self._skip + 1} is {line[:60]!r}"
             )
-
-    def _table(
-        self, data: bytes, use: list[int], separator: str | None, seen: int
-    ) -> Sequence[Array]:
-        """Numbers of the wanted columns, (n,) each."""
-        plain = plain_numbers(data, len(self.wanted.columns), use, separator)
-        if plain is not None:
-            return plain
-        lines = split_lines(data)
-        every = len(use) == len(self.wanted.columns)
-        how: dict[str, Any] = {"delimiter": separator, "ndmin": 2, "comments": None}
-        if not every:
-            how["usecols"] = use
-        if separator != ",":
-            lines = [line.replace(",", ".") for line in lines]
-        try:
-            table = list(np.loadtxt(lines, **how).T)
-        except ValueError:
-            table = []
-        if len(table) != len(use):
-            rows = [self._row(n, line, separator) for n, line in enumerate(lines, seen)]
-            whole = [row for row in rows if row]
-            table = list(np.array(whole, dtype=float).reshape(-1, len(use)).T)
-        return table
-
-    def _row(self, number: int, line: str, separator: str | None) -> list[float]:
-        """Numbers of one line, the slow way; nothing of one that is left out."""
-        cells = line.split(separator)
-        if len(cells) != len(self.wanted.columns):
-            what = f"has {len(cells)} columns, not {len(self.wanted.columns)}"
-            self.damaged(self.place(number), what)
-            return []
-        row = []
-        for name, cell in zip(self.wanted.columns, cells, strict=True):
-            if name == SKIP:
-                continue
-            try:
-                bare = cell.strip()
-                row.append(float("nan" if bare in MISSING else bare))
-            except ValueError:
-                what = f"{cell.strip()[:20]!r} is not a number"
-                self.damaged(f"{self.place(number)}, column {name}", what)
-                return []
-        return row
 
 
 def _clocked(heading: Heading, clock: int) -> Heading:

@@ -18,7 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fieldcal.importers.arrays import ArrayFile, ArrayTable, table_of
+from fieldcal.importers.arrays import ArrayFile
+from fieldcal.importing.array_tables import ArrayTable, table_of
 from fieldcal.importing.json_lists import json_lists
 from fieldcal.importing.text_encoding import as_utf8
 

@@ -11,16 +11,21 @@ zero for n0 samples and on its neighbours for n1 in the mean, and
 
 over all passes of all outputs, where S is how unsteadily a turn passes. The device has
 one firmware, so it is one mode for all.
+
+What values that were rounded down are too small by is added to the biases' variance;
+what values cut toward zero are hangs on the signs of the means, and is in the model
+(`solve.given`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Grain
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.folder import Session
@@ -85,6 +90,16 @@ def rounding_mode(session: Session, grain: Grain) -> RoundingMode:
         for ratio in passes(np.rint(values[np.isfinite(values)] / q).astype(np.intp))
     ]
     return RoundingMode(step, cut_toward_zero(shown))
+
+
+def with_rounding(found: Calibration, mode: RoundingMode) -> Calibration:
+    """The calibration with what values rounded down may take off its biases."""
+    covariance = found.covariance.copy()
+    for row, name in enumerate(found.names):
+        group, _, axis = name.partition(".")
+        if group == "acc_bias":
+            covariance[row, row] += mode.down["xyz".index(axis)] ** 2
+    return replace(found, covariance=covariance)
 
 
 def cut_toward_zero(shown: list[tuple[int, float]]) -> float:

@@ -31,8 +31,11 @@ from fieldcal.evaluation.observations import (
     observations,
     with_provenance,
 )
-from fieldcal.evaluation.rounding_mode import RoundingMode, rounding_mode
-from fieldcal.evaluation.unsaid import with_unsaid
+from fieldcal.evaluation.rounding_mode import (
+    RoundingMode,
+    rounding_mode,
+    with_rounding,
+)
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
@@ -190,7 +193,7 @@ def solved_as(laid: Laid, turns: Turns = "auto", **asked: Any) -> Calibration:
     found = replace(found, warnings=(*ahead, *still.warnings, *notes, *behind))
     found = _listed(with_provenance(found, about), laid.order)
     if not printed:
-        found = with_unsaid(found, about, laid.rounding.down)
+        found = with_rounding(found, laid.rounding)
     if shown is None:
         return found
     return misread(shown.prepared, with_not_carried(found, uncarried(shown, found)))

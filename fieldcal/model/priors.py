@@ -70,6 +70,9 @@ AGAIN = 0.3
 ALONE = 0.1
 """Part of the biases that wander of which one axis does, and the others do not."""
 
+ELSEWHERE = 1e-3
+"""Chance that a latitude that somebody wrote down is another one."""
+
 UNKNOWN = 5e-4
 """Chance of a function that no effect makes, for each covariate."""
 

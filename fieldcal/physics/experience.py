@@ -47,6 +47,7 @@ class Experience:
     base_rate : (3,) rad/s, the Earth's rate in base axes; zero where it is left out
     mounting : (3, 3) P, procedure = P device
     latitude : rad; nan where unknown
+    gravity_sigma : m/s^2, what is not known of gravity, 1 sigma
 
     """
 
@@ -68,6 +69,7 @@ class Experience:
     base_rate: Array
     mounting: Array
     latitude: float
+    gravity_sigma: float
 
     @classmethod
     def at_rest(cls, alpha: Array, beta: Array, gravity: float, **known: Any) -> Self:
@@ -101,6 +103,7 @@ class Experience:
             "base_rate": np.zeros(3),
             "mounting": np.eye(3),
             "latitude": np.nan,
+            "gravity_sigma": 0.0,
         }
         return cls(alpha, beta, **(unknown | known)).turned()
 

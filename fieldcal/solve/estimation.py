@@ -6,18 +6,14 @@ are followed about it, and the answer is taken there (`mixture`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
-from fieldcal.model.evidence.gram import Gram
-from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.mixture import Mixing, Mixture
+from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
@@ -26,19 +22,16 @@ from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turning
 from fieldcal.solve.agreement import Fit, agreement
+from fieldcal.solve.averaging import averaged_over, determined, mixed, picked_by
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
 from fieldcal.solve.shown import Shown
-from fieldcal.solve.variants import variants
 
 FOLLOWED, NEAR = 6, 0.01
 """Times that turns are followed at most, and the change of a scale factor from which
 once more: they are followed again in the end, and what is linear in a change leaves its
 square, 1e-4 and then 1e-8."""
-
-DOUBTED = 0.02
-"""Probability that a window is bad below which it moves no interval."""
 
 NO_WEIGHT = 1e5
 """Times its noise that a bad window is given where it must not bend the state."""
@@ -92,6 +85,7 @@ class Estimated:
     contradicted : windows that count, between which the gyroscopes say that the device
         went elsewhere
     wrong_angles : what wrong angles would do without being noticed
+    search : of the same rows
 
     """
 
@@ -103,6 +97,7 @@ class Estimated:
     found: Mixture
     score: float
     moved: Array
+    search: Search
     acc: Fit
     gyr: Fit
     turns: tuple[TurnRows, ...]
@@ -198,14 +193,14 @@ def estimated(
     for _ in range(1 + max(1, len(bad) // 6)):
         inference = Inference(System(_without(rows, given, bad), given), nominal, turns)
         gram = inference.gram(*_settled(inference, given), None)
-        found = _mixed(given, Search(given, gram), likely.members)
+        found = mixed(given, Search(given, gram), likely.members)
         worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
         if worst.any() and (found.bad[worst] > thresholds.SUSPECT).all():
             # a gross error bends the state so far that nothing is linear about it
             others = System(_without(rows, given, bad | worst), given)
             beside = Inference(others, nominal, turns)
             gram = inference.gram(*_settled(beside, given), None)
-            found = _mixed(given, Search(given, gram), likely.members)
+            found = mixed(given, Search(given, gram), likely.members)
         if not bad.any():
             score = found.score
         worst &= (found.bad > thresholds.CERTAIN) & ~bad
@@ -213,14 +208,15 @@ def estimated(
             break
         bad |= worst
     found = replace(found, bad=np.where(bad, 1.0, found.bad))
-    parameters = _parameters(given, gram, found, nominal, averaged)
-    picked, _ = _picked(given, found, nominal)
-    names, values, covariance, moved, missing = _determined(given, parameters)
+    parameters = averaged_over(given, gram, found, nominal, averaged)
+    picked, _ = picked_by(given, found, nominal)
+    names, values, covariance, moved, missing = determined(given, parameters)
     at = [given.names.index(name) for name in names]
     elsewhere = turning.contradicted if turning else ()
     counts = set(given.held[found.bad <= thresholds.CERTAIN].tolist())
     return Estimated(
         given, names, values, covariance, missing, found, score, moved,
+        Search(given, gram),
         agreement(gram, given, found, (0, 1, 2)),
         agreement(gram, given, found, (3, 4, 5)),
         tuple(inference.turned),
@@ -253,101 +249,6 @@ def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
         if np.abs(state.scale / before - 1).max() < NEAR:
             break
     return state, values
-
-
-def _mixed(
-    given: Given, search: Search, carried: Sequence[Member], doubt: bool = True
-) -> Mixture:
-    """A set with some causes beside what is asked for, at all its sizes.
-
-    Each window may be bad as well, unless there is no `doubt`.
-    """
-    there = search.evaluated((*given.asked, *carried))
-    return Mixing(given, search.gram, there, search.unstable, doubt=doubt).run()
-
-
-@dataclass(frozen=True, slots=True)
-class Parameters:
-    """All parameters that a set has, determined or not.
-
-    Attributes
-    ----------
-    values, covariance : (k,), (k, k), at the end of the recording
-    moved : by how many sigmas what is carried moves each, (k,)
-
-    """
-
-    values: Array
-    covariance: Array
-    moved: Array
-
-
-def _parameters(
-    given: Given, gram: Gram, likeliest: Mixture, nominal: State, averaged: bool
-) -> Parameters:
-    """The mean over all explanations, (1) of `shown`."""
-    if not averaged or not any(one.members for one in given.explanations):
-        only = _ended(given, likeliest, nominal)
-        return Parameters(*only, np.zeros(len(only[0])))
-    search = Search(given, gram)
-    found, doubt = [], bool(likeliest.bad.max(initial=0.0) > DOUBTED)
-    for one in given.explanations:
-        for same in variants(search, given.asked, one):
-            mixed = likeliest
-            if (*given.asked, *same.members) != given.members:
-                mixed = _mixed(given, search, same.members, doubt)
-            chance = one.probability * same.probability
-            found.append((chance, _ended(given, mixed, nominal)))
-    weight = np.array([p for p, _ in found])
-    means = np.array([value for _, (value, _) in found])
-    values: Array = weight @ means
-    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, (_, c) in found]))
-    covariance += (weight[:, None] * (means - values)).T @ (means - values)
-    plain, own = _ended(given, _mixed(given, search, (), doubt), nominal)
-    return Parameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
-
-
-def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
-    """Parameters of one explanation at the end of the recording, (2) of `shown`."""
-    picked, before = _picked(given, found, nominal)
-    return before + picked @ found.mean, picked @ found.covariance @ picked.T
-
-
-def _picked(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
-    """Parameters by the columns of an estimate, (k, c), and what they are without."""
-    picked = np.zeros((len(given.names), len(found.columns)))
-    before = np.zeros(len(given.names))
-    for i, name in enumerate(given.names):
-        picked[i, np.flatnonzero(found.columns == given.place(name)[0])[0]] = 1.0
-        parameter = ParameterName.of(name)
-        if parameter.sensor:
-            scale, c = parameter.is_scale, parameter.channel
-            picked[i] += given.ending[int(scale)][c, found.columns]
-            before[i] = (nominal.scale if scale else nominal.bias)[c]
-    return picked, before
-
-
-def _determined(
-    given: Given, found: Parameters
-) -> tuple[tuple[str, ...], Array, Array, Array, tuple[str, ...]]:
-    """Parameters that are determined, and the names of those that are not."""
-    before = np.zeros(given.width)
-    for group in given.groups:
-        before[group.columns] = group.sizes(group.fixed or 1.0)
-    sigma = np.sqrt(np.diag(found.covariance))
-    limits = thresholds.USEFUL | (
-        {"gyr_scale": thresholds.USEFUL_TURNED} if given.wanted.turned else {}
-    )
-    known = [
-        i
-        for i, name in enumerate(given.names)
-        if sigma[i] ** 2 < thresholds.DETERMINED * before[given.place(name)[0]] ** 2
-        and sigma[i] < limits.get(group_of(name), np.inf)
-    ]
-    names = tuple(given.names[i] for i in known)
-    missing = tuple(n for i, n in enumerate(given.names) if i not in known)
-    square = found.covariance[np.ix_(known, known)]
-    return names, found.values[known], square, found.moved[known], missing
 
 
 def scatter_of(found: Mixture, channels: tuple[int, ...]) -> float:

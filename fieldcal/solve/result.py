@@ -18,6 +18,7 @@ from fieldcal.solve import words
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
+from fieldcal.solve.latitude import EarthVertical
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import ladder_remedy
 from fieldcal.solve.reliability import WrongAngles
@@ -72,6 +73,7 @@ def calibration(
     odd = [
         *senseless(names, values, sigma, observations.nominal),
         *_contradicted(found, observations),
+        *_elsewhere(found, observations),
     ]
     acc = found.acc if any(map(_is_acc, names)) else found.gyr
     good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < thresholds.WRONG_MODEL)
@@ -248,6 +250,14 @@ def _contradicted(found: Estimated, observations: Observations) -> list[str]:
         " angle is another than session.toml says, or the gyroscopes were clipped;"
         " mend it, or turn more slowly"
     ]
+
+
+def _elsewhere(found: Estimated, observations: Observations) -> list[str]:
+    """A latitude that the gyroscopes contradict."""
+    if observations.latitude is None:
+        return []
+    shown = EarthVertical.of(found.given, found.search, observations.latitude)
+    return [shown.sentence] if shown and shown.sentence else []
 
 
 def _turns(found: Estimated) -> tuple[float, int]:

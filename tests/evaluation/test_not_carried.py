@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from session_folders import places, recorded, write_session
+from session_folders import SITE, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
@@ -193,3 +193,30 @@ def test_a_rest_of_the_ladder_that_is_off_is_never_a_good_result_that_is_wrong(
         assert out["angle_sigma_deg"] > 0.05 or out["carried"]["causes"]
     else:
         assert out["not_carried"]["moved_sigmas"]["acc_scale.z"] < -5
+
+
+def test_gravity_that_nobody_said_is_in_the_uncertainty_and_no_finding(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A scale factor of all axes alike, which gravity elsewhere would be as well."""
+    profile = replace(CALM, truth=replace(CALM.truth, acc_scale=(1.0016,) * 3))
+    held = places(WIDE)
+    free = [{k: v for k, v in p.items() if "deg" not in k} for p in held]
+    block, verdicts = recorded(profile, held), {}
+    for name, site in (("said", SITE), ("unsaid", {})):
+        write_session(tmp_path / name, block, free, site=site)
+        main(["solve", str(tmp_path / name), "--json"])
+        said = json.loads(capsys.readouterr().out)
+        main(["diagnose", str(tmp_path / name), "--json"])
+        verdicts[name] = json.loads(capsys.readouterr().out)["verdict"]
+        sigma = np.array(said["parameters"]["acc_scale"]["sigma"])
+        moved = said.get("not_carried", {}).get("moved_sigmas", {})
+        if name == "said":
+            assert (sigma < 1e-4).all() and max(map(abs, moved.values())) > 2
+        else:
+            # gravity of any latitude, and no latitude was said
+            assert (sigma > 1.4e-3).all() and (sigma < 1.8e-3).all() and not moved
+            truth = np.array(profile.truth.acc_scale)
+            found = np.array(said["parameters"]["acc_scale"]["value"])
+            assert (np.abs(found - truth) < 2 * sigma).all()
+    assert verdicts == {"said": "ambiguous", "unsaid": "consistent"}

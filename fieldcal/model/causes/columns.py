@@ -172,6 +172,12 @@ def scale(view: RowView) -> Array:
     return np.eye(6) * np.hstack([view.x.f, view.x.w])[:, :, None]
 
 
+def gravity(view: RowView) -> Array:
+    """What more of all gravity brings about, of its relative size, (n, 6, 1)."""
+    out: Array = view.state.scale * np.hstack([view.x.f, np.zeros_like(view.x.w)])
+    return out[:, :, None]
+
+
 def earth_sides(plain: Experience, state: State) -> Iterator[Pair]:
     """The rate of the base about each of its axes, rad/s."""
     for axis in np.eye(3):

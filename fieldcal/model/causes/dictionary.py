@@ -2,8 +2,8 @@
 
 A session's dictionary holds the columns once; groups say which of them they are made
 of, and how large these are typically. What a device has anyway is always in: bias,
-scale factor where something shows it, instability, the Earth's rate, and the turns of
-positions whose orientation nobody knows.
+scale factor where something shows it, instability, what is not known of gravity, the
+Earth's rate, and the turns of positions whose orientation nobody knows.
 """
 
 from __future__ import annotations
@@ -87,7 +87,9 @@ class Dictionary(ColumnTable):
         super().__init__(x, used, since, unit, wander)
         self.common, self.turns = common, turns
         self.earth = -1
-        self.always: list[Group] = [*self._calibration(), *self._earth_anyhow()]
+        self.always: list[Group] = [
+            *self._calibration(), *self._gravity(), *self._earth_anyhow()
+        ]  # fmt: skip
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
         if len(self.held) < FEW < len(x):
@@ -167,6 +169,13 @@ class Dictionary(ColumnTable):
             size = np.full(3, EARTH_RATE)
             at = self.earth + np.arange(3)
             yield Group("earth", "", at, size, fixed=1.0, in_state=True)
+
+    def _gravity(self) -> Iterator[Group]:
+        """What is not known of gravity: all accelerometers are measured by it."""
+        if self.x.gravity_sigma and np.isin(self.observed, (0, 1, 2)).any():
+            at = self.add(General("gravity", columns.gravity), 1)
+            size = np.array([self.x.gravity_sigma / self.x.gravity])
+            yield Group("gravity", "acc", np.array([at]), size, fixed=1.0)
 
     def _earth_anyhow(self) -> Iterator[Group]:
         """What the Earth may add alike wherever nobody knows the orientation.

@@ -22,6 +22,7 @@ from fieldcal.model.rows.turntable import going_round
 from fieldcal.model.rows.vibration import shaking
 from fieldcal.physics.experience import Experience
 from fieldcal.session.description import Description
+from fieldcal.session.site_gravity import gravity_sigma
 
 ROWS = 360
 """Rows aimed at, over all windows."""
@@ -223,6 +224,7 @@ def averaged(
         base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
         mounting=about.mounting,
         latitude=about.latitude,
+        gravity_sigma=gravity_sigma(about),
     )
     sd[~x.force_known, :3] = np.nan
     length = np.diff(bound, axis=1)[:, 0] / rate_of(block)

@@ -1,0 +1,123 @@
+"""The parameters of a set: the mean over all explanations, and which are determined.
+
+What the recording shows to be there beside what was asked for may be one explanation or
+another; each gives its own estimate, and the calibration is their mean with what they
+differ by in its covariance, (1) of `shown`. Biases that change are as they are at the
+end of the recording, (2) of `shown`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.calibration.names import ParameterName, group_of
+from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
+from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.posterior.mixture import Mixing, Mixture
+from fieldcal.model.search.selection import Search
+from fieldcal.model.state import State
+from fieldcal.solve.given import Given
+from fieldcal.solve.variants import variants
+
+DOUBTED = 0.02
+"""Probability that a window is bad below which it moves no interval."""
+
+
+def mixed(
+    given: Given, search: Search, carried: Sequence[Member], doubt: bool = True
+) -> Mixture:
+    """A set with some causes beside what is asked for, at all its sizes.
+
+    Each window may be bad as well, unless there is no `doubt`.
+    """
+    there = search.evaluated((*given.asked, *carried))
+    return Mixing(given, search.gram, there, search.unstable, doubt=doubt).run()
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """All parameters that a set has, determined or not.
+
+    Attributes
+    ----------
+    values, covariance : (k,), (k, k), at the end of the recording
+    moved : by how many sigmas what is carried moves each, (k,)
+
+    """
+
+    values: Array
+    covariance: Array
+    moved: Array
+
+
+def averaged_over(
+    given: Given, gram: Gram, likeliest: Mixture, nominal: State, averaged: bool
+) -> Parameters:
+    """The mean over all explanations, (1) of `shown`."""
+    if not averaged or not any(one.members for one in given.explanations):
+        only = _ended(given, likeliest, nominal)
+        return Parameters(*only, np.zeros(len(only[0])))
+    search = Search(given, gram)
+    found, doubt = [], bool(likeliest.bad.max(initial=0.0) > DOUBTED)
+    for one in given.explanations:
+        for same in variants(search, given.asked, one):
+            there = likeliest
+            if (*given.asked, *same.members) != given.members:
+                there = mixed(given, search, same.members, doubt)
+            chance = one.probability * same.probability
+            found.append((chance, _ended(given, there, nominal)))
+    weight = np.array([p for p, _ in found])
+    means = np.array([value for _, (value, _) in found])
+    values: Array = weight @ means
+    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, (_, c) in found]))
+    covariance += (weight[:, None] * (means - values)).T @ (means - values)
+    plain, own = _ended(given, mixed(given, search, (), doubt), nominal)
+    return Parameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
+
+
+def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
+    """Parameters of one explanation at the end of the recording, (2) of `shown`."""
+    picked, before = picked_by(given, found, nominal)
+    return before + picked @ found.mean, picked @ found.covariance @ picked.T
+
+
+def picked_by(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
+    """Parameters by the columns of an estimate, (k, c), and what they are without."""
+    picked = np.zeros((len(given.names), len(found.columns)))
+    before = np.zeros(len(given.names))
+    for i, name in enumerate(given.names):
+        picked[i, np.flatnonzero(found.columns == given.place(name)[0])[0]] = 1.0
+        parameter = ParameterName.of(name)
+        if parameter.sensor:
+            scale, c = parameter.is_scale, parameter.channel
+            picked[i] += given.ending[int(scale)][c, found.columns]
+            before[i] = (nominal.scale if scale else nominal.bias)[c]
+    return picked, before
+
+
+def determined(
+    given: Given, found: Parameters
+) -> tuple[tuple[str, ...], Array, Array, Array, tuple[str, ...]]:
+    """Parameters that are determined, and the names of those that are not."""
+    before = np.zeros(given.width)
+    for group in given.groups:
+        before[group.columns] = group.sizes(group.fixed or 1.0)
+    sigma = np.sqrt(np.diag(found.covariance))
+    limits = thresholds.USEFUL | (
+        {"gyr_scale": thresholds.USEFUL_TURNED} if given.wanted.turned else {}
+    )
+    known = [
+        i
+        for i, name in enumerate(given.names)
+        if sigma[i] ** 2 < thresholds.DETERMINED * before[given.place(name)[0]] ** 2
+        and sigma[i] < limits.get(group_of(name), np.inf)
+    ]
+    names = tuple(given.names[i] for i in known)
+    missing = tuple(n for i, n in enumerate(given.names) if i not in known)
+    square = found.covariance[np.ix_(known, known)]
+    return names, found.values[known], square, found.moved[known], missing

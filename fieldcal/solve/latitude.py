@@ -1,0 +1,91 @@
+"""The latitude that is stated, against the Earth's rate that gyroscopes show.
+
+Its part about the vertical goes round with the device's turns as gravity does, so that
+it tells itself from the biases wherever the positions lean far enough:
+
+    U sin(phi) = U sin(stated) - d,    d ~ N(0, U^2)                               (1)
+
+The site of the other hemisphere is the mistake that nothing else shows: gravity is the
+same there. Whether the latitude is wrong is asked as of any cause, by the evidence of
+the set with d and without.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.model import priors, thresholds
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.search.selection import Search
+from fieldcal.solve.given import Given
+
+VERTICAL = 1
+"""Place of the vertical among the columns of the Earth's rate; it points down."""
+
+
+@dataclass(frozen=True, slots=True)
+class EarthVertical:
+    """The Earth's rate about the vertical, as gyroscopes show it.
+
+    Attributes
+    ----------
+    stated : by the latitude, rad/s, upwards
+    shown, sigma : rad/s
+    probability : that the latitude is another than the one that is stated
+
+    """
+
+    stated: float
+    shown: float
+    sigma: float
+    probability: float
+
+    @classmethod
+    def of(cls, given: Given, search: Search, latitude: float) -> EarthVertical | None:
+        """What the rows of a set show, (1); None where they have no such column.
+
+        Parameters
+        ----------
+        given : the set
+        search : of its rows
+        latitude : that is stated, rad
+
+        """
+        if given.earth < 0:
+            return None
+        column = np.array([given.earth + VERTICAL])
+        group = Group("earth", "vertical", column, np.array([EARTH_RATE]), fixed=1.0)
+        other = Cause(group.cause, group.part, priors.ELSEWHERE, (group,), "given")
+        as_said = search.evaluated(given.members)
+        free = search.evaluated((*given.members, (other, group)))
+        at = free.state.columns == column[0]
+        stated = EARTH_RATE * float(np.sin(latitude))
+        return cls(
+            stated,
+            stated - float(free.state.estimate[at].sum()),
+            float(np.sqrt(free.state.inverse[np.ix_(at, at)].sum())),
+            float(1 / (1 + np.exp(as_said.score - free.score))),
+        )
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong and what to do; empty where the latitude may be right.
+
+        What no latitude has is another fault's.
+        """
+        beyond = abs(self.shown) - EARTH_RATE
+        if self.probability < thresholds.NAMED or beyond > 2 * self.sigma:
+            return ""
+        sine = np.clip(self.shown / EARTH_RATE, -1.0, 1.0)
+        degrees, stated = (
+            np.rad2deg(np.arcsin(s)) for s in (sine, self.stated / EARTH_RATE)
+        )
+        return (
+            f"the gyroscopes show the Earth's rate of latitude {degrees:.0f}°"
+            f" ({self.shown:.2g} ± {self.sigma:.1g} rad/s about the vertical), not of"
+            f" {stated:.4g}°: south is negative; mend latitude_deg in [site], or the"
+            " signs of the gyroscopes' axes, and solve again"
+        )

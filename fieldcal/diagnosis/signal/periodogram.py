@@ -208,7 +208,7 @@ def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, int, Array]:
 def _fast(n: int) -> int:
     """The next length, of factors 2, 3 and 5, that takes no long transform.
 
-    `scipy.fft.next_fast_len` knows more of them, and takes a fifth of a second to import.
+    `scipy.fft.next_fast_len` knows more; it takes a fifth of a second to import.
 
     >>> _fast(1000), _fast(1001), _fast(4097)
     (1000, 1024, 4320)

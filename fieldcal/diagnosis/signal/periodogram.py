@@ -213,7 +213,7 @@ def _fast(n: int) -> int:
     >>> _fast(1000), _fast(1001), _fast(4097)
     (1000, 1024, 4320)
     """
-    odd = [3**i * 5**j for i in range(5) for j in range(4)]
+    odd = [int(3**i * 5**j) for i in range(5) for j in range(4)]
     return min(m << (-(-n // m) - 1).bit_length() for m in odd)
 
 

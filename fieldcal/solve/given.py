@@ -26,7 +26,7 @@ from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import effect_columns, unit_of
+from fieldcal.model.causes.effect_causes import effect_columns, units_of
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
@@ -178,7 +178,7 @@ class Given(Dictionary):
                 if not (turned and p.name in effect.turned_into)]  # fmt: skip
         at = effect_columns(self, effect, [({}, 0)])[0][some]
         typical = np.array([effect.params[j].typical for j in some])
-        size, fixed = typical * unit_of(self, effect), free
+        size, fixed = typical * units_of(self, effect)[some], free
         if known is not None:
             size, fixed = np.full(len(some), known), 1.0
         group = Group(name, "", at, size, effect, params=tuple(some), in_state=True,

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS, Index
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
@@ -60,10 +60,10 @@ def _group(
     at: Index,
 ) -> Group:
     """Some parameters of an effect at one point of its grid."""
-    sizes = np.array([effect.params[j].typical for j in some]) * unit_of(table, effect)
+    every = np.array([p.typical for p in effect.params]) * units_of(table, effect)
     shape, origin = point
     return Group(
-        effect.id, part, at[list(some)], sizes, effect, shape, origin, some,
+        effect.id, part, at[list(some)], every[list(some)], effect, shape, origin, some,
         in_state=True,
     )  # fmt: skip
 
@@ -111,12 +111,13 @@ def _axes(
     return [at, *(o for o in dict.fromkeys(more) if o != at)]
 
 
-def unit_of(table: ColumnTable, effect: Effect) -> float:
-    """Outputs per SI unit, for what adds to outputs in counts or volts."""
+def units_of(table: ColumnTable, effect: Effect) -> Array:
+    """Outputs per SI unit for each parameter, (k,), of what adds to outputs."""
     if isinstance(effect, Motion):
-        return 1.0
-    gyro = all(p.unit.startswith(("rad", "(rad")) for p in effect.params)
-    return float(np.abs(table.unit[3 if gyro else 0]))
+        return np.ones(len(effect.params))
+    gyro = [p.unit.startswith(("rad", "(rad")) for p in effect.params]
+    out: Array = np.abs(np.where(gyro, table.unit[3], table.unit[0]))
+    return out
 
 
 def points(table: ColumnTable, effect: Effect) -> Iterator[Point]:

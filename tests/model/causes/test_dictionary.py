@@ -1,0 +1,339 @@
+"""What a session may have: its groups, with their sizes and chances."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
+
+from fieldcal.core.frames import EARTH_RATE, earth_rate_home
+from fieldcal.effects import catalogue
+from fieldcal.model import priors
+from fieldcal.model.causes import smooth
+from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.wander import Wander
+from fieldcal.model.system.linear_system import System
+from fieldcal.physics.experience import Experience
+
+UNIT = np.array([2.0, 2.0, 4.0, 10.0, 10.0, 20.0])
+
+
+def made(
+    x: Experience, channels: tuple[int, ...] = tuple(range(6)), turns: bool = False
+) -> Dictionary:
+    """A dictionary of outputs that are not in SI."""
+    held = len(np.unique(x.position))
+    used = np.tile(np.isin(np.arange(6), channels), (len(x), 1))
+    since, common = np.array([x.since_turn]), np.zeros((held, 6))
+    return Dictionary(x, used, since, common, UNIT, turns, Wander.none())
+
+
+def first(places: int, rows: int = 3, **known: Any) -> Experience:
+    """The first positions of the ladder."""
+    x = ladder(rows, **known)
+    some = x.position < places
+    names = [
+        "alpha", "beta", "f", "w", "w_dot", "t", "lasts", "since_start", "since_turn",
+        "warming", "heating", "variance", "position", "rate",
+    ]  # fmt: skip
+    return replace(x, **{n: getattr(x, n)[some] for n in names})
+
+
+WHOLE = made(ladder())
+CAUSES = {c.key: c for c in WHOLE.causes}
+
+
+def always(d: Dictionary) -> dict[tuple[str, str], Group]:
+    return {(g.cause, g.part): g for g in d.always}
+
+
+def test_what_a_device_has_anyway() -> None:
+    groups = always(WHOLE)
+    assert list(groups) == [("bias", "acc"), ("bias", "gyr"), ("scale", "acc"),
+                            ("earth", "")]  # fmt: skip
+    for (cause, part), sizes in {
+        ("bias", "acc"): 0.3 * UNIT[:3],
+        ("bias", "gyr"): 0.02 * UNIT[3:],
+        ("scale", "acc"): 0.01 * UNIT[:3],
+        ("earth", ""): np.full(3, EARTH_RATE),
+    }.items():
+        one = groups[cause, part]
+        np.testing.assert_allclose(one.typical, sizes)
+        assert one.in_state and one.in_step == (cause == "scale")
+        assert one.fixed == (1.0 if cause == "earth" else None)
+        np.testing.assert_allclose(one.sizes(3.0), 3.0 * sizes)
+    assert groups["bias", "gyr"].columns.tolist() == [WHOLE.bias + c for c in (3, 4, 5)]
+    assert groups["scale", "acc"].columns.tolist() == [
+        WHOLE.scale + c for c in (0, 1, 2)
+    ]
+    assert groups["earth", ""].columns.tolist() == [WHOLE.earth + c for c in (0, 1, 2)]
+
+
+def test_a_table_that_turns_shows_the_scale_factors_of_gyroscopes() -> None:
+    rate = np.zeros((27, 3))
+    rate[4, 1] = 0.5
+    assert ("scale", "gyr") in always(made(ladder(rate=rate)))
+
+
+def test_the_earth_that_is_known_or_not_seen_is_no_cause() -> None:
+    assert "earth" not in {g.cause for g in made(ladder(), (0, 1, 2)).always}
+    base = earth_rate_home(0.8)
+    assert "earth" not in {g.cause for g in made(ladder(base_rate=base)).always}
+    acc = made(ladder(), (0, 1, 2))
+    assert acc.earth == -1 and list(always(acc)) == [("bias", "acc"), ("scale", "acc")]
+    gyr = always(made(ladder(), (3, 5)))
+    assert list(gyr) == [("bias", "gyr"), ("earth", "")]
+    np.testing.assert_allclose(gyr["bias", "gyr"].typical, [0.2, 0.4])
+
+
+def test_without_angles_the_earth_turns_with_the_device() -> None:
+    d = made(ladder(free=(2, 5)))
+    assert d.free.tolist() == [p in (2, 5) for p in range(9)]
+    (one,) = (g for g in d.always if g.cause == "earth anyhow")
+    np.testing.assert_allclose(one.typical, EARTH_RATE / 3**0.5)
+    assert one.part == "gyr" and one.fixed == 1.0 and not one.in_state
+    assert not made(ladder(free=(2,)), (3, 4, 5)).free.any(), "no force is seen"
+    assert not dictionary(ladder()).free.any()
+    for free in (made(ladder(free=(2,)), (0, 1, 2)), made(first(1, free=(0,)))):
+        assert "earth anyhow" not in {g.cause for g in free.always}
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_instability_is_typical_of_each_output(turns: bool) -> None:
+    d = made(ladder(), (0, 2, 3), turns)
+    acc, gyr = 1e-3, 3e-5
+    expected = [acc * 2, 0, acc * 4, gyr * 10, 0, 0, 5e-4 * turns]
+    np.testing.assert_allclose(d.unstable, expected)
+    assert CLOSURE == 6
+    assert not made(first(2), turns=True).unstable.any(), "of two windows nobody knows"
+    np.testing.assert_allclose(made(first(3)).unstable[0], acc * 2)
+
+
+def test_of_few_windows_instability_is_within_them() -> None:
+    groups = always(made(first(2), (0, 2, 3, 4, 5)))
+    one = groups["flicker", "acc"]
+    k = np.arange(1, smooth.WAVES + 1)
+    shape = 1e-3 / np.sqrt(k)
+    np.testing.assert_allclose(one.typical, np.concatenate([2.0 * shape, 4.0 * shape]))
+    assert len(groups["flicker", "gyr"].columns) == 3 * smooth.WAVES
+    np.testing.assert_allclose(groups["flicker", "gyr"].typical[:2],
+                               3e-4 / np.sqrt([1, 2]))  # fmt: skip
+    assert not one.in_state and one.fixed is None
+    assert ("flicker", "acc") not in always(made(first(3)))
+    assert ("flicker", "acc") not in always(made(first(2, rows=1)))
+    d = made(first(2))
+    np.testing.assert_array_equal(always(d)["flicker", "acc"].columns[:3],
+                                  d.waves + np.arange(3))  # fmt: skip
+
+
+def test_a_prediction_has_bias_and_scale_factor_alone() -> None:
+    plain = made(ladder(free=(2,))).plain()
+    assert {g.cause for g in plain.always} == {"bias", "scale"}
+    assert {g.fixed for g in plain.always} == {float(priors.SIZES[-1])}
+
+
+def test_columns_that_are_added_apart_are_not_in_the_other() -> None:
+    d = made(ladder())
+    own = d.apart()
+    width, count = d.width, len(d.bases)
+    own.course("more", smooth.alpha, 8, False)
+    assert own.width == width + 48 and len(own.bases) == count + 1
+    assert d.width == width and len(d.bases) == count
+
+
+def test_where_columns_are() -> None:
+    d = WHOLE
+    assert d.wave(2, 3).tolist() == [d.waves + 2 * d.span.count + i for i in range(3)]
+    assert len(d.wave(1)) == smooth.WAVES
+    assert d.window(4).tolist() == [d.windows + 4 * 9 + i for i in range(9)]
+    assert d.places == 9 and d.held.tolist() == list(range(9))
+    assert d.scale - d.bias == 6 and d.windows - d.small_rotation == 18
+    assert d.waves - d.windows == 54
+
+
+def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
+    acc, gyr = 0.02 * UNIT[:3], 1e-3 * UNIT[3:]
+    both = np.concatenate([acc, gyr])
+    names = ("ax", "ay", "az", "gx", "gy", "gz")
+    for c, channel in enumerate(names):
+        for kind in ("alpha", "joints", "force", "temperature", "since turn"):
+            cause = CAUSES[f"{kind}:{channel}"]
+            assert (cause.kind, cause.chance) == ("unknown", priors.UNKNOWN)
+            (group,) = cause.variants
+            np.testing.assert_allclose(group.typical, both[c])
+        whole = CAUSES[f"position:{channel}"].variants[0]
+        assert whole.columns.tolist() == WHOLE.window(c).tolist()
+        np.testing.assert_allclose(whole.typical, both[c])
+        each = CAUSES[f"window:{channel}"].variants
+        assert [g.columns.tolist() for g in each] == [[w] for w in WHOLE.window(c)]
+        assert [g.position for g in each] == list(range(9))
+        fading = CAUSES[f"force and time:{channel}"].variants
+        assert [len(g.columns) for g in fading] == ([12, 4] if c < 3 else [12])
+        if c < 3:
+            own = fading[0].columns[4 * c : 4 * c + 4]
+            np.testing.assert_array_equal(fading[1].columns, own)
+        for span, group in zip(smooth.SPANS, CAUSES[f"time:{channel}"].variants,
+                               strict=True):  # fmt: skip
+            np.testing.assert_allclose(group.typical, both[c] * smooth.smooth(span))
+            assert group.shape == {"waves": span}
+    for part, some in (("acc", range(3)), ("gyr", range(3, 6))):
+        for span, group in zip(smooth.SPANS, CAUSES[f"time:{part}"].variants,
+                               strict=True):  # fmt: skip
+            shape = smooth.smooth(span)
+            at = [WHOLE.waves + c * WHOLE.span.count + i for c in some
+                  for i in range(len(shape))]  # fmt: skip
+            assert group.columns.tolist() == at
+            sizes = np.concatenate([both[c] * shape for c in some])
+            np.testing.assert_allclose(group.typical, sizes)
+
+
+def keys_of(x: Experience, channels: tuple[int, ...] = (0, 1, 2, 3, 4, 5)) -> set[str]:
+    return {c.name for c in made(x, channels).causes if c.kind != "effect"}
+
+
+def test_what_a_session_cannot_show_is_not_offered() -> None:
+    every = keys_of(ladder())
+    assert {"alpha", "beta", "joints", "position", "window", "misset"} < every
+    few = keys_of(first(3))
+    assert few == {"time", "temperature", "since turn", "random_walk", "angle_setting"}
+    four = keys_of(first(4))
+    assert four == every
+    free = keys_of(ladder(free=(2,)))
+    assert every - free == {"alpha", "beta", "joints", "misset", "angle_setting"}
+    still = ladder(warming=np.zeros(27))
+    assert every - keys_of(still) == {"temperature"}
+    never = replace(ladder(), since_turn=np.full(27, np.inf))
+    assert every - keys_of(never) == {"since turn"}
+    assert "angle_setting" not in keys_of(first(2))
+    one = {c.key for c in made(ladder(), (0, 4)).causes if c.name == "time"}
+    assert one == {"time:ax", "time:gy"}
+
+
+def test_positions_that_were_set_elsewhere() -> None:
+    cause = CAUSES["misset"]
+    assert (cause.kind, cause.chance, cause.part) == ("position", 0.01, "")
+    for p, group in enumerate(cause.variants):
+        at = WHOLE.small_rotation + 2 * p
+        assert group.columns.tolist() == [at, at + 1] and group.position == p
+        np.testing.assert_allclose(group.typical, np.deg2rad(3.0))
+        assert group.in_state
+    (group,) = CAUSES["angle_setting"].variants
+    typical = catalogue()["angle_setting"].params[0].typical
+    np.testing.assert_allclose(group.typical, np.deg2rad(typical))
+    at = WHOLE.small_rotation + np.arange(18)
+    np.testing.assert_array_equal(group.columns, at)
+    assert group.in_state and CAUSES["angle_setting"].kind == "random"
+
+
+def test_biases_that_wander() -> None:
+    effect = catalogue()["random_walk"]
+    shape = WHOLE.span.walk()[: smooth.WAVES]
+    for part, some in (("acc", (0, 1, 2)), ("gyr", (3, 4, 5))):
+        cause = CAUSES[f"random_walk:{part}"]
+        assert cause.chance == effect.chance(WHOLE.x) and cause.kind == "random"
+        (group,) = cause.variants
+        sizes = [shape * effect.params[c].typical * UNIT[c] for c in some]
+        np.testing.assert_allclose(group.typical, np.concatenate(sizes))
+        at = np.concatenate([WHOLE.wave(c) for c in some])
+        np.testing.assert_array_equal(group.columns, at)
+        assert group.params == some and not group.in_state
+        alone = CAUSES[f"random_walk:{part}, one axis"]
+        assert alone.chance == pytest.approx(0.1 * cause.chance)
+        assert [g.params for g in alone.variants] == [(c,) for c in some]
+        assert [g.part for g in alone.variants] == [
+            ("ax", "ay", "az", "gx", "gy", "gz")[c] for c in some
+        ]
+
+
+def test_an_effect_in_counts_is_of_counts() -> None:
+    """What adds to outputs is in their unit; what turns the force is not."""
+    effects = catalogue()
+    for key, unit in (("bias_drift:acc", 2.0), ("bias_drift:gyr", 10.0),
+                      ("quadratic", 2.0), ("base_tilt", 1.0)):  # fmt: skip
+        cause = CAUSES[key]
+        group = cause.variants[0]
+        typical = [effects[cause.name].params[j].typical for j in group.params]
+        np.testing.assert_allclose(group.typical, unit * np.array(typical))
+        assert group.in_state and group.effect is effects[cause.name]
+
+
+def test_an_effect_is_offered_whole_and_by_output() -> None:
+    variants = [g.params for g in CAUSES["cross_coupling"].variants]
+    assert variants[0] == tuple(range(6))
+    assert len(set(variants)) == len(variants) == 7, "of one output or of two"
+    assert [len(v) for v in variants] == [6, 2, 2, 2, 4, 4, 4]
+    turned = CAUSES["base_tilt"].variants
+    assert [g.params for g in turned] == [(0, 1)]
+    settling = CAUSES["settling:acc"].variants
+    taus = {g.shape["tau_s"] for g in settling}
+    assert len(settling) == 4 * len(taus), "all axes, or one"
+    gyr = CAUSES["settling:gyr"].variants
+    np.testing.assert_array_equal(gyr[0].params, (3, 4, 5))
+
+
+def test_the_largest_columns_of_a_wide_group() -> None:
+    typical = np.r_[np.linspace(5.0, 1.0, 70), np.linspace(0.5, 4.0, 30)]
+    group = Group("time", "ax", np.arange(200, 300), typical)
+    largest = np.sort(np.argsort(-typical)[:60])
+    np.testing.assert_array_equal(group.foremost, largest)
+    few = Group("time", "ax", np.arange(60), typical[:60])
+    np.testing.assert_array_equal(few.foremost, np.arange(60))
+
+
+def test_names_of_causes_and_triads() -> None:
+    assert (
+        Cause("a", "acc", 0.1, ()).key == "a:acc" and Cause("a", "", 0.1, ()).key == "a"
+    )
+    assert triads_of("ay") == triads_of("acc") == {"acc"}
+    assert triads_of("gx") == {"gyr"} and triads_of("") == {"acc", "gyr"}
+
+
+def test_chances_are_shared_among_variants_and_follow_changes() -> None:
+    d = made(ladder())
+    chances = [np.log(c.chance / len(c.variants)) for c in d.causes]
+    np.testing.assert_allclose(d.chances, chances)
+    at = [c.key for c in d.causes].index("settling:acc")
+    cause, width = d.causes[at], d.width
+    shown = d.shown.copy()
+    shown[5] = d.shown[5] = True
+    (more, (new,)) = d.refined(cause, cause.variants[3], [7.5])
+    assert d.causes[at] is more and more.variants[:-1] == cause.variants
+    assert more.variants[-1] is new and new.shape == {"tau_s": 7.5}
+    assert new.params == cause.variants[3].params
+    assert new.columns.min() >= width and d.width > width
+    assert d.shown.tolist() == [*shown, *[False] * (d.width - width)]
+    assert d.chances[at] == pytest.approx(np.log(cause.chance / len(more.variants)))
+    assert len(d.typical) == d.width
+    extra = Cause("extra", "", 0.5, (d.causes[0].variants[0],), "unknown")
+    d.joined([extra])
+    assert d.causes[-1] is extra and d.chances[-1] == pytest.approx(np.log(0.5))
+    widths = {b.blocks.shape[1] for b in d.by_width}
+    assert len(widths) == len(d.by_width)
+    seen = sorted((int(c), int(v)) for b in d.by_width
+                  for c, v in zip(b.cause, b.variant, strict=True))  # fmt: skip
+    assert seen == [(i, j) for i, c in enumerate(d.causes)
+                    for j in range(len(c.variants))]  # fmt: skip
+    for alike in d.by_width:
+        for i, j, block, typical in zip(
+            alike.cause, alike.variant, alike.blocks[alike.block], alike.typical,
+            strict=True,
+        ):  # fmt: skip
+            group = d.causes[i].variants[j]
+            np.testing.assert_array_equal(block, group.columns[group.foremost])
+            np.testing.assert_array_equal(typical, group.typical[group.foremost])
+
+
+def test_the_first_linearisation_tells_which_columns_windows_show() -> None:
+    x = ladder()
+    d = dictionary(x)
+    System(rows_of(x, np.hstack([x.f, x.w])), d).linearised(nominal())
+    assert d.shown[d.bias : d.bias + 6].all()
+    assert d.shown[d.scale : d.scale + 3].all()
+    assert not d.shown[d.scale + 3 : d.scale + 6].any(), "windows do not turn"
+    assert d.shown[d.small_rotation : d.small_rotation + 2 * len(LADDER)].any()
+    lever = next(c for c in d.causes if c.name == "lever_arm").variants[0]
+    assert not d.shown[lever.columns].any()

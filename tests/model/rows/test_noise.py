@@ -1,0 +1,60 @@
+"""Noise of windows, and what rounding leaves of their means."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.noise import grain_of, noise_of, rounding
+
+RATE = 100.0
+WHITE = np.array([1e-2, 2e-2, 3e-2, 1e-4, 2e-4, 3e-4])
+WINDOWS = np.array([[0, 2000], [2500, 2500], [3000, 6000]])
+
+
+def recorded(step: Array | None = None) -> Block:
+    """White noise; outputs rounded to steps where these are not 0."""
+    rng = np.random.default_rng(3)
+    six = WHITE * rng.standard_normal((6000, 6)) + [0.1, -9.8, 0.2, 0.01, 0.02, 0.03]
+    six[2000:3000] += np.linspace(0, 7, 1000)[:, None]  # the device is turned
+    if step is not None:
+        six = np.where(
+            step > 0, np.round(six / np.where(step > 0, step, 1.0)) * step, six
+        )
+    return Block.of(np.arange(6000) / RATE, six[:, :3], six[:, 3:])
+
+
+def test_noise_is_that_inside_windows() -> None:
+    found = noise_of(recorded(), WINDOWS, RATE)
+    np.testing.assert_allclose(found.white, WHITE, rtol=0.1)
+    np.testing.assert_allclose(found.quick, WHITE, rtol=0.1)
+
+
+def test_steps_of_each_output() -> None:
+    step = np.array([0.05, 0.0, 0.1, 0.0, 1e-3, 0.0])
+    some = step > 0
+    block = recorded(step)
+    np.testing.assert_allclose(grain_of(block, WINDOWS)[some], step[some] / 12**0.5)
+    np.testing.assert_array_less(grain_of(block, WINDOWS)[~some], 1e-4)
+    off = rounding(block, WINDOWS)
+    assert off.shape == (2, 6), "of windows that hold samples"
+    np.testing.assert_array_less(off[:, ~some], 1e-8)
+    still = recorded(np.repeat([1.0, 0.5], 3))
+    np.testing.assert_allclose(
+        rounding(still, WINDOWS), np.tile(np.repeat([1.0, 0.5], 3) / 12**0.5, (2, 1))
+    )
+
+
+def test_a_step_that_only_a_turn_shows() -> None:
+    """A step that the noise nowhere crosses in a window is seen on the way."""
+    block = recorded(np.repeat([1.0, 0.0], 3))
+    grain = grain_of(block, WINDOWS)
+    np.testing.assert_allclose(grain[:3], 1.0 / 12**0.5)
+    assert (grain[3:] < 1e-6).all()
+
+
+def test_the_more_noise_the_less_rounding_is_left() -> None:
+    """Sheppard: of noise of a third of a step hardly any is."""
+    step = np.repeat([0.03, 1.0], 3) * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    off = rounding(recorded(step), WINDOWS)[0]
+    assert 3e-4 < off[0] < 0.03 / 12**0.5 and off[1] < 1e-4

@@ -1,0 +1,303 @@
+"""Block means of a recording that is written down sample by sample."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows import reduce as module
+from fieldcal.model.rows.reduce import (
+    RowSource,
+    averaged,
+    edges,
+    free_force,
+    masked,
+    rate_of,
+    reduce,
+    spans,
+    table_rate,
+)
+from fieldcal.model.rows.thermometer import Thermometer
+from fieldcal.session.description import Description, parse
+
+RATE, G = 50.0, 9.8
+FORCE = {0.0: (0.0, -G, 0.0), 90.0: (-G, 0.0, 0.0)}
+"""By alpha, deg; beta is 0."""
+
+
+def place(start: float, end: float, alpha: float | None = 0.0) -> dict[str, Any]:
+    angles = {} if alpha is None else {"alpha_deg": alpha, "beta_deg": 0.0}
+    return {**angles, "start_s": start, "end_s": end}
+
+
+def about(*places: dict[str, Any], **tables: Any) -> Description:
+    site = {"gravity": G, "latitude_deg": 50.0}
+    return parse({"format": 1, "site": site, "position": list(places), **tables})
+
+
+def samples(seconds: float, seed: int = 1, acc: float = 0.01) -> Block:
+    """Noise of 0.01 m/s^2 and 1e-3 rad/s about home, from t = 2 s on."""
+    rng = np.random.default_rng(seed)
+    t = 2.0 + np.arange(round(seconds * RATE)) / RATE
+    white = rng.standard_normal((len(t), 6)) * np.repeat([acc, 1e-3], 3)
+    return Block.of(t, white[:, :3] + FORCE[0.0], white[:, 3:], 20 + 0.01 * t)
+
+
+def source(block: Block, known: Description) -> RowSource:
+    usable = np.ones((len(block), 6), dtype=bool)
+    arrived = np.full(max(len(known.positions), 1), 1.0)
+    return RowSource(block, known, usable, arrived, Thermometer.of(block))
+
+
+def test_the_rate_is_that_of_the_clock_whatever_the_stamps() -> None:
+    t = 3.0 + np.arange(1000) / 40.0
+    still = np.zeros((1000, 3))
+    assert rate_of(Block.of(t, still)) == pytest.approx(40.0)
+    bursts = t[np.arange(1000) // 10 * 10] + 1e-5 * (np.arange(1000) % 10)
+    assert rate_of(Block.of(bursts, still)) == pytest.approx(40.0)
+    gap = t + 100.0 * (t > 20.0)
+    assert rate_of(Block.of(gap, still)) == pytest.approx(40.0)
+    assert rate_of(Block.of(t[:2], still[:2])) == pytest.approx(40.0)
+    assert rate_of(Block.of(t[:1], still[:1])) == 1.0
+
+
+def test_every_so_many_steps_are_enough_for_the_rate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of steps of 0.1 and 0.3 s in turn those looked at are of one kind."""
+    monkeypatch.setattr(module, "STEPS", 10)
+    t = np.cumsum(np.tile([0.1, 0.3], 20))
+    assert rate_of(Block.of(t, np.zeros((40, 3)))) == pytest.approx(1 / 0.2, rel=0.6)
+
+
+def test_a_window_is_the_samples_from_its_start_to_before_its_end() -> None:
+    block = samples(10.0)
+    known = about(place(2.0, 4.0), place(100.0, 101.0), place(5.01, 6.0))
+    np.testing.assert_array_equal(spans(block, known), [[0, 100], [500, 500],
+                                                        [151, 200]])  # fmt: skip
+    late = about({"alpha_deg": 0.0, "beta_deg": 0.0}, place(3.0, 4.0))
+    np.testing.assert_array_equal(spans(block, late), [[500, 500], [50, 100]])
+    np.testing.assert_array_equal(spans(block, about()), [[0, 500]])
+
+
+@pytest.mark.parametrize("length", [0.3, 1.4, 5.0, 39.6])
+def test_a_short_window_has_a_row_a_second(length: float) -> None:
+    found = edges(7.0, 7.0 + length, 9)
+    even = np.linspace(7.0, 7.0 + length, max(1, round(length)) + 1)
+    np.testing.assert_allclose(found, even, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("windows", "rows"), [(0, 120), (1, 120), (4, 90), (9, 40), (45, 8), (90, 8)]
+)
+def test_a_long_window_has_so_many_rows_each_longer_by_the_same_ratio(
+    windows: int, rows: int
+) -> None:
+    found = edges(3.0, 3.0 + 600.0, windows)
+    each = np.diff(found)
+    assert len(each) == rows
+    assert found[0] == 3.0 and found[-1] == 603.0
+    assert each[0] == pytest.approx(1.0)
+    ratio = each[1:] / each[:-1]
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
+    assert ratio[0] > 1.0
+    assert len(edges(3.0, 3.0 + rows, windows)) == rows + 1
+    np.testing.assert_allclose(np.diff(edges(3.0, 3.0 + rows, windows)), 1.0)
+
+
+def test_what_may_not_be_used_is_nan_and_nothing_else() -> None:
+    block = samples(1.0)
+    usable = np.ones((50, 6), dtype=bool)
+    assert masked(block, usable) is block
+    usable[3, 1] = usable[4, 5] = False
+    found = masked(block, usable)
+    np.testing.assert_array_equal(np.isnan(found.six), ~usable)
+    np.testing.assert_array_equal(found.six[usable], block.six[usable])
+    usable[4, 5] = True
+    assert masked(block, usable).gyr is block.gyr
+    again = masked(found, usable)
+    np.testing.assert_array_equal(np.isnan(again.acc), np.isnan(found.acc))
+    already = replace(block, acc=np.where(usable[:, :3], block.acc, np.nan))
+    assert masked(already, usable) is already
+
+
+def test_rows_are_means_over_a_second_with_their_noise() -> None:
+    block = samples(40.0)
+    acc = block.acc.copy()
+    acc[block.t > 20.0] += np.subtract(FORCE[90.0], FORCE[0.0])
+    block = replace(block, acc=acc)
+    known = about(place(3.0, 13.0), place(25.0, 35.0, 90.0))
+    rows = reduce(source(block, known))
+    assert rows.x.position.tolist() == [0] * 10 + [1] * 10
+    for i, first in enumerate([*range(50, 550, 50), *range(1150, 1650, 50)]):
+        some = slice(first, first + 50)
+        np.testing.assert_allclose(rows.y[i], block.six[some].mean(axis=0), atol=1e-12)
+        ends = block.t[first], block.t[first + 49]
+        np.testing.assert_allclose(rows.span[i], ends)
+        assert rows.x.t[i] == pytest.approx(np.mean(ends))
+        assert rows.x.since_start[i] == pytest.approx(np.mean(ends) - 2.0)
+        np.testing.assert_allclose(rows.x.f[i], FORCE[90.0 if i > 9 else 0.0],
+                                   atol=1e-12)  # fmt: skip
+    np.testing.assert_allclose(rows.length, 1.0)
+    np.testing.assert_allclose(rows.x.lasts, 1.0)
+    white = np.repeat([0.01, 1e-3], 3)
+    np.testing.assert_allclose(rows.noise, white, rtol=0.1)
+    np.testing.assert_allclose(rows.sd, np.tile(rows.noise / 50**0.5, (20, 1)))
+    np.testing.assert_allclose(rows.x.variance, np.tile(rows.noise[:3] ** 2, (20, 1)))
+    assert (rows.common < 1e-6).all() and rows.wander == 0.0
+    assert rows.used.all() and not rows.x.base_rate.any()
+    np.testing.assert_allclose(rows.x.warming, 0.01 * (rows.x.t - 2.0), atol=1e-6)
+    np.testing.assert_allclose(rows.x.heating, 0.01, rtol=1e-3)
+    assert rows.x.latitude == pytest.approx(np.deg2rad(50.0))
+    assert rows.x.gravity == pytest.approx(G)
+
+
+def test_the_time_since_a_turn_counts_from_the_arrival() -> None:
+    block = samples(40.0)
+    known = about(place(3.0, 13.0), place(25.0, 35.0))
+    one = replace(source(block, known), arrived=np.array([2.5, 21.0]))
+    x = reduce(one).x
+    since = x.t - np.where(x.position == 1, 21.0, 2.5)
+    np.testing.assert_allclose(x.since_turn, since)
+
+
+def test_a_device_that_sees_the_earth_has_its_rate() -> None:
+    block, device = samples(20.0), {"grade": "navigation", "name": "a"}
+    x = reduce(source(block, about(place(3.0, 13.0), device=device))).x
+    angle = np.deg2rad(50.0)
+    expected = EARTH_RATE * np.array([0.0, -np.sin(angle), np.cos(angle)])
+    np.testing.assert_allclose(x.base_rate, expected)
+
+
+def test_rows_of_samples_that_are_missing() -> None:
+    block = samples(12.0)
+    gyr = block.gyr.copy()
+    gyr[60:70, 1], gyr[100:150, 2] = np.nan, np.nan
+    block = replace(block, gyr=gyr)
+    one = source(block, about(place(2.0, 12.0)))
+    one.usable[:25, 0] = False
+    rows = reduce(one)
+    assert rows.y[0, 0] == pytest.approx(block.acc[25:50, 0].mean(), abs=1e-12)
+    assert rows.sd[0, 0] == pytest.approx(rows.noise[0] / 5.0)
+    kept = [*range(50, 60), *range(70, 100)]
+    assert rows.y[1, 4] == pytest.approx(block.gyr[kept, 1].mean(), abs=1e-12)
+    assert rows.sd[1, 4] == pytest.approx(rows.noise[4] / 40**0.5)
+    assert np.isnan(rows.y[2, 5]) and np.isnan(rows.sd[2, 5])
+    unused = np.zeros((10, 6), dtype=bool)
+    unused[2, 5] = True
+    np.testing.assert_array_equal(rows.used, ~unused)
+    fewer = rows.without(np.arange(10) == 4)
+    np.testing.assert_array_equal(fewer.used, rows.used & (np.arange(10) != 4)[:, None])
+
+
+def test_what_never_changes_tells_nothing() -> None:
+    block = samples(12.0)
+    gyr = block.gyr.copy()
+    gyr[:, 0] = 0.01
+    rows = reduce(source(replace(block, gyr=gyr), about(place(2.0, 12.0))))
+    np.testing.assert_array_equal(
+        rows.used.all(axis=0), [True] * 3 + [False, True, True]
+    )
+
+
+def test_a_window_of_one_sample_has_no_row() -> None:
+    rows = reduce(source(samples(12.0), about(place(2.0, 2.01), place(3.0, 9.0))))
+    assert set(rows.x.position) == {1}
+
+
+def test_of_unknown_orientation_the_force_is_along_what_is_read() -> None:
+    """And the Earth may turn the device about any axis, once it was moved."""
+    block = samples(30.0)
+    known = about(place(3.0, 13.0, None), place(15.0, 25.0), nominal={
+        "acc_bias": [0.0, 1.0, 0.5], "acc_scale": [1.0, 2.0, 1.0],
+        "gyr_scale": [1.0, -2.0, 1.0],
+    })  # fmt: skip
+    rows = reduce(source(block, known))
+    free = rows.x.position == 0
+    read = (np.subtract(FORCE[0.0], [0.0, 1.0, 0.5])) / [1.0, 2.0, 1.0]
+    along = G * read / np.linalg.norm(read)
+    np.testing.assert_allclose(rows.x.f[free], np.tile(along, (10, 1)), atol=0.01)
+    np.testing.assert_allclose(rows.x.f[~free], np.tile(FORCE[0.0], (10, 1)))
+    earth = EARTH_RATE / 3**0.5 * np.array([1.0, 2.0, 1.0])
+    np.testing.assert_allclose(
+        rows.common[free, 3:], np.tile(earth, (10, 1)), rtol=0.01
+    )
+    assert (rows.common[~free] < 1e-6).all() and (rows.common[:, :3] < 1e-4).all()
+    alone = reduce(source(block, about(place(3.0, 13.0, None))))
+    assert (alone.common < 1e-6).all()
+    nowhere = reduce(source(block, about()))
+    assert not nowhere.x.oriented.any() and (nowhere.common < 1e-6).all()
+
+
+def test_coarse_outputs_may_be_off_all_through_a_window() -> None:
+    block = samples(12.0, acc=1e-4)
+    acc = block.acc.copy()
+    acc[:, 0] = 0.05 * np.round(block.acc[:, 0] / 0.05)
+    acc[30, 0] = 0.05
+    rows = reduce(source(replace(block, acc=acc), about(place(2.0, 12.0))))
+    np.testing.assert_allclose(rows.common[:, 0], 0.05 / 12**0.5, rtol=0.02)
+    assert (rows.common[:, 1:] < 1e-6).all()
+
+
+def test_averages_between_any_bounds() -> None:
+    block = samples(10.0)
+    one = source(block, about(place(2.0, 5.0), place(6.0, 12.0)))
+    bound = np.array([[10, 20], [20, 60], [200, 204]])
+    level, noise = np.full((3, 6), 2.0), np.full(6, 7.0)
+    variance = np.arange(9.0).reshape(3, 3)
+    rows = averaged(one, bound, np.array([0, 0, 1]), level, noise, variance)
+    for i, (a, b) in enumerate(bound):
+        np.testing.assert_allclose(rows.y[i], block.six[a:b].mean(axis=0), atol=1e-12)
+        np.testing.assert_allclose(rows.sd[i], 2.0 / np.sqrt(b - a))
+    np.testing.assert_allclose(rows.length, [0.2, 0.8, 0.08])
+    np.testing.assert_array_equal(rows.noise, noise)
+    np.testing.assert_array_equal(rows.x.variance, variance)
+    assert not rows.common.any()
+
+
+def test_a_table_that_turns_hides_the_force_across_its_axis() -> None:
+    turned = [
+        place(3.0, 13.0) | {"rate_deg_s": w} for w in ([0, 90.0, 0], [30.0, 0, 0])
+    ]
+    turned[1] |= {"start_s": 15.0, "end_s": 25.0}
+    known = about(*turned)
+    rows = reduce(source(samples(30.0), known))
+    upright = rows.x.position == 0
+    assert rows.used[upright].all() and not rows.used[~upright, :3].any()
+    rates = table_rate(known, rows.x.position)
+    expected = np.deg2rad(np.where(upright[:, None], [0, 90.0, 0], [30.0, 0, 0]))
+    np.testing.assert_allclose(rates, expected)
+    np.testing.assert_array_equal(
+        table_rate(about(), np.zeros(4, int)), np.zeros((4, 3))
+    )
+
+
+def test_what_goes_round_with_a_table_is_taken_out_of_its_window_alone() -> None:
+    """90 deg/s about a vertical axis; the Earth's rate goes round in the others."""
+    block = samples(40.0)
+    gyr = block.gyr * 1e-3
+    angle = np.pi / 2 * (block.t - 2.0)
+    round_ = 5e-5 * np.column_stack([np.cos(angle), 0 * angle, np.sin(angle)])
+    gyr += round_
+    gyr[:, 1] += np.where(block.t < 20.0, np.pi / 2, 0.0)
+    known = about(place(3.0, 18.3) | {"rate_deg_s": [0, 90.0, 0]}, place(22.0, 35.0))
+    rows = reduce(source(replace(block, gyr=gyr), known))
+    on = rows.x.position == 0
+    assert np.abs(rows.y[on][:, [3, 5]]).max() < 1e-6
+    assert np.abs(rows.y[~on][:, [3, 5]]).max() > 2e-5
+    np.testing.assert_allclose(rows.y[on, 4], np.pi / 2, atol=1e-6)
+
+
+def test_a_free_force_is_one_for_all_rows_of_a_position() -> None:
+    f = np.array([[3.0, 0.0, 4.1], [3.0, 0.0, 3.9], [0.0, -2.0, 0.0], [0.0] * 3])
+    position = np.array([0, 0, 1, 2])
+    found: Array = free_force(10.0, position, f)
+    expected = [[6.0, 0.0, 8.0]] * 2 + [[0.0, -10.0, 0.0], [0.0] * 3]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    f[0, 1] = np.nan
+    np.testing.assert_allclose(free_force(10.0, position, f), expected, atol=1e-12)

@@ -1,0 +1,89 @@
+"""What of the Earth's rate goes round with a table, of rates that are written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.samples import Array
+from fieldcal.model.rows.turntable import going_round
+from fieldcal.model.turns.rotation import exponential
+
+AXIS = np.array([1.0, 2.0, -2.0]) / 3.0
+SPEED = 0.5
+BIAS = np.array([0.01, -0.02, 0.03])
+SCALE = np.array([1.0, 0.9, 1.1])
+EARTH = EARTH_RATE * np.array([0.6, 0.0, 0.8])
+SD = 1e-7
+
+
+def outputs(t: Array, length: float) -> tuple[Array, Array]:
+    """Means over `length` s, and what of them lies across the axis and goes round."""
+    fine = t[:, None] + length * (np.arange(200) + 0.5) / 200 - length / 2
+    turned = exponential(-SPEED * fine[..., None] * AXIS) @ EARTH
+    across = turned - (turned @ AXIS)[..., None] * AXIS
+    round_: Array = SCALE * across.mean(axis=1)
+    return BIAS + SCALE * (SPEED * AXIS + AXIS * (EARTH @ AXIS)) + round_, round_
+
+
+@pytest.mark.parametrize("length", [0.0, 1.0, 3.0])
+def test_it_is_found_beside_the_mean(length: float) -> None:
+    t = 5.0 + np.arange(0.0, 30.0, 1.0)
+    gyr, round_ = outputs(t, length)
+    found = going_round(t, SPEED * AXIS, gyr, np.full((30, 3), SD), SCALE, length)
+    np.testing.assert_allclose(found.values, round_, atol=2e-9)
+    assert np.abs(round_).max() > 2e-5
+
+
+def test_its_uncertainty_is_that_of_the_mean_that_is_left() -> None:
+    """Of white noise, against many draws."""
+    t = np.arange(0.0, 15.0, 1.0)
+    gyr, round_ = outputs(t, 1.0)
+    rng, sd = np.random.default_rng(1), np.full((15, 3), 2e-6) * [1.0, 2.0, 0.5]
+    off = []
+    for _ in range(1000):
+        noisy = gyr + sd * rng.standard_normal(gyr.shape)
+        found = going_round(t, SPEED * AXIS, noisy, sd, SCALE, np.ones(15))
+        off.append((found.values - round_).mean(axis=0))
+    spread = np.cov(np.array(off).T)
+    size = np.sqrt(np.diag(found.covariance))
+    np.testing.assert_allclose(
+        spread / np.outer(size, size), found.covariance / np.outer(size, size), atol=0.2
+    )
+
+
+def test_rows_that_are_missing_are_not_asked() -> None:
+    t = np.arange(0.0, 30.0, 1.0)
+    gyr, round_ = outputs(t, 1.0)
+    sd = np.full((30, 3), SD)
+    gyr[4, 1], sd[9, 2] = np.nan, np.nan
+    gyr[9] += 1.0
+    found = going_round(t, SPEED * AXIS, gyr, sd, SCALE, 1.0)
+    np.testing.assert_allclose(found.values, round_, atol=2e-9)
+    gyr[2:] = np.nan
+    assert not going_round(t, SPEED * AXIS, gyr, sd, SCALE, 1.0).values.any()
+
+
+@pytest.mark.parametrize("times", [1.5, 0.5])
+def test_what_is_larger_than_the_earth_makes_stays(times: float) -> None:
+    t = np.arange(0.0, 30.0, 1.0)
+    gyr, round_ = outputs(t, 1.0)
+    size = np.linalg.norm(EARTH - AXIS * (EARTH @ AXIS))
+    gyr += (times * EARTH_RATE / size - 1.0) * round_
+    found = going_round(t, SPEED * AXIS, gyr, np.full((30, 3), SD), SCALE, 1.0)
+    assert found.values.any() == (times < 1.0)
+
+
+@pytest.mark.parametrize(("seconds", "share"), [(12.0, 1 / 36.0), (2.0, 0.5)])
+def test_of_less_than_a_turn_the_mean_keeps_what_nobody_can_tell(
+    seconds: float, share: float
+) -> None:
+    """(2): none of it along the axis, whatever the direction across."""
+    t = np.linspace(0.0, seconds, 20)
+    gyr, _ = outputs(t, 0.1)
+    found = going_round(t, SPEED * AXIS, gyr, np.full((20, 3), SD), SCALE, 0.1)
+    assert not found.values.any()
+    size = 2 / 3 * EARTH_RATE**2 * share
+    expected = size * (np.eye(3) - np.outer(AXIS, AXIS))
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-9)

@@ -1,0 +1,111 @@
+"""Bounds of a motion between two windows, of rates that are written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.reduce import Rows, RowSource, reduce
+from fieldcal.model.rows.thermometer import Thermometer
+from fieldcal.model.turns.motion import moving
+from fieldcal.session.description import parse
+
+RATE, NOISE = 100.0, 1e-4
+GAP = (1000, 4000)
+"""Samples between the windows, 10 s and 40 s."""
+
+MARGIN = 60
+"""0.6 s."""
+
+
+def recorded(
+    rate: Array, bias: Array | None = None, gap: tuple[int, int] = GAP
+) -> tuple[RowSource, Rows]:
+    """Two windows at rest about a gap; the rate (n,) is about z."""
+    rng, n = np.random.default_rng(1), len(rate)
+    gyr = NOISE * rng.standard_normal((n, 3))
+    gyr[:, 2] += rate
+    gyr += 0.0 if bias is None else bias
+    acc = 1e-3 * rng.standard_normal((n, 3)) + [0.0, -9.8, 0.0]
+    block = Block.of(np.arange(n) / RATE, acc, gyr)
+    places = [
+        {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
+        for a, b in ((0.0, gap[0] / RATE), (gap[1] / RATE, n / RATE))
+    ]
+    usable = np.ones((n, 6), dtype=bool)
+    about = parse({"format": 1, "position": places})
+    source = RowSource(block, about, usable, np.zeros(2), Thermometer.of(block))
+    return source, reduce(source)
+
+
+def turning(first: int, last: int, size: float = 0.5, n: int = 5000) -> Array:
+    rate = np.zeros(n)
+    rate[first:last] = size
+    return rate
+
+
+@pytest.mark.parametrize("size", [0.5, -0.5, 0.02])
+@pytest.mark.parametrize("bias", [0.0, 0.3])
+def test_the_motion_is_found_with_some_time_around_it(size: float, bias: float) -> None:
+    source, rows = recorded(turning(2000, 2500, size), np.full(3, bias))
+    found = moving(source, rows, (0, 1), *GAP)
+    assert found is not None
+    start, end = found
+    assert 2000 - MARGIN - 12 <= start <= 2000 - MARGIN + 1
+    assert 2500 + MARGIN - 1 <= end <= 2500 + MARGIN + 12
+
+
+def test_it_ends_where_the_windows_do() -> None:
+    source, rows = recorded(turning(1020, 3990))
+    assert moving(source, rows, (0, 1), *GAP) == GAP
+
+
+@pytest.mark.parametrize(("before", "after"), [(1, 0), (0, 1), (1, 1)])
+def test_what_goes_slowly_before_and_after_belongs_to_it(
+    before: int, after: int
+) -> None:
+    """2e-3 rad/s for a second do not show at once; the angle does."""
+    rate = turning(2000, 2500)
+    rate[1800:1900] = 2e-3 * before
+    rate[2600:2700] = 2e-3 * after
+    source, rows = recorded(rate)
+    found = moving(source, rows, (0, 1), *GAP)
+    assert found is not None
+    start, end = found
+    first, last = (1800 if before else 2000), (2700 if after else 2500)
+    assert first - MARGIN - 12 <= start <= first - MARGIN + 40
+    assert last + MARGIN - 40 <= end <= last + MARGIN + 12
+
+
+def test_where_nothing_stands_out_the_gap_is_taken() -> None:
+    source, rows = recorded(turning(2000, 2500, 1e-3))
+    assert moving(source, rows, (0, 1), *GAP) == GAP
+    source, rows = recorded(turning(2000, 2500, 1e-3, 8000), gap=(1000, 7100))
+    long = moving(source, rows, (0, 1), 1000, 6900)
+    assert long == (1000, 6900), "59 s"
+    assert moving(source, rows, (0, 1), 1000, 7100) is None, "61 s are not followed"
+
+
+@pytest.mark.parametrize(("end", "followed"), [(7200, True), (7450, False)])
+def test_a_motion_of_more_than_a_minute_is_not_followed(
+    end: int, followed: bool
+) -> None:
+    gap = 1000, 8000
+    source, rows = recorded(turning(1500, end, n=9000), gap=gap)
+    assert (moving(source, rows, (0, 1), *gap) is not None) == followed
+
+
+def test_without_all_samples_no_motion_is_followed() -> None:
+    source, rows = recorded(turning(2000, 2500))
+    source.usable[3000, 1] = False
+    assert moving(source, rows, (0, 1), *GAP) is None
+    source.usable[3000, 1], source.usable[4500, 1] = True, False
+    assert moving(source, rows, (0, 1), *GAP) is not None
+    assert moving(source, rows, (0, 1), 2000, 2039) is None, "too few"
+    for lost, found in ((2, True), (3, False)):
+        t = source.block.t.copy()
+        t[2200:] += lost / RATE
+        source.block.t[:] = t
+        assert (moving(source, rows, (0, 1), *GAP) is not None) == found
+        source.block.t[:] = np.arange(len(t)) / RATE

@@ -29,7 +29,7 @@ mutants: mutants-core mutants-windows mutants-model mutants-solve
 
 mutants-%: .venv/.mutants
 	@rm -rf mutants/$* && mkdir -p mutants/$*
-	@ln -sfn $(foreach f,fieldcal drivers procedures sim_device tests pyproject.toml,$(CURDIR)/$f) mutants/$*
+	@ln -sfn $(foreach f,fieldcal benchmarks drivers procedures sim_device tests pyproject.toml,$(CURDIR)/$f) mutants/$*
 	@sed 's/ROOM/$*/' tests/mutmut.cfg > mutants/$*/setup.cfg
 	@cd mutants/$* && { test -z '$(DRAW)' || $(CURDIR)/$(BIN)/mutmut run none >/dev/null 2>&1 || true; }
 	cd mutants/$* && OMP_NUM_THREADS=1 $(CURDIR)/$(BIN)/mutmut run --max-children $(JOBS) $(if $(DRAW),$$($(DRAWN)))

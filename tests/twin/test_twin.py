@@ -317,7 +317,7 @@ def test_the_circle_closes(
     code, said, _ = diagnosed(first, capsys)
     assert code == 1 and [e["id"] for e in said["effects"]] == ["base_tilt"]
     twin = f"--virtual=--profile={first / 'twin.toml'}"
-    run = ["--headless", "--speed", "max", "--json", "--no-report", "--seconds", "20"]
+    run = ["--headless", "--speed", "20", "--json", "--no-report", "--seconds", "20"]
     # a chi-squared that is high by chance leaves the numbers less sure than is asked
     assert main(["run", "five_position", twin, *run, "-o", str(second)]) in (0, 1)
     result = json.loads(capsys.readouterr().out)

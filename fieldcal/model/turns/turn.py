@@ -238,7 +238,7 @@ def only(x: Experience, rows: Sequence[int]) -> Experience:
     """Some rows."""
     per_row = {
         name: getattr(x, name)[list(rows)]
-        for name in ("alpha", "beta", "f", "w", "w_dot", "t", "since_start",
+        for name in ("alpha", "beta", "f", "w", "w_dot", "t", "lasts", "since_start",
                      "since_turn", "warming", "heating", "variance", "position", "rate")
     }  # fmt: skip
     return replace(x, **per_row)

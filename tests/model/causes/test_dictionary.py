@@ -17,6 +17,7 @@ from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.system.linear_system import System
+from fieldcal.model.turns.turn import only
 from fieldcal.physics.experience import Experience
 
 UNIT = np.array([2.0, 2.0, 4.0, 10.0, 10.0, 20.0])
@@ -35,14 +36,10 @@ def made(
 def first(places: int, rows: int = 3, **known: Any) -> Experience:
     """The first positions of the ladder."""
     x = ladder(rows, **known)
-    some = x.position < places
-    names = [
-        "alpha", "beta", "f", "w", "w_dot", "t", "lasts", "since_start", "since_turn",
-        "warming", "heating", "variance", "position", "rate",
-    ]  # fmt: skip
-    return replace(x, **{n: getattr(x, n)[some] for n in names})
+    return only(x, np.flatnonzero(x.position < places).tolist())
 
 
+NAMES = ("ax", "ay", "az", "gx", "gy", "gz")
 WHOLE = made(ladder())
 CAUSES = {c.key: c for c in WHOLE.causes}
 
@@ -158,8 +155,7 @@ def test_where_columns_are() -> None:
 def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
     acc, gyr = 0.02 * UNIT[:3], 1e-3 * UNIT[3:]
     both = np.concatenate([acc, gyr])
-    names = ("ax", "ay", "az", "gx", "gy", "gz")
-    for c, channel in enumerate(names):
+    for c, channel in enumerate(NAMES):
         for kind in ("alpha", "joints", "force", "temperature", "since turn"):
             cause = CAUSES[f"{kind}:{channel}"]
             assert (cause.kind, cause.chance) == ("unknown", priors.UNKNOWN)
@@ -189,6 +185,16 @@ def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
             assert group.columns.tolist() == at
             sizes = np.concatenate([both[c] * shape for c in some])
             np.testing.assert_allclose(group.typical, sizes)
+
+
+def test_every_group_says_of_what_it_is() -> None:
+    for cause in WHOLE.causes:
+        for group in cause.variants:
+            assert group.cause == cause.name
+            assert triads_of(group.part[:2] if group.part[:2] in NAMES else group.part
+                             ) <= triads_of(cause.part.partition(",")[0])  # fmt: skip
+            assert len(group.columns) == len(group.typical) > 0
+            assert group.columns.max() < WHOLE.width and (group.typical > 0).all()
 
 
 def keys_of(x: Experience, channels: tuple[int, ...] = (0, 1, 2, 3, 4, 5)) -> set[str]:
@@ -244,9 +250,7 @@ def test_biases_that_wander() -> None:
         alone = CAUSES[f"random_walk:{part}, one axis"]
         assert alone.chance == pytest.approx(0.1 * cause.chance)
         assert [g.params for g in alone.variants] == [(c,) for c in some]
-        assert [g.part for g in alone.variants] == [
-            ("ax", "ay", "az", "gx", "gy", "gz")[c] for c in some
-        ]
+        assert [g.part for g in alone.variants] == [NAMES[c] for c in some]
 
 
 def test_an_effect_in_counts_is_of_counts() -> None:

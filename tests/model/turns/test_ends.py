@@ -136,6 +136,8 @@ def test_blur_is_what_a_turn_in_half_the_steps_comes_out_otherwise_by(
     w = a * 2 * np.pi * hz * np.column_stack([np.cos(phase), np.sin(phase), 0 * t])
     missed = blur(t, w, each, np.zeros(3))
     assert 1e-5 < missed < 1e-2
+    for turned in (w[:, [2, 0, 1]], w[:, [1, 2, 0]]):
+        assert blur(t, turned, each, np.zeros(3)) == pytest.approx(missed, rel=1e-6)
     noise = 5e-3
     chance = 3 * noise**2 * 4.0**2 / 401
     found = blur(t, w, each, np.full(3, noise))

@@ -230,8 +230,8 @@ def test_positions_that_were_set_elsewhere() -> None:
     (group,) = CAUSES["angle_setting"].variants
     typical = catalogue()["angle_setting"].params[0].typical
     np.testing.assert_allclose(group.typical, np.deg2rad(typical))
-    at = WHOLE.small_rotation + np.arange(18)
-    np.testing.assert_array_equal(group.columns, at)
+    every = WHOLE.small_rotation + np.arange(18)
+    np.testing.assert_array_equal(group.columns, every)
     assert group.in_state and CAUSES["angle_setting"].kind == "random"
 
 

@@ -48,7 +48,8 @@ def ends(known: bool = True) -> Experience:
 def way() -> Array:
     """The turn from the first position to the second in device axes, (3, 3)."""
     first, second = turn(ALPHA, BETA)
-    return MOUNTING.T @ second @ first.T @ MOUNTING
+    turned: Array = MOUNTING.T @ second @ first.T @ MOUNTING
+    return turned
 
 
 SMALL = np.array([2e-4, -1e-4, 3e-4])

@@ -117,6 +117,7 @@ class ArrayFile(ColumnRecording):
                         f" {error}; copy it again from where it came"
                     ) from error
                 yield samples.block(got, some.stop - first)
+            self.says += [s for s in samples.says if s not in self.says]
 
     def _named(self, tables: Mapping[str, ArrayTable]) -> dict[str, tuple[str, int]]:
         """Array and its column, by column of a session."""

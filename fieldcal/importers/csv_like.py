@@ -18,6 +18,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
+from fieldcal.drivers.codec import recognise
 from fieldcal.importing import columns
 from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.columns import SKIP
@@ -25,7 +26,8 @@ from fieldcal.importing.headings import Column
 from fieldcal.importing.number_table import NumberTable
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.text_encoding import is_plain, wide
-from fieldcal.importing.text_forms import CLOCK, TextForm, forms_of
+from fieldcal.importing.text_form import TextForm
+from fieldcal.importing.text_forms import CLOCK, forms_of
 from fieldcal.importing.text_lines import (
     TOP,
     behind,
@@ -52,6 +54,12 @@ NAMED = 50
 BEGINNING = 1 << 16
 """Rows at the beginning by which physics tells columns."""
 
+SECONDS = 1.0
+"""Time that the first bytes are taken for, where the format asks."""
+
+PLAIN = "text"
+"""Wire format of lines of numbers, whose units nobody says."""
+
 _CHECKED = re.compile(rb"\$.*\*[0-9A-Fa-f]{2}\s*$")
 
 
@@ -61,7 +69,9 @@ def recognises(head: bytes, path: Path) -> bool:
         return wide(head) is not None
     lines = head.split(b"\n")[1:-1]
     if lines and sum(map(_is_checked, lines)) > len(lines) / 2:
-        return False
+        # of a format of its own, a port's bytes; of others physics tells the units
+        fits = recognise(head, SECONDS)
+        return is_plain(head) and (fits is None or fits[0] == PLAIN)
     return is_plain(head)
 
 
@@ -212,6 +222,7 @@ class TextColumns(ColumnRecording):
             with np.errstate(invalid="ignore"):  # a time beyond all is no time
                 since = block.t - t0 if self.from_first else block.t
             yield replace(block, t=since)
+        self.says += [s for s in samples.says if s not in self.says]
         if table is None or not table.seen:
             number, line = list(enumerate(first_lines[:2], 1))[-1]
             raise InputError(

@@ -13,17 +13,26 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing import column_physics, columns, headings
-from fieldcal.importing.column_times import coarse_question, rates_of_turns
+from fieldcal.importing.column_times import (
+    coarse_question,
+    counted_question,
+    counts_rows,
+    is_clock_number,
+    rates_of_turns,
+    split_seconds,
+)
 from fieldcal.importing.gravity_size import are_means
 from fieldcal.importing.heading_words import meaning
 from fieldcal.importing.headings import Column, HeadingMatch
 from fieldcal.importing.means import scatter_columns
 from fieldcal.importing.recording import (
+    CLOCK_NUMBER,
     ImuStream,
     MeanScatter,
     ReadOptions,
     Recording,
 )
+from fieldcal.importing.row_times import FRACTIONS
 from fieldcal.importing.time_units import (
     coarse_clock,
     unit_by_rate,
@@ -98,8 +107,12 @@ class ColumnRecording(Recording):
     def imus(self) -> dict[str, ReadOptions]:
         """Options of each IMU by its name."""
         if self.imus_found is None:
+            own = not self.wanted.columns
             found = self._found()
-            self.imus_found = {name: self._rated(one) for name, one in found.items()}
+            self.imus_found = {
+                name: self._rated(self._clocked(one) if own else one, own)
+                for name, one in found.items()
+            }
             if len(self.imus_found) == 1:
                 (self.wanted,) = self.imus_found.values()
         if len(self.imus_found) == 1:
@@ -122,7 +135,7 @@ class ColumnRecording(Recording):
             if channel in where:
                 values[:, i] = table[:, where[channel]]
         count = table[:, where["n"]] if "n" in where else None
-        return MeanScatter(values, count, _has_time(wanted))
+        return MeanScatter(values, count, columns.has_time(wanted.columns))
 
     def _numbers_of(self, wanted: ReadOptions) -> dict[str, int]:
         """Number of each channel's column among those of `beginning`."""
@@ -132,10 +145,36 @@ class ColumnRecording(Recording):
         places = [c.place for way in self.heading() for c in way.columns]
         return {n: places.index(p) for n, _, p in names if p in places}
 
-    def _rated(self, wanted: ReadOptions) -> ReadOptions:
-        """Options with the rate that the file says, or with the unit of its times."""
-        if _has_time(wanted):
-            return self._ticked(wanted)
+    def _clocked(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with both columns of a clock that has its seconds in one of them."""
+        table, at = self.beginning(), self._numbers_of(wanted)
+        own = [at[name] for name in ("t", "dt") if name in at]
+        wholes = own or [i for i in range(table.shape[1]) if i not in at.values()]
+        split = split_seconds(table, wholes)
+        if split is None or wanted.rate_hz:
+            return wanted
+        named = [c for c in wanted.columns]
+        places = [c.place for way in self.heading() for c in way.columns]
+        for i, name in ((split.whole, "t"), (split.fraction, split.name)):
+            if len(named) == table.shape[1] and not any("=" in c for c in named):
+                named[i] = name
+            elif f"{name}={places[i]}" not in named:
+                named = [*(c for c in named if not c.endswith(f"={places[i]}")),
+                         f"{name}={places[i]}"]  # fmt: skip
+        self.says.append("its clock has whole seconds and what is beyond them apart")
+        return replace(wanted, columns=tuple(named), time_unit="s")
+
+    def _rated(self, wanted: ReadOptions, own: bool) -> ReadOptions:
+        """Options with the rate that the file says, or with the unit of its times.
+
+        Parameters
+        ----------
+        wanted : of one IMU
+        own : whether the columns are those that the file says
+
+        """
+        if columns.has_time(wanted.columns):
+            return self._ticked(wanted, own)
         if wanted.rate_hz:
             return wanted
         said = self.rate_said()
@@ -151,7 +190,7 @@ class ColumnRecording(Recording):
         self.says += [sentence] if sentence not in self.says else []
         return replace(wanted, rate_hz=rate)
 
-    def _ticked(self, wanted: ReadOptions) -> ReadOptions:
+    def _ticked(self, wanted: ReadOptions, own: bool) -> ReadOptions:
         """Options with the unit of times, where the rate or their name tells it.
 
         Raises
@@ -164,11 +203,17 @@ class ColumnRecording(Recording):
         if not 0 <= at < table.shape[1]:
             return wanted
         t = table[:, at]
-        if (coarse := coarse_clock(t)) is not None:
+        both = any(name in self._numbers_of(wanted) for name in FRACTIONS)
+        if not both and (coarse := coarse_clock(t)) is not None:
             raise InputError(f"{self.path}: {coarse_question(wanted, coarse, t)}")
         if wanted.time_unit:
             return wanted
+        if is_clock_number(t):
+            self.guessed["time"] = f"{CLOCK_NUMBER}: no second of a minute is beyond 60"
+            return replace(wanted, time_unit=CLOCK_NUMBER)
         said = self.rate_said()
+        if own and said is None and counts_rows(t):
+            raise InputError(f"{self.path}: {counted_question(wanted, table)}")
         names = [c.name for way in self.heading() for c in way.columns[at : at + 1]]
         unit, why = "", "its name says ticks"
         if said is not None:
@@ -262,7 +307,7 @@ class ColumnRecording(Recording):
             With what the turns say of it.
 
         """
-        if _has_time(wanted) or wanted.rate_hz or not wanted.columns:
+        if columns.has_time(wanted.columns) or wanted.rate_hz or not wanted.columns:
             return
         turns = rates_of_turns(wanted, self.beginning())
         unit, about = next(iter(turns.items()), ("", 100.0))
@@ -282,10 +327,6 @@ def _as_option(
     return [f"{channels[i]}={places[i]}" for i in sorted(channels)]
 
 
-def _has_time(wanted: ReadOptions) -> bool:
-    return any(c.partition("=")[0] == "t" for c in wanted.columns)
-
-
 def _worth(found: Sequence[HeadingMatch]) -> tuple[int, int]:
     """How many channels are named, and of how many kinds the unit is."""
     named = sum(len([c for c in one.columns if c != columns.SKIP]) for one in found)
@@ -297,7 +338,7 @@ def _whole(named: Sequence[HeadingMatch]) -> bool:
     if not named:
         return False
     known = {c.partition("=")[0] for c in named[0].columns}
-    return {"t", "ax", "gx"} <= known
+    return {"ax", "gx"} <= known and columns.has_time(known)
 
 
 def _known(named: Sequence[HeadingMatch], way: Heading | None) -> dict[int, str]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from shlex import quote
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,10 +13,87 @@ from fieldcal.importing.columns import SKIP
 from fieldcal.importing.gravity_size import gravity_in
 from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import TIME_UNITS, ReadOptions
+from fieldcal.importing.row_times import FRACTIONS, NEAR
+from fieldcal.importing.scales import FEWEST
 from fieldcal.importing.time_units import CoarseClock, time_units
 
 SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
 """Rates of logs, Hz."""
+
+
+LATER = 0.999
+"""Share of rows that are later than the row before, of a clock: one may be damaged."""
+
+FRACTION_NAMES = tuple(sorted(FRACTIONS, key=lambda name: -FRACTIONS[name]))
+"""Columns of fractions of a second, the coarsest first."""
+
+
+class SplitSeconds(NamedTuple):
+    """A clock in two columns.
+
+    Attributes
+    ----------
+    whole, fraction : numbers of the columns
+    name : what the second is called, of `FRACTIONS`
+
+    """
+
+    whole: int
+    fraction: int
+    name: str
+
+
+def split_seconds(table: Array, wholes: Iterable[int]) -> SplitSeconds | None:
+    """Two columns of (n, k) that are a clock together; None if no two are.
+
+    One holds whole seconds, the other what is beyond them, and both together only grow.
+
+    Parameters
+    ----------
+    table : (n, k) first rows
+    wholes : numbers of the columns that may hold the seconds
+
+    """
+    if len(table) < FEWEST:
+        return None
+    for i in wholes:
+        seconds = table[:, i]
+        steps = np.diff(seconds)
+        if not np.isfinite(steps).all() or (steps != np.round(steps)).any():
+            continue
+        if not (steps == 1).any() or (steps == 0).mean() < 0.5:
+            continue
+        for j in range(table.shape[1]):
+            part = table[:, j]
+            name = next((f for f in FRACTION_NAMES
+                         if np.max(part) * FRACTIONS[f] < 1), "")  # fmt: skip
+            if i == j or not name or np.min(part) < 0 or np.ptp(part) == 0:
+                continue
+            if (np.diff(part)[steps == 1] < 0).mean() < LATER:
+                continue
+            both = np.diff(seconds + part * FRACTIONS[name])
+            # within a minute the seconds begin again
+            if (both > 0).mean() > LATER - (steps < 0).mean():
+                return SplitSeconds(i, j, name)
+    return None
+
+
+def is_clock_number(t: Array) -> bool:
+    """Whether times (n,) hold hours, minutes and seconds in one number: 142031.5.
+
+    >>> is_clock_number(np.r_[142058:142060:0.5, 142100:142102:0.5])
+    True
+    """
+    t = t[np.isfinite(t)]
+    begins = np.flatnonzero(np.diff(np.floor(t / 100)) > 0)
+    if not len(begins) or not (t >= 0).all() or t.max() >= 240000:
+        return False
+    inside = (t % 100 < 60).all() and (np.floor(t / 100) % 100 < 60).all()
+    ends = (t[begins] % 100, t[begins + 1] % 100)
+    usual = float(np.median(np.diff(t)))
+    return bool(inside and usual > 0
+                and (60 - ends[0] < NEAR * usual).all()
+                and (ends[1] < NEAR * usual).all())  # fmt: skip
 
 
 def coarse_question(wanted: ReadOptions, coarse: CoarseClock, t: Array) -> str:
@@ -30,6 +109,25 @@ def coarse_question(wanted: ReadOptions, coarse: CoarseClock, t: Array) -> str:
     )
 
 
+def counted_question(wanted: ReadOptions, table: Array) -> str:
+    """Ask for the rate where the times only count the rows."""
+    names = [SKIP if name == "t" else name for name in wanted.columns
+             if not name.startswith("t=")]  # fmt: skip
+    turns = rates_of_turns(wanted, table)
+    unit, rate = next(iter(turns.items()), ("", USUAL))
+    hint = f", which its turns say about, if rates are in {unit}" if unit else ""
+    return (
+        f"its times only count rows: add --columns {quote(','.join(names))} --rate"
+        f" {rate:.3g}{hint}, or --time-unit ms if a row is taken each ms"
+    )
+
+
+def counts_rows(t: Array) -> bool:
+    """Whether times (n,) are the numbers of the rows."""
+    steps = np.diff(t[np.isfinite(t)])
+    return len(steps) > FEWEST and float((steps == 1).mean()) > LATER
+
+
 def rates_of_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
     """Rates, Hz, at which the turns are those that gravity shows, by unit."""
     at = {c.partition("=")[0]: i for i, c in enumerate(wanted.columns)}
@@ -42,7 +140,9 @@ def rates_of_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
     if gravity is None:
         return {}
     reads = rate_in(np.arange(len(table)) / 100.0, acc, gyr, gravity)
-    if reads is None:
+    # of counts, each full scale would be another rate
+    counts = np.isfinite(gyr).all() and (gyr == np.round(gyr)).all()
+    if reads is None or (counts and not wanted.gyr_unit):
         return {}
     fits = {"rad/s": 1.0, "deg/s": float(np.rad2deg(1.0)), "mrad/s": 1e3}
     if wanted.gyr_unit:

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.row_times import FRACTIONS, RowTimes
 from fieldcal.session.sample_files import COLUMNS
 
 SKIP = "_"
 """Name of a column to skip."""
+
+WITHOUT_GRAVITY = ("lx", "ly", "lz")
+"""Columns of an acceleration without gravity, where ``ax ay az`` are gravity alone."""
+
+KNOWN = (*COLUMNS, "dt", *FRACTIONS, *WITHOUT_GRAVITY)
+"""What columns may be called."""
+
+
+def has_time(names: Iterable[str]) -> bool:
+    """Whether columns, also ``t=name``, say when a row was taken, or how much later."""
+    return any(name.partition("=")[0] in ("t", "dt") for name in names)
 
 
 def check(wanted: ReadOptions) -> None:
@@ -26,16 +38,16 @@ def check(wanted: ReadOptions) -> None:
     """
     known = [c.partition("=")[0] for c in wanted.columns]
     for name in known:
-        if name not in (*COLUMNS, SKIP):
+        if name not in (*KNOWN, SKIP):
             raise InputError(
-                f"column {name!r} is none of: {', '.join(COLUMNS)}, _ to skip one"
+                f"column {name!r} is none of: {', '.join(KNOWN)}, _ to skip one"
             )
     named = [c for c in known if c != SKIP]
     if len(set(named)) < len(named):
         raise InputError(f"a column is named twice in {','.join(wanted.columns)}")
     if not {"ax", "gx", "temperature"} & set(named):
         raise InputError("name the columns: neither ax ay az nor gx gy gz is there")
-    if "t" not in named and not wanted.rate_hz:
+    if not has_time(named) and not wanted.rate_hz:
         raise InputError("no column is t, the time: give the rate, e.g. --rate 100")
     _ = wanted.acc_scale, wanted.gyr_scale, wanted.time_scale, wanted.celsius
 
@@ -51,7 +63,12 @@ class ColumnReader:
 
     def __init__(self, wanted: ReadOptions) -> None:
         self._wanted = wanted
-        self._seen = 0
+        self._times = RowTimes(wanted)
+
+    @property
+    def says(self) -> list[str]:
+        """What the user must know of the times, a sentence each."""
+        return self._times.says
 
     def block(self, columns: Mapping[str, Array], n: int) -> Block:
         """Samples of the next n rows; what is not there is unknown."""
@@ -67,14 +84,12 @@ class ColumnReader:
                     np.multiply(column, scale, out=table[i])
             return table.T
 
-        if "t" in columns:
-            t = columns["t"] * wanted.time_scale
-        else:
-            t = (self._seen + np.arange(n)) / (wanted.rate_hz or 1.0)
-        self._seen += n
+        acc = triad("a", wanted.acc_scale)
+        if WITHOUT_GRAVITY[0] in columns:
+            acc = acc + triad("l", wanted.acc_scale)
         return Block.of(
-            t,
-            triad("a", wanted.acc_scale),
+            self._times.of(columns, n),
+            acc,
             triad("g", wanted.gyr_scale),
             _warmth(columns.get("temperature"), *wanted.celsius),
             columns.get("seq"),

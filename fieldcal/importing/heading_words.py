@@ -9,60 +9,13 @@ some mean one without gravity by it.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-SPELLINGS = {
-    "m/s^2": (
-        "m/s^2",
-        "m/s2",
-        "m/s²",
-        "m/s/s",
-        "m/s**2",
-        "mps2",
-        "m s-2",
-        "ms-2",
-        "m s^-2",
-        "m/(s^2)",
-    ),
-    "mg": ("mg", "milli g", "millig"),
-    "g": ("g", "g's", "gs"),
-    "deg/s": (
-        "deg/s",
-        "°/s",
-        "dps",
-        "degps",
-        "deg s-1",
-        "deg/sec",
-        "°/sec",
-        "deg s^-1",
-    ),
-    "mrad/s": ("mrad/s", "mradps"),
-    "rad/s": ("rad/s", "radps", "rad s-1", "rad/sec", "rps", "rad s^-1"),
-    "s": ("s", "sec", "secs", "seconds", "second"),
-    "ms": ("ms", "msec", "millis", "milliseconds"),
-    "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
-    "ns": ("ns", "nsec", "nanos", "nanoseconds"),
-    "deg C": ("c", "°c", "°", "degc", "deg c", "celsius", "℃", "degrees c"),
-}
-"""How each unit is written."""
-
-UNITS = {
-    "a": ("m/s^2", "g", "mg"),
-    "g": ("rad/s", "deg/s", "mrad/s"),
-    "t": ("s", "ms", "us", "ns"),
-    "temperature": ("deg C",),
-    "m": (),
-    "seq": (),
-    "t_host": (),
-    "": ("m/s^2", "g", "mg", "rad/s", "deg/s", "mrad/s"),
-}
-"""Units that a kind of channel may have; of an axis alone, those that tell its kind."""
+from fieldcal.importing.heading_units import TELLING, UNITS, unit_in
 
 AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
-
-TELLING = ("m/s^2", "rad/s", "deg/s", "mrad/s")
-"""Units that tell the kind of a sensor, whatever its axes are called."""
 
 _SENSORS = {
     "a": (
@@ -74,22 +27,58 @@ _SENSORS = {
         "acceleration",
         "accs",
         "accl",
+        "acce",
         "ac",
+        "beschleunigung",
+        "aceleracion",
+        "aceleracao",
+        "accelerazione",
+        "versnelling",
+        "加速度",
     ),
-    "g": ("g", "w", "gyr", "gyro", "gyroscope", "gyros", "omega", "rate", "gy"),
-    "m": ("m", "mag", "magnetometer", "magnetic", "compass"),
+    "g": (
+        "g",
+        "w",
+        "gyr",
+        "gyro",
+        "gyroscope",
+        "gyros",
+        "omega",
+        "rate",
+        "gy",
+        "gyroskop",
+        "giroscopio",
+        "drehrate",
+        "winkelgeschwindigkeit",
+        "角速度",
+        "陀螺仪",
+    ),
+    "m": ("m", "mag", "magnetometer", "magnetic", "compass", "磁场"),
+    "v": ("gravity", "grav"),
 }
 _PHRASES = (
     (("angular", "velocity"), "g"),
     (("angular", "rate"), "g"),
     (("rotation", "rate"), "g"),
+    (("gyro", "rotation"), "g"),
+    (("velocidad", "angular"), "g"),
     (("specific", "force"), "a"),
     (("rate", "of", "turn"), "g"),
     (("linear", "acceleration"), "linear"),
     (("linear", "accel"), "linear"),
+    (("accelerometer", "acceleration"), "a"),
 )
-_TIMES = ("t", "time", "timestamp", "stamp", "timestamps")
-_TEMPERATURES = ("temp", "temperature", "temps", "tmp")
+_TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "zeit",
+          "tiempo", "temps", "tempo", "tijd", "时间", "sow", "tow")  # fmt: skip
+_STEPS = (("dt",), ("delta", "t"), ("delta", "time"), ("time", "delta"), ("deltat",),
+          ("time", "step"), ("sample", "interval"))  # fmt: skip
+"""Names of the time that passed since the row before."""
+
+_TEMPERATURES = ("temp", "temperature", "tmp", "temper", "temperatur", "temperatura",
+                 "温度")  # fmt: skip
+_WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world", "earth")
+"""Words of accelerations that may lack gravity, or lie in axes of the Earth."""
+
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
 """Words that tell no IMU from another where all of one kind have them."""
@@ -97,8 +86,12 @@ _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+")
 _BRACKETS = re.compile(r"(.*?)\s*[\[({](.*)[\])}]\s*")
 _BRACKETED_AXIS = re.compile(r"[\[(]([xyzXYZ])[\])]")
+_CAPITAL = re.compile(r"(?<=[A-Za-z0-9])[A-Z]")
+_PER = re.compile("Per(?=[A-Z])")
+_BARE = re.compile("[\u0300-\u036f]")
+"""Accents, once they are apart from their letters."""
+
 _INDEX = re.compile(r"(.+)\[([012])\]")
-_WRITTEN = {text: unit for unit, texts in SPELLINGS.items() for text in texts}
 
 
 class Meaning(NamedTuple):
@@ -121,15 +114,6 @@ class Meaning(NamedTuple):
     weak: bool = False
 
 
-def unit_in(text: str) -> str | None:
-    """Return the unit that a text is, in brackets or bare; None if it is none.
-
-    >>> unit_in(" (°/s)"), unit_in("g"), unit_in("x")
-    ('deg/s', 'g', None)
-    """
-    return _WRITTEN.get(text.strip().strip("[]() ").lower())
-
-
 def meaning(name: str, unit: str = "") -> Meaning | None:
     """Say what a name means; None if it names no channel.
 
@@ -141,6 +125,7 @@ def meaning(name: str, unit: str = "") -> Meaning | None:
     >>> meaning("imu1_GyroX (dps)")
     Meaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), weak=False)
     """
+    name = _BARE.sub("", unicodedata.normalize("NFD", name))
     name = _BRACKETED_AXIS.sub(r" \1 ", name.strip().strip('"')).strip()
     if (whole := _WHOLE.get(name.lower())) is not None:
         return Meaning(whole, "", None)
@@ -151,7 +136,7 @@ def meaning(name: str, unit: str = "") -> Meaning | None:
         if found.kind or said is not None:
             return found._replace(
                 kind=found.kind or _kind_of(said),
-                weak=found.weak or "user" in found.label,
+                weak=found.weak or bool({*_WITHOUT_GRAVITY} & {*found.label}),
             )
     return None
 
@@ -174,14 +159,20 @@ def _ways(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
         bare = f"{name[:a]}_{axis.group(2)}" if axis else name[:a]
         if (said := unit_in(inner.replace("_", "/"))) is not None:
             yield bare, said
+    for cut in _CAPITAL.finditer(name):
+        # of "GyroXRadPerSec" the end; a letter alone is an axis
+        if (said := unit_in(_PER.sub("/", name[cut.start() :]))) in TELLING:
+            yield name[: cut.start()], said
     yield name, unit_in(unit)
 
 
 def _of_words(words: list[str], unit: str | None) -> Meaning | None:
     if not words:
         return None
-    if words == ["t"] and unit == "deg C":
-        return Meaning("temperature", "", unit)
+    if "t" in words and unit == "deg C":
+        return Meaning("temperature", "", unit, tuple(w for w in words if w != "t"))
+    if (step := _step(words, unit)) is not None:
+        return step
     for phrase, kind in _PHRASES:
         if (at := _place(words, phrase)) is not None:
             rest = words[:at] + words[at + len(phrase) :]
@@ -191,7 +182,7 @@ def _of_words(words: list[str], unit: str | None) -> Meaning | None:
         rest = words[:i] + words[i + 1 :]
         kind = next((k for k, names in _SENSORS.items() if word[:-1] in names), "")
         # of "GyX" the axis is the X
-        apart = word in _SENSORS["g"] and bool(rest[i:]) and rest[i] in AXES
+        apart = word in _SENSORS["g"] and bool(rest[i:]) and rest[i] in "xyz"
         if kind and word[-1] in "xyz" and not apart:
             return Meaning(kind, word[-1], unit, tuple(rest))
         kind = next((k for k, names in _SENSORS.items() if word[1:] in names), "")
@@ -234,18 +225,29 @@ def _with_axis(
     return Meaning(kind, rest[at], unit, tuple(rest[:at] + rest[at + 1 :]), weak)
 
 
+def _step(words: list[str], unit: str | None) -> Meaning | None:
+    """The meaning of the time since the row before."""
+    for names in _STEPS:
+        if (at := _place(words, names)) is not None:
+            rest = words[:at] + words[at + len(names) :]
+            inner = [u for w in rest if (u := unit_in(w)) in UNITS["dt"]]
+            if len(inner) == len(rest):
+                return Meaning("dt", "", unit or (inner[-1] if inner else None))
+    return None
+
+
 def _time(words: list[str], unit: str | None) -> Meaning | None:
     """The meaning of a time: by its name, or by a unit of time that is all of it."""
     said = unit if unit in UNITS["t"] else None
     named = [w for w in words if w in _TIMES]
     rest = [w for w in words if w not in _TIMES]
-    inner = [w for w in rest if _WRITTEN.get(w) in UNITS["t"]]
+    inner = [w for w in rest if unit_in(w) in UNITS["t"]]
     if named or (len(inner) == len(rest) == 1 and len(rest[0]) > 1):
-        said = said or (_WRITTEN[inner[-1]] if inner else None)
+        said = said or (unit_in(inner[-1]) if inner else None)
         label = tuple(w for w in rest if w not in inner)
         return Meaning("t", "", said if unit is None or said else unit, label)
     if inner and rest == [*inner, "elapsed"]:
-        return Meaning("t", "", _WRITTEN[inner[-1]], ("elapsed",))
+        return Meaning("t", "", unit_in(inner[-1]), ("elapsed",))
     return None
 
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from shlex import quote
 from typing import NamedTuple
 
-from fieldcal.importing.heading_words import UNITS, Meaning, bare_label, meaning
+from fieldcal.importing.heading_units import UNITS
+from fieldcal.importing.heading_words import Meaning, bare_label, meaning
 from fieldcal.importing.recording import ReadOptions
 
 SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "noise")
@@ -30,6 +31,10 @@ NOT_SAMPLES = (
     "offset",
     "cov",
     "filtered",
+    "magnitude",
+    "norm",
+    "drift",
+    "delta",
 )
 """Words of columns that are no samples of a sensor."""
 
@@ -128,6 +133,7 @@ def read(columns: Sequence[Column], skip: str = "") -> tuple[HeadingMatch, ...]:
         and (said := meaning(column.name, column.unit)) is not None
         and not set(said.label) & set(NOT_SAMPLES)
     ]
+    named = _with_gravity(named)
     acc, gyr = _triads(named, "a"), _triads(named, "g")
     if acc is None or gyr is None:
         return ()
@@ -137,13 +143,15 @@ def read(columns: Sequence[Column], skip: str = "") -> tuple[HeadingMatch, ...]:
     if not gyr and all(one.says.weak for three in acc.values() for one in three):
         return ()
     times = _one([n for n in named if n.says.kind == "t"], OTHER_CLOCK)
+    times = times or [n for n in named if n.says.kind == "dt"][:1]
+    apart = [n for n in named if n.says.kind == "l"]
     found = []
     for label in acc or gyr:
         both = [*acc.get(label, ()), *_beside(label, gyr)]
         warm, says = _thermometer(named, label)
         rest = _one([n for n in named if n.says.kind == "seq"], ())
         rest += [n for n in named if n.says.kind == "t_host"][:1]
-        chosen = [*times, *both, *warm, *rest]
+        chosen = [*times, *both, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
     if len(found) == 1:
         found = [replace(found[0], name="0")]
@@ -158,6 +166,26 @@ def _of_a_thermometer(
     if sorted(kinds) != ["t", "temperature"] or len(columns) != len(kinds):
         return ()
     return (_match(columns, named, skip, "0", ()),)
+
+
+def _with_gravity(named: Sequence[Named]) -> list[Named]:
+    """Columns without those of accelerations that lack gravity, where others have it.
+
+    Where gravity stands in columns of its own, both together are what was measured.
+    """
+    forces = [n for n in named if n.says.kind == "a"]
+    weak = [n for n in forces if n.says.weak]
+    gravity = [n for n in named if n.says.kind == "v"]
+    others = [n for n in named if n not in weak and n not in gravity]
+    if len(weak) < len(forces):
+        return others
+    axes = [sorted(n.says.axis for n in three) for three in (weak, gravity)]
+    if axes != [["x", "y", "z"]] * 2 or weak[0].says.unit != gravity[0].says.unit:
+        return others + weak
+    both = ((gravity, "a"), (weak, "l"))
+    parts = [Named(n.number, n.says._replace(kind=kind, label=(), weak=False))
+             for three, kind in both for n in three]  # fmt: skip
+    return others + parts
 
 
 def _triads(
@@ -230,5 +258,5 @@ def _match(
         channel = said.kind + said.axis
         found.append(f"{channel}={column.place}" if column.place else channel)
         if UNITS[said.kind]:
-            units[said.kind] = said.unit
+            units["t" if said.kind == "dt" else said.kind] = said.unit
     return HeadingMatch(tuple(found), units, name, says)

@@ -14,7 +14,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from fieldcal.importing.heading_words import unit_in
+from fieldcal.importing.heading_units import unit_in
 
 TIME = "utc time [s]"
 """Name of the time that a monitor writes before a line."""

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.gzip_stream import PIECE, pieces
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS
@@ -35,6 +36,14 @@ TEMP_UNITS = {
 }
 """Kelvin in one of each, and deg C at its 0; "none" leaves it out."""
 
+FORCE_UNITS = ACC_UNITS | {"ug": 1e-6 * G0, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
+RATE_UNITS = GYR_UNITS | {
+    "mdeg/s": 1e-3 * GYR_UNITS["deg/s"],
+    "udeg/s": 1e-6 * GYR_UNITS["deg/s"],
+    "deg/h": GYR_UNITS["deg/s"] / 3600,
+}
+"""SI units (or counts, volts) in one of each that a file may be in."""
+
 TIME_UNITS = {
     "s": 1.0,
     "ms": 1e-3,
@@ -42,7 +51,11 @@ TIME_UNITS = {
     "us": 1e-6,
     "ns": 1e-9,
     "d": 86400.0,
+    "hhmmss": 1.0,
 }
+
+CLOCK_NUMBER = "hhmmss"
+"""Unit of times such as 142031.5, which is 14:20:31.5."""
 
 
 class MeanScatter(NamedTuple):
@@ -97,12 +110,12 @@ class ReadOptions:
     @property
     def acc_scale(self) -> float:
         """SI units (or counts, volts) in one of the file's."""
-        return _unit(self.acc_unit or "m/s^2", ACC_UNITS) / self.acc_lsb
+        return _unit(self.acc_unit or "m/s^2", FORCE_UNITS) / self.acc_lsb
 
     @property
     def gyr_scale(self) -> float:
         """SI units (or counts, volts) in one of the file's."""
-        return _unit(self.gyr_unit or "rad/s", GYR_UNITS) / self.gyr_lsb
+        return _unit(self.gyr_unit or "rad/s", RATE_UNITS) / self.gyr_lsb
 
     @property
     def time_scale(self) -> float:

@@ -62,6 +62,8 @@ ACC_SCALES = (
     Scale(1.0, "g"),
     Scale(1000.0, "mg"),
     *(Scale(c, "g", c) for c in _G_COUNTS),
+    Scale(1e6, "ug"),
+    Scale(1000 * G0, "mm/s^2"),
 )
 
 GYR_SCALES = (
@@ -69,6 +71,9 @@ GYR_SCALES = (
     Scale(180 / np.pi, "deg/s"),
     Scale(1000.0, "mrad/s"),
     *(Scale(c * 180 / np.pi, "deg/s", c) for c in _DEG_COUNTS),
+    Scale(180e3 / np.pi, "mdeg/s"),
+    Scale(180e6 / np.pi, "udeg/s"),
+    Scale(180 * 3600 / np.pi, "deg/h"),
 )
 
 

@@ -1,7 +1,12 @@
-"""Texts that are not plain columns, written as such: quotes, labels, times of a clock.
+r"""Texts that are not plain columns, written as such: quotes, labels, times of a clock.
 
     "0,12","0,34"                      quoted, also with decimal commas
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
+    IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
+    $IMU,0.01,0.1*5A                   lines with a checksum
+    angular_velocity:\n  x: 0.1        messages as ROS shows them
+    | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
+    FF3A 0012                          counts in hexadecimal digits
     2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
 
 Which of these a text is, its first lines tell. Each form turns lines into lines, so
@@ -12,15 +17,15 @@ from __future__ import annotations
 
 import csv
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
+from fieldcal.importing.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.clock_text import IN_LINE, ClockText, is_clock, is_date
 from fieldcal.importing.labels import labelled_values, names_of
+from fieldcal.importing.line_forms import CheckedLines, EchoedMessages
+from fieldcal.importing.tagged_lines import TaggedLines
+from fieldcal.importing.text_form import MOSTLY, Reader, TextForm, most
 from fieldcal.importing.text_top import cells, separator_of
-
-MOSTLY = 0.5
-"""Share of lines that tell the form of a text."""
 
 CLOCK = "utc time [s]"
 """What a column is called whose clock was read; a device's own time goes before it."""
@@ -28,31 +33,6 @@ CLOCK = "utc time [s]"
 _ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*->\s*")
 
 _DEFINED = re.compile(r"FMT,\s*\d+,\s*\d+,\s*IMU,\s*\w+,\s*(.*)")
-
-Reader = Callable[[Sequence[str]], list[str]]
-"""Turns lines into lines; called with one piece of a text after the other."""
-
-
-class TextForm(ABC):
-    """A form of a text.
-
-    Attributes
-    ----------
-    names : of its columns, where its lines say them; else empty
-    clock : number of the column whose clock is read, or None
-    gathers : whether rows are not simply lines
-    says : what the user must know, or nothing
-
-    """
-
-    names: tuple[str, ...] = ()
-    clock: int | None = None
-    gathers = False
-    says = ""
-
-    @abstractmethod
-    def reader(self) -> Reader:
-        """Return what reads a text of this form from its beginning."""
 
 
 def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
@@ -65,18 +45,12 @@ def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
 
     """
     found: list[TextForm] = []
-    for form in (
-        DataflashText, QuotedCells, LabelledValues, ArrivalPrefix, ClockColumn
-    ):  # fmt: skip
+    for form in FORMS:
         one = form.of(lines, separator)
         if one is not None:
             found.append(one)
             lines = one.reader()(lines)
     return found
-
-
-def _most(lines: Sequence[str], is_so: Callable[[str], bool]) -> bool:
-    return sum(map(is_so, lines)) > MOSTLY * len(lines)
 
 
 class DataflashText(TextForm):
@@ -127,7 +101,7 @@ class QuotedCells(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> QuotedCells | None:
         """The form, if most lines have it."""
-        if not _most(lines, lambda line: line.count('"') > 1):
+        if not most(lines, lambda line: line.count('"') > 1):
             return None
         bare = re.sub('"[^"]*"', '""', lines[-1])
         return cls(separator or separator_of(bare) or " ", separator or "\t")
@@ -195,7 +169,7 @@ class ArrivalPrefix(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> ArrivalPrefix | None:
         """The form, if most lines have it."""
-        if not _most(lines, lambda line: _ARRIVAL.match(line) is not None):
+        if not most(lines, lambda line: _ARRIVAL.match(line) is not None):
             return None
         return cls(separator or separator_of(_ARRIVAL.sub("", lines[-1])) or "\t")
 
@@ -275,3 +249,10 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
     if said is None or len(lines[-1].split()) in others:
         return None
     return len(lines[-1][: said.start()].split())
+
+
+FORMS: tuple[type[TextForm], ...] = (
+    DataflashText, CheckedLines, EchoedMessages, QuotedCells, LabelledValues,
+    BarTable, ListCells, TaggedLines, ArrivalPrefix, HexCells, ClockColumn,
+)  # fmt: skip
+"""Forms in the order in which they are looked for."""

@@ -14,7 +14,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.importing.gzip_stream import PIECE
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.text_encoding import as_utf8
-from fieldcal.importing.text_forms import TextForm
+from fieldcal.importing.text_form import TextForm
 from fieldcal.importing.text_lines import split_lines, top_lines
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.column_recording import Heading
 from fieldcal.importing.columns import SKIP
-from fieldcal.importing.heading_words import unit_in
+from fieldcal.importing.heading_units import unit_in
 from fieldcal.importing.headings import Column
 
 SEPARATORS = (";", "\t", ",")

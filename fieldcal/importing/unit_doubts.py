@@ -119,4 +119,5 @@ class SaidUnits:
 
 def _within(size: float, scales: tuple[Scale, ...]) -> list[str]:
     """Units without counts in which a quantity may show as `size`."""
-    return [s.unit for s in scales[:3] if abs(np.log(size / s.size)) < FAR]
+    plain = [s for s in scales if s.lsb == 1]
+    return [s.unit for s in plain if abs(np.log(size / s.size)) < FAR]

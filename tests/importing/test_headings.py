@@ -141,7 +141,7 @@ def test_any_names_are_understood_or_not(names: list[str]) -> None:
         ("seconds_elapsed", ("t", "", "s")), ("x_g", ("a", "x", "g")),
         ("baro_temp [degC]", ("temperature", "", "deg C")), ("mag_x", ("m", "x", None)),
         ("ax [LSB]", ("a", "x", None)), ("tx", None), ("x", None), ("", None),
-        ("gravity_x", None), ("quat_w", None), ("GyX", ("g", "x", None)),
+        ("gravity_x", ("v", "x", None)), ("quat_w", None), ("GyX", ("g", "x", None)),
         ("w_RS_S_x [rad s^-1]", ("g", "x", "rad/s")), ("XACCL_OUT", ("a", "x", None)),
         ("Rotation Y [rad/s]", ("g", "y", "rad/s")), ("Rotation Y [deg]", None),
         ("Accelerometer (z) [m/s²]", ("a", "z", "m/s^2")), ("AngleX(°)", None),

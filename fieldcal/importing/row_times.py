@@ -1,0 +1,105 @@
+"""Times of the rows of a file, s: from a clock, from steps between rows, or a rate.
+
+A clock may hold whole seconds in one column and what is beyond them in another, the
+hours and minutes in one number (``142031.5`` is 14:20:31.5), or count up to where its
+bits or the day end and begin again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
+
+FRACTIONS = {"t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9}
+"""Columns that hold what is beyond the whole seconds of ``t``, and s in one of each."""
+
+COUNTED = (2.0**16, 2.0**24, 2.0**32)
+"""Where counters of a device begin again."""
+
+PERIODS = (60.0, 3600.0, 86400.0, 604800.0)
+"""Where clocks begin again, s: a minute, an hour, a day, a week."""
+
+NEAR = 20.0
+"""Usual steps by which a clock is before its end, and behind its beginning."""
+
+
+def clock_numbers(values: Array) -> Array:
+    """Seconds since midnight of numbers (n,) such as 142031.5.
+
+    >>> clock_numbers(np.array([142031.5])).tolist()
+    [51631.5]
+    """
+    minutes = np.floor(values / 100)
+    since: Array = values % 100 + 60 * (minutes % 100) + 3600 * np.floor(minutes / 100)
+    return since
+
+
+class RowTimes:
+    """Makes times, block by block.
+
+    Parameters
+    ----------
+    wanted : unit of times, and the rate where no column holds them
+
+    Attributes
+    ----------
+    says : what the user must know, a sentence for each time a clock began again
+
+    """
+
+    def __init__(self, wanted: ReadOptions) -> None:
+        self._wanted, self.says = wanted, list[str]()
+        self._seen, self._sum, self._offset = 0, 0.0, 0.0
+        self._last = self._usual = np.nan
+
+    def of(self, columns: Mapping[str, Array], n: int) -> Array:
+        """Times (n,) of the next rows."""
+        scale = self._wanted.time_scale
+        self._seen += n
+        if "t" in columns:
+            return self._of_clock(columns["t"], columns, scale)
+        if "dt" in columns:
+            passed = np.cumsum(np.nan_to_num(columns["dt"])) * scale + self._sum
+            self._sum = float(passed[-1]) if n else self._sum
+            return passed
+        first = self._seen - n
+        return (first + np.arange(n)) / (self._wanted.rate_hz or 1.0)
+
+    def _of_clock(
+        self, values: Array, columns: Mapping[str, Array], scale: float
+    ) -> Array:
+        if self._wanted.time_unit == CLOCK_NUMBER:
+            values = clock_numbers(values)
+        t: Array = values * scale
+        for name, size in FRACTIONS.items():
+            if name in columns:
+                t = t + columns[name] * size
+        known = np.flatnonzero(np.isfinite(t))
+        steps = np.diff(t[known], prepend=self._last)
+        forward = steps[steps > 0]
+        self._usual = float(np.median(forward)) if len(forward) else self._usual
+        offsets = np.full(len(t), self._offset)
+        for i in np.flatnonzero(steps < 0).tolist():
+            began = float(t[known[i]])
+            period = self._period(began - steps[i], began, scale)
+            offsets[known[i] :] += period
+            self._offset += period
+        self._last = float(t[known[-1]]) if len(known) else self._last
+        t = t + offsets
+        return t
+
+    def _period(self, before: float, began: float, scale: float) -> float:
+        """Where a clock began again that went from one time to another; 0 if not."""
+        near = NEAR * self._usual
+        for period in (*(many * scale for many in COUNTED), *PERIODS):
+            if 0 <= began < near and 0 < period - before < near:
+                self.says.append(
+                    f"its clock ends at {period:g} s and begins again: the times behind"
+                    " go on"
+                )
+                return period
+        return 0.0

@@ -1,0 +1,52 @@
+"""What a form of a text is: how its lines become lines of plain columns."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Self
+
+MOSTLY = 0.5
+"""Share of lines that tell the form of a text."""
+
+Reader = Callable[[Sequence[str]], list[str]]
+"""Turns lines into lines; called with one piece of a text after the other."""
+
+
+class TextForm(ABC):
+    """A form of a text.
+
+    Attributes
+    ----------
+    names : of its columns, where its lines say them; else empty
+    clock : number of the column whose clock is read, or None
+    gathers : whether rows are not simply lines
+    says : what the user must know, or nothing
+
+    """
+
+    names: tuple[str, ...] = ()
+    clock: int | None = None
+    gathers = False
+    says = ""
+
+    @classmethod
+    @abstractmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
+        """Return the form, if these first lines have it.
+
+        Parameters
+        ----------
+        lines : that are not empty
+        separator : of columns, where the user says it
+
+        """
+
+    @abstractmethod
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+
+def most(lines: Sequence[str], is_so: Callable[[str], bool]) -> bool:
+    """Whether something is so of most lines."""
+    return sum(map(is_so, lines)) > MOSTLY * len(lines)

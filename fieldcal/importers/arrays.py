@@ -25,11 +25,13 @@ from fieldcal.importing.array_tables import (
     hdf5_tables,
     hdf5_units,
     listed,
-    matlab_tables,
+    matlab_arrays,
     numpy_tables,
+    tables_of,
 )
 from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.gzip_stream import head, on_disk
+from fieldcal.importing.said_rate import rate_of, scalars
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
 
@@ -57,6 +59,8 @@ class ArrayFile(ColumnRecording):
 
     _loaded: dict[str, ArrayTable] | None = None
     """Of a format whose reader gives all arrays at once, so that it does so once."""
+    _scalars: Mapping[str, float] = {}
+    """Numbers that stand alone in it, by name."""
     _units: dict[str, str] | None = None
     """Of the arrays of an HDF5 file, so that it is looked through once."""
 
@@ -81,6 +85,11 @@ class ArrayFile(ColumnRecording):
                 nothing = np.full(rows.stop, np.nan)
                 found += table.read(rows, many) if whole else [nothing for _ in many]
             return np.reshape(found, (len(found), rows.stop)).T
+
+    def rate_said(self) -> tuple[float, str] | None:
+        """Rate that a number in it says, such as ``fs``."""
+        with self._opened():
+            return rate_of(self._scalars)
 
     def ask(self) -> str:
         """Say which arrays there are."""
@@ -169,9 +178,12 @@ class ArrayFile(ColumnRecording):
             try:
                 if _is_hdf5(first):
                     tables = self._hdf5(path, stack)
+                elif first.startswith(MATLAB):
+                    loaded = matlab_arrays(path)
+                    self._scalars = dict(scalars(loaded))
+                    tables = self._loaded = tables_of(loaded)
                 else:
-                    read = matlab_tables if first.startswith(MATLAB) else numpy_tables
-                    tables = self._loaded = read(path)
+                    tables = self._loaded = numpy_tables(path)
             except InputError:
                 raise
             except Exception as error:

@@ -23,8 +23,9 @@ from fieldcal.importing import columns
 from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.headings import Column
+from fieldcal.importing.instances import Instances, instances_in
 from fieldcal.importing.number_table import NumberTable
-from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.text_encoding import is_plain, wide
 from fieldcal.importing.text_form import TextForm
 from fieldcal.importing.text_forms import CLOCK, forms_of
@@ -88,11 +89,12 @@ class TextColumns(ColumnRecording):
     from_first : whether times count from the first line
     member : the file of a .zip that is the text; "" if it is the file itself
     sensor : what bare axes are of, as the name of the file says it; "" if it does not
+    instance : which of several IMUs that come in turn is read; "" for the first
 
     """
 
     from_first = True
-    member = sensor = ""
+    member = sensor = instance = ""
     _skip = 0
 
     def place(self, row: int) -> str:
@@ -118,7 +120,18 @@ class TextColumns(ColumnRecording):
         """Options of each IMU by its name; columns may be chosen by their names."""
         if any("=" in column for column in self.wanted.columns):
             self.wanted = replace(self.wanted, columns=self._by_names())
-        return super().imus()
+        found = super().imus()
+        if self._in_turn is None or self.instance or len(found) > 1:
+            return found
+        (one,) = found.values()
+        return dict.fromkeys(self._in_turn.names, one)
+
+    def alone(self, stream: str) -> Recording:
+        """The recording with one of its IMUs."""
+        one = super().alone(stream)
+        if isinstance(one, TextColumns) and self._in_turn is not None:
+            one.instance = stream if stream in self._in_turn.names else ""
+        return one
 
     def _by_names(self) -> tuple[str, ...]:
         """Columns in their order, of those that the user says as ``ax=name``.
@@ -223,6 +236,8 @@ class TextColumns(ColumnRecording):
                 since = block.t - t0 if self.from_first else block.t
             yield replace(block, t=since)
         self.says += [s for s in samples.says if s not in self.says]
+        if table is not None and table.headings:
+            self.says.append(f"lines of names between its rows: {table.headings}")
         if table is None or not table.seen:
             number, line = list(enumerate(first_lines[:2], 1))[-1]
             raise InputError(
@@ -248,7 +263,18 @@ class TextColumns(ColumnRecording):
 
     def _pieces(self) -> Iterator[bytes]:
         """Whole lines of the file, many at a time, in columns."""
-        return self._text.pieces(self._forms)
+        pieces = self._text.pieces(self._forms)
+        if self._in_turn is None:
+            return pieces
+        name, only = self.instance or self._in_turn.names[0], self._in_turn.only
+        return ("\n".join([*only(name, split_lines(data)), ""]).encode()
+                for data in pieces)  # fmt: skip
+
+    @cached_property
+    def _in_turn(self) -> Instances | None:
+        """What tells several IMUs apart whose rows come in turn."""
+        first = next((top_lines(d) for d in self._text.pieces(self._forms)), [])
+        return instances_in(first, self.wanted.separator)
 
     @cached_property
     def _forms(self) -> list[TextForm]:

@@ -3,6 +3,7 @@
     {"t": 0.01, "acc": [0.1, 0.2, 9.8], "gyro": {"x": 0, "y": 0, "z": 0}}
     [{"time": "2024-05-03T12:00:00.01Z", "ax": 0.1, ...}, ...]
     {"t": [0.01, ...], "ax": [0.1, ...], ...}
+    {'t': 0.01, 'ax': 0.1}             [0.01, 0.1, 0.2, 9.8]       as Python prints them
     {"data": [{"imu6": {"Timestamp": 10, "ArrayAcc": [{"x": ...}, ...]}}, ...]}
 
 What lies within is named with what it lies in, ``acc/x``. Records that hold the samples
@@ -11,6 +12,7 @@ of some time say when it began; the samples lie evenly until the next begins.
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 from collections.abc import Iterator
@@ -21,11 +23,14 @@ from typing import Any
 from fieldcal.importers.arrays import ArrayFile
 from fieldcal.importing.array_tables import ArrayTable, table_of
 from fieldcal.importing.json_lists import json_lists
+from fieldcal.importing.said_rate import scalars
 from fieldcal.importing.text_encoding import as_utf8
 
 WHAT = "JSON: records or lists"
 
-BEGINS = re.compile(rb"\s*(?:\xef\xbb\xbf)?\s*(?:\{\s*\"|\[\s*[\[{])")
+BEGINS = re.compile(
+    rb"\s*(?:\xef\xbb\xbf)?\s*(?:\{\s*[\"']|\[\s*(?:[\[{]|[-+.\d]+\s*,))"
+)
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -45,7 +50,9 @@ class JsonLog(ArrayFile):
         """Every list of numbers in the file."""
         if self._loaded is None:
             text = b"".join(as_utf8(self.pieces())).decode(errors="replace")
-            lists = json_lists(self._document(text))
+            document = self._document(text)
+            self._scalars = dict(scalars(document))
+            lists = json_lists(document)
             self._loaded = {name: table_of(values) for name, values in lists}
         yield self._loaded
 
@@ -67,7 +74,18 @@ class JsonLog(ArrayFile):
             if not line.strip():
                 continue
             try:
-                found.append(json.loads(line))
+                found.append(_of_line(line))
             except (ValueError, RecursionError) as error:
                 self.damaged(f"line {number}", f"is no JSON: {error}"[:80])
         return found
+
+
+def _of_line(line: str) -> Any:
+    """What a line holds, in JSON or as Python prints it, with single quotes."""
+    try:
+        return json.loads(line)
+    except ValueError as error:
+        try:
+            return ast.literal_eval(line)
+        except (ValueError, SyntaxError, MemoryError):
+            raise error from None

@@ -82,11 +82,12 @@ def listed(tables: Mapping[str, ArrayTable]) -> str:
     return ", ".join(shapes) or "no arrays of numbers"
 
 
-def matlab_tables(path: Path) -> dict[str, ArrayTable]:
-    """Arrays of a MATLAB file up to version 7."""
+def matlab_arrays(path: Path) -> dict[str, Any]:
+    """What a MATLAB file up to version 7 holds, structures as mappings."""
     from scipy.io import loadmat
 
-    return _of_arrays(loadmat(path, simplify_cells=True))
+    loaded: dict[str, Any] = loadmat(path, simplify_cells=True)
+    return loaded
 
 
 def numpy_tables(path: Path) -> dict[str, ArrayTable]:
@@ -95,9 +96,9 @@ def numpy_tables(path: Path) -> dict[str, ArrayTable]:
         _check_size(path)
     loaded = np.load(path, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
-        return _of_arrays({"array": loaded})
+        return tables_of({"array": loaded})
     with loaded:
-        return _of_arrays({name: loaded[name] for name in loaded.files})
+        return tables_of({name: loaded[name] for name in loaded.files})
 
 
 def _check_size(path: Path) -> None:
@@ -113,7 +114,8 @@ def _check_size(path: Path) -> None:
         )
 
 
-def _of_arrays(arrays: Mapping[str, Any]) -> dict[str, ArrayTable]:
+def tables_of(arrays: Mapping[str, Any]) -> dict[str, ArrayTable]:
+    """Arrays of numbers as tables, also those within structures."""
     return {
         name: table_of(array)
         for name, array in _leaves(arrays)

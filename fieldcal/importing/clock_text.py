@@ -20,7 +20,13 @@ _TIME = (
     r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:[.,:]\d+)?)"
     r"(?:\s*(?P<half>[AaPp][Mm]))?(?:\s*(?:Z|UTC|GMT|[+-]\d\d:?\d\d))?"
 )
-_CLOCK = re.compile(rf"(?:{_DATE}[T ,;\t]\s*)?{_TIME}")
+_CLOCK = re.compile(rf"(?:(?:{_DATE}|(?P<days>\d+) days?)[T ,;\t]\s*)?{_TIME}")
+_LATE_YEAR = re.compile(
+    r"(?:[A-Z][a-z]{2} )?(?P<month>[A-Z][a-z]{2})\s+(?P<day>\d{1,2})"
+    r" (?P<time>[\d:.]+) (?P<year>\d{4})"
+)
+"""What C calls ``ctime``: ``Wed Dec 22 21:09:46 2021``."""
+
 _MINUTES = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d{2}[.,]\d+)")
 _DAY = re.compile(_DATE)
 IN_LINE = re.compile(rf"{_DATE}[T ]\s*{_TIME}(?=\s|$)")
@@ -36,13 +42,21 @@ def is_clock(cell: str) -> bool:
     >>> [is_clock(c) for c in ("23:59:50.123", "05/03/2024 11:59 PM", "1.5", "59:50.1")]
     [True, False, False, True]
     """
-    cell = cell.strip()
+    cell = _usual(cell)
     return bool(_CLOCK.fullmatch(cell) or _MINUTES.fullmatch(cell))
 
 
 def is_date(cell: str) -> bool:
     """Whether a cell is a date alone."""
     return _DAY.fullmatch(cell.strip()) is not None
+
+
+def _usual(text: str) -> str:
+    """A time with its date before it, where the year stands behind."""
+    said = _LATE_YEAR.fullmatch(text.strip())
+    if said is None:
+        return text.strip()
+    return f"{said['day']}-{said['month']}-{said['year']} {said['time']}"
 
 
 class ClockText:
@@ -67,7 +81,7 @@ class ClockText:
         day : the date, where it has a column of its own
 
         """
-        said = _CLOCK.fullmatch(text.strip())
+        said = _CLOCK.fullmatch(_usual(text))
         if said is None:
             return self._of_minutes(text)
         h, half = int(said["h"]), (said["half"] or "").lower()
@@ -75,6 +89,8 @@ class ClockText:
             h = h % 12 + (12 if half == "pm" else 0)
         s = float(re.sub("[,:]", ".", said["s"]))
         since = HOUR * h + 60.0 * int(said["m"]) + s
+        if said["days"]:
+            return DAY * int(said["days"]) + since
         if written := said["date"] or day.strip():
             return DAY * self._number(written) + since
         return self._unwrapped(since, DAY)

@@ -15,10 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.importing.gravity_size import FEWEST_MEANS, Gravity, are_means, gravity_in
 from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.scales import ACC_OUT, ACC_SCALES, FEWEST, fitting
+from fieldcal.importing.scales import ACC_OUT, ACC_SCALES, FEWEST, fitting, gains
+from fieldcal.importing.time_units import step_of
 
 GROWS = 0.999
 """Share of steps of a time that are positive: a line may be damaged."""
@@ -27,6 +29,9 @@ EACH = "xyz"
 
 NOISY = 0.1
 """Part of gravity that its own noise is not."""
+
+EXACT = 5e-5
+"""Part by which a direction's length differs: a sensor has scatter and bias."""
 
 LEAST_COUNTS = 1000.0
 """Counts in a g by which an accelerometer is told without turns."""
@@ -83,6 +88,13 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     if all(known.get(i) == name for i, name in channels.items()):
         return None
     return Told(channels, why)
+
+
+def directions(table: Array) -> list[Three]:
+    """Columns side by side that are a direction: calculated, such as of gravity."""
+    free = [i for i in range(table.shape[1]) if _moves(table[:, i])]
+    beside = [(a, a + 1, a + 2) for a in free if {a + 1, a + 2} <= set(free)]
+    return [three for three in beside if _is_direction(table[:, list(three)])]
 
 
 def unnamed(table: Array, names: Sequence[str], known: Collection[int]) -> list[Three]:
@@ -146,6 +158,10 @@ def _pair(
     """Specific force and rate among sets of axes, and why."""
     sizes = {three: _gravity(table, three) for three in forces}
     usual = [three for three in forces if sizes[three] is not None]
+    if not usual and (step := step_of(clock)):
+        # no force, but what velocity and angle gained since the row before
+        sizes = {three: _gravity(table, three, step) for three in forces}
+        usual = [three for three in forces if sizes[three] is not None]
     # a sphere through rests in many directions is no accident
     usual = [three for three in usual if _is_round(sizes[three])] or usual
     turning = []
@@ -160,6 +176,8 @@ def _pair(
     if len(turning) == 1:
         return turning[0], "gravity turns in the first three as the other three say"
     if turning:
+        return None
+    if step_of(clock) and not any(_gravity(table, three) for three in usual):
         return None
     # of counts, any length is one: without a turn they are asked about
     usual = [three for three in usual if _plain(sizes[three])]
@@ -178,6 +196,15 @@ def _scattered(values: Array, size: float) -> bool:
         return False
     differ = np.abs(np.diff(values, axis=0))
     return bool(np.nanmedian(differ, axis=0).max() > NOISY * size)
+
+
+def _is_direction(values: Array) -> bool:
+    """Whether rows (n, 3) are as long as each other: calculated, not measured."""
+    if are_means(values):
+        return False
+    length = np.linalg.norm(values[np.isfinite(values).all(axis=1)], axis=1)
+    moves = np.nanmax(np.ptp(values, axis=0)) > NOISY * np.median(length)
+    return bool(moves and np.ptp(length) < EXACT * np.median(length))
 
 
 def _is_round(gravity: Gravity | None) -> bool:
@@ -199,11 +226,19 @@ def _even(clock: Array) -> Array:
     return scaled
 
 
-def _gravity(table: Array, three: Three) -> Gravity | None:
-    """What three columns read at rest, if it is gravity in a usual unit."""
+def _gravity(table: Array, three: Three, step: float = 0.0) -> Gravity | None:
+    """What three columns read at rest, if it is gravity in a usual unit.
+
+    Parameters
+    ----------
+    table, three : (n, k) and the columns
+    step : s, where the columns hold the gain of velocity over it; 0 where not
+
+    """
     values = table[:, list(three)]
     found = gravity_in(values)
-    if found is None or _scattered(values, found.size):
+    if found is None or _scattered(values, found.size) or _is_direction(values):
         return None
     within = ACC_OUT[not found.round]
-    return found if fitting(found.size, ACC_SCALES, within) else None
+    scales = gains(step, "m/s^2", G0) if step else ACC_SCALES
+    return found if fitting(found.size, scales, within) else None

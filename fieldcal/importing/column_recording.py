@@ -43,6 +43,10 @@ TICK = "fine"
 """Part of the name of times that count ticks: ``SampleTimeFine``."""
 
 
+BOSCH = ("sensortime", "39.0625us")
+"""Name of the counter of sensors by Bosch, and what it counts."""
+
+
 class Heading(NamedTuple):
     """Columns of a file, as it names them.
 
@@ -110,7 +114,7 @@ class ColumnRecording(Recording):
             own = not self.wanted.columns
             found = self._found()
             self.imus_found = {
-                name: self._rated(self._clocked(one) if own else one, own)
+                name: self._signed(self._rated(self._clocked(one) if own else one, own))
                 for name, one in found.items()
             }
             if len(self.imus_found) == 1:
@@ -144,6 +148,17 @@ class ColumnRecording(Recording):
             return {name: i for i, (name, _, _) in enumerate(names)}
         places = [c.place for way in self.heading() for c in way.columns]
         return {n: places.index(p) for n, _, p in names if p in places}
+
+    def _signed(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with the kinds of channel whose sign was not read."""
+        table, at = self.beginning(), self._numbers_of(wanted)
+        threes = {k: [at[k + x] for x in "xyz" if k + x in at] for k in "ag"}
+        found = {kind for kind, three in threes.items()
+                 if three and max(three) < table.shape[1]
+                 and columns.are_unsigned(table[:, three])}  # fmt: skip
+        if found:
+            self.guessed["counts"] = "of 16 bits with a sign: 65535 is -1"
+        return replace(wanted, unsigned=frozenset(found))
 
     def _clocked(self, wanted: ReadOptions) -> ReadOptions:
         """Options with both columns of a clock that has its seconds in one of them."""
@@ -186,7 +201,7 @@ class ColumnRecording(Recording):
             # of means nobody knows when: they are counted
             return replace(wanted, rate_hz=1.0) if means else wanted
         rate, where = said
-        sentence = f"its top says the rate: {where!r}"
+        sentence = f"it says the rate: {where!r}"
         self.says += [sentence] if sentence not in self.says else []
         return replace(wanted, rate_hz=rate)
 
@@ -217,9 +232,11 @@ class ColumnRecording(Recording):
         names = [c.name for way in self.heading() for c in way.columns[at : at + 1]]
         unit, why = "", "its name says ticks"
         if said is not None:
-            unit, why = unit_by_rate(t, said[0]), f"its top says the rate: {said[1]!r}"
+            unit, why = unit_by_rate(t, said[0]), f"it says the rate: {said[1]!r}"
         elif any(TICK in name.lower() for name in names):
             unit = unit_of_ticks(t)
+        elif any(BOSCH[0] in name.lower() for name in names):
+            unit, why = BOSCH[1], "its name is that of Bosch's counter"
         if unit in ("", "s"):
             return wanted
         self.guessed["time"] = f"{unit}: {why}"

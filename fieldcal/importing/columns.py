@@ -10,16 +10,47 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.row_times import FRACTIONS, RowTimes
+from fieldcal.importing.scales import FEWEST
 from fieldcal.session.sample_files import COLUMNS
 
 SKIP = "_"
 """Name of a column to skip."""
+
+HALF = 2.0**15
+"""Numbers of 16 bits from which on the sign is negative."""
+
+SOME = 0.05
+"""Share of numbers on either side of zero, where their sign was not read."""
 
 WITHOUT_GRAVITY = ("lx", "ly", "lz")
 """Columns of an acceleration without gravity, where ``ax ay az`` are gravity alone."""
 
 KNOWN = (*COLUMNS, "dt", *FRACTIONS, *WITHOUT_GRAVITY)
 """What columns may be called."""
+
+
+def are_unsigned(values: Array) -> bool:
+    """Whether numbers (n, k) are 16 bits of which nobody read the sign.
+
+    What is a little below zero reads a little below 65 536, and nothing lies between.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < FEWEST or known.min() < 0 or known.max() >= 2 * HALF:
+        return False
+    if known.max() < HALF or (known != np.round(known)).any():
+        return False
+    low, high = (known < HALF / 2).mean(), (known >= 1.5 * HALF).mean()
+    return bool(min(low, high) > SOME and 1 - low - high < SOME / 2)
+
+
+def wrapped(column: Array) -> Array:
+    """Numbers of 16 bits with their sign.
+
+    >>> wrapped(np.array([1.0, 65535.0])).tolist()
+    [1.0, -1.0]
+    """
+    signed: Array = np.where(column >= HALF, column - 2 * HALF, column)
+    return signed
 
 
 def has_time(names: Iterable[str]) -> bool:
@@ -81,7 +112,8 @@ class ColumnReader:
             table = np.empty((3, n)) if whole else np.full((3, n), np.nan)
             for i, column in there:
                 if column is not None:
-                    np.multiply(column, scale, out=table[i])
+                    signed = wrapped(column) if kind in wanted.unsigned else column
+                    np.multiply(signed, scale, out=table[i])
             return table.T
 
         acc = triad("a", wanted.acc_scale)
@@ -111,7 +143,8 @@ def units(wanted: ReadOptions) -> str:
         ("gx", wanted.gyr_unit or "rad/s", wanted.gyr_lsb),
     ):
         if channel in known:
-            says.append(f"{lsb:g} counts/({unit})" if lsb != 1 else unit)
+            counts = f"{lsb:g} counts/({unit})" if lsb > 1 else f"{unit} x {lsb:g} s"
+            says.append(unit if lsb == 1 else counts)
     return ", ".join(says) or "deg C"
 
 

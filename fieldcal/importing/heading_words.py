@@ -68,15 +68,16 @@ _PHRASES = (
     (("linear", "accel"), "linear"),
     (("accelerometer", "acceleration"), "a"),
 )
-_TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "zeit",
-          "tiempo", "temps", "tempo", "tijd", "时间", "sow", "tow")  # fmt: skip
+_TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "sensortime",
+          "zeit", "tiempo", "temps", "tempo", "tijd", "时间", "sow", "tow")  # fmt: skip
 _STEPS = (("dt",), ("delta", "t"), ("delta", "time"), ("time", "delta"), ("deltat",),
           ("time", "step"), ("sample", "interval"))  # fmt: skip
 """Names of the time that passed since the row before."""
 
 _TEMPERATURES = ("temp", "temperature", "tmp", "temper", "temperatur", "temperatura",
                  "温度")  # fmt: skip
-_WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world", "earth")
+_WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world",
+                    "earth")  # fmt: skip
 """Words of accelerations that may lack gravity, or lie in axes of the Earth."""
 
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}

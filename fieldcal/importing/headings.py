@@ -133,7 +133,7 @@ def read(columns: Sequence[Column], skip: str = "") -> tuple[HeadingMatch, ...]:
         and (said := meaning(column.name, column.unit)) is not None
         and not set(said.label) & set(NOT_SAMPLES)
     ]
-    named = _with_gravity(named)
+    named = _with_gravity(_with_temperature(columns, named))
     acc, gyr = _triads(named, "a"), _triads(named, "g")
     if acc is None or gyr is None:
         return ()
@@ -166,6 +166,16 @@ def _of_a_thermometer(
     if sorted(kinds) != ["t", "temperature"] or len(columns) != len(kinds):
         return ()
     return (_match(columns, named, skip, "0", ()),)
+
+
+def _with_temperature(columns: Sequence[Column], named: Sequence[Named]) -> list[Named]:
+    """Columns of which a "T" is the temperature, where another is the time."""
+    times = [n for n in named if n.says.kind == "t"]
+    warm = [n for n in times if columns[n.number].name.strip() == "T"]
+    if not warm or len(times) == len(warm):
+        return [*named]
+    as_warm = [n._replace(says=Meaning("temperature", "", None)) for n in warm]
+    return [n for n in named if n not in warm] + as_warm
 
 
 def _with_gravity(named: Sequence[Named]) -> list[Named]:

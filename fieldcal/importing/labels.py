@@ -3,6 +3,7 @@
     ax: 0.12 ay: 0.34 az: 9.81        AcX = 12 | AcY = 34 | AcZ = 16384
     Acceleration X: 0.1, Y: 0.2, Z: 9.8 m/s^2
     12:34:56.789 -> Accel: 0.1, 0.2, 9.8 g  Gyro: 1, 2, 3
+    I (312) IMU: ax=0.1 ay=0.2         2024-05-03 14:20:01,123 INFO acc=(0.1, 0.2, 9.8)
 
 An axis alone belongs to the label before it; three values behind one label are axes; a
 unit holds for all axes before it. A time of day at the beginning is one of the monitor.
@@ -19,6 +20,9 @@ from fieldcal.importing.heading_units import unit_in
 TIME = "utc time [s]"
 """Name of the time that a monitor writes before a line."""
 
+TICKS = "time [ms]"
+"""Name of the time since a device started."""
+
 AXES = ("x", "y", "z")
 
 OFTEN = 0.5
@@ -28,8 +32,17 @@ LONGEST = 12
 """Letters of a unit; what is longer is a sentence."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LIST = re.compile(
+    rf"(?<=[:=])\s*[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]"
+)
 _LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
 _VALUES = re.compile(rf"\s*({_NUMBER}(?:[\s,;|]+{_NUMBER})*)\s*(.*)", re.DOTALL)
+_TICKS = re.compile(r"[EWIDV] \((\d+)\) [\w.-]+:\s*")
+"""What ESP-IDF writes before a line: its level, ms since the start, and a name."""
+
+_LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:-]*")
+"""What programs write behind the time of a line."""
+
 _ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*(?:->|>|:|\s)\s*")
 
 Labelled = tuple[str, str]
@@ -44,8 +57,11 @@ def labelled_values(line: str) -> list[Labelled]:
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
-    arrival = _ARRIVAL.match(line)
+    line = _LIST.sub(r" \1", line)
+    arrival, ticks = _ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
+    rest = rest[ticks.end() :] if ticks else rest
+    rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest
     parts = _LABEL.split(rest)
     if len(parts) < len(AXES) or parts[0].strip(" \t,;|"):
         return []
@@ -67,6 +83,7 @@ def labelled_values(line: str) -> list[Labelled]:
         if unit_in(behind):
             read = _with_unit(read, behind)
     first = [(TIME, arrival[1].strip())] if arrival else []
+    first += [(TICKS, ticks[1])] if ticks else []
     return first + [(f"{n} [{u}]" if u else n, v) for n, v, u in read]
 
 

@@ -29,6 +29,7 @@ class NumberTable:
     Attributes
     ----------
     seen : rows that were read
+    headings : lines of names between them, which are no rows
 
     """
 
@@ -42,7 +43,7 @@ class NumberTable:
         self._names, self._separator = names, separator
         self._place, self._damaged = place, damaged
         self._use = [i for i, name in enumerate(names) if name != SKIP]
-        self.seen = 0
+        self.seen = self.headings = 0
 
     def read(self, data: bytes) -> Sequence[Array]:
         """Numbers of the wanted columns of some lines, (n,) each."""
@@ -72,6 +73,9 @@ class NumberTable:
     def _row(self, number: int, line: str) -> list[float]:
         """Numbers of one line, the slow way; nothing of one that is left out."""
         cells = line.split(self._separator)
+        if _are_names(cells):
+            self.headings += 1
+            return []
         if len(cells) != len(self._names):
             what = f"has {len(cells)} columns, not {len(self._names)}"
             self._damaged(self._place(number), what)
@@ -88,3 +92,10 @@ class NumberTable:
                 self._damaged(f"{self._place(number)}, column {name}", what)
                 return []
         return row
+
+
+def _are_names(cells: Sequence[str]) -> bool:
+    """Whether cells are all words, as a device writes them when it starts."""
+    said = [cell.strip().strip('"').strip() for cell in cells]
+    words = all(not cell or cell[:1].isalpha() for cell in said)
+    return words and len({*said} - {*MISSING}) > 1

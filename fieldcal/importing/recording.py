@@ -48,6 +48,7 @@ TIME_UNITS = {
     "s": 1.0,
     "ms": 1e-3,
     "0.1ms": 1e-4,
+    "39.0625us": 39.0625e-6,
     "us": 1e-6,
     "ns": 1e-9,
     "d": 86400.0,
@@ -89,6 +90,7 @@ class ReadOptions:
     temp_lsb, temp_zero : counts in 1 K, and deg C at count 0
     options : as in a device's address, ``name=value&name=value``
     named : kinds of channel (a, g, t) whose unit the file's headings say
+    unsigned : kinds of channel (a, g) in 16 bits of which the sign was not read
 
     """
 
@@ -106,6 +108,7 @@ class ReadOptions:
     temp_lsb: float = 1.0
     temp_zero: float = 0.0
     named: frozenset[str] = frozenset()
+    unsigned: frozenset[str] = frozenset()
 
     @property
     def acc_scale(self) -> float:

@@ -37,9 +37,11 @@ class Scale(NamedTuple):
 
     def __str__(self) -> str:
         """Say it: "g" or "counts of 16384 in one g"."""
-        return (
-            self.unit if self.lsb == 1 else f"counts, {self.lsb:.6g} in a {self.unit}"
-        )
+        if self.lsb == 1:
+            return self.unit
+        if self.lsb < 1:
+            return f"gains over {self.lsb:.6g} s, {self.unit} times s"
+        return f"counts, {self.lsb:.6g} in a {self.unit}"
 
 
 def _counts(per_unit: float) -> float:
@@ -75,6 +77,19 @@ GYR_SCALES = (
     Scale(180e6 / np.pi, "udeg/s"),
     Scale(180 * 3600 / np.pi, "deg/h"),
 )
+
+
+def gains(step: float, unit: str, size: float = 1.0) -> tuple[Scale, ...]:
+    """How a quantity reads that is the gain over a step, such as of velocity.
+
+    Parameters
+    ----------
+    step : time over which it is gained, s
+    unit : of the quantity
+    size : what the quantity reads in that unit
+
+    """
+    return (Scale(size * step, unit, step),)
 
 
 def fitting(size: float, scales: tuple[Scale, ...], within: float) -> list[Scale]:

@@ -131,7 +131,7 @@ class LabelledValues(TextForm):
         if len(many) <= MOSTLY * len(lines) or len(names) < len("xyz"):
             return None
         gathers = max(len(row) for row in many) < len(names)
-        return cls(names, separator or ",", gathers)
+        return cls(names, separator or "\t", gathers)
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""

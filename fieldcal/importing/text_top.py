@@ -24,11 +24,20 @@ SEPARATORS = (";", "\t", ",")
 ABOVE = 4
 """Lines above the numbers among which their names are looked for."""
 
+LATEST = 50
+"""Lines below the first of numbers among which their names are looked for."""
+
 NUMBERS = 0.5
 """Share of the cells of a line that are numbers, where names of columns are not."""
 
 _AXIS = re.compile(r"(.*[^\W_].*?|.*\(|[A-Za-z])([xyzXYZ])(\)?\s*(?:[\[({].*[\])}])?)")
 """A name that ends with an axis, and maybe a unit."""
+
+_RATE_WITHIN = re.compile(
+    r"(?:\bat|rate|frequency|freq|odr|fs)\b[\s:=_]*(?:is|of)?\s*([0-9]+(?:\.[0-9]+)?)\s*hz\b",
+    re.IGNORECASE,
+)
+"""A rate that stands among other words of a line."""
 
 _RATE = re.compile(
     r"[#%/\s\"]*(?:fs|(?:sample|sampling|output|update|data|logging)[ _]*"
@@ -77,9 +86,17 @@ def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]
     """What stands above the numbers, read as names in each of several ways."""
     first = first_numbers(lines, separator)
     tops = [line.lstrip("#%/ ") for line in lines[max(0, first - ABOVE) : first]]
+    # who listens before the device starts has rows above the names
+    tops += [line for line in lines[first : first + LATEST] if _all_words(line)]
     rows = [cells(line, separator or separator_of(line)) for line in tops]
     found = [Heading(way, SKIP) for way in _ways(rows)]
     return [one for one in found if len(one.columns) > 2]
+
+
+def _all_words(line: str) -> bool:
+    """Whether all cells of a line are words."""
+    row = cells(line, separator_of(line))
+    return len(row) > 2 and all(cell[:1].isalpha() for cell in row)
 
 
 def _ways(rows: Sequence[Sequence[str]]) -> Iterator[list[Column]]:
@@ -121,9 +138,11 @@ def _filled(row: Sequence[str]) -> list[str]:
 def rate_above(lines: Sequence[str], separator: str | None) -> tuple[float, str] | None:
     """Rate in Hz that a line above the numbers says, and that line."""
     for line in lines[: first_numbers(lines, separator)]:
+        within = _RATE_WITHIN.findall(line)
         matched = _RATE.fullmatch(line.strip())
-        if matched and float(matched.group(1)) > 0:
-            return float(matched.group(1)), line.strip()
+        said = [matched.group(1)] if matched else within if len(within) == 1 else []
+        if said and float(said[0]) > 0:
+            return float(said[0]), line.strip()
     return None
 
 

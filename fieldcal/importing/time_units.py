@@ -46,6 +46,12 @@ def time_units(t: Array) -> list[str]:
     return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST] or usual
 
 
+def step_of(t: Array) -> float:
+    """Usual distance of times (n,), s, if one unit alone fits them; else 0."""
+    fits = time_units(t)
+    return _step(t) / TIME_SIZES[fits[0]] if len(fits) == 1 else 0.0
+
+
 TICKS = ("0.1ms", "us")
 """Units of what is called ``SampleTimeFine``, by the device."""
 

@@ -26,9 +26,10 @@ from fieldcal.importing.scales import (
     GYR_OUT,
     GYR_SCALES,
     fitting,
+    gains,
 )
 from fieldcal.importing.thermometers import temperature_counts, temperature_fits
-from fieldcal.importing.time_units import TIME_SIZES, time_units
+from fieldcal.importing.time_units import TIME_SIZES, step_of, time_units
 from fieldcal.importing.unit_answers import answers, as_written, unusual
 from fieldcal.importing.unit_doubts import SaidUnits, hold_own_units
 
@@ -129,6 +130,7 @@ class _Guess:
         gravity = gravity_in(block.acc)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
+        self._step = step_of(t) if said.rate_hz is None else 1 / said.rate_hz
         if gravity and not said.acc_unit and said.acc_lsb == 1:
             self._acceleration(gravity, block.acc)
         elif gravity and said.acc_lsb != 1:
@@ -175,6 +177,9 @@ class _Guess:
     def _acceleration(self, gravity: Gravity, acc: Array) -> None:
         fits = fitting(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
         fits = as_written(fits, acc)
+        if not fits and self._step:
+            scales = gains(self._step, "m/s^2", G0)
+            fits = fitting(gravity.size, scales, ACC_OUT[not gravity.round])
         shows = f"|a| at rest is {gravity.size:.4g}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
@@ -184,7 +189,7 @@ class _Guess:
                 f" {' or '.join(map(str, fits)) or 'no usual unit'}",
                 answers("acc", fits, "g", gravity.size),
             )
-        if fits[0].unit != "m/s^2":
+        if (fits[0].unit, fits[0].lsb) != ("m/s^2", 1):
             self.found["acceleration"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, acc_unit=fits[0].unit, acc_lsb=fits[0].lsb)
 
@@ -214,7 +219,12 @@ class _Guess:
             return
         fits = fitting(reads, GYR_SCALES, GYR_OUT[not gravity.round])
         fits = as_written(fits, block.gyr)
-        if self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
+        if self.said.acc_lsb == self._step:
+            # who writes gains of velocity, writes gains of angle beside them
+            degrees = gains(self._step, "deg/s", 180 / np.pi)
+            scales = (*gains(self._step, "rad/s"), *degrees)
+            fits = fitting(reads, scales, GYR_OUT[not gravity.round])
+        elif self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
             # who writes one sensor's registers as they are, writes the other's so too
             fits = counts
         shows = f"as gravity turns, 1 rad/s reads {reads:.4g}"
@@ -223,7 +233,7 @@ class _Guess:
                 f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
                 answers("gyr", fits, "deg/s", np.deg2rad(reads)),
             )
-        if fits[0].unit != "rad/s":
+        if (fits[0].unit, fits[0].lsb) != ("rad/s", 1):
             self.found["angular_rate"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
 
@@ -232,7 +242,10 @@ class _Guess:
         if "degC" in fits:
             return
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        if len(fits) != 1:
+        known = values[np.isfinite(values)]
+        # who writes one sensor's registers as they are, may write the other's so too
+        raw = self.said.acc_lsb != 1 and bool((known == np.round(known)).all())
+        if len(fits) != 1 or raw:
             self._ask(
                 f"its temperature reads {low:.6g} to {high:.6g}, which is no deg C",
                 [

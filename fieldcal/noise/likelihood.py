@@ -1,0 +1,207 @@
+"""Whittle's likelihood of the powers for a set of processes, and its maximum.
+
+    S_b = sum_i theta_i g_ib(T_i)                                                  (1)
+    log L = - sum_b nu_b (log S_b + P_b / S_b) / 2                                 (2)
+    J = sum_b nu_b d_b d_b' / 2,    d_b = grad log S_b                             (3)
+
+theta are variances, g the columns of `spectrum`, P the mean power of the nu
+coefficients of a bin; parameters are log theta and log T. The maximum is found by
+Fisher's scoring. A fold f of the coefficients is predicted from all others by one step
+from the maximum,
+
+    x_-f = x - (J - J_f)^-1 grad log L_f                                           (4)
+
+and scores log L_f(x_-f). Sources: Whittle 1953; for (4) Stone 1977.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.noise.spectrum import Spectrum
+
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+TIMED = ("G", "BT")
+"""Terms that have a correlation time: Gauss-Markov, and flicker up to one."""
+
+MOST_STEPS = 60
+LONGEST_STEP = 1.5
+CLOSE = 1e-4
+NOTHING = 0.05
+"""Information about the log of a variance below which its process is not there: what is
+known of it then spans a factor of eighty."""
+
+
+@dataclass(frozen=True, slots=True)
+class Powers:
+    """What is to be explained of one channel.
+
+    Attributes
+    ----------
+    power, count : (b, folds) sums of squares, and of how many
+    free : (b,) bins that are described by their own level
+
+    """
+
+    power: Array
+    count: Array
+    free: Flags
+
+    def scaled(self, dispersion: float) -> Powers:
+        """With coefficients that tell as much less as they scatter more."""
+        return replace(
+            self, power=self.power / dispersion, count=self.count / dispersion
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Processes at their most likely sizes.
+
+    Attributes
+    ----------
+    terms : symbols; "G" may come several times
+    x : log of the variances, then of the correlation times of those that have one
+    information : of x, (3)
+    level : (b,) expected powers
+    log_likelihood : (2)
+    scores : (folds,) of each fold as predicted from the others, (4)
+
+    """
+
+    terms: tuple[str, ...]
+    x: Array
+    information: Array
+    level: Array
+    log_likelihood: float
+    scores: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Of x."""
+        return np.linalg.pinv(self.information, hermitian=True)
+
+    @property
+    def timed(self) -> list[int]:
+        """Places in `terms` of those with a correlation time."""
+        return [i for i, term in enumerate(self.terms) if term in TIMED]
+
+
+def levels_of(
+    spectrum: Spectrum, terms: tuple[str, ...], x: Array
+) -> tuple[Array, Array]:
+    """Expected powers (b,) and the gradient of their logarithms (b, p), (1)."""
+    times = iter(range(len(terms), len(x)))
+    columns = np.empty((len(spectrum.frequency), len(x)))
+    for i, term in enumerate(terms):
+        size = np.exp(x[i])
+        if term in TIMED:
+            j = next(times)
+            of = spectrum.markov if term == "G" else spectrum.flicker
+            column, slope = of(float(x[j]))
+            columns[:, j] = size * slope
+        elif term == "B":
+            column = spectrum.flicker()[0]
+        else:
+            column = spectrum.fixed[term]
+        columns[:, i] = size * column
+    level = columns[:, : len(terms)].sum(axis=1)
+    return level, columns / level[:, None]
+
+
+def likelihood(level: Array, power: Array, count: Array) -> float:
+    """Log likelihood of sums of squares, (2)."""
+    return -0.5 * float(np.sum(count * np.log(level) + power / level))
+
+
+def fit(
+    spectrum: Spectrum, powers: Powers, terms: tuple[str, ...], start: Array
+) -> Fit | None:
+    """Most likely sizes; None where one of the processes is not there at all."""
+    used = ~powers.free
+    power, count = powers.power[used].sum(axis=1), powers.count[used].sum(axis=1)
+    bounds = _bounds(spectrum, terms)
+    x = np.clip(start, *bounds)
+    level, slopes = (a[used] for a in levels_of(spectrum, terms, x))
+    best, damping = likelihood(level, power, count), 1e-3
+    for _ in range(MOST_STEPS):
+        gradient = 0.5 * slopes.T @ (power / level - count)
+        information = 0.5 * slopes.T @ (count[:, None] * slopes)
+        step = _step(information, gradient, damping)
+        trial = np.clip(x + step, *bounds)
+        trial_level, trial_slopes = (a[used] for a in levels_of(spectrum, terms, trial))
+        found = likelihood(trial_level, power, count)
+        if not found >= best:
+            damping *= 8
+            if damping > 1e8:
+                break
+            continue
+        moved = float(np.max(np.abs(trial - x)))
+        x, level, slopes = trial, trial_level, trial_slopes
+        gained, best, damping = found - best, found, max(damping / 5, 1e-9)
+        told = 0.5 * count @ slopes[:, : len(terms)] ** 2
+        if (told < NOTHING).any():
+            return None
+        if moved < CLOSE or (gained < 1e-6 and moved < 0.1):
+            break
+    return _finished(spectrum, powers, terms, x)
+
+
+def _bounds(spectrum: Spectrum, terms: tuple[str, ...]) -> tuple[Array, Array]:
+    times = sum(term in TIMED for term in terms)
+    low, high = spectrum.log_times
+    return (
+        np.array([-np.inf] * len(terms) + [low] * times),
+        np.array([np.inf] * len(terms) + [high] * times),
+    )
+
+
+def _step(information: Array, gradient: Array, damping: float) -> Array:
+    damped = information + damping * np.diag(np.diag(information) + 1e-12)
+    step = np.linalg.lstsq(damped, gradient, rcond=None)[0]
+    longest = float(np.max(np.abs(step)))
+    out: Array = step * min(1.0, LONGEST_STEP / max(longest, 1e-300))
+    return out
+
+
+def _finished(
+    spectrum: Spectrum, powers: Powers, terms: tuple[str, ...], x: Array
+) -> Fit:
+    level, slopes = levels_of(spectrum, terms, x)
+    used = np.where(powers.free, 0.0, 1.0)
+    count = powers.count * used[:, None]
+    power = powers.power * used[:, None]
+    information = 0.5 * slopes.T @ (count.sum(axis=1)[:, None] * slopes)
+    total = likelihood(level, power.sum(axis=1), count.sum(axis=1))
+    total += _free_likelihood(powers)
+    scores = np.empty(count.shape[1])
+    for f in range(len(scores)):
+        own = 0.5 * slopes.T @ (count[:, f][:, None] * slopes)
+        gradient = 0.5 * slopes.T @ (power[:, f] / level - count[:, f])
+        held = x - _step(information - own, gradient, 1e-6)
+        held_level = levels_of(spectrum, terms, held)[0]
+        scores[f] = likelihood(held_level, power[:, f], count[:, f])
+    scores += _free_scores(powers)
+    return Fit(terms, x, information, level, total, scores)
+
+
+def _free_scores(powers: Powers) -> Array:
+    """Scores (folds,) of the bins that have a level of their own, from other folds."""
+    power, count = powers.power[powers.free], powers.count[powers.free]
+    others = power.sum(axis=1, keepdims=True) - power
+    number = count.sum(axis=1, keepdims=True) - count
+    with np.errstate(divide="ignore", invalid="ignore"):
+        level = others / number
+        each = -0.5 * (count * np.log(level) + power / level)
+    scores: Array = np.where(count > 0, each, 0.0).sum(axis=0)
+    return scores
+
+
+def _free_likelihood(powers: Powers) -> float:
+    """Log likelihood of the bins that have a level of their own."""
+    power, count = (a[powers.free].sum(axis=1) for a in (powers.power, powers.count))
+    return likelihood(power / count, power, count)

@@ -1,0 +1,129 @@
+"""The Allan deviation that another recording of the device will have.
+
+A band holds what is not known of the processes (how large, and which, by the weights of
+`terms`), and the scatter of the estimate from a recording of its length. The sizes are
+drawn from their likelihood: from the normal distribution about its maximum, weighted by
+the likelihood and drawn again (Rubin 1987).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.noise.likelihood import Fit, levels_of, likelihood
+from fieldcal.noise.processes import FAR, STEPS, covariances, freedom
+from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.terms import Chosen
+
+DRAWS = 200
+WIDER = 1.3
+"""Standard deviations of what is drawn from, so that the tails are there."""
+
+FURTHEST = 3.0
+"""No logarithm is drawn further from its maximum."""
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """Sizes of processes as they may be, with how often they were drawn."""
+
+    terms: tuple[str, ...]
+    x: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What the Allan deviation of another recording will be.
+
+    Attributes
+    ----------
+    tau : (t,) s
+    median, low, high : (t,) deviation, and what holds 68 of 100
+    variance, freedom : (t, d) of each draw, of which the estimate is chi squared
+
+    """
+
+    tau: Array
+    median: Array
+    low: Array
+    high: Array
+    variance: Array
+    freedom: Array
+
+    def log_score(self, deviation: Array) -> Array:
+        """Log density of the logarithm of measured deviations (t,), natural units."""
+        from scipy.special import gammaln, logsumexp
+
+        half = self.freedom / 2
+        ratio = np.log(deviation**2)[:, None] - np.log(self.variance)
+        each = (
+            np.log(2) + half * np.log(half) - gammaln(half)
+            + half * (ratio - np.exp(ratio))
+        )  # fmt: skip
+        found: Array = logsumexp(each, axis=1) - np.log(each.shape[1])
+        return found
+
+
+def draws(spectrum: Spectrum, chosen: Chosen, seed: int = 0) -> list[Draw]:
+    """Sizes of the processes of a channel as they may be."""
+    rng = np.random.default_rng(seed)
+    out: list[Draw] = []
+    for weight, one in chosen.others:
+        number = round(weight * DRAWS)
+        if number:
+            out += _of_fit(spectrum, chosen, one, number, rng)
+    return out
+
+
+def _of_fit(
+    spectrum: Spectrum, chosen: Chosen, one: Fit, number: int, rng: np.random.Generator
+) -> list[Draw]:
+    values, axes = np.linalg.eigh(one.covariance)
+    spread = WIDER * axes * np.sqrt(np.maximum(values, 0.0))
+    standard = rng.standard_normal((3 * number, len(one.x)))
+    steps = np.clip(standard @ spread.T, -FURTHEST, FURTHEST)
+    used = ~chosen.powers.free
+    power = chosen.powers.power[used].sum(axis=1)
+    count = chosen.powers.count[used].sum(axis=1)
+    low, high = spectrum.log_times
+    bounds = np.array([[-np.inf, np.inf]] * len(one.terms)
+                      + [[low, high]] * (len(one.x) - len(one.terms)))  # fmt: skip
+    tried = np.clip(one.x + steps, *bounds.T)
+    weights = np.array(
+        [likelihood(levels_of(spectrum, one.terms, x)[0][used], power, count)
+         for x in tried]
+    )  # fmt: skip
+    weights += 0.5 * np.sum(standard**2, axis=1)
+    chance = np.exp(weights - weights.max())
+    picked = rng.choice(len(tried), number, p=chance / chance.sum())
+    return [Draw(one.terms, tried[i]) for i in picked]
+
+
+def predict(
+    drawn: list[Draw], tau: Array, length: float, dt: float, ramp: float = 0.0
+) -> Prediction:
+    """Predict the overlapping Allan deviation of a recording.
+
+    Parameters
+    ----------
+    drawn : of `draws`
+    tau : (t,) averaging times, s
+    length : of the recording, s
+    dt : s between samples
+    ramp : of the channel, units per s
+
+    """
+    variance, nu = np.empty((2, len(tau), len(drawn)))
+    for j, one in enumerate(drawn):
+        for i, t in enumerate(tau.tolist()):
+            r = covariances(one.terms, one.x, t, dt, FAR * STEPS)
+            variance[i, j] = r[0] + ramp**2 * t * t / 2
+            nu[i, j] = freedom(r, t, length)
+    rng = np.random.default_rng(0)
+    scatter = variance[:, :, None] * rng.chisquare(nu[:, :, None], (*nu.shape, 16))
+    measured = np.sqrt(scatter / nu[:, :, None]).reshape(len(tau), -1)
+    low, median, high = np.quantile(measured, [0.16, 0.5, 0.84], axis=1)
+    return Prediction(tau, median, low, high, variance, nu)

@@ -1,0 +1,125 @@
+"""Allan variance of each process, and how its estimate from a recording scatters.
+
+With the generalised covariance G(s) of the integral of a process, the half square of
+the difference of neighbouring means has at lag h the covariance
+
+    r(h) = (G(h-2t) - 4 G(h-t) + 6 G(h) - 4 G(h+t) + G(h+2t)) / (2 t^2)            (1)
+
+and r(0) is the Allan variance at t. Of the processes
+
+    N  -N^2 |s| / 2          K  K^2 |s|^3 / 12        B  B^2 s^2 ln|s| / (2 pi)    (2)
+    Q   Q^2 at s = 0         s, T   -s^2 T^2 (u - u^2/2 + exp(-u) - 1), u = |s|/T  (3)
+
+(a square in s drops out of (1)). The estimate of the variance from a length L,
+overlapping, is chi squared with
+
+    nu = M^2 r(0)^2 / sum (M - |h|) r(h)^2                                         (4)
+
+degrees of freedom, M differences. Source: Greenhall and Riley 2003; IEEE 952-1997.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.noise.likelihood import TIMED
+
+OF_UNIT = {
+    "N": "{}/√Hz",
+    "Q": "{}·s",
+    "B": "{}",
+    "K": "{}·√Hz",
+    "R": "{}/s",
+    "G": "{}",
+}
+"""Unit of each process, of that of the channel."""
+
+STEPS = 8
+"""Differences that are taken in each averaging time: more of them tell no more."""
+
+FAR = 12
+"""Averaging times after which differences have nothing in common."""
+
+
+def allan_variance(
+    terms: tuple[str, ...], x: Array, tau: Array, finest: float
+) -> Array:
+    """Allan variance (t,) of processes at averaging times (t,), s.
+
+    Parameters
+    ----------
+    terms, x : as a `Fit` has them
+    tau : s
+    finest : shortest correlation time in flicker that is cut off, s
+
+    """
+    return np.array([covariances(terms, x, float(t), finest, 1)[0] for t in tau])
+
+
+def covariances(
+    terms: tuple[str, ...], x: Array, tau: float, finest: float, lags: int
+) -> Array:
+    """Covariance (1) at lags of an eighth of the averaging time, (lags,)."""
+    steps = np.arange(-2 * STEPS, lags + 2 * STEPS)
+    s = np.abs(steps) * tau / STEPS
+    g = generalised(terms, x, s, finest)
+    at = [g[i * STEPS : i * STEPS + lags] for i in range(5)]
+    found: Array = at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]
+    return found / (2 * tau * tau)
+
+
+def generalised(terms: tuple[str, ...], x: Array, s: Array, finest: float) -> Array:
+    """Generalised covariance (n,) of the sum of processes at lags s, (2), (3)."""
+    total = np.zeros(len(s))
+    times = iter(range(len(terms), len(x)))
+    for i, term in enumerate(terms):
+        size = float(np.exp(x[i]))
+        time = float(np.exp(x[next(times)])) if term in TIMED else 0.0
+        total += size * _of(term, s, time, finest)
+    return total
+
+
+def _of(term: str, s: Array, time: float, finest: float) -> Array:
+    if term == "N":
+        return -s / 2
+    if term == "K":
+        return s**3 / 12
+    if term == "Q":
+        return np.where(s == 0, 1.0, 0.0)
+    if term == "G":
+        return _markov(s, time)
+    if term == "B":
+        return s * s * np.log(np.where(s > 0, s, 1.0)) / (2 * np.pi)
+    nodes = np.linspace(np.log(finest), np.log(time), 65)
+    weights = np.full(65, (nodes[1] - nodes[0]) / np.pi)
+    weights[[0, -1]] /= 2
+    total: Array = sum(
+        (w * _markov(s, float(t)) for w, t in zip(weights, np.exp(nodes), strict=True)),
+        np.zeros(len(s)),
+    )
+    return total
+
+
+def _markov(s: Array, time: float) -> Array:
+    u = s / time
+    small = u**3 * (-1 / 6 + u * (1 / 24 - u / 120))
+    whole = u + np.expm1(-u) - u * u / 2
+    found: Array = -time * time * np.where(u < 0.03, small, whole)
+    return found
+
+
+def freedom(covariance: Array, tau: float, length: float) -> float:
+    """Degrees of freedom of an overlapping Allan variance, (4).
+
+    Parameters
+    ----------
+    covariance : (lags,) of `covariances`
+    tau, length : averaging time, and of the recording, s
+
+    """
+    count = max(1.0, (length - 2 * tau) / tau * STEPS + 1)
+    lags = np.arange(1, min(len(covariance), int(np.ceil(count))))
+    other = 2 * float(np.sum((count - lags) * covariance[lags] ** 2))
+    first = float(covariance[0]) ** 2
+    return count**2 * first / (count * first + other)

@@ -1,0 +1,154 @@
+"""From samples as they come to stretches reduced to powers, in constant memory.
+
+Samples count as evenly spaced, as a device takes them; where none came for a second or
+more, and where the level is another after a disturbance, a new stretch begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.noise.disturbed import calmed
+from fieldcal.noise.levels import Levels, Reduced
+
+GAP = 1.0
+"""Time without samples that begins a new stretch, s."""
+
+ROWS = 1 << 17
+"""Samples that are looked at together."""
+
+CHANNELS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Reduction:
+    """A recording as `Spectrum` takes it.
+
+    Attributes
+    ----------
+    stretches : reduced, columns: six channels and the thermometer
+    known : (6,) whether a channel was measured
+    warm : whether a thermometer was
+    samples, bridged : how many, and how many of them were disturbed and replaced
+    start, end : first and last time, s
+
+    """
+
+    stretches: tuple[Reduced, ...]
+    known: Array
+    warm: bool
+    samples: int
+    bridged: int
+    start: float
+    end: float
+
+
+class Reducer:
+    """Takes the samples of one recording."""
+
+    def __init__(self) -> None:
+        self._done: list[Reduced] = []
+        self._levels: Levels | None = None
+        self._waiting: list[Block] = []
+        self._rows = self._samples = self._bridged = 0
+        self._last = self._first = np.nan
+        self._steps, self._stepped, self._span = 0, 0.0, (np.nan, np.nan)
+        self._known = np.zeros(CHANNELS, dtype=bool)
+        self._value = np.full(CHANNELS + 1, np.nan)
+        self._dt = np.nan
+
+    def add(self, block: Block) -> None:
+        """Take samples, in order of time."""
+        if not len(block):
+            return
+        edges = np.flatnonzero(np.diff(block.t, prepend=self._last) > GAP)
+        first = 0
+        for edge in [*edges.tolist(), len(block)]:
+            if edge > first:
+                self._take(block[first:edge])
+            if edge < len(block):
+                self._flush()
+                self._end()
+            first = edge
+        self._last = float(block.t[-1])
+
+    def reduction(self) -> Reduction:
+        """Everything that was taken."""
+        self._flush()
+        self._end()
+        return Reduction(
+            tuple(self._done),
+            self._known,
+            bool(np.isfinite(self._value[CHANNELS])),
+            self._samples,
+            self._bridged,
+            *self._span,
+        )
+
+    def _take(self, block: Block) -> None:
+        self._waiting.append(block)
+        self._rows += len(block)
+        self._samples += len(block)
+        self._span = (float(np.fmin(self._span[0], block.t[0])), float(block.t[-1]))
+        if self._rows >= ROWS:
+            self._flush()
+
+    def _flush(self) -> None:
+        """Look at what is waiting."""
+        if not self._rows:
+            return
+        t = np.concatenate([b.t for b in self._waiting])
+        rows = np.concatenate(
+            [np.column_stack([b.acc, b.gyr, b.temperature]) for b in self._waiting]
+        )
+        self._waiting, self._rows = [], 0
+        if len(t) > 1:
+            self._steps += len(t) - 1
+            self._stepped += float(t[-1] - t[0])
+        if not self._steps:
+            return
+        for calm in calmed(self._filled(rows), self._stepped / self._steps, CHANNELS):
+            if calm.begins:
+                self._end(keep=True)
+            if self._levels is None:
+                self._levels = Levels(1.0, CHANNELS + 1, CHANNELS)
+            self._levels.add(calm.rows)
+            self._bridged += calm.bridged
+
+    def _filled(self, rows: Array) -> Array:
+        """Samples with missing values as the last one known; 0 where none is."""
+        missing = ~np.isfinite(rows)
+        self._known |= ~missing[:, :CHANNELS].all(axis=0)
+        for c in np.flatnonzero(missing.any(axis=0)):
+            good = np.flatnonzero(~missing[:, c])
+            if not len(good):
+                rows[:, c] = np.nan_to_num(self._value[c])
+                continue
+            if np.isnan(self._value[c]):
+                self._value[c] = rows[good[0], c]
+            place = np.searchsorted(good, np.arange(len(rows)), side="right") - 1
+            rows[:, c] = np.where(place < 0, self._value[c], rows[good[place], c])
+        found = ~missing.all(axis=0)
+        self._value[found] = rows[-1, found]
+        return rows
+
+    def _end(self, keep: bool = False) -> None:
+        """End a stretch."""
+        if self._levels is not None:
+            dt = self._stepped / self._steps
+            self._done.append(replace(self._levels.reduced(), dt=dt))
+        self._levels = None
+        if not keep:
+            self._steps, self._stepped = 0, 0.0
+
+
+def reduced(blocks: Iterable[Block]) -> Reduction:
+    """Reduce a recording of a device at rest, block by block."""
+    reducer = Reducer()
+    for block in blocks:
+        reducer.add(block)
+    return reducer.reduction()

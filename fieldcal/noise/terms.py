@@ -1,0 +1,271 @@
+"""Which processes a channel has: those that predict what they were not fitted to.
+
+A process more, or less, is weighed by the score of held-out coefficients
+(`likelihood`): it is taken where the gain is more than its own standard error.
+Above 1 Hz, where a device filters its outputs and machines hum, bins can be described
+by their own level instead: what windows of seconds obey is below. Where processes do
+not explain the scatter of the powers, all is known as much less well.
+
+Source of the rule: Breiman et al. 1984, one standard error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.noise.likelihood import TIMED, Fit, Flags, Powers, fit
+from fieldcal.noise.spectrum import Spectrum
+
+FILTERED_HZ = 1.0
+"""From this frequency on a spectrum may be the device's filter, Hz."""
+
+RICH = ("N", "Q", "B", "K")
+MOST_MARKOV = 2
+NEGLIGIBLE = 0.01
+MULTIPLIED = 100
+STARTS = 6
+"""Correlation times from which a Gauss-Markov process is looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """The processes of a channel.
+
+    Attributes
+    ----------
+    best : the fit of the chosen processes
+    others : (weight, fit) of all that predict, the chosen one among them; their weights
+        add to 1
+    powers : with the bins that are left to themselves
+    dispersion : by how much the powers scatter more than the processes alone would have
+        them, as a factor of variance; at least 1
+
+    """
+
+    best: Fit
+    others: tuple[tuple[float, Fit], ...]
+    powers: Powers
+    dispersion: float
+
+
+def choose(spectrum: Spectrum, powers: Powers) -> Chosen:
+    """Find the processes of a channel."""
+    powers = _without_filter(spectrum, powers)
+    best, seen = grown(spectrum, powers)
+    dispersion = _dispersion(powers, best)
+    if dispersion > 1:
+        powers = powers.scaled(dispersion)
+        best, seen = grown(spectrum, powers)
+    return Chosen(best, _weighted(seen), powers, dispersion)
+
+
+def _weighted(fits: list[Fit]) -> tuple[tuple[float, Fit], ...]:
+    """Each set of processes once, weighted by what it predicts (Geisser, Eddy 1979)."""
+    sets = {tuple(sorted(f.terms)): f for f in fits}
+    scores = np.array([f.scores.sum() for f in sets.values()])
+    weights = np.exp(scores - scores.max())
+    kept = weights > NEGLIGIBLE * weights.max()
+    total = weights[kept].sum()
+    return tuple(
+        (float(w / total), f)
+        for w, f, k in zip(weights, sets.values(), kept, strict=True)
+        if k
+    )
+
+
+def grown(spectrum: Spectrum, powers: Powers) -> tuple[Fit, list[Fit]]:
+    """The set that no further process, and none less, would predict better.
+
+    Beside it all that were tried.
+    """
+    best = _first(spectrum, powers)
+    seen = [best]
+    while True:
+        tried = [_with(spectrum, powers, best, new) for new in _additions(best.terms)]
+        every = [f for f in [*tried, _pair(spectrum, powers, best)] if f]
+        seen += every
+        more = [f for f in every if _better(f, best)]
+        if not more:
+            break
+        best = max(more, key=lambda f: float(f.scores.sum()))
+    for place in range(1, len(best.terms)):  # white noise is always there
+        less = _dropped(best, place)
+        if found := fit(spectrum, powers, less.terms, less.x):
+            seen.append(found)
+    return _simplest(seen), seen
+
+
+def _simplest(fits: list[Fit]) -> Fit:
+    """The fit with fewest parameters that no other predicts clearly better than."""
+    best = max(fits, key=lambda f: float(f.scores.sum()))
+    fewer = [f for f in fits if len(f.x) < len(best.x) and not _better(best, f)]
+    return _simplest(fewer) if fewer else best
+
+
+def _first(spectrum: Spectrum, powers: Powers) -> Fit:
+    used = ~powers.free
+    column = spectrum.fixed["N"][used]
+    total = (powers.power[used].sum(axis=1) / column).sum() / powers.count[used].sum()
+    # white noise is what the quickest bins have
+    found = fit(spectrum, powers, ("N",), np.log([total]))
+    if found is None:
+        raise AssertionError("white noise is in every bin")
+    return found
+
+
+def _additions(terms: tuple[str, ...]) -> list[str]:
+    """What may be added to a set."""
+    new = [t for t in ("K", "Q") if t not in terms]
+    if "B" in terms:
+        new.append("BT")
+    elif "BT" not in terms:
+        new.append("B")
+    if terms.count("G") < MOST_MARKOV:
+        new.append("G")
+    return new
+
+
+def _with(spectrum: Spectrum, powers: Powers, old: Fit, new: str) -> Fit | None:
+    """The most likely fit with one process more, or with flicker cut off."""
+    low, high = spectrum.log_times
+    if new not in TIMED:
+        return _started(spectrum, powers, old, new, None)
+    kept = old
+    if new == "BT":
+        place = old.terms.index("B")
+        kept = _dropped(old, place)
+    tries = np.linspace(low, high, STARTS + 2)[1:-1]
+    found = [_started(spectrum, powers, kept, new, float(t)) for t in tries]
+    return max((f for f in found if f), key=lambda f: f.log_likelihood, default=None)
+
+
+def _started(
+    spectrum: Spectrum, powers: Powers, old: Fit, new: str, log_time: float | None
+) -> Fit | None:
+    """A fit that begins where the new process would explain what is left."""
+    if new == "G":
+        column = spectrum.markov(log_time or 0.0)[0]
+    elif new in ("B", "BT"):
+        column = spectrum.flicker(log_time)[0]
+    else:
+        column = spectrum.fixed[new]
+    used = ~powers.free
+    count = powers.count[used].sum(axis=1)
+    share = column[used] / old.level[used]
+    left = powers.power[used].sum(axis=1) / old.level[used] - count
+    size = float(share @ left / (share**2 @ count))
+    least = 0.02 / float(share.max())
+    sizes, times = old.x[: len(old.terms)], old.x[len(old.terms) :]
+    new_time = [] if log_time is None else [log_time]
+    start = np.concatenate([sizes, [np.log(max(size, least))], times, new_time])
+    return fit(spectrum, powers, (*old.terms, new), start)
+
+
+def _dropped(old: Fit, place: int) -> Fit:
+    """The same without one process, not fitted again."""
+    keep = [i for i in range(len(old.terms)) if i != place]
+    if old.terms[place] in TIMED:
+        gone = len(old.terms) + old.timed.index(place)
+    else:
+        gone = -1
+    times = [i for i in range(len(old.terms), len(old.x)) if i != gone]
+    return replace(
+        old, terms=tuple(old.terms[i] for i in keep), x=old.x[[*keep, *times]]
+    )
+
+
+def _pair(spectrum: Spectrum, powers: Powers, best: Fit) -> Fit | None:
+    """Two processes more, of which neither may help alone."""
+    new = [t for t in ("K", "B") if t not in best.terms and t + "T" not in best.terms]
+    if len(new) < 2:
+        return None
+    one = _with(spectrum, powers, best, new[0])
+    return one and _with(spectrum, powers, one, new[1])
+
+
+def _better(more: Fit, less: Fit) -> bool:
+    """Whether held-out coefficients say so by more than the gain is uncertain.
+
+    Twice the gain in likelihood is noncentral chi squared: its standard error is twice
+    its root.
+    """
+    gain = float((more.scores - less.scores).sum())
+    likely = max(more.log_likelihood - less.log_likelihood, 0.0)
+    return bool(gain > np.sqrt(2 * likely))
+
+
+def _without_filter(spectrum: Spectrum, powers: Powers) -> Powers:
+    """With the bins above a corner left to themselves, if that predicts better."""
+    top = spectrum.frequency.max()
+    best, chosen = rich(spectrum, powers), powers
+    corner = top / 2
+    while corner >= FILTERED_HZ:
+        free = powers.free | (spectrum.frequency > corner)
+        tried = replace(powers, free=free)
+        found = rich(spectrum, tried)
+        if _better(found, best):
+            best, chosen = found, tried
+        corner /= 2
+    return _without_lines(spectrum, chosen, best)
+
+
+def _without_lines(spectrum: Spectrum, powers: Powers, rich: Fit) -> Powers:
+    """Bins above 1 Hz in which something hums, left to themselves."""
+    excess = _excess(powers, rich)
+    usual = 1.4826 * np.median(np.abs(excess[~powers.free]))
+    odd = (excess > 6 * max(1.0, usual)) & (spectrum.frequency > FILTERED_HZ)
+    return replace(powers, free=powers.free | odd)
+
+
+def rich(spectrum: Spectrum, powers: Powers) -> Fit:
+    """A fit of all processes without a correlation time that are there."""
+    used = ~powers.free
+    terms = list(RICH)
+    table = [spectrum.flicker()[0] if t == "B" else spectrum.fixed[t] for t in RICH]
+    columns = np.array(table)[:, used]
+    sizes = _multiplied(columns, powers.power[used].sum(axis=1),
+                        powers.count[used].sum(axis=1))  # fmt: skip
+    while len(terms) > 1:
+        if found := fit(spectrum, powers, tuple(terms), np.log(sizes)):
+            return found
+        # what has the least part in any bin goes first
+        parts = (sizes[:, None] * columns / (sizes @ columns)).max(axis=1)
+        gone = 1 + int(np.argmin(parts[1:]))
+        terms.pop(gone)
+        sizes, columns = np.delete(sizes, gone), np.delete(columns, gone, axis=0)
+    return _first(spectrum, powers)
+
+
+def _multiplied(columns: Array, power: Array, count: Array) -> Array:
+    """Variances (p,) near their most likely ones, by multiplication.
+
+    Each step raises the likelihood (Fevotte and Idier 2011, Itakura-Saito).
+    """
+    sizes: Array = (power.sum() / count.sum()) / (columns.max(axis=1) * len(columns))
+    for _ in range(MULTIPLIED):
+        level = sizes @ columns
+        sizes *= np.sqrt(columns @ (power / level**2) / (columns @ (count / level)))
+    least: Array = np.maximum(sizes, 1e-12 * sizes.max())
+    return least
+
+
+def _excess(powers: Powers, found: Fit) -> Array:
+    """By how many of its standard errors each bin is above the model, (b,)."""
+    count = powers.count.sum(axis=1)
+    ratio = powers.power.sum(axis=1) / np.maximum(count, 1e-300) / found.level
+    excess: Array = np.where(count > 0, (ratio - 1) * np.sqrt(count / 2), 0.0)
+    return excess
+
+
+def _dispersion(powers: Powers, found: Fit) -> float:
+    """Mean squared excess of the bins that the model explains, at least 1."""
+    some: Flags = ~powers.free & (powers.count.sum(axis=1) > 1)
+    freedom = int(some.sum()) - len(found.x)
+    if freedom < 1:
+        return 1.0
+    squares = float(np.sum(_excess(powers, found)[some] ** 2)) / freedom
+    # what chance alone reaches in one of forty
+    return squares if squares > 1 + 2 * np.sqrt(2 / freedom) else 1.0

@@ -1,0 +1,51 @@
+"""Variances of cosine coefficients beside those of dense covariances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from processes_apart import covariance
+from scipy.fft import dct
+
+from fieldcal.core.samples import Array
+from fieldcal.noise import cosine
+
+N, DT = 48, 0.1
+
+
+def dense(process: str, m: int, time: float = 1.0) -> Array:
+    """Variance of the coefficients of N means over m samples each."""
+    means = np.kron(np.eye(N), np.full((1, m), 1 / m))
+    to = dct(np.eye(N), norm="ortho", axis=0)[1:] @ means
+    return np.asarray(np.sum(to @ covariance(N * m, DT, process, time) * to, axis=1))
+
+
+@pytest.mark.parametrize("m", [1, 4, 8])
+def test_variances_are_those_of_the_covariance(m: int) -> None:
+    for process, of in (
+        ("N", cosine.white),
+        ("Q", cosine.quantisation),
+        ("K", cosine.walk),
+    ):
+        assert of(N, m, DT) == pytest.approx(dense(process, m), rel=1e-9)
+    for time in (0.01, 0.3, 5.0, 1e3):
+        found = cosine.markov(N, m, DT, time)
+        assert found == pytest.approx(dense("G", m, time), rel=1e-7)
+
+
+def test_a_mean_over_many_samples_is_summed_in_closed_form() -> None:
+    """Where samples are so many, their sum is an integral."""
+    m, time = 8192, 5.0  # a mean tells next to nothing of the following one
+    span = m * DT / time
+    continuous = 2 / span**2 * (span + np.expm1(-span))
+    found = cosine.markov(4, m, DT, time)
+    assert found == pytest.approx(continuous, rel=0.02)
+
+
+def test_white_noise_and_walk_are_independent_in_cosines() -> None:
+    to = dct(np.eye(N), norm="ortho", axis=0)[1:]
+    for process in ("N", "K"):
+        whole = to @ covariance(N, DT, process) @ to.T
+        size = np.sqrt(np.diag(whole))
+        rest = whole / np.outer(size, size) - np.eye(N - 1)
+        assert np.abs(rest).max() < 1e-10

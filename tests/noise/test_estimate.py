@@ -1,0 +1,190 @@
+"""Estimates beside the Cramer-Rao bound, and what must not disturb them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from processes_apart import bound, covariance, noise, recording
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
+from fieldcal.noise import estimate, reduced
+from fieldcal.noise.levels import Levels
+from fieldcal.noise.likelihood import Powers, fit
+from fieldcal.noise.spectrum import Spectrum
+
+DT = 0.1
+
+
+def fits(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
+    """Relative errors of the sizes, (c, p), and stated ones."""
+    levels = Levels(DT, values.shape[1], values.shape[1])
+    levels.add(values)
+    spectrum = Spectrum([levels.reduced()], values.shape[1])
+    start = 2 * np.log(list(sizes.values()))
+    errors, stated = [], []
+    for c in range(values.shape[1]):
+        one = np.ones(len(spectrum.last.bin))
+        power, count = spectrum.of(c, spectrum.last.values[:, c], one)
+        powers = Powers(power, count, np.zeros(len(power), dtype=bool))
+        if found := fit(spectrum, powers, tuple(sizes), start):
+            errors.append((found.x - start) / 2)
+            stated.append(np.sqrt(np.diag(found.covariance)) / 2)
+    assert len(errors) > 0.95 * values.shape[1]
+    return np.array(errors), np.array(stated)
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize(
+    "sizes",
+    [{"N": 1.0, "K": 1.0}, {"N": 1.0, "B": 1.0}, {"N": 1.0, "Q": 0.3}],
+    ids=["walk", "flicker", "quantisation"],
+)
+def test_estimates_are_as_good_as_any_can_be(sizes: dict[str, float]) -> None:
+    rng = np.random.default_rng(4)
+    whole = sum(s**2 * covariance(600, DT, p) for p, s in sizes.items())
+    values = np.linalg.cholesky(whole) @ rng.standard_normal((600, 100))
+    errors, stated = fits(values, sizes)
+    best = bound(600, DT, sizes)
+    # of 100, a root mean square is known to 7 %
+    assert np.sqrt(np.mean(errors**2, axis=0)) == pytest.approx(best, rel=0.2)
+    assert np.std(errors / stated, axis=0) == pytest.approx(1.0, abs=0.18)
+
+
+@pytest.mark.statistical
+def test_long_recordings_are_known_as_well_as_their_levels_allow() -> None:
+    """White noise of n samples is known to 1 / sqrt(2 n)."""
+    sizes = {"N": 1.0, "K": 0.05}
+    values = noise(np.random.default_rng(5), 60_000, DT, 40, **sizes)
+    errors, stated = fits(values, sizes)
+    assert stated[:, 0].mean() == pytest.approx(1 / np.sqrt(2 * 60_000), rel=0.25)
+    assert np.std(errors / stated, axis=0) == pytest.approx(1.0, abs=0.3)
+    assert np.abs(errors.mean(axis=0)) == pytest.approx(0, abs=0.06)
+
+
+@pytest.mark.statistical
+def test_processes_that_are_there_are_named_and_no_others() -> None:
+    rng = np.random.default_rng(6)
+    seen = []
+    for _ in range(4):
+        values = np.hstack(
+            [
+                noise(rng, 20_000, DT, 2, N=1.0),
+                noise(rng, 20_000, DT, 2, N=1.0, K=0.1),
+                noise(rng, 20_000, DT, 2, N=1.0, B=1.0),
+            ]
+        )
+        found = estimate([reduced([recording(values, DT)])]).channels
+        seen.append(["".join(sorted(c.processes)) for c in found.values()])
+    for pair, expected in ((0, "N"), (2, "KN"), (4, "BN")):
+        named = [row[i] == expected for row in seen for i in (pair, pair + 1)]
+        assert np.mean(named) >= 0.7, [row[pair] for row in seen]
+
+
+def test_a_slow_process_has_its_correlation_time() -> None:
+    values = noise(np.random.default_rng(7), 100_000, DT, 6, N=1.0, s=1.0, T=20.0)
+    found = estimate([reduced([recording(values, DT)])]).channels
+    times = [c.processes["G1"] for c in found.values() if "G1" in c.processes]
+    assert len(times) >= 4
+    for one in times:
+        assert abs(one.time - 20.0) < 3.5 * one.time_sigma
+        assert abs(one.value - 1.0) < 3.5 * one.sigma
+
+
+def test_everything_scales_with_the_unit() -> None:
+    values = noise(np.random.default_rng(8), 8000, DT, 6, N=1.0, K=0.2)
+    one = estimate([reduced([recording(values, DT)])]).channels["gz"]
+    other = estimate([reduced([recording(1e-6 * values + 3.0, DT)])]).channels["gz"]
+    assert one.processes.keys() == other.processes.keys()
+    for name, size in one.processes.items():
+        assert 1e-6 * size.value == pytest.approx(other.processes[name].value, rel=1e-4)
+
+
+def test_bumps_are_bridged_and_change_nothing() -> None:
+    rng = np.random.default_rng(9)
+    values = noise(rng, 40_000, 0.01, 6, N=1.0, K=0.05)
+    calm = estimate([reduced([recording(values, 0.01)])])
+    for at in range(2000, 40_000, 6000):
+        values[at : at + 60] += 80 * rng.standard_normal((60, 6))
+    bumped = estimate([reduced([recording(values, 0.01)])])
+    assert 0.005 < bumped.bridged < 0.1 and calm.bridged < 0.005
+    for name, channel in bumped.channels.items():
+        before = calm.channels[name].processes["N"]
+        assert abs(channel.processes["N"].value - before.value) < 6 * before.sigma
+        assert channel.processes["N"].value == pytest.approx(1.0, rel=0.05)
+
+
+def test_what_follows_the_temperature_is_taken_out() -> None:
+    rng = np.random.default_rng(10)
+    t = np.arange(30_000) * DT
+    warmth = 25 + 4 * np.sin(t / 300) + 0.02 * rng.standard_normal(len(t))
+    values = noise(rng, len(t), DT, 6, N=1.0)
+    values[:, 3:] += 0.2 * (warmth - 25)[:, None]
+    found = estimate([reduced([recording(values, DT, warmth)])]).channels
+    for name, channel in found.items():
+        if name[0] == "g":
+            assert channel.temperature is not None
+            value, sigma = channel.temperature
+            assert abs(value - 0.2) < 4 * sigma < 0.1
+            assert "K" not in channel.processes and "B" not in channel.processes
+        else:
+            assert channel.temperature is None
+
+
+def test_a_ramp_is_no_walk() -> None:
+    values = noise(np.random.default_rng(11), 30_000, DT, 6, N=1.0, R=1e-3)
+    for channel in estimate([reduced([recording(values, DT)])]).channels.values():
+        ramp = channel.processes["R"]
+        assert abs(ramp.value - 1e-3) < 4 * ramp.sigma
+        assert "K" not in channel.processes
+
+
+def test_a_filter_in_the_device_does_not_make_white_noise_smaller() -> None:
+    rng = np.random.default_rng(12)
+    dt = 0.005
+    white = noise(rng, 60_000, dt, 6, N=1.0)
+    filtered = np.apply_along_axis(
+        lambda x: np.convolve(x, np.ones(8) / 8, "same"), 0, white
+    )
+    for channel in estimate([reduced([recording(filtered, dt)])]).channels.values():
+        assert channel.processes["N"].value == pytest.approx(1.0, rel=0.08)
+        assert channel.filtered_hz < 60
+
+
+def test_several_sessions_tell_more_than_one() -> None:
+    rng = np.random.default_rng(13)
+    parts = [reduced([recording(noise(rng, 6000, DT, 6, N=1.0), DT)]) for _ in range(4)]
+    one, all_ = (estimate(p).channels["ax"].processes["N"] for p in (parts[:1], parts))
+    assert all_.sigma == pytest.approx(one.sigma / 2, rel=0.1)
+
+
+def test_a_gap_begins_another_stretch_and_a_turn_too() -> None:
+    values = noise(np.random.default_rng(14), 9000, DT, 6, N=1.0)
+    values[6000:, 1] += 500.0  # turned
+    block = recording(values, DT)
+    block.t[3000:] += 60.0
+    found = reduced([block[:100], block[100:5000], block[5000:]])
+    assert [s.samples for s in found.stretches] == pytest.approx(
+        [3000, 3000, 3000], abs=20
+    )
+    for channel in estimate([found]).channels.values():
+        assert channel.processes["N"].value == pytest.approx(1.0, rel=0.08)
+
+
+def test_what_is_missing_is_not_a_channel() -> None:
+    values = noise(np.random.default_rng(15), 4000, DT, 6, N=1.0)
+    values[:, 2] = 9.81  # stuck
+    values[::7, 0] = np.nan
+    values[:, 4] = np.nan
+    found = estimate([reduced([recording(values, DT)])])
+    assert list(found.channels) == ["ax", "ay", "gx", "gz"]
+
+
+def test_too_short_a_recording_is_refused_with_what_to_do() -> None:
+    values = noise(np.random.default_rng(16), 200, DT, 6, N=1.0)
+    with pytest.raises(InputError, match=r"lasts 20 s: record 30 s at least"):
+        estimate([reduced([recording(values, DT)])])
+    with pytest.raises(InputError, match="lasts 0 s"):
+        estimate([reduced([])])
+    with pytest.raises(InputError, match="none of ax"):
+        estimate([reduced([recording(np.zeros((900, 6)), DT)])])

@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fieldcal.core.errors import InputError
+
 if TYPE_CHECKING:
     from fieldcal.diagnosis import Diagnosis
     from fieldcal.diagnosis.explain import Explanation
@@ -23,6 +25,7 @@ EXAMPLE = """\
   fieldcal diagnose bench-7/2026-03-01 --json > diagnosis.json
   fieldcal diagnose bench-7/2026-03-01 --twin bench-7.toml
   fieldcal sim --profile bench-7.toml
+  fieldcal diagnose bench-7/2026-03-01 --against simulated.csv
 """
 
 DIAGNOSIS = "diagnosis.json"
@@ -42,10 +45,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the virtual device with everything that was found, for fieldcal sim"
         " --profile FILE, and replay the session on it",
     )
+    add(
+        "--against",
+        metavar="SIM",
+        help="say what differs from a simulator's output: a session folder, or a file"
+        " that import reads, of the same positions",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command: 0 consistent, 1 something is left out or unexplained."""
+    if args.against:
+        from fieldcal.commands import against
+
+        if args.twin:
+            raise InputError("name --twin or --against: each is an answer of its own")
+        return against.run(args)
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare
     from fieldcal.diagnosis.verdict import concluded

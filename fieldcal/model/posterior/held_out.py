@@ -96,6 +96,27 @@ class HeldOut:
             total += whole.score - there.score
         return total
 
+    def squares(self, one: Set) -> tuple[float, int]:
+        """Whitened squares of each part as the others predict it, and their number.
+
+        The prediction's own uncertainty is counted,
+
+            chi^2 = Q(all) - Q(others),   Q = (y - h)^T R^-1 (y - h) - b^T u
+
+        with u the estimate and b = Phi^T R^-1 (y - h); (nan, 0) where none can be.
+        """
+        d, total = self.dictionary, 0.0
+        every = gram(self.linear, d, self.fitted.values, (), self.columns)
+        for i in np.unique(self.fold):
+            if not self.fold.max() or (search := self._without(int(i))) is None:
+                return float("nan"), 0
+            rest = search.evaluated(one.members, one.sizes)
+            tau = priors.SIZES[list(rest.sizes.instability)] * search.unstable
+            there = rest.state
+            whole = Eliminated.of(every.weighed(tau), there.columns, there.sizes)
+            total += _left(whole) - _left(there)
+        return total, sum(len(part.white) for part in self.linear)
+
     def _without(self, i: int) -> Search | None:
         """What the rows say without a part; None where a channel has no others."""
         if i not in self._rest:
@@ -155,6 +176,12 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
         ):
             out[part] = i % FOLDS
     return out
+
+
+def _left(there: Eliminated) -> float:
+    """Q: squares that the estimate leaves, what it takes of its prior counted."""
+    pull = there.rows.pull(there.columns)
+    return there.rows.square - float(pull @ there.estimate)
 
 
 def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:

@@ -145,6 +145,21 @@ def test_how_likely_each_position_is_given_the_others(keys: tuple[str, ...]) -> 
     assert found == pytest.approx(expected, rel=1e-8)
 
 
+def test_squares_of_what_is_predicted_count_what_the_prediction_does_not_know() -> None:
+    one, expected = refit(("cross_coupling",)), 0.0
+    state, dense = one.fitted.set.state, one.dense
+    total = dense.total(state.columns, state.sizes)
+    for p in range(len(LADDER)):
+        left = np.repeat(one.dictionary.x.position == p, 6)
+        across = total[np.ix_(left, ~left)]
+        told = np.linalg.solve(total[np.ix_(~left, ~left)], across.T)
+        off = dense.y[left] - told.T @ dense.y[~left]
+        cov = total[np.ix_(left, left)] - across @ told
+        expected += float(off @ np.linalg.solve(cov, off))
+    found, count = HeldOut(one.fitted, [one.fitted.set]).squares(one.fitted.set)
+    assert found == pytest.approx(expected, rel=1e-6) and count == 6 * ROWS
+
+
 @pytest.mark.parametrize("free", [(), (3, 4)], ids=["misset", "loose"])
 def test_a_positions_own_angles_are_sought_in_it(free: tuple[int, ...]) -> None:
     """Those it was set at, or those that nobody knows; nothing else is."""

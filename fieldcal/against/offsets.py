@@ -1,0 +1,124 @@
+"""Differences in what every device has: bias, scale factor, the Earth's rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fieldcal.against.causes import Decided
+from fieldcal.against.joint import differs
+from fieldcal.against.result import Difference, Pair
+from fieldcal.against.widened import Widened
+from fieldcal.core.samples import CHANNELS, Array, Index
+from fieldcal.diagnosis.findings.calibrated import GROUPS
+from fieldcal.diagnosis.result import Mismatch, Quantity
+from fieldcal.model import thresholds
+from fieldcal.model.causes.cause import Group
+
+DETERMINED = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
+"""Sigma from which a difference counts as not determined, m/s^2, rad/s, 1."""
+
+
+def differences(found: Decided) -> Iterator[Difference]:
+    """Groups of the calibration in which the two differ."""
+    for name, axes in shared_axes(found.real, found.sim):
+        yield from _difference(found, name, axes)
+
+
+def shared_axes(one: Widened, two: Widened) -> Iterator[tuple[str, Index]]:
+    """Groups of a calibration, with the channels that two sessions both have."""
+    for name in GROUPS:
+        groups = [_group(w, name) for w in (one, two)]
+        axes = [_axes(w, g) for w, g in zip((one, two), groups, strict=True) if g]
+        if len(axes) == len(groups) and len(both := np.intersect1d(axes[0], axes[1])):
+            yield name, both
+
+
+def calibration(there: Widened, name: str, axes: Index) -> tuple[Array, Array, Array]:
+    """A group of one session's calibration.
+
+    Parameters
+    ----------
+    there : the session
+    name : acc_bias, acc_scale, gyr_bias or gyr_scale
+    axes : (k,) channels
+
+    Returns
+    -------
+    values (k,) and covariance (k, k), m/s^2, rad/s or 1, and typical sizes (k,)
+
+    """
+    d, nominal = there.inference.dictionary, there.inference.nominal
+    first, base = (
+        (d.bias, nominal.bias) if name.endswith("bias") else (d.scale, nominal.scale)
+    )
+    group = _group(there, name)
+    if group is None:
+        raise KeyError(name)
+    values, covariance = there.estimate(first + axes)
+    typical = group.typical[np.isin(group.columns, first + axes)]
+    return base[axes] + values, covariance, typical
+
+
+def _group(there: Widened, name: str) -> Group | None:
+    part, _, cause = name.partition("_")
+    always = there.inference.dictionary.always
+    return next((g for g in always if g.cause == cause and g.part == part), None)
+
+
+def _axes(there: Widened, group: Group) -> Index:
+    d = there.inference.dictionary
+    return group.columns - (d.bias if group.cause == "bias" else d.scale)
+
+
+def _difference(found: Decided, name: str, axes: Index) -> Iterator[Difference]:
+    (one, cov, typical), (two, more, _) = (
+        calibration(w, name, axes) for w in (found.real, found.sim)
+    )
+    sigma = np.sqrt(np.diag(cov + more))
+    known = np.flatnonzero(sigma < DETERMINED[name])
+    if not len(known):
+        return
+    inner = np.ix_(known, known)
+    probability = differs((one - two)[known], (cov + more)[inner], typical[known])
+    if probability < thresholds.NAMED:
+        return
+    unit, parameters = GROUPS[name], dict[str, Pair]()
+    for i in known.tolist():
+        parameters["xyz"[axes[i] % 3]] = Pair(
+            Quantity(float(one[i]), float(np.sqrt(cov[i, i])), unit),
+            Quantity(float(two[i]), float(np.sqrt(more[i, i])), unit),
+            Quantity(float(one[i] - two[i]), float(sigma[i]), unit),
+        )
+    where = tuple(
+        _everywhere(
+            found,
+            name.endswith("scale"),
+            CHANNELS[axes[i]],
+            float(one[i] - two[i]),
+            float(sigma[i]),
+        )
+        for i in known
+        if abs(one[i] - two[i]) > thresholds.STANDS_OUT * sigma[i]
+    )
+    yield Difference(name, "resized", probability, parameters, where=where)
+
+
+def _everywhere(
+    found: Decided, scale: bool, channel: str, off: float, sigma: float
+) -> Mismatch:
+    """A difference in all of a recording."""
+    explanation = found.pairing.real.explanation
+    about, span = explanation.prepared.source.about, explanation.rows.span
+    held = explanation.dictionary.held.tolist()
+    return Mismatch(
+        channel=channel,
+        kind="position",
+        positions=tuple(sorted(about.numbered(held))),
+        from_s=float(span[0, 0]),
+        to_s=float(span[-1, 1]),
+        covariate="specific force" if scale else "",
+        rms=abs(off),
+        sigma=abs(off) / sigma,
+    )

@@ -1,0 +1,107 @@
+"""How a simulator predicts a recording, as it is and with what was found.
+
+As it is, its calibration and effects are put in the place of the recording's, with
+their covariance C; nothing of the recording is fitted, but an orientation that nobody
+knows. With y - h - Phi u = r at the simulator's values and G = Phi^T R^-1 Phi,
+
+    chi^2 = r^T (R + Phi C Phi^T)^-1 r
+          = r^T R^-1 r - b^T L (1 + L^T G L)^-1 L^T b,   b = Phi^T R^-1 r, C = L L^T (1)
+
+With what was found, each position is left out and predicted from the others
+(`HeldOut`): so a simulator does that was patched by the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.against.causes import Decided
+from fieldcal.against.offsets import shared_axes
+from fieldcal.against.result import Prediction
+from fieldcal.against.side import Side
+from fieldcal.against.widened import Widened
+from fieldcal.core.samples import Array, Index
+from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.model import priors
+from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.system.fitted import Fitted, whole
+from fieldcal.model.system.linear_system import gram
+
+
+def before(found: Decided) -> Prediction:
+    """The recording as the simulator is."""
+    real = found.pairing.asked[0]
+    rows = found.pairing.real.explanation.rows
+    columns, values, covariance = _as_the_simulator(found)
+    fitted = Fitted(rows, real.inference.dictionary, real.linear, real.values, real.set)
+    state = replace(real.set.state, columns=columns, estimate=values)
+    residual = fitted.residual(whole(state, real.inference.dictionary))
+    squares = _squares(real, columns, values, covariance)
+    return _prediction(rows, residual, squares, sum(len(p.white) for p in real.linear))
+
+
+def after(real: Side) -> Prediction:
+    """The recording, each part as the others predict it."""
+    explanation = real.explanation
+    ahead = explanation.held_out.residual(explanation.in_question)
+    squares, count = explanation.held_out.squares(explanation.best.set)
+    return _prediction(explanation.rows, ahead, squares, count)
+
+
+def _prediction(rows: Rows, residual: Array, squares: float, count: int) -> Prediction:
+    sizes = rms(rows, residual)
+    acc, gyr = (_mean(sizes[part]) for part in (slice(0, 3), slice(3, 6)))
+    return Prediction(acc, gyr, squares / count if count else np.nan)
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+def _as_the_simulator(found: Decided) -> tuple[Index, Array, Array]:
+    """Columns of the recording's dictionary, with what the simulator has there."""
+    real, sim = found.pairing.asked[0], found.sim
+    columns, base, theirs = [], [], []
+    for name, axes in shared_axes(real, sim):
+        first = "bias" if name.endswith("bias") else "scale"
+        here, there = (getattr(w.inference.dictionary, first) for w in (real, sim))
+        nominal = [getattr(w.inference.nominal, first) for w in (real, sim)]
+        columns += (here + axes).tolist()
+        theirs += (there + axes).tolist()
+        base += (nominal[1][axes] - nominal[0][axes]).tolist()
+    earth = [w.inference.dictionary.earth for w in (real, sim)]
+    if min(earth) >= 0:
+        columns += list(range(earth[0], earth[0] + 3))
+        theirs += list(range(earth[1], earth[1] + 3))
+        base += [0.0] * 3
+    for cause, group in sim.set.members:
+        ours = real.member(cause.key)
+        if ours is None or not group.in_state or group.position >= 0:
+            continue
+        for j, at in zip(group.params, group.columns.tolist(), strict=True):
+            if j in ours[1].params:
+                columns.append(int(ours[1].columns[ours[1].params.index(j)]))
+                theirs.append(at)
+                base.append(0.0)
+    values, covariance = sim.estimate(np.array(theirs, dtype=np.intp))
+    return np.array(columns, dtype=np.intp), values + np.array(base), covariance
+
+
+def _squares(real: Widened, columns: Index, values: Array, covariance: Array) -> float:
+    """Squares of what is predicted, windows alone, (1)."""
+    d = real.inference.dictionary
+    some = np.flatnonzero(real.inference.wanted(real.set.members) | (real.values != 0))
+    rows = gram(real.linear, d, real.values, (), some)
+    tau = priors.SIZES[list(real.set.sizes.instability)] * real.search.unstable
+    weighed = rows.weighed(tau)
+    inner, pull = weighed.matrix(columns, columns), weighed.pull(columns)
+    left = weighed.square - 2 * values @ pull + values @ inner @ values
+    sigma = np.sqrt(np.diag(covariance))
+    power, axes = np.linalg.eigh(covariance / sigma / sigma[:, None])
+    root = sigma[:, None] * axes * np.sqrt(np.maximum(power, 0.0))  # L of (1)
+    rest = root.T @ (pull - inner @ values)
+    taken = np.linalg.solve(np.eye(len(rest)) + root.T @ inner @ root, rest)
+    return float(left - rest @ taken)

@@ -1,0 +1,172 @@
+"""What a comparison says: the content of against.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from fieldcal.diagnosis.result import Mismatch, Quantity, Verdict, number
+
+Direction = Literal["left_out", "added", "resized"]
+"""What the recording has alone, what the simulator has alone, what both have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """One quantity in the recording and in the simulator; None where it is not.
+
+    `difference` is recording less simulator, with the uncertainty of both.
+    """
+
+    real: Quantity | None
+    simulator: Quantity | None
+    difference: Quantity
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of against.json."""
+        return {
+            "real": None if self.real is None else self.real.to_json(),
+            "simulator": None if self.simulator is None else self.simulator.to_json(),
+            "difference": self.difference.to_json(),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One thing in which the two differ.
+
+    Attributes
+    ----------
+    id : an effect of the catalogue, a group of the calibration, "noise", or what an
+        unexplained mismatch follows
+    direction : who has it
+    probability : that they differ in it
+    parameters : by name
+    aliases : effects that may stand in its place
+    where : channel, positions, time and what it follows, in the one that has it
+    shown : whether the other recording could have shown it
+    explained : whether it is physics that has a name
+
+    """
+
+    id: str
+    direction: Direction
+    probability: float
+    parameters: Mapping[str, Pair]
+    aliases: tuple[str, ...] = ()
+    where: tuple[Mismatch, ...] = ()
+    shown: bool = True
+    explained: bool = True
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of against.json."""
+        return {
+            "id": self.id,
+            "direction": self.direction,
+            "probability": number(self.probability),
+            "parameters": {n: p.to_json() for n, p in self.parameters.items()},
+            "aliases": list(self.aliases),
+            "where": [m.to_json() for m in self.where],
+            "shown": self.shown,
+            "explained": self.explained,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """How a simulator predicts a recording that it was not fitted to.
+
+    Attributes
+    ----------
+    rms_acc, rms_gyr : over parts of windows, m/s^2 and rad/s; nan where none
+    chi2_per_dof : of what was predicted, its uncertainty counted
+
+    """
+
+    rms_acc: float
+    rms_gyr: float
+    chi2_per_dof: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of against.json."""
+        return {name: number(value) for name, value in asdict(self).items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a recording is made of.
+
+    Attributes
+    ----------
+    rate_hz : samples a second
+    step_acc, step_gyr : least change of an output, m/s^2 and rad/s; nan where none
+    start_c : temperature at the start, deg C; nan where unknown
+    noise : by channel, from sample to sample at rest, m/s^2 and rad/s
+
+    """
+
+    rate_hz: float
+    step_acc: float
+    step_gyr: float
+    start_c: float
+    noise: Mapping[str, Quantity]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of against.json."""
+        return {
+            "rate_hz": number(self.rate_hz),
+            "step_acc": number(self.step_acc),
+            "step_gyr": number(self.step_gyr),
+            "start_c": number(self.start_c),
+            "noise": {n: q.to_json() for n, q in self.noise.items()},
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """A recording held against a simulator's.
+
+    Attributes
+    ----------
+    verdict : consistent, left_out, ambiguous or unexplained
+    probability : that the verdict is right
+    differences : what differs, the surest first
+    alike : ids of what both have to the same size
+    before, after : how the simulator predicts the recording as it is, and with what was
+        found, each position left out of everything that is known of it
+    real, simulator : what each recording is made of
+    warnings : what limits the comparison
+    says : a paragraph for a person
+
+    """
+
+    verdict: Verdict
+    probability: float
+    differences: tuple[Difference, ...]
+    alike: tuple[str, ...]
+    before: Prediction
+    after: Prediction
+    real: Facts
+    simulator: Facts
+    warnings: tuple[str, ...]
+    says: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of against.json."""
+        return {
+            "verdict": self.verdict,
+            "probability": number(self.probability),
+            "differences": [d.to_json() for d in self.differences],
+            "alike": list(self.alike),
+            "prediction": {
+                "before": self.before.to_json(),
+                "after": self.after.to_json(),
+            },
+            "recordings": {
+                "real": self.real.to_json(),
+                "simulator": self.simulator.to_json(),
+            },
+            "warnings": list(self.warnings),
+            "says": self.says,
+        }

@@ -1,0 +1,139 @@
+"""One of two recordings that are held against each other: samples, and what is in them.
+
+What a session says under [model] is of another simulation than the one it is compared
+with, so it counts for nothing here. Outputs without noise, as simulators have them, are
+given white noise of a part of the other recording's: repeated values are no proof of a
+fault there, and nothing is known better than the other recording can tell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.diagnosis import Diagnosis
+from fieldcal.diagnosis.explain import Explanation, explain
+from fieldcal.diagnosis.prepare import Prepared, prepare
+from fieldcal.diagnosis.verdict import concluded
+from fieldcal.model.rows.reduce import rate_of, spans
+from fieldcal.physics.recording import lsb_of
+from fieldcal.session.description import Description
+from fieldcal.windows.noise import short_lag
+
+PART = 0.1
+"""Least noise of a simulator's output, in that of the recording's: it adds a hundredth
+to the variance of a difference."""
+
+SEED = 1
+"""Of the noise that is added, so that the same files give the same answer."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """A recording with what was found in it.
+
+    Attributes
+    ----------
+    name : as the user calls it
+    block : its samples as they came
+    explanation, diagnosis : of the samples
+    noise, unsure : (6,) standard deviation from one sample to the next while at rest,
+        and the uncertainty of its logarithm
+    steps : (6,) step of the grid that outputs lie on, 0 where they lie on none
+    rate_hz : samples a second
+    quieted : channels to which noise was added
+
+    """
+
+    name: str
+    block: Block
+    explanation: Explanation
+    diagnosis: Diagnosis
+    noise: Array
+    unsure: Array
+    steps: Array
+    rate_hz: float
+    quieted: tuple[int, ...] = ()
+
+    @property
+    def start(self) -> float:
+        """First instant of the first window, s of device time."""
+        return float(self.explanation.rows.span[0, 0])
+
+
+def side(
+    name: str, block: Block, about: Description, beside: Side | None = None
+) -> Side:
+    """Diagnose a recording; a simulator's `beside` the recording that it is to be like.
+
+    Raises
+    ------
+    InputError
+        If nothing in it can be used.
+
+    """
+    about = replace(about, model={})
+    heard, quieted = block, tuple[int, ...]()
+    noise, unsure = noise_of(block, about)
+    if beside is not None:
+        heard, quieted = _audible(block, noise, beside.noise)
+    prepared = prepare(heard, about)
+    if beside is not None:
+        prepared = _from_one_temperature(prepared, beside.explanation.prepared)
+    explanation = explain(prepared)
+    found = concluded(heard, explanation)
+    steps = np.array([lsb_of(column) for column in block.six.T])
+    return Side(
+        name, block, explanation, found, noise, unsure, steps, rate_of(block), quieted
+    )
+
+
+def _from_one_temperature(prepared: Prepared, other: Prepared) -> Prepared:
+    """A recording whose biases are those at the temperature another one started at."""
+    warmth, start = prepared.source.warmth, other.source.warmth.start_c
+    ahead = warmth.start_c - start
+    if not np.isfinite(ahead):
+        return prepared
+    warmth = replace(warmth, warming=warmth.warming + ahead, start_c=start)
+    rows = prepared.rows
+    warmer = replace(rows, x=replace(rows.x, warming=rows.x.warming + ahead))
+    return replace(
+        prepared, source=replace(prepared.source, warmth=warmth), rows=warmer
+    )
+
+
+def noise_of(block: Block, about: Description) -> tuple[Array, Array]:
+    """Noise from sample to sample in windows, (6,), and its relative uncertainty.
+
+    Differences of white noise tell its deviation to sqrt(3 / (4 n)); where windows
+    disagree by more, to that.
+    """
+    levels, counts = [], []
+    for first, last in spans(block, about):
+        piece = block[slice(int(first), int(last))].six
+        if len(piece) > 1:
+            levels.append(short_lag(piece))
+            counts.append(np.isfinite(piece).sum(axis=0))
+    if not levels:
+        return np.full(6, np.nan), np.full(6, np.nan)
+    square, many = np.array(levels) ** 2, np.maximum(np.array(counts), 1)
+    weight = np.where(np.isfinite(square), many, 0)
+    total = np.maximum(weight.sum(axis=0), 1)
+    mean = (weight * np.nan_to_num(square)).sum(axis=0) / total
+    mean = np.where(weight.any(axis=0), mean, np.nan)
+    off = np.where(mean > 0, np.nan_to_num(square) / np.where(mean > 0, mean, 1) - 1, 0)
+    among = np.sqrt((weight**2 * off**2).sum(axis=0)) / total / 2
+    return np.sqrt(mean), np.maximum(among, np.sqrt(0.75 / total))
+
+
+def _audible(
+    block: Block, noise: Array, wanted: Array
+) -> tuple[Block, tuple[int, ...]]:
+    """A block in which no channel is much quieter than is wanted."""
+    rng, six = np.random.default_rng(SEED), block.six.copy()
+    quiet = np.flatnonzero(np.nan_to_num(noise, nan=np.inf) < PART * wanted)
+    for c in quiet:
+        six[:, c] += PART * wanted[c] * rng.standard_normal(len(six))
+    return replace(block, acc=six[:, :3], gyr=six[:, 3:]), tuple(quiet.tolist())

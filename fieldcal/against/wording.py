@@ -1,0 +1,135 @@
+"""What a comparison says, in sentences and in lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from fieldcal.against.result import Difference, Direction, Pair, Prediction
+from fieldcal.calibration.wording import pretty
+from fieldcal.diagnosis.result import Quantity, Verdict
+from fieldcal.diagnosis.wording.lines import pretty_quantity
+from fieldcal.diagnosis.wording.paragraph import with_uncertainty
+
+SHOWN = 3.0
+"""Standard deviations from which a sentence names a parameter."""
+
+LEADS: Mapping[Direction, str] = {
+    "left_out": "The simulator leaves out",
+    "added": "The simulator adds",
+    "resized": "Both have, but not alike:",
+}
+
+SHORT: Mapping[Direction, str] = {
+    "left_out": "left out", "added": "added", "resized": "another size",
+}  # fmt: skip
+
+
+def paragraph(
+    verdict: Verdict,
+    differences: Sequence[Difference],
+    predicted: tuple[Prediction, Prediction],
+) -> str:
+    """Say verdict, differences and what they do to the prediction."""
+    if verdict == "consistent":
+        return (
+            "Recording and simulator agree: the simulator predicts the recording with"
+            f" χ²/dof {predicted[0].chi2_per_dof:.2f}, and nothing differs that these"
+            " recordings can show."
+        )
+    out = []
+    for direction, lead in LEADS.items():
+        some = [d for d in differences if d.direction == direction]
+        if some:
+            out.append(f"{lead} {'; '.join(map(named, some))}.")
+    unseen = [d.id for d in differences if not d.shown]
+    if unseen:
+        out.append(
+            f"The other recording could not have shown {', '.join(unseen)}: whether it"
+            " is there as well is not known."
+        )
+    return " ".join([*out, _predicted(*predicted)])
+
+
+def _predicted(before: Prediction, after: Prediction) -> str:
+    said = []
+    for one, two, unit in (
+        (before.rms_acc, after.rms_acc, "m/s^2"),
+        (before.rms_gyr, after.rms_gyr, "rad/s"),
+    ):
+        if one == one and two == two:
+            said.append(f"{one:.2g} to {two:.2g} {unit}")
+    return (
+        "Positions that it was not fitted to are predicted with what was found: the rms"
+        f" goes from {' and from '.join(said)}, χ²/dof from"
+        f" {before.chi2_per_dof:.3g} to {after.chi2_per_dof:.3g}."
+    )
+
+
+def named(one: Difference) -> str:
+    """A difference with the parameters that stand out."""
+    told = []
+    for name, pair in one.parameters.items():
+        off = pair.difference
+        if isinstance(off.value, str):
+            told.append(f"{name} {off.value}")
+        elif not off.sigma or abs(off.value) > SHOWN * off.sigma:
+            told.append(_said(name, one.direction, pair))
+    name = one.id.replace("_", " ")
+    others = (
+        f", or {' or '.join(a.replace('_', ' ') for a in one.aliases)}"
+        if one.aliases
+        else ""
+    )
+    return f"{name} ({', '.join(told)}){others}" if told else f"{name}{others}"
+
+
+def _said(name: str, direction: Direction, pair: Pair) -> str:
+    """A parameter in words: what is there alone, or by how much it differs."""
+    alone = pair.simulator if direction == "added" else pair.real
+    if direction != "resized" and alone is not None:
+        return f"{name} = {with_uncertainty(alone)}"
+    return f"{name} by {signed(pair.difference)}"
+
+
+def signed(quantity: Quantity) -> str:
+    """A difference with its sign and uncertainty."""
+    text = with_uncertainty(quantity)
+    plus = not isinstance(quantity.value, str) and quantity.value >= 0
+    return f"+{text}" if plus else text
+
+
+def line(one: Difference) -> tuple[str, str, str, str]:
+    """What, how big in each, and the difference, for one row of a table."""
+    told = {
+        n: p
+        for n, p in one.parameters.items()
+        if not isinstance(p.difference.value, str)
+    }
+    what = one.id.replace("_", " ")
+    if one.aliases:
+        what += f", or {' or '.join(a.replace('_', ' ') for a in one.aliases)}"
+    if not told:
+        return what, SHORT[one.direction], "", ""
+    name = max(told, key=lambda n: _clear(told[n].difference))
+    pair, more = (
+        told[name],
+        sum(_clear(p.difference) > SHOWN for p in told.values()) - 1,
+    )
+    also = f" (+{more})" if more > 0 else ""
+    sizes = "real " + _shown(pair.real) + ", simulator " + _shown(pair.simulator)
+    return (
+        what,
+        SHORT[one.direction],
+        f"{name}: {sizes}{also}",
+        pretty(signed(pair.difference)),
+    )
+
+
+def _shown(quantity: Quantity | None) -> str:
+    return "none" if quantity is None else pretty_quantity(quantity)
+
+
+def _clear(quantity: Quantity) -> float:
+    if isinstance(quantity.value, str) or not quantity.sigma:
+        return 0.0
+    return abs(quantity.value) / quantity.sigma

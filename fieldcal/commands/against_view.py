@@ -1,0 +1,109 @@
+"""A comparison with a simulator as a person at a terminal reads it."""
+
+from __future__ import annotations
+
+from typing import IO
+
+from fieldcal.against.result import Match
+from fieldcal.against.wording import line
+from fieldcal.calibration.wording import position_numbers, pretty
+from fieldcal.commands.diagnosis_view import STYLES
+from fieldcal.diagnosis.findings.agreement import UNITS
+from fieldcal.diagnosis.wording.lines import format_probability
+
+
+def show(
+    found: Match,
+    out: IO[str] | None = None,
+    details: bool = False,
+    width: int | None = None,
+) -> None:
+    """Print verdict, differences and prediction; where each shows, if `details`.
+
+    `width` is that of the terminal unless it is said.
+    """
+    from rich.text import Text
+
+    from fieldcal.commands.console import ShownConsole
+
+    console = ShownConsole(file=out, width=width)
+    head = Text(found.verdict.replace("_", " ").upper(), style=STYLES[found.verdict])
+    sure = format_probability(found.probability)
+    console.print(head + Text(f"  probability {sure}"))
+    if found.differences:
+        console.print(_lines(found))
+    else:
+        console.print(found.says, markup=False)
+    console.print(_prediction(found))
+    if details:
+        if found.differences:
+            console.print(f"\n{found.says}", markup=False)
+            console.print(_places(found))
+        console.print(_recordings(found))
+
+
+def _lines(found: Match) -> object:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, expand=True)
+    for name, ratio in (("what", 4), ("simulator has it", 3), ("how big", 7)):
+        table.add_column(name, ratio=ratio)
+    table.add_column("real − simulator", ratio=4)
+    table.add_column("how sure", no_wrap=True)
+    for one in found.differences:
+        cells = (*line(one), format_probability(one.probability))
+        table.add_row(*map(Text, cells))
+    return table
+
+
+def _prediction(found: Match) -> object:
+    from rich.table import Table
+
+    table = Table(title="What was not fitted, predicted", title_justify="left")
+    names = ("", *(f"rms {pretty(unit)}" for unit in UNITS), "χ²/dof")
+    for name in names:
+        table.add_column(name, justify="right" if name else "left")
+    for label, one in (("simulator", found.before), ("patched", found.after)):
+        sizes = [f"{v:.2g}" if v == v else "–" for v in (one.rms_acc, one.rms_gyr)]
+        table.add_row(label, *sizes, f"{one.chi2_per_dof:.3g}")
+    return table
+
+
+def _places(found: Match) -> object:
+    from rich.table import Table
+
+    table = Table(title="Where it shows", title_justify="left")
+    for name in ("what", "channel", "follows", "positions", "time, s", "σ"):
+        table.add_column(name)
+    for one in found.differences:
+        for m in one.where:
+            follows = (
+                m.kind if m.covariate in (m.kind, "") else f"{m.kind}: {m.covariate}"
+            )
+            span = f"{m.from_s:.0f}–{m.to_s:.0f}"
+            places = position_numbers(m.positions)
+            table.add_row(one.id, m.channel, follows, places, span, f"{m.sigma:.0f}")
+    return table
+
+
+def _recordings(found: Match) -> object:
+    from rich.table import Table
+
+    table = Table(title="Recordings", title_justify="left")
+    for name in ("", "real", "simulator"):
+        table.add_column(name, justify="right" if name else "left")
+    both = (found.real, found.simulator)
+    table.add_row("rate, Hz", *(f"{one.rate_hz:.4g}" for one in both))
+    for name, unit in zip(("step_acc", "step_gyr"), UNITS, strict=True):
+        steps = [getattr(one, name) for one in both]
+        shown = [f"{s:.3g}" if s == s else "none" for s in steps]
+        table.add_row(f"step, {pretty(unit)}", *shown)
+    for channel in found.real.noise:
+        cells = []
+        for one in both:
+            q = one.noise.get(channel)
+            cells.append("–" if q is None else f"{q.value:.3g} ± {q.sigma:.1g}")
+        table.add_row(f"noise {channel}", *cells)
+    return table

@@ -1,0 +1,103 @@
+"""A numpy simulator held against recordings of a device that has more, or less."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import strapdown
+
+from fieldcal.against import Match, matched
+from fieldcal.against.side import Side, side
+from fieldcal.core.samples import Array, Block
+from fieldcal.session import description
+
+DEVICE: dict[str, Any] = {
+    "bias": {"acc": [0.05, -0.03, 0.1], "gyr": [1e-3, -2e-3, 5e-4]},
+    "matrix": {"acc": [[1.004, 0, 0], [0.002, 0.997, 0], [0, 0, 1.001]]},
+    "noise": {"acc": [0.02] * 3, "gyr": [1e-3] * 3},
+}
+LATER = 40.0
+"""By how much later the simulator begins, s."""
+
+
+def played(device: dict[str, Any], seed: int, later: float = 0.0) -> tuple[Any, Any]:
+    """Samples and description of what the numpy simulator makes."""
+    table = strapdown.outputs({**device, "seed": seed})
+    unknown = np.full(len(table), np.nan)
+    block = Block.of(
+        table[:, 0] + later, table[:, 1:4], table[:, 4:7], unknown, unknown, unknown
+    )
+    about = description.parse(
+        {
+            "format": 1,
+            "site": {"gravity": strapdown.GRAVITY},
+            "position": strapdown.schedule(3.0 + later),
+        }
+    )
+    return block, about
+
+
+@pytest.fixture(scope="module")
+def real() -> Side:
+    return side("real", *played(DEVICE, 1))
+
+
+def against(real: Side, device: dict[str, Any], seed: int = 2) -> Match:
+    return matched(real, side("simulator", *played(device, seed, LATER), real))
+
+
+def value(found: Match, name: str, parameter: str) -> tuple[float, float]:
+    one = next(d for d in found.differences if d.id == name)
+    off = one.parameters[parameter].difference
+    assert off.sigma is not None
+    return float(off.value), off.sigma
+
+
+def test_a_simulator_that_is_like_the_device_agrees(real: Side) -> None:
+    found = against(real, DEVICE)
+    assert found.verdict == "consistent" and not found.differences
+    assert found.alike == ("cross_coupling",)
+    assert found.before.chi2_per_dof == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_perfect_simulator_leaves_out_everything(real: Side) -> None:
+    found = against(real, {})
+    said = {(d.id, d.direction) for d in found.differences}
+    assert said == {
+        ("acc_bias", "resized"), ("acc_scale", "resized"), ("gyr_bias", "resized"),
+        ("cross_coupling", "left_out"), ("noise", "left_out"),
+    }  # fmt: skip
+    off: Array = np.array([value(found, "acc_bias", axis) for axis in "xyz"])
+    assert (np.abs(off[:, 0] - DEVICE["bias"]["acc"]) < 4 * off[:, 1]).all()
+    k21, sigma = value(found, "cross_coupling", "k21")
+    assert abs(k21 - 0.002) < 4 * sigma < 4e-4
+    assert found.before.chi2_per_dof > 100 and found.after.chi2_per_dof < 1.2
+    assert found.before.rms_acc > 20 * found.after.rms_acc
+    assert any("next to no noise" in warning for warning in found.warnings)
+
+
+def test_what_the_simulator_has_beyond_the_device_has_the_other_direction(
+    real: Side,
+) -> None:
+    more = {
+        **DEVICE,
+        "quadratic": [0.0, 0.0, 3e-4],
+        "matrix": {"acc": [[1.004, 0, 0], [0.004, 0.997, 0], [0, 0, 1.001]]},
+        "noise": {"acc": [0.02] * 3, "gyr": [1.5e-3] * 3},
+    }
+    found = against(real, more)
+    said = {d.id: d.direction for d in found.differences}
+    assert said == {
+        "quadratic": "added", "cross_coupling": "resized", "noise": "resized"
+    }  # fmt: skip
+    z, sigma = value(found, "quadratic", "z")
+    assert abs(z + 3e-4) < 4 * sigma, "recording less simulator"
+    k21, sigma = value(found, "cross_coupling", "k21")
+    assert abs(k21 + 0.002) < 4 * sigma
+    noise, sigma = value(found, "noise", "gx")
+    assert abs(noise + 5e-4) < 4 * sigma
+    quadratic = next(d for d in found.differences if d.id == "quadratic")
+    assert {m.channel for m in quadratic.where} == {"az"}
+    assert "The simulator adds quadratic" in found.says

@@ -1,0 +1,95 @@
+"""Files of a simulator: where the device was held is worked out, or asked for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import strapdown
+from session_folders import write_session
+
+from fieldcal.against.opening import opened
+from fieldcal.cli import main
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
+from fieldcal.session.folder import Session
+
+HEAD = "t (s),ax (m/s^2),ay (m/s^2),az (m/s^2),gx (rad/s),gy (rad/s),gz (rad/s)"
+NOISE = {"noise": {"acc": [0.02] * 3, "gyr": [1e-3] * 3}}
+
+
+def write_csv(path: Path, table: Array) -> Path:
+    np.savetxt(path, table, fmt="%.9g", delimiter=",", header=HEAD, comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    table = strapdown.outputs(NOISE)
+    unknown = np.full(len(table), np.nan)
+    block = Block.of(
+        table[:, 0], table[:, 1:4], table[:, 4:7], unknown, unknown, unknown
+    )
+    site = {"gravity": strapdown.GRAVITY}
+    there = tmp_path_factory.mktemp("real") / "real"
+    return write_session(there, block, strapdown.schedule(), site=site)
+
+
+def test_the_same_schedule_on_another_clock(tmp_path: Path, folder: Path) -> None:
+    session = Session.open(folder)
+    table = strapdown.outputs(NOISE)
+    table[:, 0] += 7.0
+    path = write_csv(tmp_path / "simulated.csv", table)
+    block, about, _ = opened(path, (session.block, session.about))
+    starts = [w[0] - block.t[0] for w in about.windows if w]
+    assert starts[0] == pytest.approx(3.0) and len(starts) == len(strapdown.ANGLES)
+
+
+def test_other_times_of_the_same_positions_in_their_order(
+    tmp_path: Path, folder: Path
+) -> None:
+    session = Session.open(folder)
+    table = strapdown.outputs(NOISE)
+    table[:, 0] *= 0.5  # held for half as long
+    table[:, 4:] *= 2.0
+    path = write_csv(tmp_path / "quick.csv", table)
+    _, about, _ = opened(path, (session.block, session.about))
+    windows = [w for w in about.windows if w]
+    assert len(windows) == len(strapdown.ANGLES)
+    assert all(5.0 < end - start < 9.0 for start, end in windows)
+    assert [p.degrees for p in about.positions] == [
+        p.degrees for p in session.positions
+    ]
+
+
+def test_other_positions_are_refused(tmp_path: Path, folder: Path) -> None:
+    session = Session.open(folder)
+    table = strapdown.outputs(NOISE)
+    path = write_csv(tmp_path / "short.csv", table[: len(table) // 3])
+    with pytest.raises(InputError, match="rests 3 times .* 9 positions"):
+        opened(path, (session.block, session.about))
+
+
+def test_the_command_writes_shows_and_ends_with_what_it_found(
+    tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = strapdown.outputs({**NOISE, "seed": 5})
+    table[:, 3] += 0.1
+    off = write_csv(tmp_path / "off.csv", table)
+    assert main(["diagnose", str(folder), "--against", str(off), "--details"]) == 1
+    shown = capsys.readouterr().out
+    assert "acc bias" in shown and "-0.10" in shown and "Where it shows" in shown
+    told = json.loads((folder / "against.json").read_text())
+    assert told["against"] == str(off) and told["verdict"] == "left_out"
+    assert told["prediction"]["before"]["chi2_per_dof"] > 10
+    assert not (folder / "diagnosis.json").exists()
+
+
+def test_a_twin_and_a_simulator_are_two_questions(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = ["diagnose", str(folder), "--against", "x.csv", "--twin", "y.toml"]
+    assert main(call) == 2
+    assert "--twin or --against" in capsys.readouterr().err

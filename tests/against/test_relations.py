@@ -1,0 +1,100 @@
+"""Evidence of one effect in two sessions, against dense Gaussian densities."""
+
+import numpy as np
+import pytest
+
+from fieldcal.against.joint import (
+    Told,
+    apart,
+    as_large,
+    both,
+    differs,
+    likeliest,
+    weighed,
+)
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+
+SIGMA = 0.01
+SHARE = priors.density()
+
+
+def rows(value: Array, seed: int) -> tuple[Array, Array]:
+    """A design and rows that show an effect of some size."""
+    rng = np.random.default_rng(seed)
+    design = rng.normal(0, 1, (30, len(value)))
+    return design, design @ value + SIGMA * rng.standard_normal(30)
+
+
+def told(design: Array, y: Array) -> Told:
+    inner = design.T @ design / SIGMA**2
+    return Told(inner, design.T @ y / SIGMA**2, float(np.diag(inner).max()))
+
+
+def density(design: Array, y: Array, v: float) -> float:
+    """ln of how likely rows are with an effect of size v, over that without it."""
+    out = 0.0
+    for size, sign in ((v, 1.0), (0.0, -1.0)):
+        cov = SIGMA**2 * np.eye(len(y)) + size**2 * design @ design.T
+        square = y @ np.linalg.solve(cov, y)
+        out -= sign * 0.5 * float(square + np.linalg.slogdet(cov)[1])
+    return out
+
+
+def over_sizes(values: list[float]) -> float:
+    return float(np.log(np.sum(SHARE * np.exp(np.array(values)))))
+
+
+REAL, SIM = rows(np.array([0.02, -0.01]), 1), rows(np.array([0.015, 0.0]), 2)
+
+
+def test_the_same_effect_in_both_is_that_of_all_rows_together() -> None:
+    design, y = np.vstack([REAL[0], SIM[0]]), np.concatenate([REAL[1], SIM[1]])
+    expected = over_sizes([density(design, y, v) for v in priors.SIZES])
+    assert both(told(*REAL), told(*SIM)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_what_is_random_shares_its_size_alone() -> None:
+    expected = over_sizes([density(*REAL, v) + density(*SIM, v) for v in priors.SIZES])
+    assert as_large(told(*REAL), told(*SIM)) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("real", "sim", "expected"),
+    [
+        ((0.05, 0.0), (0.0, 0.0), "real"),
+        ((0.0, 0.0), (0.05, -0.05), "simulator"),
+        ((0.05, 0.0), (0.1, 0.0), "other"),
+    ],
+)
+def test_who_has_it(
+    real: tuple[float, float], sim: tuple[float, float], expected: str
+) -> None:
+    one, two = told(*rows(np.array(real), 3)), told(*rows(np.array(sim), 4))
+    found = weighed(one, two, 0.01, None)
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert apart(found) > 0.99 and likeliest(found) == expected
+
+
+@pytest.mark.parametrize("size", [0.0, 0.05])
+def test_equal_pairs_do_not_differ(size: float) -> None:
+    for seed in range(20):
+        value = np.array([size, -size])
+        one, two = (told(*rows(value, 100 * k + seed)) for k in (1, 2))
+        assert apart(weighed(one, two, 0.01, None)) < 0.5
+
+
+def test_what_a_session_cannot_have_is_the_others_alone() -> None:
+    found = weighed(told(*rows(np.array([0.05, 0.0]), 5)), None, 0.01, None)
+    assert found["real"] > 0.99 and set(found) == {"neither", "real"}
+
+
+def test_a_difference_counts_by_its_sigmas_and_not_by_its_unit() -> None:
+    cov, typical = np.diag([1e-4, 4e-4, 1e-4]), np.full(3, 0.3)
+    chances = [
+        differs(k * np.sqrt(np.diag(cov)), cov, typical) for k in (0.0, 1.0, 4.0, 8.0)
+    ]
+    assert chances == sorted(chances)
+    assert chances[1] < 0.05 < 0.95 < chances[3]
+    mg = differs(8e3 * np.sqrt(np.diag(cov)), 1e6 * cov, 1e3 * typical)
+    assert mg == pytest.approx(chances[3])

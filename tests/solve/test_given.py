@@ -1,12 +1,16 @@
 """The set that is given: its names and places, detents, and the Earth's rate."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from observed import GYR_BIAS, OMEGA, carried, observe, outputs
+from small_sessions import nominal
 
 from fieldcal.core.positions import FIVE, SIX_FACES, Position, angles
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
+from fieldcal.model.causes.columns import RowView
 from fieldcal.physics.experience import Experience
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.given import (
@@ -221,3 +225,27 @@ def test_no_unknown_function_and_no_cause_is_searched_for() -> None:
     assert {c.name for c in d.causes} - {"detents"} == {
         "base_tilt", "cross_coupling", "angle_setting",
     }  # fmt: skip
+
+
+# --- what is cut toward zero
+
+
+def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
+    """Toward zero from either side; of values of both signs by less."""
+    recorded = of_means(seen(FIVE))
+    y = recorded.rows.y.copy()
+    y[:, 0] = [0.5, -0.5, 0.005, -0.02, np.nan]
+    rows = seen_by(replace(recorded.rows, y=y), np.zeros(3))
+    d = Given(rows, np.ones(6), recorded.since, False, Wanted(), cut=(0.01, 0.0, 0.02))
+    (one,) = (g for _, g in d.asked if g.cause == "rounding")
+    assert one.typical.tolist() == [0.01, 0.02] and one.fixed == 1.0
+    np.testing.assert_allclose(d.sign[:5, 0], [1.0, -1.0, 0.5, -1.0, 0.0])
+    assert not d.sign[:, 1].any() and not d.sign[-1].any(), "none on the way"
+    basis = next(b for first, b in d.bases if first <= one.columns[0] < first + 3)
+    view = RowView.of(rows.x, recorded.since, nominal(len(FIVE)))
+    table = basis.of(view)
+    np.testing.assert_allclose(np.abs(table[:, 0, 0]), np.abs(d.sign[:5, 0]))
+    np.testing.assert_allclose(table[:, 0, 0], -d.sign[:5, 0])
+    assert np.count_nonzero(table[:, 1:, 0]) == 0
+    plain = Given(rows, np.ones(6), recorded.since, False, Wanted())
+    assert "rounding" not in {g.cause for _, g in plain.asked}

@@ -12,6 +12,7 @@ from observed import BIAS, SCALE, observe, outputs
 from fieldcal.core.positions import SIX_FACES, Position
 from fieldcal.model.causes.effect_causes import of_effects
 from fieldcal.model.causes.random_causes import of_chance
+from fieldcal.model.causes.unknown_causes import of_no_effect
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
@@ -89,6 +90,56 @@ def test_one_that_hardly_can_be_is_left_out_and_so_is_what_the_set_has() -> None
         rows.rows, np.ones(6), rows.since, False, Wanted("angle_offset"), shown
     )
     assert not same.explanations[0].members
+
+
+def test_windows_that_are_off_each_for_itself_are_no_cause_of_a_set() -> None:
+    """It has those already, as windows that scatter or may be bad."""
+    d = given()
+    every = [*of_chance(d), *of_no_effect(d)]
+    for name in ("misset", "window", "position"):
+        cause = next(c for c in every if c.name == name)
+        shown = given([Shown(((cause, cause.variants[0]),), 0.9), Shown((), 0.1)])
+        assert [s.members for s in shown.explanations] == [()]
+        assert shown.explanations[0].probability == pytest.approx(1.0)
+    (angles,) = (c for c in every if c.name == "angle_setting")
+    shown = given([Shown(((angles, angles.variants[0]),), 1.0)])
+    assert shown.explanations == (Shown((), 1.0),), "how well they are set is in"
+    assert given().explanations == (Shown((), 1.0),)
+
+
+def test_functions_without_physics_are_carried_by_their_place() -> None:
+    d = given()
+    cause = next(c for c in of_no_effect(d) if c.key == "time:ay")
+    shown = given([Shown(((cause, cause.variants[2]),), 1.0)])
+    ((same, group),) = shown.explanations[0].members
+    assert same.key == "time:ay" and group.shape == cause.variants[2].shape
+    assert same.kind == "unknown"
+    ends = shown.ending[0]
+    assert np.flatnonzero(ends.any(axis=1)).tolist() == [1]
+    expected = (-1.0) ** np.arange(1, len(group.columns) + 1)
+    np.testing.assert_allclose(ends[1, group.columns], expected)
+
+
+def test_a_scale_factor_that_changes_has_its_value_at_the_end() -> None:
+    """Of a function of force and time: at the end every Legendre polynomial is 1."""
+    d = given()
+    cause = next(c for c in of_no_effect(d) if c.key == "force and time:ax")
+    shown = given([Shown(((cause, cause.variants[1]),), 1.0)])
+    ((_, group),) = shown.explanations[0].members
+    bias, scale = shown.ending
+    assert not bias.any()
+    np.testing.assert_allclose(scale[0, group.columns], 1 / 9.81, rtol=1e-6)
+    assert np.count_nonzero(scale) == len(group.columns)
+
+
+def test_an_effect_of_one_triad_may_be_on_the_other_as_well() -> None:
+    shown = given([Shown((member("bias_drift"),), 1.0)])
+    (one,) = shown.explanations
+    assert one.maybe == (), "no gyroscopes were measured"
+    ((cause, group),) = one.members
+    params = {g.params for g in cause.variants}
+    assert params == {(0,), (1,), (2,), (0, 1), (0, 2), (1, 2), (0, 1, 2)}
+    assert group is cause.variants[0]
 
 
 def test_the_bias_is_that_at_the_end() -> None:
@@ -171,3 +222,8 @@ def test_points_stand_evenly_for_the_variants_of_every_cause() -> None:
     for quarter in (one & two, one & ~two, ~one & two, ~one & ~two):
         assert 4 <= quarter.sum() <= 8
     assert len(spread(0)) == 1
+    line = spread(1, 5)[:, 0]
+    np.testing.assert_allclose(line, [0.1, 0.3, 0.5, 0.7, 0.9])
+    two = spread(3, 4)
+    np.testing.assert_allclose(two[:, 1], (np.arange(4) * 2**0.5 + 0.125) % 1)
+    np.testing.assert_allclose(two[:, 2], (np.arange(4) * 3**0.5 + 0.125) % 1)

@@ -1,0 +1,294 @@
+"""What a user is told of an estimate, whole sentences of estimates made up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from observed import GYR_BIAS, observe, outputs
+
+from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.solve import observations, result, words
+from fieldcal.solve.assumed import Asked
+from fieldcal.solve.estimation import Estimated
+from fieldcal.solve.observations import Observations
+from fieldcal.solve.reliability import WrongAngles
+
+HOME = "α = 0°, β = 0°"
+
+
+def fit(**known: Any) -> SimpleNamespace:
+    nothing = {"chi2": 3.0, "dof": 6, "rms": 1e-3, "left_out": np.nan}
+    return SimpleNamespace(**(nothing | known))
+
+
+def estimated(**known: Any) -> Estimated:
+    """An estimate of which only what is asked for is known."""
+    wanted = SimpleNamespace(turned=False, gyr_scale=True, level_deg=None)
+    given = SimpleNamespace(
+        wanted=wanted, free=np.zeros(5, dtype=bool), names=("acc_bias.x",)
+    )
+    nothing: dict[str, Any] = {
+        "names": ("acc_bias.x",), "missing": (), "given": given, "acc": fit(),
+        "gyr": fit(rms=np.nan), "contradicted": (), "closures": (0.0, 0),
+        "found": SimpleNamespace(scatter=np.array([3, 4, 0, 1, 1, 1, 5.0])),
+    }  # fmt: skip
+    return cast(Estimated, SimpleNamespace(**(nothing | known)))
+
+
+def observed(
+    places: Sequence[Position] = FIVE, gyr: bool = True, **known: Any
+) -> Observations:
+    still = [p if p.oriented else FIVE[0] for p in places]
+    rates = np.tile(GYR_BIAS, (len(places), 1)) if gyr else None
+    return observe(places, outputs(still), gyr=rates, **known)
+
+
+def test_turns_that_led_elsewhere_are_named_three_by_three() -> None:
+    """Of four the fourth is counted."""
+    seen = observed()
+    assert result._contradicted(estimated(), seen) == []
+    names = [p.name for p in FIVE]
+    pairs = tuple((i, i + 1) for i in range(4))
+    after = (
+        ": an axis, a sign, a unit or an angle is another than session.toml says, or"
+        " the gyroscopes were clipped; mend it, or turn more slowly"
+    )
+    said = "the gyroscopes lead to another attitude than the accelerometers or the"
+    for count, start, listed in (
+        (1, "in 1 turn ", f"{names[0]} to {names[1]}"),
+        (3, "in 3 turns ", f"{names[0]} to {names[1]}, {names[1]} to {names[2]} and"
+         f" {names[2]} to {names[3]}"),
+        (4, "in 4 turns ", f"{names[0]} to {names[1]}, {names[1]} to {names[2]} and"
+         f" {names[2]} to {names[3]}, and 1 more"),
+    ):  # fmt: skip
+        (text,) = result._contradicted(estimated(contradicted=pairs[:count]), seen)
+        assert text == f"{start}{said} stated angles (from {listed}){after}"
+
+
+def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
+    none = estimated(names=(), missing=("acc_bias.x", "acc_scale.x"), found=None)
+    none.given.names = ("acc_bias.x", "acc_scale.x")  # type: ignore[misc]
+    carried = {"sure": 0.0, "causes": {}, "moved": np.zeros(0), "ended_s": None}
+    vars(none).update(carried | {"values": np.zeros(0), "covariance": np.zeros((0, 0))})
+    with pytest.raises(NotObservable) as error:
+        result.calibration("joint", observed(TWO, False), Asked(), none, ["a note"])
+    text = str(error.value)
+    assert text.startswith("these positions determine nothing: acc_bias.x and")
+    assert text.endswith("; a note")
+
+
+@pytest.mark.parametrize(
+    ("turned", "rates", "gyr", "cross", "says"),
+    [
+        (False, False, ["gyr_scale.x"], [],
+         "gyr_scale.x is left out: the Earth's rate gives it only roughly in these"
+         " windows; average longer, or integrate turns between the positions"),
+        (False, False, ["gyr_scale.x", "gyr_scale.y"], [],
+         "gyr_scale.x and gyr_scale.y are left out: the Earth's rate gives it only"
+         " roughly in these windows; average longer, or integrate turns between the"
+         " positions"),
+        (True, False, ["gyr_scale.y"], ["gyro_cross_coupling.s13"],
+         "gyr_scale.y and 1 of 6 gyro_cross_coupling are not determined by these turns:"
+         " add turns about device axis y and z while that axis is level"),
+        (False, True, [], ["gyro_cross_coupling.s21", "gyro_cross_coupling.s31"],
+         "2 of 6 gyro_cross_coupling is not determined by this schedule: add a rate of"
+         " 20°/s about device axis x"),
+    ],
+)  # fmt: skip
+def test_what_turns_or_rates_leave_open(
+    turned: bool, rates: bool, gyr: list[str], cross: list[str], says: str
+) -> None:
+    found = estimated()
+    found.given.wanted.turned = turned  # type: ignore[misc]
+    seen = observed()
+    if rates:
+        seen = observed((FIVE[0], Position("", rate=(0.1, 0.0, 0.0))))
+    assert result._turning(gyr, cross, seen, found) == says
+
+
+@pytest.mark.parametrize(
+    ("missing", "n", "dof", "says"),
+    [
+        (["acc_bias.x", "cross_coupling.k12"], 12, 5,
+         "acc_bias.x and cross_coupling.k12 are not determined by these orientations:"
+         " add positions with each axis up and down"),
+        (["cross_coupling.k12"], 12, 5,
+         "cross_coupling.k12 is not determined, axes held up and down alone cannot show"
+         " it: add positions with gravity half way between x and y"),
+        (["cross_coupling.k13", "cross_coupling.k23"], 8, 1,
+         "cross_coupling.k13 and cross_coupling.k23 are not determined, 8 norms cannot"
+         " carry 9 parameters: add positions with gravity half way between x and z and"
+         " y and z"),
+        (["cross_coupling.k23"], 9, 2,
+         "cross_coupling.k23 is not determined, axes held up and down alone cannot show"
+         " it (and all nine would leave two degrees of freedom): add positions with"
+         " gravity half way between y and z"),
+    ],
+)  # fmt: skip
+def test_what_lengths_leave_open(
+    missing: list[str], n: int, dof: int, says: str
+) -> None:
+    assert result._scalar(missing, estimated(acc=fit(dof=dof)), n) == says
+
+
+def test_of_so_few_windows_the_residual_says_nothing() -> None:
+    assert result._few("joint", estimated(acc=fit(dof=0))) == [words.NO_DOF]
+    assert result._few("joint", estimated(acc=fit(dof=1))) == []
+    one = "one degree of freedom: the residual says nothing about the fit; add"
+    assert result._few("scalar", estimated(acc=fit(dof=1))) == [
+        f"{one} positions in other orientations"
+    ]
+    assert result._few("scalar", estimated(acc=fit(dof=3))) == []
+    assert result._few("joint", estimated(acc=fit(dof=0, rms=np.nan))) == []
+
+
+def test_a_base_that_two_positions_take_for_level_is_said() -> None:
+    seen = observed(TWO, gravity=10.0)
+    (text,) = result._level("two_position", Asked(), seen)
+    assert text == (
+        "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to 0.017"
+        " m/s^2 unseen; take five positions, or say how level it is (--level)"
+    )
+    assert result._level("two_position", Asked(level_deg=0.1), seen) == []
+    assert result._level("joint", Asked(), seen) == []
+
+
+def test_scatter_of_each_triad_and_of_turns_is_said_with_its_unit() -> None:
+    loud = {"chi2": 60.0, "dof": 6, "rms": 1e-3}
+    spread = "an extra scatter of {} {} is in the uncertainties"
+    both = estimated(acc=fit(**loud), gyr=fit(**loud), closures=(90.0, 6))
+    acc, gyr, turns = result._scattered(both)
+    assert acc.startswith("the positions disagree")
+    assert spread.format("2.9", "m/s^2") in acc
+    assert gyr.startswith("the gyroscopes' means disagree")
+    assert spread.format("1", "rad/s") in gyr
+    assert turns.startswith("the turns disagree") and "dof 6" in turns
+    assert spread.format("5", "rad") in turns
+    both.given.free[:] = True
+    assert result._scattered(both)[0].startswith("the norms disagree")
+    few = estimated(closures=(90.0, 5), names=("gyr_scale.x",))
+    assert len(result._scattered(few)) == 1, "four of five are left over"
+    assert result._turns(few) == (90.0, 4)
+    more = estimated(
+        closures=(1.0, 1), names=("gyr_scale.x", "gyro_cross_coupling.s12")
+    )
+    assert result._turns(more) == (1.0, 0)
+
+
+def test_gyroscopes_of_which_no_scale_factor_is_asked_for() -> None:
+    found = estimated()
+    found.given.wanted.gyr_scale = False  # type: ignore[misc]
+    assert result._open("joint", observed(), found) == [words.NO_SCALE]
+    earth = observed(grade="navigation", latitude=0.8)
+    assert result._open("joint", earth, found) == [
+        "gyr_scale is not determined: the Earth's rate gives it only with two known"
+        " positions and the latitude"
+    ]
+    assert result._open("joint", observed(gyr=False), found) == []
+
+
+def test_wrong_angles_harm_where_they_move_more_than_the_margin() -> None:
+    found = estimated(names=("acc_bias.x", "acc_bias.y"))
+    vars(found)["covariance"] = np.diag([4.0, 1.0])
+    for moves, harms in (((9.9, -4.9), False), ((10.1, 0.0), True), ((0, -5.1), True)):
+        both = dict(zip(found.names, moves, strict=True))
+        assert result._harms(WrongAngles(0, None, 1, 0.5, both), found) == harms
+
+
+def test_what_is_carried_says_when_and_at_which_temperature() -> None:
+    known = {"moved": np.array([1.5]), "causes": {"bias_drift": 0.9}, "ended_s": 300.0}
+    seen = observed(temperature=np.array([20.0, 21.0, 22.0, 23.0, 24.0]))
+    assert result._carried(seen, estimated(**known)) == {
+        "causes": {"bias_drift": 0.9}, "moved_sigmas": {"acc_bias.x": 1.5},
+        "as_of": {"since_start_s": 300.0, "temperature_degc": 24.0},
+    }  # fmt: skip
+    unknown = result._carried(observed(), estimated(**known))
+    assert unknown["as_of"]["temperature_degc"] is None
+    assert "as_of" not in result._carried(seen, estimated(**known | {"ended_s": None}))
+
+
+def test_accelerometers_that_gave_nothing_are_no_result() -> None:
+    found = estimated(names=("gyr_bias.x",))
+    assert result._blind(found, observed())
+    assert not result._blind(estimated(), observed())
+    turning = observed((FIVE[0], Position("", rate=(0.1, 0.0, 0.0))))
+    assert not result._blind(found, turning)
+
+
+# --- what estimators are given
+
+
+def test_correlations_that_a_window_is_too_short_to_know_are_dropped() -> None:
+    size = np.array([1.0, 2.0, 3.0, 1e-3, 2e-3, 3e-3])
+    alike = np.full((6, 6), 0.5) + 0.5 * np.eye(6)
+    kept = alike * np.outer(size, size)
+    np.testing.assert_array_equal(observations._regular(kept), kept)
+    one = alike.copy()
+    one[0, 1] = one[1, 0] = 1.0
+    one[0, 2] = one[1, 2] = one[2, 0] = one[2, 1] = 0.5
+    singular = one * np.outer(size, size)
+    found = observations._regular(singular)
+    np.testing.assert_allclose(found[:3, :3], np.diag(size[:3] ** 2))
+    np.testing.assert_array_equal(found[3:, 3:], singular[3:, 3:])
+    assert not found[:3, 3:].any() and not found[3:, :3].any()
+    nowhere = kept.copy()
+    nowhere[3:, :] = nowhere[:, 3:] = np.nan
+    np.testing.assert_array_equal(observations._regular(nowhere), nowhere)
+    still = kept.copy()
+    still[1, :] = still[:, 1] = 0.0
+    np.testing.assert_array_equal(observations._regular(still), still)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"gravity": 0.0}, "gravity is 0 m/s^2: give the local value, about 9.8, or the"
+         " latitude and height of the site"),
+        ({"mean": np.zeros((5, 5))}, "mean is (5, 5) where 5 positions need (5, 6)"),
+        ({"time": np.zeros(4)}, "time is (4,) where 5 positions need (5,)"),
+        ({"covariance": np.zeros((5, 6, 6))}, "the accelerometers' means have no"
+         " uncertainty above 0 m/s^2: a window of repeated equal values tells nothing"
+         " about its noise"),
+    ],
+)  # fmt: skip
+def test_observations_that_cannot_be_are_refused(
+    change: dict[str, Any], says: str
+) -> None:
+    seen = observed()
+    known: dict[str, Any] = {"positions": seen.positions, "mean": seen.mean,
+                             "covariance": seen.covariance, "gravity": 9.8}  # fmt: skip
+    with pytest.raises(InputError) as error:
+        Observations(**(known | change))
+    assert str(error.value) == says
+
+
+def test_a_mean_that_is_missing_is_named() -> None:
+    seen = observed()
+    mean = seen.mean.copy()
+    mean[3, 4] = np.nan
+    with pytest.raises(InputError) as error:
+        Observations(seen.positions, mean, seen.covariance, 9.8)
+    assert str(error.value) == (
+        f"position 4 ({FIVE[3].name}) has no mean of gy: take its window again or leave"
+        " it out"
+    )
+    with pytest.raises(InputError, match="there is no position with a window: take at"):
+        Observations.of((), (), 9.8)
+    with pytest.raises(InputError, match="the latitude is not known, so the Earth's"):
+        _ = seen.known_latitude
+    assert observed(latitude=0.7).known_latitude == 0.7
+
+
+def test_of_some_positions_everything_is_theirs() -> None:
+    seen = observed(temperature=np.arange(5.0), time=10 * np.arange(5.0))
+    some = seen[[3, 1]]
+    assert [p.name for p in some.positions] == [FIVE[3].name, FIVE[1].name]
+    np.testing.assert_array_equal(some.mean, seen.mean[[3, 1]])
+    np.testing.assert_array_equal(some.temperature, [3.0, 1.0])
+    np.testing.assert_array_equal(some.time, [30.0, 10.0])
+    assert len(some.covariance) == 2 and len(some) == 2

@@ -9,6 +9,7 @@ They are every third in the order of their kinds, so that each kind is among the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -32,9 +33,14 @@ def ordered() -> list[str]:
     return sorted(of, key=lambda id_: (_kind(of[id_]), of[id_].seen_in, id_))
 
 
-def every_effect() -> list[Any]:
-    """Parameters of a test: all ids, of which some are for `--all` alone."""
+def a_third(cases: Sequence[tuple[Any, ...]]) -> list[Any]:
+    """Parameters of a test: all cases, of which some are for `--all` alone."""
     return [
-        id_ if i % ONE_IN == 0 else pytest.param(id_, marks=pytest.mark.thorough)
-        for i, id_ in enumerate(ordered())
+        pytest.param(*case, marks=[pytest.mark.thorough] if i % ONE_IN else [])
+        for i, case in enumerate(cases)
     ]
+
+
+def every_effect() -> list[Any]:
+    """All ids, of which some are for `--all` alone."""
+    return a_third([(id_,) for id_ in ordered()])

@@ -27,33 +27,42 @@ settings.register_profile(
 settings.load_profile("any machine")
 
 
-WAITING = frozenset(
-    [
-        "test_companions",
-        "test_can_imu",
-        "test_terminal_run",
-        "test_crash_safety",
-        "test_end_to_end",
-        "test_full_disk",
-        "test_installing",
-        "test_link_contract",
-        "test_link_faults",
-        "test_mavlink_imu",
-        "test_operator_errors",
-        "test_plan_file",
-        "test_ports",
-        "test_pulled_stick",
-        "test_pytest_plugin",
-        "test_replay",
-        "test_resume",
-        "test_serial_imu",
-        "test_sim_keys",
-        "test_sim_serial",
-        "test_wires_meet",
-        "test_write",
-    ]
+WAITING = (
+    frozenset(
+        [
+            "test_can_imu",
+            "test_end_to_end",
+            "test_full_disk",
+            "test_link_faults",
+            "test_pytest_plugin",
+            "test_replay",
+            "test_resume",
+            "test_serial_imu",
+            "test_sim_keys",
+            "test_terminal_run",
+            "test_wires_meet",
+            "test_write",
+        ]
+    ),
+    frozenset(
+        [
+            "test_companions",
+            "test_crash_safety",
+            "test_installing",
+            "test_link_contract",
+            "test_mavlink_imu",
+            "test_operator_errors",
+            "test_plan_file",
+            "test_ports",
+            "test_pulled_stick",
+            "test_restart",
+            "test_sim_serial",
+            "test_write_killed",
+        ]
+    ),
 )
-"""Modules whose tests wait for devices in processes of their own."""
+"""Modules whose tests wait for devices in processes of their own: two groups that wait
+about as long, as one alone would wait for longer than all others calculate."""
 
 SPREAD = frozenset(["test_any_recording", "test_diagnosis_contract", "test_twin"])
 """Long modules whose tests have nothing in common that takes time to make."""
@@ -82,8 +91,8 @@ def pytest_collection_modifyitems(
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Share the tests out among processes, if there are several.
 
-    What waits is one group: it leaves a processor free. Of the others each module is
-    one, for what its tests have in common. The largest come first.
+    What waits is two groups, which leave processors free. Of the others each module is
+    one group, for what its tests have in common. The largest come first.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -92,7 +101,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
             module = nodeid.partition("::")[0]
             if Path(module).stem in SPREAD:
                 return nodeid
-            return "waiting" if Path(module).stem in WAITING else module
+            name = Path(module).stem
+            waits = [str(i) for i, some in enumerate(WAITING) if name in some]
+            return waits[0] if waits else module
 
     return ByModule(config, log)
 

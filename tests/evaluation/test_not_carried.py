@@ -65,7 +65,9 @@ def test_wrongly_decoded_bytes_are_put_right(
     assert as_printed["parameters"]["acc_scale"] == said["parameters"]["acc_scale"]
 
 
-@pytest.mark.parametrize("size", [1e-4, -3e-5])
+@pytest.mark.parametrize(
+    "size", [1e-4, pytest.param(-3e-5, marks=pytest.mark.thorough)]
+)
 def test_a_drift_is_in_the_result(
     size: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -40,10 +40,12 @@ def diagnosed(
     return code, json.loads(out), profile_file.read(file)
 
 
-def concealing(folder: Path, *effects: str, seed: int = 1, **more: Any) -> Path:
-    """Write a session of a device with effects."""
+def concealing(
+    folder: Path, *effects: str, seed: int = 1, count: int = 9, **more: Any
+) -> Path:
+    """Write a session of a device with effects, in some of nine positions."""
     device = replace(DEVICE, effects=tuple(map(parse, effects)), **more)
-    positions = places()
+    positions = places()[:count]
     return write_session(folder, recorded(device, positions, seed), positions)
 
 
@@ -347,7 +349,7 @@ def test_temperature_and_warm_up_go_into_the_twin(
 def test_the_console_shows_the_replay_and_where_the_files_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = concealing(tmp_path / "s", "base_tilt:about_x_deg=1")
+    folder = concealing(tmp_path / "s", "base_tilt:about_x_deg=1", count=4)
     file = tmp_path / "twin.toml"
     assert main(["diagnose", str(folder), "--twin", str(file)]) == 1
     out = capsys.readouterr().out
@@ -361,7 +363,7 @@ def test_the_console_shows_the_replay_and_where_the_files_are(
 def test_a_device_file_that_cannot_be_written_is_one_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = concealing(tmp_path / "s", "base_tilt:about_x_deg=1")
+    folder = concealing(tmp_path / "s", "base_tilt:about_x_deg=1", count=4)
     nowhere = tmp_path / "nowhere" / "twin.toml"
     assert main(["diagnose", str(folder), "--twin", str(nowhere)]) == 2
     err = capsys.readouterr().err

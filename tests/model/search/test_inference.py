@@ -19,7 +19,7 @@ FADING = {
 def test_the_way_is_left_with_its_noise_beside_what_fades(name: str) -> None:
     """A time constant between the points of the grid; chi2 over several sessions."""
     square, freedom = 0.0, 0
-    for seed in range(3):
+    for seed in range(2):
         session = _having(name, seed)
         found = explain(prepare(session.record(seed), session.about))
         assert [one.name for one in found.standing] == [name]
@@ -27,7 +27,7 @@ def test_the_way_is_left_with_its_noise_beside_what_fades(name: str) -> None:
         for turn in found.inferred.turned:
             left = turn.way - turn.way_design @ values[turn.columns]
             square, freedom = square + float(left @ left), freedom + len(left)
-    assert freedom > 1000
+    assert freedom > 700
     assert abs(square - freedom) < 5 * np.sqrt(2 * freedom)
 
 

@@ -7,11 +7,14 @@ import contextlib
 import os
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.introduce import introduce
+from fieldcal.commands.run_operator import operator_of
+from fieldcal.commands.run_page import LOCAL, served, told_end
+from fieldcal.commands.run_results import write_junit
 from fieldcal.commands.run_task import make_task
 from fieldcal.commands.run_waits import (
     PATIENCE,
@@ -29,8 +32,7 @@ if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.calibration.limits import GradeLimits
     from fieldcal.run.companions import Companion
-    from fieldcal.run.movers import Mover
-    from fieldcal.run.operator.protocol import Operator
+    from fieldcal.run.page.server import PageServer
     from fieldcal.run.plan_file import Task
 
 EXAMPLE = """\
@@ -67,6 +69,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_task(parser)
     add("-o", "--output", type=Path, metavar="FOLDER", help="where to record")
     add("--headless", action="store_true", help="no operator: progress as JSON lines")
+    add(
+        "--page",
+        nargs=argparse.OPTIONAL,
+        const=LOCAL,
+        metavar="HOST:PORT",
+        help="a page for phone and tablet, on the local network",
+    )
     add("--plain", action="store_true", help="lines instead of a screen")
     add("--json", action="store_true", help="print the result as one JSON object")
     add("--no-report", action="store_true", help="write no report.html")
@@ -148,6 +157,16 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _carried_out(args: argparse.Namespace) -> int:
+    if _names_none(args):
+        introduce(args)
+    task, folder = make_task(args)
+    with served(args) as page:
+        return _shown_on(page, args, task, folder)
+
+
+def _shown_on(
+    page: PageServer | None, args: argparse.Namespace, task: Task, folder: Path
+) -> int:
     from fieldcal.calibration import limits
     from fieldcal.commands import run_view
     from fieldcal.commands.run_results import (
@@ -157,30 +176,29 @@ def _carried_out(args: argparse.Namespace) -> int:
     )
     from fieldcal.history.store import History, default_path
 
-    if _names_none(args):
-        introduce(args)
-    task, folder = make_task(args)
     file = args.limits or task.run.get("limits")
     bounds = limits.read(task.about.grade, Path(file) if file else None)
     history = History(args.history or default_path())
     try:
-        found, truth, others = _record(args, task, folder, bounds)
+        found, truth, others = _record(args, task, folder, bounds, page)
         found = first_result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
+        told_end(page, (), error)
         _broken_off(args, task, folder, error)
         raise
     if args.junit:
-        _write_junit(args.junit, task, folder, found.to_json())
+        write_junit(args.junit, task, folder, found.to_json())
     further = further_results(others, bounds, history)
+    told_end(page, (found, *further.values()))
     if args.json:
         run_view.show_json(found, truth, further)
     else:
         run_view.show_results(found, folder, truth, further)
     if not args.no_report:
         for each in (folder, *(folder / name for name in further)):
-            page = run_view.write_report(each, history.path)
-            if page and not args.json:
-                sys.stdout.write(f"report:   {page}\n")
+            report = run_view.write_report(each, history.path)
+            if report and not args.json:
+                sys.stdout.write(f"report:   {report}\n")
     if not args.json:
         run_view.show_decisions(found, further, folder)
     try:
@@ -212,31 +230,15 @@ def _broken_off(
         f" fieldcal run --resume {shlex.quote(str(folder))}\n"
     )
     if args.junit:
-        _write_junit(args.junit, task, folder, None, str(error) or "interrupted")
-
-
-def _write_junit(
-    path: Path, task: Task, folder: Path, result: Any, said: str = ""
-) -> None:
-    from fieldcal.acceptance.verification import planned
-    from fieldcal.core.positions import Position
-    from fieldcal.run import junit
-    from fieldcal.session.description import with_more
-    from fieldcal.session.folder import ADDED, MARKS, read_marks
-
-    marks = list(read_marks(folder / MARKS))
-    about = task.about
-    more = [m for m in marks if m.get("event") == ADDED]
-    about = with_more(about, [
-        Position.deg(m["alpha_deg"], m["beta_deg"], m["name"])
-        for m in more if int(m["position"]) >= len(about.positions)
-    ])  # fmt: skip
-    positions = [*about.positions, *filter(None, [planned(about)])]
-    junit.write(path, task.procedure, positions, marks, result, said)
+        write_junit(args.junit, task, folder, None, str(error) or "interrupted")
 
 
 def _record(
-    args: argparse.Namespace, task: Task, folder: Path, bounds: GradeLimits
+    args: argparse.Namespace,
+    task: Task,
+    folder: Path,
+    bounds: GradeLimits,
+    page: PageServer | None,
 ) -> tuple[Calibration, dict[str, Any] | None, Sequence[Companion]]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
     from fieldcal import procedures
@@ -261,7 +263,7 @@ def _record(
             record_companions(task.further, own, task.tables)
         )
         turns = PatientMover(mover, patience(args))
-        operator = stack.enter_context(_operator(args, task, turns, folder))
+        operator = stack.enter_context(operator_of(args, task, turns, folder, page))
         turns.tell = recorder.tell = operator.tell
         unseen = [gravity_unknown(task.about)]
         if procedures.most(task.about, task.procedure) is None:
@@ -298,31 +300,3 @@ def _take_besides(
         alpha, beta = position.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
         recorder.mark(ADDED, position=number, name=position.name, **angles)
-
-
-@contextlib.contextmanager
-def _operator(
-    args: argparse.Namespace, task: Task, mover: Mover, folder: Path
-) -> Iterator[Operator]:
-    if args.headless:
-        from fieldcal.run.operator.script import ScriptOperator
-
-        yield ScriptOperator(mover)
-        return
-    from fieldcal import procedures
-    from fieldcal.commands.console import ShownConsole
-    from fieldcal.run.operator.keyboard import Keyboard
-    from fieldcal.run.operator.terminal import ConsoleOperator
-
-    most = procedures.most(task.about, task.procedure)
-    with ConsoleOperator(
-        f"fieldcal · {task.procedure} · {folder}",
-        task.about.positions if most else task.positions,
-        mover,
-        ShownConsole(stderr=args.json),
-        args.plain,
-        Keyboard(),
-        len(task.about.positions) if task.verification and most is None else None,
-        most,
-    ) as operator:
-        yield operator

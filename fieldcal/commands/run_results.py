@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fieldcal.core.errors import DeviceError, FieldcalError
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fieldcal.calibration.limits import GradeLimits
     from fieldcal.history.store import History
     from fieldcal.run.companions import Companion
+    from fieldcal.run.plan_file import Task
     from fieldcal.session.folder import Session
 
 
@@ -86,3 +87,24 @@ def check_heard(others: Sequence[Companion]) -> None:
                 f"{other.folder.name}: {other.failed}; the other devices have their"
                 " results"
             )
+
+
+def write_junit(
+    path: Path, task: Task, folder: Path, result: Any, said: str = ""
+) -> None:
+    """Write what happened as JUnit XML; `result` is None where the run broke off."""
+    from fieldcal.acceptance.verification import planned
+    from fieldcal.core.positions import Position
+    from fieldcal.run import junit
+    from fieldcal.session.description import with_more
+    from fieldcal.session.folder import ADDED, MARKS, read_marks
+
+    marks = list(read_marks(folder / MARKS))
+    about = task.about
+    more = [m for m in marks if m.get("event") == ADDED]
+    about = with_more(about, [
+        Position.deg(m["alpha_deg"], m["beta_deg"], m["name"])
+        for m in more if int(m["position"]) >= len(about.positions)
+    ])  # fmt: skip
+    positions = [*about.positions, *filter(None, [planned(about)])]
+    junit.write(path, task.procedure, positions, marks, result, said)

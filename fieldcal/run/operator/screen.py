@@ -17,6 +17,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.operator import widgets
 from fieldcal.run.operator.banner import drawable, large
 from fieldcal.run.operator.box import pictures
+from fieldcal.run.operator.instruction import TURN, Instruction
 from fieldcal.run.operator.keyboard import HELP, SHORT_HELP
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.operator.widgets import alert
@@ -26,8 +27,6 @@ TALL = 32
 
 SMALL = (76, 22)
 """Columns and lines below which only what to do, why, how long and keys are shown."""
-
-TURN = "TURN TO"
 
 FEWEST = 3
 """Positions that are listed however little room there is."""
@@ -176,27 +175,9 @@ class Screen:
 
     def _words(self) -> tuple[str, str, str]:
         """What is said large, what small, and its colour."""
-        hold = self._shown.hold
-        view = (
-            self._shown.view
-            if self._shown.view and self._shown.view.hold is hold
-            else None
-        )
-        if hold is None:
-            return "WAIT", "for the device", ""
-        number = self._shown.number
-        if view is None or view.phase == "turning":
-            if view is None or view.arrival is None or not view.arrival.ok:
-                wrong = view is not None and alert(view)
-                return TURN, f"{number}, then let go", "yellow" if wrong else "cyan"
-            if alert(view):
-                return "WAIT", f"{number}: it is in place, hands off", "yellow"
-            return "HANDS OFF", f"{number}: it is in place", "cyan"
-        if view.phase == "silent":
-            return "NO SAMPLES", f"{number}: nothing is lost of what was taken", "red"
-        if view.phase == "averaging":
-            return "HOLD STILL", f"{number}: do not touch the device", "green"
-        return "TAKEN", number, "green"
+        shown = self._shown
+        now = Instruction.of(shown.hold, shown.view, shown.number)
+        return now.words, now.detail, now.colour
 
 
 def _angles(position: Position | None, width: int) -> list[str]:

@@ -1,0 +1,52 @@
+"""Who is shown a run and moves its device: a script, or a person at the console."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fieldcal.commands.run_page import watched
+
+if TYPE_CHECKING:
+    from fieldcal.run.movers import Mover
+    from fieldcal.run.operator.protocol import Operator
+    from fieldcal.run.page.server import PageServer
+    from fieldcal.run.plan_file import Task
+
+
+@contextlib.contextmanager
+def operator_of(
+    args: argparse.Namespace,
+    task: Task,
+    mover: Mover,
+    folder: Path,
+    page: PageServer | None,
+) -> Iterator[Operator]:
+    """Yield the operator of a run, seen on the page as well if there is one."""
+    from fieldcal import procedures
+
+    most = procedures.most(task.about, task.procedure)
+    title = f"fieldcal · {task.procedure} · {folder}"
+    if args.headless:
+        from fieldcal.run.operator.script import ScriptOperator
+
+        yield watched(ScriptOperator(mover), page, task, title, most)
+        return
+    from fieldcal.commands.console import ShownConsole
+    from fieldcal.run.operator.keyboard import Keyboard
+    from fieldcal.run.operator.terminal import ConsoleOperator
+
+    with ConsoleOperator(
+        title,
+        task.about.positions if most else task.positions,
+        mover,
+        ShownConsole(stderr=args.json),
+        args.plain,
+        Keyboard(),
+        len(task.about.positions) if task.verification and most is None else None,
+        most,
+    ) as operator:
+        yield watched(operator, page, task, title, most)

@@ -1,0 +1,73 @@
+"""Who may press the buttons of the page: one at a time, and everybody may watch."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from time import monotonic
+from typing import get_args
+
+from fieldcal.run.operator.protocol import Wish
+
+GONE = 15.0
+"""Time after which one who was not heard of any more has left the buttons, s."""
+
+OFFERED = frozenset(get_args(Wish)) - {"wait"}
+"""What can be asked for from the page."""
+
+
+class Buttons:
+    """The buttons, and who holds them.
+
+    Parameters
+    ----------
+    clock : s
+
+    """
+
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+        self._clock, self._lock = clock, threading.Lock()
+        self._holder, self._heard = "", 0.0
+        self._pressed: deque[Wish] = deque(maxlen=1)
+
+    def here(self, client: str) -> bool:
+        """Note that somebody watches; whether the buttons are theirs."""
+        with self._lock:
+            if client == self._holder:
+                self._heard = self._clock()
+            return client == self._holder
+
+    def free(self) -> bool:
+        """Whether nobody holds them, or who did is gone."""
+        with self._lock:
+            return self._free()
+
+    def _free(self) -> bool:
+        return not self._holder or self._clock() - self._heard > GONE
+
+    def take(self, client: str, over: bool = False) -> bool:
+        """Take the buttons; from somebody else only if they are asked for `over`."""
+        with self._lock:
+            if client != self._holder and not (over or self._free()):
+                return False
+            self._holder, self._heard = client, self._clock()
+            return True
+
+    def press(self, client: str, wish: Wish) -> bool:
+        """Press one; False if somebody else holds them."""
+        with self._lock:
+            if client != self._holder:
+                return False
+            self._heard = self._clock()
+            self._pressed.append(wish)
+            return True
+
+    def pressed(self) -> Wish | None:
+        """What was asked for since the last call: the last one."""
+        with self._lock:
+            return self._pressed.pop() if self._pressed else None
+
+    def forget(self) -> None:
+        """Forget what was pressed by now: it was meant for what is over."""
+        self.pressed()

@@ -1,0 +1,196 @@
+"""The page's server: beside the run, in a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any, Self
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from fieldcal.core.errors import InputError
+from fieldcal.run.page.access import Access, Gate
+from fieldcal.run.page.board import Board
+from fieldcal.run.page.buttons import OFFERED, Buttons
+
+FILES = Path(__file__).parent / "files"
+
+EVERY = 0.125
+"""Shortest time between two views that are sent, s."""
+
+ALIVE = 2.0
+"""Time after which something is sent though nothing changed, s."""
+
+LINGER = 3.0
+"""How long the last view is offered to who has not seen it, s."""
+
+NAME = 64
+"""Letters of a client's name."""
+
+
+class PageServer:
+    """Serves a run's page; a context manager.
+
+    Parameters
+    ----------
+    host, port : where to listen; port 0 is any that is free
+    board : what there is to see, once there is a run
+    buttons : what is pressed
+
+    Raises
+    ------
+    InputError
+        If nothing can listen there.
+
+    """
+
+    def __init__(self, host: str, port: int = 0) -> None:
+        self.buttons, self.board = Buttons(), Board("fieldcal", [])
+        self._seen: dict[str, int] = {}
+        self._socket = _listening(host, port)
+        port = self._socket.getsockname()[1]
+        name = f"[{host}]" if ":" in host else host
+        self.access = Access((f"{name}:{port}",))
+        config = uvicorn.Config(
+            Gate(_app(self), self.access), log_config=None, access_log=False,
+            lifespan="off", timeout_graceful_shutdown=1, server_header=False,
+            limit_concurrency=64,
+        )  # fmt: skip
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(
+            target=self._server.run, args=([self._socket],), daemon=True
+        )
+
+    @property
+    def address(self) -> str:
+        """What to open, with the token."""
+        return f"http://{self.access.hosts[0]}/?token={self.access.token}"
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody has seen the page."""
+        return bool(self._seen)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        until = monotonic() + LINGER
+        while monotonic() < until and any(
+            seen < self.board.version for seen in self._seen.values()
+        ):
+            sleep(EVERY)
+        self._server.should_exit = True
+        self._thread.join(timeout=5.0)
+        self._socket.close()
+
+    def look(self, client: str) -> str:
+        """What a client is to see now, as JSON."""
+        version = self.board.version
+        mine = self.buttons.here(client)
+        content = {**self.board.content(), "mine": mine, "free": self.buttons.free()}
+        self._seen[client] = version
+        return json.dumps(content)
+
+    async def views(self, client: str) -> AsyncIterator[str]:
+        """Every change, as events of server-sent events."""
+        before, sent = "", -ALIVE
+        try:
+            while not self._server.should_exit:
+                now = self.look(client)
+                if now != before or monotonic() - sent > ALIVE:
+                    before, sent = now, monotonic()
+                    yield f"data: {now}\n\n"
+                await asyncio.sleep(EVERY)
+        finally:
+            self._seen.pop(client, None)
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except (OSError, OverflowError) as error:
+        raise InputError(
+            f"the page cannot be served at {host}:{port}: {error}; give an address of"
+            " this computer and a free port, as in --page 192.168.1.5:8080"
+        ) from error
+
+
+def this_computer() -> str:
+    """The address that others on the local network reach this computer by.
+
+    That from which it would send to them; nothing is sent.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # for documentation only, RFC 5737
+            return str(probe.getsockname()[0])
+        except OSError:
+            return "127.0.0.1"
+
+
+def _app(server: PageServer) -> Starlette:
+    async def page(_: Request) -> Response:
+        return FileResponse(FILES / "page.html", media_type="text/html")
+
+    def file(name: str) -> Callable[[Request], Awaitable[Response]]:
+        async def sent(_: Request) -> Response:
+            return FileResponse(FILES / name)
+
+        return sent
+
+    async def events(request: Request) -> Response:
+        client = request.query_params.get("client", "")
+        if not _is_name(client):
+            return JSONResponse({"error": "a client has a name"}, 400)
+        return StreamingResponse(server.views(client), media_type="text/event-stream")
+
+    async def take(request: Request) -> Response:
+        given = await _object(request)
+        if given is None or type(given.get("over", False)) is not bool:
+            return JSONResponse({"error": "client and over are wanted"}, 400)
+        if not server.buttons.take(given["client"], given.get("over", False)):
+            return JSONResponse({"error": "somebody else has the buttons"}, 409)
+        return JSONResponse({})
+
+    async def wish(request: Request) -> Response:
+        given = await _object(request)
+        if given is None or given.get("wish") not in OFFERED:
+            return JSONResponse({"error": "client and wish are wanted"}, 400)
+        if not server.buttons.press(given["client"], given["wish"]):
+            return JSONResponse({"error": "somebody else has the buttons"}, 409)
+        return JSONResponse({})
+
+    others = sorted(f.name for f in FILES.iterdir() if f.suffix != ".html")
+    routes = [
+        Route("/", page),
+        Route("/events", events),
+        Route("/buttons", take, methods=["POST"]),
+        Route("/wish", wish, methods=["POST"]),
+        *(Route(f"/{name}", file(name)) for name in others),
+    ]
+    return Starlette(routes=routes)
+
+
+async def _object(request: Request) -> dict[str, Any] | None:
+    """What a request wants, with the client's name; None where it is none."""
+    try:
+        given = json.loads(await request.body())
+    except (ValueError, RecursionError):
+        return None
+    return given if isinstance(given, dict) and _is_name(given.get("client")) else None
+
+
+def _is_name(client: Any) -> bool:
+    return isinstance(client, str) and 0 < len(client) <= NAME and client.isalnum()

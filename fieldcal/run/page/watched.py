@@ -1,0 +1,49 @@
+"""An operator whose run is seen on the page as well, and wished from there."""
+
+from __future__ import annotations
+
+from fieldcal.planning.steps import Hold
+from fieldcal.run.operator.protocol import Operator, OperatorView, Wish
+from fieldcal.run.page.board import Board
+from fieldcal.run.page.buttons import Buttons
+from fieldcal.run.wait_reason import WaitReason, reminder
+
+
+class WatchedOperator:
+    """Another operator, seen and wished on the page.
+
+    Parameters
+    ----------
+    inner : the operator at the console, or the script
+    board : what the page shows
+    buttons : what is pressed there
+
+    """
+
+    def __init__(self, inner: Operator, board: Board, buttons: Buttons) -> None:
+        self._inner, self._board, self._buttons = inner, board, buttons
+
+    def place(self, hold: Hold) -> None:
+        """Ask for a position."""
+        self._buttons.forget()
+        self._board.asked(hold)
+        self._inner.place(hold)
+
+    def tell(self, text: str) -> None:
+        """Show a sentence that must not be missed."""
+        self._board.told(text)
+        self._inner.tell(text)
+
+    def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+        """Call the operator."""
+        self._board.alarmed(reminder(waited))
+        self._inner.alarm(reason, waited)
+
+    def show(self, view: OperatorView) -> None:
+        """Show the state."""
+        self._board.seen(view)
+        self._inner.show(view)
+
+    def wish(self) -> Wish | None:
+        """What was asked for here or there; the page asks back by itself."""
+        return self._buttons.pressed() or self._inner.wish()

@@ -1,0 +1,194 @@
+"""What the page has to show, and who may press its buttons."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fieldcal.core.positions import FIVE, Position
+from fieldcal.drivers.driver import Health
+from fieldcal.planning.steps import Hold
+from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
+from fieldcal.run.page.board import Board
+from fieldcal.run.page.buttons import GONE, Buttons
+from fieldcal.run.page.watched import WatchedOperator
+from fieldcal.run.position_check import PositionCheck
+from fieldcal.run.wait_reason import WaitReason, WaitState
+
+HOLD = Hold(3, FIVE[3], 30.0)
+NEAR = PositionCheck(False, 20.04, -1.26, "", 2.0)
+
+
+def view(phase: Phase, hold: Hold = HOLD, **changes: object) -> OperatorView:
+    known: dict[str, object] = {
+        "arrival": NEAR if phase == "turning" else None,
+        "stillness": 0.4,
+        "elapsed": 12.0,
+        "sigma": np.array([1e-3, 2e-3, 3e-3, 1e-5, 1e-5, 2e-5]),
+        "reason": WaitReason(WaitState.TURNING),
+        "rate_hz": 100.0,
+        "temperature": 24.5,
+        "health": Health(samples=1234),
+    }
+    return OperatorView(phase, hold, **(known | changes))  # type: ignore[arg-type]
+
+
+def test_a_turn_is_shown_with_where_it_is_and_where_it_should_be() -> None:
+    board = Board("fieldcal", FIVE)
+    board.asked(HOLD)
+    board.seen(view("turning"))
+    now = board.content()
+    assert (now["words"], now["detail"]) == ("TURN TO", "position 4 of 5, then let go")
+    assert now["there"] == {"alpha_deg": 20.0, "beta_deg": -1.3, "ok": False}
+    assert now["wanted"] == {"alpha_deg": 45.0, "beta_deg": 2.5}
+    assert now["reason"] == "waiting for the turn"
+    assert "100 Hz" in now["link"] and "elapsed_s" not in now
+
+
+def test_a_window_fills_and_is_listed_when_it_is_taken() -> None:
+    board = Board("fieldcal", FIVE)
+    board.asked(HOLD)
+    board.told("the device was moved")
+    board.seen(view("averaging"))
+    now = board.content()
+    assert now["words"] == "HOLD STILL" and now["colour"] == "green"
+    assert (now["elapsed_s"], now["seconds"]) == (12.0, 30.0)
+    assert now["reached"] == "± 3.00 mm/s², 0.020 mrad/s" and now["still"] is True
+    assert now["told"] == ["the device was moved"]
+    board.seen(view("taken"))
+    now = board.content()
+    assert now["words"] == "TAKEN" and now["told"] == []
+    assert [row["taken"] for row in now["positions"]] == [
+        "",
+        "",
+        "",
+        "± 3.00 mm/s²",
+        "",
+    ]
+    board.asked(HOLD)  # once more
+    assert not any(row["taken"] for row in board.content()["positions"])
+
+
+def test_what_needs_the_operator_is_said_with_how_long_it_waits() -> None:
+    board = Board("fieldcal", FIVE)
+    board.asked(HOLD)
+    wrong = WaitReason(WaitState.MISPLACED, "the device is at α = 3.0°")
+    board.seen(view("turning", reason=wrong))
+    board.alarmed("still waiting, 60 s: ")
+    now = board.content()
+    assert now["colour"] == "yellow"
+    assert now["told"] == ["still waiting, 60 s: the device is at α = 3.0°"]
+
+
+def test_positions_that_are_found_on_the_way_are_listed() -> None:
+    board = Board("fieldcal", FIVE[:1], most=9)
+    board.asked(Hold(0, FIVE[0], 30.0))
+    board.asked(Hold(1, FIVE[4], 30.0))
+    now = board.content()
+    assert now["detail"] == "position 2 of at most 9, then let go"
+    assert [row["name"] for row in now["positions"]] == [FIVE[0].name, FIVE[4].name]
+
+
+def test_what_others_wrote_is_shown_and_never_carried_out() -> None:
+    evil = Position("\x1b]0;GO\x07", 0.0, 0.0)
+    board = Board("fieldcal", [evil])
+    board.asked(Hold(0, evil, 30.0))
+    board.told("a\u202eb")
+    now = board.content()
+    assert now["positions"][0]["name"] == r"\x1b]0;GO\x07"
+    assert now["told"] == [r"a\u202eb"]
+
+
+def test_the_end_is_what_is_shown_last() -> None:
+    board = Board("fieldcal", FIVE)
+    board.asked(HOLD)
+    board.seen(view("averaging"))
+    before = board.version
+    board.ended("NO-GO", ["take position 3 again"], good=False)
+    now = board.content()
+    assert (now["words"], now["colour"], now["ended"]) == ("NO-GO", "red", True)
+    assert now["told"] == ["take position 3 again"] and "phase" not in now
+    assert board.version > before
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_one_has_the_buttons_and_all_others_watch() -> None:
+    clock = Clock()
+    buttons = Buttons(clock)
+    assert buttons.free() and buttons.take("a")
+    assert buttons.here("a") and not buttons.here("b")
+    assert not buttons.take("b") and not buttons.press("b", "stop")
+    assert buttons.press("a", "repeat") and buttons.pressed() == "repeat"
+    assert buttons.pressed() is None
+    assert buttons.take("b", over=True) and not buttons.press("a", "stop")
+
+
+def test_whoever_is_gone_leaves_the_buttons() -> None:
+    clock = Clock()
+    buttons = Buttons(clock)
+    buttons.take("a")
+    clock.now = GONE - 1
+    assert buttons.here("a") and not buttons.free()
+    clock.now += GONE - 1
+    assert not buttons.free() and not buttons.take("b")
+    clock.now += 2
+    assert buttons.free() and buttons.take("b")
+
+
+class Console:
+    """An operator that notes what it is shown."""
+
+    def __init__(self) -> None:
+        self.seen: list[object] = []
+        self.wishes: list[Wish | None] = []
+
+    def place(self, hold: Hold) -> None:
+        self.seen.append(hold)
+
+    def tell(self, text: str) -> None:
+        self.seen.append(text)
+
+    def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
+        self.seen.append((reason, waited))
+
+    def show(self, view: OperatorView) -> None:
+        self.seen.append(view)
+
+    def wish(self) -> Wish | None:
+        return self.wishes.pop() if self.wishes else None
+
+
+def test_the_console_is_shown_everything_and_both_may_wish() -> None:
+    console, board, buttons = Console(), Board("fieldcal", FIVE), Buttons()
+    both = WatchedOperator(console, board, buttons)
+    buttons.take("a")
+    buttons.press("a", "stop")
+    now, reason = view("turning"), WaitReason(WaitState.NO_SAMPLES, "no samples")
+    both.place(HOLD)  # what was pressed before was meant for what is over
+    assert both.wish() is None
+    both.tell("said")
+    both.alarm(reason, 30.0)
+    both.show(now)
+    assert console.seen == [HOLD, "said", (reason, 30.0), now]
+    assert board.content()["words"] == "TURN TO"
+    console.wishes = ["wait"]
+    buttons.press("a", "confirm")
+    assert both.wish() == "confirm" and both.wish() == "wait"
+
+
+@pytest.mark.parametrize("name", ["page.html", "page.css", "page.js"])
+def test_nothing_of_the_page_comes_from_elsewhere(name: str) -> None:
+    text = (Path("fieldcal/run/page/files") / name).read_text(encoding="utf-8")
+    assert (
+        "http:" not in text
+        and "https:" not in text
+        and "//" not in text.replace("// ", "")
+    )

@@ -1,0 +1,146 @@
+"""The page in a real browser, on screens of a phone and of a tablet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, radians, sin
+from pathlib import Path
+
+import pytest
+from browser import CHROMIUM, Browser, browser
+
+from fieldcal.core.positions import FIVE
+from fieldcal.planning.steps import Hold
+from fieldcal.run.page.board import Board
+from fieldcal.run.page.server import PageServer
+
+pytestmark = pytest.mark.skipif(
+    not CHROMIUM, reason="there is no Chromium to show the page in"
+)
+
+PHONE, TABLET = (390, 844), (1180, 820)
+WORDS = "document.getElementById('words')?.textContent"
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with browser(tmp_path_factory.mktemp("browser")) as made:
+        yield made
+
+
+@pytest.fixture
+def server() -> Iterator[PageServer]:
+    with PageServer("127.0.0.1") as made:
+        made.board = Board("fieldcal · five_position", FIVE)
+        made.board.asked(Hold(1, FIVE[1], 30.0))
+        yield made
+
+
+def opened(page: Browser, server: PageServer) -> None:
+    page.open(server.address)
+    page.until(f"{WORDS} === 'TURN TO'")
+
+
+def tap(page: Browser, what: str) -> None:
+    page.value(f"document.querySelector({what!r}).click()")
+
+
+@pytest.mark.parametrize("size", [PHONE, TABLET])
+def test_it_shows_what_to_do_on_any_screen(
+    page: Browser, server: PageServer, size: tuple[int, int]
+) -> None:
+    server.board.told("<b>not carried out</b> " + "x" * 300)
+    page.size(*size)
+    opened(page, server)
+    assert page.text("angles") == FIVE[1].name
+    assert page.text("detail") == "position 2 of 5, then let go"
+    assert "<b>not carried out</b>" in page.text("told")
+    assert page.value("location.search") == ""  # the token is not kept in sight
+    assert "token" not in str(page.value("document.cookie"))
+    # nothing runs off to the side, what is pressed with gloves is large
+    assert page.value("document.documentElement.scrollWidth <= innerWidth")
+    assert page.value("document.getElementById('take').offsetHeight") >= 48
+    large = "parseFloat(getComputedStyle(document.getElementById('words')).fontSize)"
+    assert page.value(large) > 40
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(22.5, 2.5), (-45.0, 90.0)])
+def test_the_box_stands_as_the_position_says(
+    page: Browser, server: PageServer, alpha: float, beta: float
+) -> None:
+    """Of the box at home, east to the right, down, and towards who looks north."""
+    opened(page, server)
+    script = f"turned({alpha}, {beta}).slice(9, -1).split(',').map(Number)"
+    m = page.value(script)
+    east, down, south = m[0:3], m[4:7], m[8:11]
+    a, b = radians(alpha), radians(beta)
+    # alpha: its east side goes down; beta: its north side goes up
+    assert east == pytest.approx([cos(a), sin(a), 0.0], abs=1e-5)
+    assert down[1] == pytest.approx(cos(a) * cos(b), abs=1e-5)
+    assert south == pytest.approx([-sin(a) * sin(b), cos(a) * sin(b), cos(b)], abs=1e-5)
+
+
+def test_it_is_dark_where_the_screen_is(page: Browser, server: PageServer) -> None:
+    ground = (
+        "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
+    )
+    page.size(*PHONE)
+    opened(page, server)
+    light = sum(page.value(ground))
+    page.size(*PHONE, dark=True)
+    assert sum(page.value(ground)) < 150 < light
+    page.size(*PHONE)
+
+
+def test_buttons_are_taken_pressed_and_pressed_twice(
+    page: Browser, server: PageServer
+) -> None:
+    opened(page, server)
+    assert page.value("document.getElementById('mine').hidden")
+    tap(page, "#take")
+    page.until("document.getElementById('mine').hidden", False)
+    tap(page, "[data-wish=repeat]")
+    page.until("document.getElementById('theirs').hidden")
+    while (wish := server.buttons.pressed()) is None:
+        page.value("0")
+    assert wish == "repeat"
+    tap(page, "[data-wish=skip]")
+    shown = "document.querySelector('[data-wish=skip]').textContent"
+    assert page.value(shown) == "Really leave out?"
+    assert server.buttons.pressed() is None
+    tap(page, "[data-wish=skip]")
+    while (wish := server.buttons.pressed()) is None:
+        page.value("0")
+    assert wish == "skip"
+    assert server.buttons.take("other", over=True)
+    page.until("document.getElementById('mine').hidden")
+    assert "take them over" in page.text("take")
+
+
+def test_a_link_that_is_lost_comes_back(page: Browser, server: PageServer) -> None:
+    opened(page, server)
+    lost = "!document.getElementById('lost').hidden"
+    assert not page.value(lost)
+    page.ask("Network.emulateNetworkConditions", offline=True, latency=0,
+             downloadThroughput=-1, uploadThroughput=-1)  # fmt: skip
+    page.value("source.close(), listen()")
+    page.until(lost)
+    assert page.value(WORDS) == "TURN TO"  # what was known last stays in sight
+    server.board.asked(Hold(2, FIVE[2], 30.0))
+    page.ask("Network.emulateNetworkConditions", offline=False, latency=0,
+             downloadThroughput=-1, uploadThroughput=-1)  # fmt: skip
+    page.until(lost, False)
+    assert page.text("angles") == FIVE[2].name
+
+
+def test_the_end_stays_though_nothing_is_served_any_more(
+    page: Browser, tmp_path: Path
+) -> None:
+    with PageServer("127.0.0.1") as server:
+        server.board = Board("fieldcal", FIVE)
+        server.board.asked(Hold(0, FIVE[0], 30.0))
+        opened(page, server)
+        server.board.ended("GO", [], good=True)
+    page.until(f"{WORDS} === 'GO'")
+    assert page.value("document.getElementById('lost').hidden")
+    assert page.value("document.getElementById('mine').hidden")

@@ -20,13 +20,14 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.names import group_of
-from fieldcal.model import thresholds
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
 from fieldcal.solve import printed
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.estimation import Estimated, Recorded, estimated
 from fieldcal.solve.given import Tilt, Wanted, earth_known, seen_by
+from fieldcal.solve.latitude import EarthVertical
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import ladder_remedy
 from fieldcal.solve.result import calibration
@@ -34,6 +35,12 @@ from fieldcal.solve.rows import of_means
 from fieldcal.solve.words import join
 
 TILTED: tuple[Tilt, ...] = ("angle_offset", "base_tilt")
+
+NO_EARTH = (
+    "the gyroscopes do not show the Earth's rate, as those of a simulator without it:"
+    " their biases are stated without; real ones that do so take out what is a bias"
+)
+"""Said where the Earth's rate is absent."""
 
 
 def solve(
@@ -87,8 +94,13 @@ def solve(
     if as_printed:
         return printed.solve(observations, asked)
     chosen = asked.method_for(observations)
-    session = _Session(observations, asked, chosen, recorded)
-    found, notes = session.best()
+    found, notes = _Session(observations, asked, chosen, recorded).best()
+    shown = EarthVertical.of(found.given, found.search, observations.latitude)
+    if shown and shown.wrong:
+        still = _Session(observations, asked, chosen, recorded, earth=False)
+        other, others = still.best()
+        if other.score - found.score + np.log(priors.ELSEWHERE) > shown.gain:
+            found, notes = other, [NO_EARTH, *others]
     return calibration(chosen, observations, asked, found, notes)
 
 
@@ -101,6 +113,7 @@ class _Session:
     asked : what for
     method : that was chosen
     recorded : its rows, if there are more than the means
+    earth : whether gyroscopes have the Earth's rate
 
     """
 
@@ -110,12 +123,15 @@ class _Session:
         asked: Asked,
         method: Method,
         recorded: Recorded | None,
+        earth: bool = True,
     ) -> None:
         self.observations, self.asked, self.method = observations, asked, method
         navigation = observations.grade == "navigation"
         base, self.unknown = earth_known(
             observations.latitude, navigation, asked.heading
         )
+        if not earth:
+            base, self.unknown = np.zeros(3), (0.0, 0.0, 0.0)
         given = recorded or of_means(observations)
         rows = given.rows
         if method == "scalar":

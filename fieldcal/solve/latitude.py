@@ -7,7 +7,8 @@ it tells itself from the biases wherever the positions lean far enough:
 
 The site of the other hemisphere is the mistake that nothing else shows: gravity is the
 same there. Whether the latitude is wrong is asked as of any cause, by the evidence of
-the set with d and without.
+the set with d and without. A simulated device may have no Earth's rate at all: that is
+a third possibility, with a fit of its own.
 """
 
 from __future__ import annotations
@@ -34,27 +35,29 @@ class EarthVertical:
     ----------
     stated : by the latitude, rad/s, upwards
     shown, sigma : rad/s
-    probability : that the latitude is another than the one that is stated
+    gain : ln of evidence times chance, for another latitude than the stated one
 
     """
 
     stated: float
     shown: float
     sigma: float
-    probability: float
+    gain: float
 
     @classmethod
-    def of(cls, given: Given, search: Search, latitude: float) -> EarthVertical | None:
+    def of(
+        cls, given: Given, search: Search, latitude: float | None
+    ) -> EarthVertical | None:
         """What the rows of a set show, (1); None where they have no such column.
 
         Parameters
         ----------
         given : the set
         search : of its rows
-        latitude : that is stated, rad
+        latitude : that is stated, rad; None where none is
 
         """
-        if given.earth < 0:
+        if given.earth < 0 or latitude is None:
             return None
         column = np.array([given.earth + VERTICAL])
         group = Group("earth", "vertical", column, np.array([EARTH_RATE]), fixed=1.0)
@@ -67,18 +70,19 @@ class EarthVertical:
             stated,
             stated - float(free.state.estimate[at].sum()),
             float(np.sqrt(free.state.inverse[np.ix_(at, at)].sum())),
-            float(1 / (1 + np.exp(as_said.score - free.score))),
+            free.score - as_said.score,
         )
 
     @property
-    def sentence(self) -> str:
-        """What is wrong and what to do; empty where the latitude may be right.
-
-        What no latitude has is another fault's.
-        """
+    def wrong(self) -> bool:
+        """Whether it is likelier that of another latitude; what none has is no such."""
         beyond = abs(self.shown) - EARTH_RATE
-        if self.probability < thresholds.NAMED or beyond > 2 * self.sigma:
-            return ""
+        named = np.log(thresholds.NAMED / (1 - thresholds.NAMED))
+        return self.gain > float(named) and beyond < 2 * self.sigma
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong, and what to do."""
         sine = np.clip(self.shown / EARTH_RATE, -1.0, 1.0)
         degrees, stated = (
             np.rad2deg(np.arcsin(s)) for s in (sine, self.stated / EARTH_RATE)

@@ -254,10 +254,8 @@ def _contradicted(found: Estimated, observations: Observations) -> list[str]:
 
 def _elsewhere(found: Estimated, observations: Observations) -> list[str]:
     """A latitude that the gyroscopes contradict."""
-    if observations.latitude is None:
-        return []
     shown = EarthVertical.of(found.given, found.search, observations.latitude)
-    return [shown.sentence] if shown and shown.sentence else []
+    return [shown.sentence] if shown and shown.wrong else []
 
 
 def _turns(found: Estimated) -> tuple[float, int]:

@@ -174,6 +174,16 @@ def test_what_a_set_may_be_given_is_asked_beside_other_instabilities(seed: int) 
             assert offer.less == table.less
         ranked = [o.score for o in table.offers]
         assert ranked == sorted(ranked, reverse=True)
+    plain, small = (t for t in tables if t.less == mode)
+    assert plain.score == pytest.approx(there.score)
+    starts = np.cumsum([0, *(len(g.columns) for g in d.always)])
+    i = [g.cause for g in d.always].index("scale")
+    sizes = there.state.sizes.copy()
+    sizes[starts[i] : starts[i + 1]] = d.always[i].sizes(float(SIZES[0]))
+    np.testing.assert_allclose(small.state.sizes, sizes)
+    lost = DENSITY[0] - DENSITY[there.sizes.calibration[i]]
+    expected = there.score - there.state.score + small.state.score + lost
+    assert small.score == pytest.approx(expected)
     beside = fallen(mode, (0, 1, 2), 6)
     fresh = SESSION.search(SESSION.noise(np.random.default_rng(seed), tau))
     again = fresh.evaluated(())

@@ -6,7 +6,7 @@ of columns by what the model has of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -18,6 +18,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.mixture import Mixing
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.reported import reported
 from fieldcal.model.priors import SIZES
@@ -165,6 +166,21 @@ def test_with_sizes_found_estimates_are_as_near_as_they_say() -> None:
         state = reported(one.search, one.found).state
         away.append(pulls(state, one.value)[:count])
     assert 0.93 < np.mean(np.abs(np.concatenate(away)) < 1.96) < 0.97
+
+
+def test_what_is_reported_is_the_mean_over_instabilities() -> None:
+    one = draws()[1]
+    found = reported(one.search, one.found)
+    wide, _ = one.search.opened(one.found)
+    state = Eliminated.of(one.found.state.rows, one.found.state.columns, wide)
+    opened = replace(one.found, state=state)
+    mixed = Mixing(SESSION.dictionary, one.search.gram, opened, one.search.unstable,
+                   False).run()  # fmt: skip
+    np.testing.assert_allclose(found.state.estimate, mixed.mean)
+    np.testing.assert_allclose(found.state.inverse, mixed.covariance)
+    half = found.state.half
+    np.testing.assert_allclose(half.T @ half, mixed.covariance, rtol=1e-6, atol=1e-18)
+    assert found.members == one.found.members and found.score == one.found.score
 
 
 def test_what_does_the_same_stands_in_its_place() -> None:

@@ -83,6 +83,15 @@ def test_one_that_moves_until_the_window_begins_has_just_arrived() -> None:
     assert found[1] == pytest.approx(20.0, abs=0.02)
 
 
+def test_of_slow_samples_a_piece_has_two() -> None:
+    """Of five a second, counted back from the window: 20 - 17 * 0.4 s."""
+    t = 1.0 + np.arange(150) / 5.0
+    six = NOISE * np.random.default_rng(0).standard_normal((len(t), 6))
+    six[(t >= 11.0) & (t < 13.1), 3] += 0.5
+    block = Block.of(t, six[:, :3], six[:, 3:])
+    assert arrivals(block, KNOWN, NOISE)[1] == pytest.approx(13.2)
+
+
 def test_between_windows_that_touch_there_is_no_turn_to_see() -> None:
     known = about((4.0, 10.0), (10.0, 20.0), (20.05, 25.0))
     block = recorded(np.array([0.0, 0.0]), 0.0, 3)

@@ -65,14 +65,14 @@ def test_rows_that_are_missing_are_not_asked() -> None:
     assert not going_round(t, SPEED * AXIS, gyr, sd, SCALE, 1.0).values.any()
 
 
-@pytest.mark.parametrize("times", [1.5, 0.5])
+@pytest.mark.parametrize("times", [1.5, 1.0, 0.5])
 def test_what_is_larger_than_the_earth_makes_stays(times: float) -> None:
     t = np.arange(0.0, 30.0, 1.0)
     gyr, round_ = outputs(t, 1.0)
     size = np.linalg.norm(EARTH - AXIS * (EARTH @ AXIS))
     gyr += (times * EARTH_RATE / size - 1.0) * round_
     found = going_round(t, SPEED * AXIS, gyr, np.full((30, 3), SD), SCALE, 1.0)
-    assert found.values.any() == (times < 1.0)
+    assert found.values.any() == (times <= 1.0)
 
 
 @pytest.mark.parametrize(("seconds", "share"), [(12.0, 1 / 36.0), (2.0, 0.5)])

@@ -185,6 +185,29 @@ def test_information_of_closures_is_that_of_noise() -> None:
         np.testing.assert_allclose(1 / np.sqrt(turn.info), sigma, rtol=0.3)
 
 
+def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
+    """Outputs of twice the rate with the same noise tell the angle twice as well."""
+    block, windows = recorded()
+    block = replace(block, gyr=2.0 * block.gyr + QUIET.gyr[0] * np.random.default_rng(
+        1).standard_normal(block.gyr.shape))  # fmt: skip
+    places = [
+        {"alpha_deg": a, "beta_deg": b, "start_s": w.start, "end_s": w.end}
+        for (a, b), w in zip(PLACES, windows, strict=True)
+    ]
+    about = {"format": 1, "position": places, "nominal": {"gyr_scale": [2.0] * 3}}
+    prepared = prepare(block, parse(about))
+    inference = inference_of(prepared.source, prepared.rows, prepared)
+    d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
+    linear = inference.system.linearised(inference.nominal)
+    assert inference.turns is not None and not d.free.any()
+    turns = inference.turns.linearised(inference.nominal, at_rest, linear, None)
+    noise = float(np.sqrt((prepared.rows.noise[3:] ** 2).mean()))
+    for turn in turns:
+        sigma = noise / 2.0 * np.sqrt((TURN_S + 2.0) / 100.0)
+        np.testing.assert_allclose(1 / np.sqrt(turn.info), sigma, rtol=0.3)
+        assert not len(turn.way), "what windows say is not known yet"
+
+
 def test_a_copied_column_is_as_the_one_it_is_near() -> None:
     turn = ride("gyro_scale").turns[2]
     old, new = turn.columns[[1, 4]], np.array([9001, 9002])

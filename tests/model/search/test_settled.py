@@ -1,0 +1,250 @@
+"""The state that is found, on rows of a device whose errors are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from small_sessions import LADDER, SD, Session, dictionary, ladder, nominal, rows_of
+
+from fieldcal.core.samples import Array
+from fieldcal.effects import catalogue
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.search import selection
+from fieldcal.model.search.inference import Inference, Inferred
+from fieldcal.model.search.selection import Search
+from fieldcal.model.state import State, Term
+from fieldcal.model.system.linear_system import System
+from fieldcal.physics.shape import FINEST
+
+X = ladder(6)
+EFFECTS = catalogue()
+TAU = 7.3
+BIAS = np.array([0.02, -0.03, 0.01, 1e-3, -2e-3, 5e-4])
+SCALE = np.array([1.002, 0.999, 1.001, 1.0, 1.0, 1.0])
+
+
+def state_of(*terms: Term, turned: Array | None = None) -> State:
+    small = np.zeros((len(LADDER), 2)) if turned is None else turned
+    return State(BIAS, SCALE, small, np.zeros(3), terms)
+
+
+def inference_of(state: State, seed: int = 2) -> Inference:
+    """Of rows that a state predicts, with noise."""
+    d = dictionary(X)
+    y = state.output(state.experienced(X), d.since)
+    y += SD * np.random.default_rng(seed).standard_normal(y.shape)
+    return Inference(System(rows_of(X, y), d), nominal())
+
+
+SETTLING = Term(
+    EFFECTS["settling"], np.array([0.05, -0.03, 0.02, 0, 0, 0]), {"tau_s": TAU}
+)
+
+
+@cache
+def settling() -> Inferred:
+    return inference_of(state_of(SETTLING)).run()
+
+
+def chi2(found: Inferred) -> float:
+    """Weighted squares of what the state leaves, over the rows."""
+    inference = found.inference
+    rows, d = inference.system.rows, inference.dictionary
+    off = rows.y - found.state.output(found.state.experienced(X), d.since)
+    return float(np.mean((off / SD) ** 2))
+
+
+def test_a_time_constant_is_found_between_the_points_of_its_grid() -> None:
+    found = settling()
+    ((cause, group),) = found.best.members
+    assert cause.key == "settling:acc"
+    assert 0.0 < group.unsure < 0.05 * TAU
+    assert abs(group.shape["tau_s"] - TAU) < 4 * group.unsure
+    (term,) = found.state.terms
+    assert term.shape == group.shape and term.effect is EFFECTS["settling"]
+    sigma = np.sqrt(np.diag(found.best.state.inverse))
+    at = [found.best.state.columns.tolist().index(c) for c in group.columns]
+    off = term.values[list(group.params)] - SETTLING.values[list(group.params)]
+    assert (np.abs(off) < 6 * sigma[at] + 1e-3).all()
+    assert chi2(found) == pytest.approx(1.0, abs=0.2)
+
+
+def test_the_state_is_what_the_columns_say() -> None:
+    found, d = settling(), settling().inference.dictionary
+    values = found.values
+    np.testing.assert_allclose(found.state.bias, values[d.bias : d.bias + 6])
+    np.testing.assert_allclose(found.state.scale, 1 + values[d.scale : d.scale + 6])
+    np.testing.assert_allclose(found.state.earth, values[d.earth : d.earth + 3])
+    np.testing.assert_allclose(found.state.bias, BIAS, atol=1e-3)
+    assert not found.state.small_rotation.any()
+    assert len(values) == d.width
+    kept = {int(c) for g in d.always for c in g.columns}
+    kept |= {int(c) for _, g in found.best.members for c in g.columns}
+    assert set(np.flatnonzero(values)) <= kept
+
+
+def test_a_nominal_state_is_started_from_and_kept() -> None:
+    """What a simulation has already is not found once more."""
+    plain = inference_of(state_of(SETTLING))
+    near = SCALE + [0.01, -0.006, 0.003, 0.0, 0.0, 0.0]
+    start = State(BIAS + 0.01, near, np.zeros((9, 2)), np.zeros(3), (SETTLING,))
+    plain.nominal = start
+    found = plain.run()
+    assert found.best.members == ()
+    (term,) = found.state.terms
+    assert term.effect is SETTLING.effect and term.shape == SETTLING.shape
+    np.testing.assert_array_equal(term.values, SETTLING.values)
+    np.testing.assert_allclose(found.state.bias, BIAS, atol=1e-3)
+    np.testing.assert_allclose(found.state.scale[:3], SCALE[:3], atol=1e-3)
+    assert chi2(found) == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_position_far_from_where_it_is_said_to_be_is_followed() -> None:
+    turned = np.zeros((len(LADDER), 2))
+    turned[4] = np.deg2rad([9.0, -4.0])
+    found = inference_of(state_of(turned=turned)).run()
+    ((cause, group),) = found.best.members
+    assert (cause.name, group.position) == ("misset", 4)
+    np.testing.assert_allclose(found.state.small_rotation, turned, atol=2e-4)
+    assert chi2(found) == pytest.approx(1.0, abs=0.2)
+
+
+def test_where_nothing_is_the_state_is_bias_and_scale_factor() -> None:
+    found = inference_of(state_of()).run()
+    assert found.best.members == () and found.state.terms == ()
+    np.testing.assert_allclose(found.state.bias, BIAS, atol=1e-3)
+    assert chi2(found) == pytest.approx(1.0, abs=0.2)
+
+
+def test_another_set_is_refined_beside_and_leaves_no_columns() -> None:
+    """Its evidence is no less than that at the best point of the grid."""
+    found = settling()
+    d = found.inference.dictionary
+    cause = next(c for c in d.causes if c.key == "settling:gyr")
+    whole = [g for g in cause.variants if len(g.columns) == 3]
+    (own,) = found.best.members
+    on_grid = [found.search.evaluated((own, (cause, g))).score for g in whole]
+    best = whole[int(np.argmax(on_grid))]
+    there = found.search.evaluated((own, (cause, best)))
+    width, count = d.width, len(d.bases)
+    refined = found.inference.beside(found, there)
+    assert (d.width, len(d.bases)) == (width, count)
+    assert refined.members[0][1] is own[1], "what was found stays"
+    assert refined.members[1][1].shape != best.shape
+    assert refined.members[1][1].params == best.params
+    more = len(refined.members[1][0].variants) / len(cause.variants)
+    assert refined.score >= max(on_grid) - np.log(more) - 0.1
+
+
+def test_a_settled_state_stays() -> None:
+    """About it the estimate is the state itself, column by column."""
+    found = settling()
+    inference, d = found.inference, found.inference.dictionary
+    members = found.best.members
+    state, values, again = inference.settled(found.state, found.values, members)
+    sigma = np.sqrt(np.diag(again.state.inverse))
+    linear = [c for g in d.always for c in g.columns]
+    at = np.isin(again.state.columns, linear)
+    off = (values - found.values)[again.state.columns]
+    assert (np.abs(off) < 0.1 * sigma)[at].all()
+    np.testing.assert_allclose(state.bias, found.state.bias, atol=1e-4)
+
+
+def test_wanted_are_columns_of_the_set_and_what_is_always_there() -> None:
+    found, d = settling(), settling().inference.dictionary
+    wanted = found.inference.wanted(found.best.members)
+    groups = [*d.always, *(g for _, g in found.best.members)]
+    expected = sorted({int(c) for g in groups for c in g.columns})
+    assert np.flatnonzero(wanted).tolist() == expected
+    free = Inference(System(rows_of(X, X.f @ np.zeros((3, 6))),
+                            dictionary(ladder(6, (2,)))), nominal())  # fmt: skip
+    own = free.dictionary
+    some = free.wanted(())
+    assert some[own.small_rotation : own.small_rotation + 18].all()
+
+
+def test_the_top_of_a_parabola_is_where_it_is() -> None:
+    """Three scores a ratio apart, and how sharp it is."""
+    d = dictionary(X)
+    inference = Inference(System(rows_of(X, np.zeros((len(X), 6))), d), nominal())
+    cause = next(c for c in d.causes if c.key == "settling:acc")
+    here = cause.variants[4]
+    at, sharp = here.shape["tau_s"], 40.0
+    top = 0.3 * np.log(FINEST)
+    scores = [-0.5 * sharp * (k * np.log(FINEST) - top) ** 2 for k in (0, -1, 1)]
+    _, group = inference._at_top(cause, here, here, scores, "tau_s")
+    found = group.shape["tau_s"]
+    assert found == pytest.approx(at * FINEST**0.3)
+    assert group.unsure == pytest.approx(found / sharp**0.5)
+    beyond = [0.0, -5.0, 4.0]
+    _, group = inference._at_top(cause, here, here, beyond, "tau_s")
+    assert group.shape["tau_s"] == pytest.approx(at * FINEST), "no further than a step"
+
+
+# --- two at a time
+
+KEYS = ("angle_offset", "quadratic", "g_sensitivity", "bias_drift:acc",
+        "bias_drift:gyr", "cross_coupling")  # fmt: skip
+SESSION = Session.of(ladder(), KEYS)
+
+
+def drawn(seed: int) -> tuple[Search, Set]:
+    """Two causes that are there beside noise."""
+    rng = np.random.default_rng(seed)
+    causes = {c.key: c for c in SESSION.dictionary.causes}
+    off = SESSION.noise(rng)
+    for key in ("cross_coupling", "bias_drift:acc"):
+        group = causes[key].variants[0]
+        some = 0.05 * group.typical * rng.standard_normal(len(group.columns))
+        off += SESSION.design[:, :, group.columns] @ some
+    search = SESSION.search(off)
+    return search, search.evaluated(())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
+    search, empty = drawn(seed)
+    found = search._paired(empty, -np.inf)
+    assert len(found.members) == 2
+    scores = []
+    for table in search.tables(empty):
+        for one, two, gain in selection._pairs(table):
+            assert one.size is not None and two.size is not None
+            foretold = table.score + gain + search._more(empty, one, two)
+            scores.append(foretold)
+            both = search.taken(empty, one, two)
+            assert both.keys == {one.member[0].key, two.member[0].key}
+    every = [s for s in search.visited.values() if len(s.members) == 2]
+    assert found.score >= max(s.score for s in every) - 0.5
+    assert found.score >= max(scores) - 1.0
+    assert search._paired(empty, np.inf) is empty, "none comes near"
+
+
+def part_of(whole: Group, count: int) -> Group:
+    return replace(
+        whole, params=whole.params[:count], columns=whole.columns[:count],
+        typical=whole.typical[:count],
+    )  # fmt: skip
+
+
+def test_all_the_parameters_of_a_cause() -> None:
+    d: Dictionary = SESSION.dictionary
+    cause: Cause = next(c for c in d.causes if c.key == "cross_coupling")
+    whole = cause.variants[0]
+    assert selection._whole(cause, part_of(whole, 2)) is whole
+    assert selection._whole(cause, whole) is whole
+    shaped = replace(part_of(whole, 2), shape={"tau_s": 1.0})
+    assert selection._whole(cause, shaped) is shaped
+    search, empty = drawn(0)
+    offer = next(o for o in search.offers(empty)
+                 if o.member[0].key == "cross_coupling")  # fmt: skip
+    wide = selection._widened(replace(offer, member=(cause, part_of(whole, 2))))
+    assert wide.member == (cause, whole)
+    assert (wide.size, wide.less) == (offer.size, offer.less)
+    same = replace(offer, member=(cause, whole))
+    assert selection._widened(same) is same

@@ -223,7 +223,7 @@ def test_what_settles_shows_whatever_the_orientations(
     [
         pytest.param("base_tilt", {"about_x_deg": 0.5}, marks=pytest.mark.thorough),
         ("cross_coupling", {"k12": 0.004, "k31": -0.003}),
-        ("gyro_scale", {"s1": 0.02}),
+        pytest.param("gyro_scale", {"s1": 0.02}, marks=pytest.mark.thorough),
     ],
 )
 def test_positions_without_angles_among_those_that_have_them(

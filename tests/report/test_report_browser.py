@@ -81,7 +81,9 @@ def view(browser: Browser) -> tuple[float, float]:
     return (found[0], found[1])
 
 
-@pytest.mark.parametrize("make", [consistent, left_out, real])
+@pytest.mark.parametrize(
+    "make", [pytest.param(consistent, marks=pytest.mark.thorough), left_out, real]
+)
 def test_every_plot_is_drawn_and_can_be_zoomed(
     browser: Browser, folder: Path, make: Callable[[Path], Path]
 ) -> None:

@@ -100,7 +100,7 @@ CASES = [
     (Model(), TWO, 100),
     (Model("angle_offset"), FIVE, 60),
     pytest.param(Model("angle_offset"), WIDE, 60, marks=pytest.mark.thorough),
-    (Model("base_tilt"), WIDE, 60),
+    pytest.param(Model("base_tilt"), WIDE, 60, marks=pytest.mark.thorough),
     (Model("base_tilt"), NINE, 40),
     (Model(cross=True), SIX_FACES, 50),
 ]

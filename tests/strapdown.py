@@ -6,7 +6,7 @@ holds a device in nine positions, turned about z by alpha and then about the tur
 beta (x East, y down, z north), and writes what its IMU says as CSV. PATCH is JSON,
 
     {"bias": {"acc": [3], "gyr": [3]}, "matrix": {"acc": [[3] * 3], ...},
-     "noise": {"acc": [3], "gyr": [3]}, "quadratic": [3], "seed": 1}
+     "noise": {"acc": [3], "gyr": [3]}, "effects": {"quadratic": {"x": 0.0}}, "seed": 1}
 
 all of it optional: U = bias + M f + quadratic f^2 + noise. If it has none of it, the
 device is perfect. SI units.
@@ -90,7 +90,8 @@ def outputs(device: Mapping[str, Any], start: float = 3.0) -> Any:
         bias = np.array(device.get("bias", {}).get(triad, [0.0] * 3), float)
         noise = np.array(device.get("noise", {}).get(triad, [0.0] * 3), float)
         columns.append(true @ matrix.T + bias + noise * rng.standard_normal(true.shape))
-    columns[1] = columns[1] + np.array(device.get("quadratic", [0.0] * 3)) * force**2
+    even = device.get("effects", {}).get("quadratic", {})
+    columns[1] = columns[1] + force**2 * [even.get(axis, 0.0) for axis in "xyz"]
     return np.hstack(columns)
 
 

@@ -101,6 +101,7 @@ class Facts:
     ----------
     rate_hz : samples a second
     step_acc, step_gyr : least change of an output, m/s^2 and rad/s; nan where none
+    start_s : first sample, s of device time
     start_c : temperature at the start, deg C; nan where unknown
     noise : by channel, from sample to sample at rest, m/s^2 and rad/s
 
@@ -109,6 +110,7 @@ class Facts:
     rate_hz: float
     step_acc: float
     step_gyr: float
+    start_s: float
     start_c: float
     noise: Mapping[str, Quantity]
 
@@ -118,6 +120,7 @@ class Facts:
             "rate_hz": number(self.rate_hz),
             "step_acc": number(self.step_acc),
             "step_gyr": number(self.step_gyr),
+            "start_s": number(self.start_s),
             "start_c": number(self.start_c),
             "noise": {n: q.to_json() for n, q in self.noise.items()},
         }

@@ -53,6 +53,7 @@ def facts(one: Side) -> Facts:
         rate_hz=one.rate_hz,
         step_acc=steps[0] or np.nan,
         step_gyr=steps[1] or np.nan,
+        start_s=float(one.block.t[0]),
         start_c=Thermometer.of(one.block).start_c,
         noise={
             name: _level(one, c)

@@ -10,34 +10,85 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fieldcal.against import Match
+    from fieldcal.against.rounds import Round
+    from fieldcal.against.sensor_model import SensorModel
+    from fieldcal.against.side import Side
+    from fieldcal.session.folder import Session
 
 AGAINST = "against.json"
+
+PLAIN = "json"
+"""Format of the patches of a command unless another is named."""
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the comparison: 0 if the two agree, 1 if they differ."""
-    from fieldcal.against import matched
-    from fieldcal.against.opening import opened
+    from fieldcal.against.rounds import is_command
     from fieldcal.against.side import side
     from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
-    real = session.block, session.about
-    block, about, said = opened(Path(args.against), real)
-    one = side(str(args.session), *real)
-    found = matched(one, side(str(args.against), block, about, one))
-    path = session.write_json(AGAINST, found.to_json() | {"against": args.against})
+    real = side(str(args.session), session.block, session.about)
+    compared = _rounds if is_command(args.against) else _once
+    found, model, said = compared(args, session, real)
+    content = found.to_json() | {"against": args.against}
+    written = [session.write_json(AGAINST, content)]
+    if model is not None:
+        written.append(_patch(args.patch or PLAIN, session, model, said))
     for warning in (*session.warnings, *said, *found.warnings):
         sys.stderr.write(f"fieldcal diagnose: {warning}\n")
     _say(args, found)
-    if not args.json:
-        sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.commands.report import write
 
-        page = write(args.session)
-        (sys.stderr if args.json else sys.stdout).write(f"written: {page}\n")
+        written.append(write(args.session))
+    for path in written:
+        (sys.stderr if args.json else sys.stdout).write(f"written: {path}\n")
     return 0 if found.verdict == "consistent" else 1
+
+
+def _once(
+    args: argparse.Namespace, session: Session, real: Side
+) -> tuple[Match, SensorModel | None, list[str]]:
+    """Compare with a file or a session; the patch that was asked for."""
+    from fieldcal.against import matched
+    from fieldcal.against.opening import opened
+    from fieldcal.against.sensor_model import patched
+    from fieldcal.against.side import side
+
+    block, about, said = opened(Path(args.against), (session.block, session.about))
+    found = matched(real, side(args.against, block, about, real))
+    return found, patched(found) if args.patch else None, said
+
+
+def _rounds(
+    args: argparse.Namespace, session: Session, real: Side
+) -> tuple[Match, SensorModel | None, list[str]]:
+    """Run a command, patch it, and run it again; the last patch that was tried."""
+    from fieldcal.against.rounds import rounds
+
+    form = args.patch or PLAIN
+    done = rounds(args.against, real, session.about, form, args.rounds, _tell)
+    last = done[-1]
+    return last.match, last.patch, list(last.says)
+
+
+def _tell(number: int, one: Round) -> None:
+    """A line for each run of the simulator."""
+    differ = ", ".join(d.id.replace("_", " ") for d in one.match.differences)
+    sys.stderr.write(
+        f"run {number}{', patched' if number else ''}: {differ or 'nothing'} differs,"
+        f" χ²/dof {one.match.before.chi2_per_dof:.3g}\n"
+    )
+
+
+def _patch(form: str, session: Session, model: SensorModel, said: list[str]) -> Path:
+    """Write the patch beside the recording."""
+    from fieldcal.against import patches
+
+    path = session.folder / f"patch{patches.patch_format(form).ENDING}"
+    said += patches.write(form, model, path)
+    return path
 
 
 def _say(args: argparse.Namespace, found: Match) -> None:

@@ -25,7 +25,8 @@ EXAMPLE = """\
   fieldcal diagnose bench-7/2026-03-01 --json > diagnosis.json
   fieldcal diagnose bench-7/2026-03-01 --twin bench-7.toml
   fieldcal sim --profile bench-7.toml
-  fieldcal diagnose bench-7/2026-03-01 --against simulated.csv
+  fieldcal diagnose bench-7/2026-03-01 --against sitl.bin --patch sitl
+  fieldcal diagnose bench-7/2026-03-01 --against "./simulate {patch} {out}"
 """
 
 DIAGNOSIS = "diagnosis.json"
@@ -49,7 +50,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--against",
         metavar="SIM",
         help="say what differs from a simulator's output: a session folder, or a file"
-        " that import reads, of the same positions",
+        " that import reads, of the same positions; or a command with {patch} and"
+        " {out} in it, which is run, patched and run again",
+    )
+    add(
+        "--patch",
+        choices=("gazebo", "json", "kalibr", "px4", "sitl", "toml"),
+        help="with --against: write what makes the simulator like the recording",
+    )
+    add(
+        "--rounds",
+        type=int,
+        default=3,
+        metavar="N",
+        help="patches that are tried on a command (default: 3)",
     )
 
 
@@ -61,6 +75,8 @@ def run(args: argparse.Namespace) -> int:
         if args.twin:
             raise InputError("name --twin or --against: each is an answer of its own")
         return against.run(args)
+    if args.patch:
+        raise InputError("--patch needs --against: say what is to be patched")
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare
     from fieldcal.diagnosis.verdict import concluded

@@ -95,22 +95,22 @@ def write(source: ExportSource, path: Path) -> list[str]:
         f"update_rate: {rate:.6g}" if np.isfinite(rate) else "# update_rate: unknown",
         "model: scale-misalignment",
         "accelerometers:",
-        f"  M: {_text(acc)}",
-        f"  bias: {_text(acc_bias)}",
+        f"  M: {written(acc)}",
+        f"  bias: {written(acc_bias)}",
         "gyroscopes:",
-        f"  M: {_text(lower)}",
-        f"  C_gyro_i: {_text(turn)}",
+        f"  M: {written(lower)}",
+        f"  C_gyro_i: {written(turn)}",
         "  A: [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]",
-        f"  bias: {_text(gyr_bias)}",
+        f"  bias: {written(gyr_bias)}",
     ]
     write_whole(path, "\n".join(lines) + "\n")
     return says
 
 
-def _text(array: Array) -> str:
+def written(array: Array) -> str:
     """Write an array as YAML; an exponent needs its point there."""
     if array.ndim == 2:
-        return "[" + ", ".join(_text(row) for row in array) + "]"
+        return "[" + ", ".join(written(row) for row in array) + "]"
     return "[" + ", ".join(_number(float(x)) for x in array) + "]"
 
 

@@ -83,7 +83,7 @@ def test_what_the_simulator_has_beyond_the_device_has_the_other_direction(
 ) -> None:
     more = {
         **DEVICE,
-        "quadratic": [0.0, 0.0, 3e-4],
+        "effects": {"quadratic": {"z": 3e-4}},
         "matrix": {"acc": [[1.004, 0, 0], [0.004, 0.997, 0], [0, 0, 1.001]]},
         "noise": {"acc": [0.02] * 3, "gyr": [1.5e-3] * 3},
     }

@@ -1,0 +1,55 @@
+"""Gazebo: the <imu> element of an SDF sensor, with its noise.
+
+Gazebo adds to each axis a normal number of mean <mean> and deviation <stddev>, and
+rounds to steps of <precision> where the type is gaussian_quantized. A bias is written
+as <mean>: <bias_mean> is given either sign by chance each time a world is loaded.
+m/s^2, rad/s, sensor axes. Source: gz-sensors, GaussianNoiseModel.cc; SDFormat, imu.
+"""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from fieldcal.against.sensor_model import SensorModel
+
+WHAT = "Gazebo, the <imu> element of SDF"
+ENDING = ".sdf"
+HOLDS = ("acc_bias", "gyr_bias", "noise", "quantisation")
+
+TRIADS = (("gyr", "angular_velocity"), ("acc", "linear_acceleration"))
+
+
+def text(model: SensorModel) -> tuple[str, list[str]]:
+    """The element, and what the user must know."""
+    imu = Element("imu")
+    for triad, name in TRIADS:
+        if _says(model, triad):
+            part = SubElement(imu, name)
+            for i, axis in enumerate("xyz"):
+                _noise(SubElement(part, axis), model, triad, i)
+    indent(imu)
+    says = ["put it into <sensor type='imu'> in the place of the <imu> that is there"]
+    if model.rate_hz == model.rate_hz:
+        says.append(f"<update_rate> of the recording: {model.rate_hz:.6g}")
+    return tostring(imu, encoding="unicode") + "\n", says
+
+
+def _says(model: SensorModel, triad: str) -> bool:
+    """Whether anything of a triad is to be changed."""
+    noisy = any(name[0] == triad[0] for name in model.noise)
+    stepped = triad in model.effects.get("quantisation", {})
+    return noisy or stepped or f"{triad}_bias" in model.calibration
+
+
+def _noise(axis: Element, model: SensorModel, triad: str, i: int) -> None:
+    """One axis."""
+    step = model.number("quantisation", triad)
+    noise = SubElement(axis, "noise")
+    noise.set("type", "gaussian_quantized" if step else "gaussian")
+    values = {
+        "mean": model.group(f"{triad}_bias")[i],
+        "stddev": model.noise.get(f"{triad[0]}{'xyz'[i]}", 0.0),
+        **({"precision": step} if step else {}),
+    }
+    for name, value in values.items():
+        SubElement(noise, name).text = f"{value:.9g}"

@@ -1,0 +1,58 @@
+"""Our virtual device: tables of a device file, for fieldcal sim --profile.
+
+    U = acc_bias + acc_scale f + effects,    W = gyr_bias + gyr_scale w + effects
+
+What is not in the file is that of a device file's defaults. Instants count from when
+the device is switched on. Source: `fieldcal.sim_device.profile_file`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fieldcal.against.sensor_model import SensorModel
+from fieldcal.core.samples import CHANNELS
+from fieldcal.sim_device.effects import ids, kind
+from fieldcal.sim_device.profile_file import FORMAT, from_tables
+
+WHAT = "the virtual device of fieldcal sim"
+ENDING = ".toml"
+HOLDS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "noise", *ids())
+
+
+def text(model: SensorModel) -> tuple[str, list[str]]:
+    """The device file, and what the user must know."""
+    import tomlkit
+
+    tables: dict[str, Any] = {"format": FORMAT}
+    if model.rate_hz == model.rate_hz:
+        tables["sampling"] = {"rate_hz": float(f"{model.rate_hz:.9g}")}
+    if model.calibration:
+        tables["truth"] = {n: v.tolist() for n, v in model.calibration.items()}
+    if model.noise:
+        tables["noise"] = _noise(model)
+    effects = {n: _known(n, v) for n, v in model.effects.items() if n in ids()}
+    effects = {n: v for n, v in effects.items() if any(v.values())}
+    if effects:
+        tables["effects"] = effects
+    from_tables(tables)  # what it refuses is not written
+    return tomlkit.dumps(tables), []
+
+
+def _noise(model: SensorModel) -> dict[str, list[float]]:
+    """White noise by triad; what is random besides is an effect of its own."""
+    level = [model.noise.get(name, 0.0) for name in CHANNELS]
+    none = [0.0, 0.0, 0.0]
+    return {
+        "acc": level[:3],
+        "gyr": level[3:],
+        "acc_instability": none,
+        "gyr_instability": none,
+    }
+
+
+def _known(name: str, values: Any) -> dict[str, Any]:
+    """Parameters that the virtual device has a word for."""
+    one = kind(name)
+    words = {*one.VECTOR, *one.NUMBERS, *one.WORDS}
+    return {n: v for n, v in values.items() if n in words}

@@ -1,0 +1,148 @@
+"""A simulator that is a command: run, compared, patched, and run again.
+
+    CMD {patch} {out}
+
+is run without a shell, with the patch's file and that of its output in the places of
+these words. At first the patch changes nothing. What a simulator that fails has said
+is told, and nothing is kept of a round that was not finished.
+"""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from fieldcal.against import patches
+from fieldcal.against.comparison import matched
+from fieldcal.against.opening import opened
+from fieldcal.against.result import Match
+from fieldcal.against.sensor_model import SensorModel, patched
+from fieldcal.against.side import Side, side
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
+from fieldcal.core.shown import shown
+from fieldcal.session.description import Description
+
+PATCH, OUT = "{patch}", "{out}"
+
+SAID = 5
+"""Last lines of a simulator that failed which are shown."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One run of the simulator.
+
+    Attributes
+    ----------
+    patch : what it was run with
+    match : how its output compares
+    says : what the user must know of the output
+
+    """
+
+    patch: SensorModel
+    match: Match
+    says: tuple[str, ...]
+
+
+def is_command(text: str) -> bool:
+    """Whether what is compared with is a command, and no file."""
+    return OUT in text
+
+
+def rounds(
+    command: str,
+    real: Side,
+    about: Description,
+    form: str,
+    most: int,
+    tell: Callable[[int, Round], None],
+) -> list[Round]:
+    """Run and patch until nothing differs, or `most` patches were tried.
+
+    Parameters
+    ----------
+    command : with {out} in it, and {patch}
+    real, about : what it is to be like
+    form : of the patch, in `patches.formats`
+    most : patches
+    tell : is called after each run with its number, from 0
+
+    Raises
+    ------
+    InputError
+        If the command fails, writes nothing, or what it writes cannot be compared.
+
+    """
+    if most < 0:
+        raise InputError(f"--rounds {most}: name how many patches are tried, or 0")
+    if PATCH not in command:
+        raise InputError(
+            f"{command}: has no {PATCH}, in the place of which the patch's file stands"
+        )
+    done: list[Round] = []
+    model = SensorModel(rate_hz=real.rate_hz)
+    for number in range(most + 1):
+        block, placed, said = _run(command, real, about, form, model)
+        found = matched(real, side(command, block, placed, real))
+        done.append(Round(model, found, tuple(said)))
+        tell(number, done[-1])
+        if not found.differences:
+            break
+        model = patched(found, model)
+    return done
+
+
+def _run(
+    command: str, real: Side, about: Description, form: str, model: SensorModel
+) -> tuple[Block, Description, list[str]]:
+    """What the simulator makes with a patch."""
+    with TemporaryDirectory() as folder:
+        ending = patches.patch_format(form).ENDING
+        patch, out = Path(folder) / f"patch{ending}", Path(folder) / "out"
+        patches.write(form, model, patch)
+        places = {PATCH: str(patch), OUT: str(out)}
+        _call([_placed(word, places) for word in _words(command)], command)
+        if not out.exists():
+            raise InputError(
+                f"{command}: ended well and wrote nothing to {OUT}: let it write its"
+                " recording to the file that stands there"
+            )
+        return opened(out, (real.block, about))
+
+
+def _words(command: str) -> list[str]:
+    try:
+        return shlex.split(command)
+    except ValueError as error:
+        raise InputError(f"{command}: is no command: {error}") from None
+
+
+def _placed(word: str, places: dict[str, str]) -> str:
+    for name, path in places.items():
+        word = word.replace(name, path)
+    return word
+
+
+def _call(words: list[str], command: str) -> None:
+    """Run a command to its end."""
+    try:
+        done = subprocess.run(
+            words, capture_output=True, text=True, errors="replace", check=False
+        )
+    except OSError as error:
+        raise InputError(f"{command}: cannot be started: {error.strerror}") from None
+    if done.returncode:
+        said = [
+            line for line in (done.stdout + done.stderr).splitlines() if line.strip()
+        ]
+        last = "".join(f"\n  {shown(line)}" for line in said[-SAID:])
+        raise InputError(
+            f"{command}: failed with exit code {done.returncode}; it said"
+            f"{last or ' nothing'}"
+        )

@@ -1,0 +1,151 @@
+"""Patches, read as the simulators they are for read them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import yaml
+
+from fieldcal.against import patches
+from fieldcal.against.sensor_model import SensorModel
+from fieldcal.commands import diagnose
+from fieldcal.core.samples import Array
+from fieldcal.sim_device import profile_file
+
+BIAS, SCALE = np.array([0.05, -0.03, 0.1]), np.array([1.004, 0.997, 1.001])
+GYRO = np.array([1e-3, -2e-3, 5e-4])
+FORCE, RATE = np.array([9.0, -3.0, 2.0]), np.array([0.5, -0.2, 0.1])
+MODEL = SensorModel(
+    {"acc_bias": BIAS, "acc_scale": SCALE, "gyr_bias": GYRO},
+    {"ax": 0.02, "ay": 0.02, "az": 0.03, "gx": 1e-3, "gy": 1e-3, "gz": 2e-3},
+    {
+        "gyro_scale": {"s1": 0.01, "s3": -0.02},
+        "cross_coupling": {"k21": 0.002},
+        "temperature_bias": {"ax": 3e-3, "gz": -1e-5},
+        "lever_arm": {"x": 0.1, "y": 0.0, "z": -0.05},
+    },
+    100.0,
+    21.0,
+)
+ACC = SCALE * FORCE + BIAS
+GYR = (1 + np.array([0.01, 0, -0.02])) * RATE + GYRO
+
+
+def written(name: str, tmp_path: Path, model: SensorModel = MODEL) -> tuple[str, str]:
+    path = tmp_path / f"patch{patches.patch_format(name).ENDING}"
+    says = patches.write(name, model, path)
+    return path.read_text("utf-8"), "; ".join(says)
+
+
+def parameters(text: str, name: int, value: int) -> dict[str, float]:
+    rows = [line.split() for line in text.splitlines() if line[0] != "#"]
+    return {row[name]: float(row[value]) for row in rows}
+
+
+def axes(found: dict[str, float], name: str) -> Array:
+    return np.array([found[name.format(axis)] for axis in "XYZ"])
+
+
+def test_sitl_makes_what_the_device_makes(tmp_path: Path) -> None:
+    text, says = written("sitl", tmp_path)
+    found = parameters(text, 0, 1)
+    acc = FORCE / axes(found, "SIM_ACC1_SCAL_{}") + axes(found, "SIM_ACC1_BIAS_{}")
+    np.testing.assert_allclose(acc, ACC, rtol=1e-7)
+    scale = 1 + axes(found, "SIM_GYR1_SCALE_{}") * 0.01
+    np.testing.assert_allclose(
+        RATE * scale + axes(found, "SIM_GYR1_BIAS_{}"), GYR, rtol=1e-7
+    )
+    middle = (found["SIM_IMUT1_TMIN"] + found["SIM_IMUT1_TMAX"]) / 2
+    warmer = axes(found, "SIM_IMUT1_ACC1_{}") * (31.0 - middle) * 1e-6
+    np.testing.assert_allclose(warmer, [3e-2, 0, 0], rtol=1e-7)
+    assert axes(found, "SIM_IMU_POS_{}").tolist() == [0.1, 0.0, -0.05]
+    assert "nothing for cross coupling (k21 = 0.002)" in says
+    assert "nothing for noise" in says and "fixed" in says
+
+
+def test_gazebo_has_the_bias_where_it_keeps_its_sign(tmp_path: Path) -> None:
+    steps = {"quantisation": {"acc": 0.01}}
+    model = SensorModel({"acc_bias": BIAS}, MODEL.noise, steps, 100.0)
+    text, says = written("gazebo", tmp_path, model)
+    imu = ElementTree.fromstring(text)
+    for i, axis in enumerate("xyz"):
+        noise = imu.find(f"linear_acceleration/{axis}/noise")
+        assert noise is not None and noise.get("type") == "gaussian_quantized"
+        assert float(noise.findtext("mean", "")) == pytest.approx(BIAS[i])
+        assert float(noise.findtext("stddev", "")) == MODEL.noise[f"a{axis}"]
+        assert float(noise.findtext("precision", "")) == 0.01
+        assert noise.find("bias_mean") is None, "that has either sign"
+        rate = imu.find(f"angular_velocity/{axis}/noise")
+        assert rate is not None and rate.get("type") == "gaussian"
+        assert float(rate.findtext("stddev", "")) == MODEL.noise[f"g{axis}"]
+    assert "nothing for acc scale" in written("gazebo", tmp_path)[1]
+    assert "100" in says
+
+
+def test_px4_takes_the_opposite_out_of_its_perfect_sensors(tmp_path: Path) -> None:
+    text, says = written("px4", tmp_path)
+    found = parameters(text, 2, 3)
+    off, scale = (axes(found, f"CAL_ACC0_{{}}{what}") for what in ("OFF", "SCALE"))
+    np.testing.assert_allclose((FORCE - off) * scale, ACC, rtol=1e-7)
+    np.testing.assert_allclose(
+        RATE - axes(found, "CAL_GYRO0_{}OFF"), RATE + GYRO, rtol=1e-7
+    )
+    assert "nothing for gyro scale" in says and "fixed" in says
+
+
+def test_kalibr_has_matrices_and_densities(tmp_path: Path) -> None:
+    text, says = written("kalibr", tmp_path)
+    found = yaml.safe_load(text)
+    coupled = np.diag(SCALE)
+    coupled[1, 0] = 0.002
+    acc = found["accelerometers"]
+    np.testing.assert_allclose(acc["M"], coupled)
+    np.testing.assert_allclose(acc["bias"], BIAS)
+    gyr = found["gyroscopes"]
+    whole = np.array(gyr["M"]) @ np.array(gyr["C_gyro_i"])
+    np.testing.assert_allclose(whole @ RATE + gyr["bias"], GYR, rtol=1e-9)
+    assert found["accelerometer_noise_density"] == pytest.approx(0.003)
+    assert found["gyroscope_noise_density"] == pytest.approx(2e-4)
+    assert "nothing for temperature bias" in says
+
+
+def test_the_virtual_device_takes_its_tables(tmp_path: Path) -> None:
+    written("toml", tmp_path)
+    device = profile_file.read(tmp_path / "patch.toml")
+    assert device.truth.acc_bias == tuple(BIAS) and device.sampling.rate_hz == 100.0
+    assert device.noise.gyr == (1e-3, 1e-3, 2e-3)
+    there = {e.id for e in device.effects}
+    assert there == {"gyro_scale", "cross_coupling", "temperature_bias", "lever_arm"}
+
+
+def test_json_has_everything_with_its_equation(tmp_path: Path) -> None:
+    text, says = written("json", tmp_path)
+    found = json.loads(text)
+    acc = np.array(found["matrix"]["acc"]) @ FORCE + found["bias"]["acc"]
+    np.testing.assert_allclose(acc - ACC, [0, 0.002 * FORCE[0], 0], atol=1e-12)
+    gyr = np.array(found["matrix"]["gyr"]) @ RATE + found["bias"]["gyr"]
+    np.testing.assert_allclose(gyr, GYR)
+    warm = found["effects"]["temperature_bias"]
+    assert warm["ax"] == 3e-3 and "T" in warm["equation"]
+    assert not says
+
+
+@pytest.mark.parametrize("name", patches.formats())
+def test_a_patch_that_changes_nothing_is_a_file_of_its_format(
+    name: str, tmp_path: Path
+) -> None:
+    text, says = written(name, tmp_path, SensorModel())
+    assert text.endswith("\n") and "nothing for" not in says
+
+
+def test_the_command_knows_all_formats() -> None:
+    import argparse
+
+    parser = argparse.ArgumentParser()
+    diagnose.add_arguments(parser)
+    (patch,) = [a for a in parser._actions if a.dest == "patch"]
+    assert tuple(patch.choices or ()) == patches.formats()

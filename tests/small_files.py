@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +75,44 @@ def _json(path: Path, block: Block) -> None:
     path.write_text("\n".join(json.dumps(row) for row in rows) + "\n")
 
 
+def _workbook(path: Path, block: Block) -> None:
+    write_workbook(path, [COLUMNS, *table(block).tolist()])
+
+
+def write_workbook(path: Path, rows: Sequence[Sequence[str | float]]) -> None:
+    """Write a workbook of one sheet, by the parts that ECMA-376 asks for."""
+    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    package = "http://schemas.openxmlformats.org/package/2006"
+    sheet = "application/vnd.openxmlformats-officedocument.spreadsheetml"
+    cells = "".join(f"<row>{''.join(map(_cell, row))}</row>" for row in rows)
+    link = f'<Relationship Id="r1" Type="{office}/%s" Target="%s"/>'
+    links = f'<Relationships xmlns="{package}/relationships">{link}</Relationships>'
+    parts = {
+        "[Content_Types].xml": f'<Types xmlns="{package}/content-types">'
+        '<Default Extension="rels"'
+        ' ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+        f'<Override PartName="/xl/workbook.xml" ContentType="{sheet}.sheet.main+xml"/>'
+        '<Override PartName="/xl/worksheets/sheet1.xml"'
+        f' ContentType="{sheet}.worksheet+xml"/></Types>',
+        "_rels/.rels": links % ("officeDocument", "xl/workbook.xml"),
+        "xl/_rels/workbook.xml.rels": links % ("worksheet", "worksheets/sheet1.xml"),
+        "xl/workbook.xml": f'<workbook xmlns="{main}" xmlns:r="{office}"><sheets>'
+        '<sheet name="log" sheetId="1" r:id="r1"/></sheets></workbook>',
+        "xl/worksheets/sheet1.xml": f'<worksheet xmlns="{main}"><sheetData>{cells}'
+        "</sheetData></worksheet>",
+    }
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in parts.items():
+            archive.writestr(name, text)
+
+
+def _cell(value: str | float) -> str:
+    if isinstance(value, str):
+        return f'<c t="inlineStr"><is><t>{value}</t></is></c>'
+    return "<c/>" if np.isnan(value) else f"<c><v>{value!r}</v></c>"
+
+
 SMALL: dict[str, Callable[[Path, Block], object]] = {
     "ulog": lambda path, block: path.write_bytes(ulog({0: block}, {})),
     "dataflash": lambda path, block: path.write_bytes(dataflash({0: block}, {})),
@@ -87,6 +125,7 @@ SMALL: dict[str, Callable[[Path, Block], object]] = {
     "json_log": _json,
     "blackbox": lambda path, block: path.write_bytes(of_block(block)),
     "parquet": _parquet,
+    "workbook": _workbook,
     "csv_like": lambda path, block: np.savetxt(path, table(block), delimiter=","),
 }
 

@@ -92,9 +92,13 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
     add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
     add("--separator", help="between columns (default: found)")
     add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
-    add("--acc-unit", default="", help="m/s^2, g, mg, V, count")
-    add("--gyr-unit", default="", help="rad/s, deg/s, mrad/s, V, count")
-    add("--time-unit", default="", help="s, ms, 0.1ms, us, ns, d")
+    add("--acc-unit", default="", help="m/s^2, mm/s^2, cm/s^2, g, mg, ug, V, count")
+    add(
+        "--gyr-unit",
+        default="",
+        help="rad/s, mrad/s, deg/s, mdeg/s, udeg/s, deg/h, V, count",
+    )
+    add("--time-unit", default="", help="s, ms, 0.1ms, 39.0625us, us, ns, d, hhmmss")
     add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--temp-unit", default="", help="degC, cdegC, K, count, none")

@@ -22,6 +22,9 @@ from fieldcal.importing.recording import ReadOptions, Recording
 LAST = ("csv_like", "wire")
 """Formats without a mark of their own, tried last, in this order."""
 
+TIMES = "timestamps.txt"
+"""File by which a folder of samples is read."""
+
 MANY = 1 << 16
 """Bytes by which formats without a mark of their own are told."""
 
@@ -57,6 +60,8 @@ def open_recording(
     if name and name not in formats():
         known = (*formats(), *codec.formats())
         raise InputError(f"no format {name!r}: there are {', '.join(known)}")
+    if (path / TIMES).is_file():
+        path = path / TIMES
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name the recording in it")
     if path.is_char_device():

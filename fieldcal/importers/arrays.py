@@ -22,6 +22,7 @@ from fieldcal.importing.array_tables import (
     WIDEST,
     ArrayTable,
     columns_of,
+    hdf5_has_objects,
     hdf5_tables,
     hdf5_units,
     listed,
@@ -31,6 +32,7 @@ from fieldcal.importing.array_tables import (
 )
 from fieldcal.importing.column_recording import ColumnRecording, Heading
 from fieldcal.importing.gzip_stream import head, on_disk
+from fieldcal.importing.matlab_objects import holds_objects, object_tables
 from fieldcal.importing.said_rate import rate_of, scalars
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
@@ -61,6 +63,8 @@ class ArrayFile(ColumnRecording):
     """Of a format whose reader gives all arrays at once, so that it does so once."""
     _scalars: Mapping[str, float] = {}
     """Numbers that stand alone in it, by name."""
+    _objects: Mapping[str, ArrayTable] = {}
+    """Tables of MATLAB in an HDF5 file, which another reader gives."""
     _units: dict[str, str] | None = None
     """Of the arrays of an HDF5 file, so that it is looked through once."""
 
@@ -181,6 +185,8 @@ class ArrayFile(ColumnRecording):
                 elif first.startswith(MATLAB):
                     loaded = matlab_arrays(path)
                     self._scalars = dict(scalars(loaded))
+                    if holds_objects(loaded):
+                        loaded |= object_tables(path)
                     tables = self._loaded = tables_of(loaded)
                 else:
                     tables = self._loaded = numpy_tables(path)
@@ -200,4 +206,6 @@ class ArrayFile(ColumnRecording):
         file = stack.enter_context(h5py.File(path, "r"))
         if self._units is None:
             self._units = hdf5_units(file)
-        return hdf5_tables(file, self._units)
+            if hdf5_has_objects(file):
+                self._objects = tables_of(object_tables(path))
+        return hdf5_tables(file, self._units) | dict(self._objects)

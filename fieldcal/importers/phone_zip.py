@@ -18,6 +18,7 @@ from typing import Any
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importers.csv_like import TextColumns
+from fieldcal.importers.workbook import MARKS
 from fieldcal.importing import columns
 from fieldcal.importing.alignment import AlignedPair
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
@@ -37,8 +38,9 @@ SENSOR = {"a": "acc", "g": "gyr"}
 
 
 def recognises(head: bytes, path: Path) -> bool:
-    """Whether a file begins like an archive, but not of arrays."""
-    return head.startswith(b"PK\x03\x04") and b".npy" not in head
+    """Whether a file begins like an archive, but not of arrays or sheets."""
+    zipped = head.startswith(b"PK\x03\x04") and b".npy" not in head
+    return zipped and not any(mark in head for mark in MARKS)
 
 
 class PhoneArchive(Recording):

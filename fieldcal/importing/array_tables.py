@@ -16,6 +16,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings import Column
+from fieldcal.importing.matlab_objects import DECODE
 
 WIDEST = 64
 """Columns of a table that are read together: they lie side by side in the file."""
@@ -138,6 +139,11 @@ def hdf5_tables(file: Any, units: Mapping[str, str]) -> dict[str, ArrayTable]:
     return {name: table_of(_dataset(file, name), unit) for name, unit in units.items()}
 
 
+def hdf5_has_objects(file: Any) -> bool:
+    """Whether an HDF5 file of MATLAB holds objects, such as tables."""
+    return any(DECODE in item.attrs for name, item in file.items() if name[0] != "#")
+
+
 def hdf5_units(file: Any) -> dict[str, str]:
     """Arrays of numbers in an HDF5 file and their units, where it says them."""
     import h5py
@@ -146,6 +152,8 @@ def hdf5_units(file: Any) -> dict[str, str]:
 
     def visit(name: str, item: Any) -> None:
         if not isinstance(item, h5py.Dataset) or name.startswith("#"):
+            return
+        if DECODE in item.attrs:
             return
         said = item.attrs.get("units", item.attrs.get("unit", ""))
         unit = said.decode() if isinstance(said, bytes) else str(said)

@@ -303,7 +303,7 @@ def _marks(
     now = round(time(), 3)
     imported = {
         "event": "imported",
-        "files": [digest(part.path) for part in parts],
+        "files": [digest(path) for part in parts for path in part.files()],
         "format": type(parts[0]).__module__.rpartition(".")[2],
         "stream": stream,
         **facts.table(),

@@ -37,6 +37,9 @@ _LIST = re.compile(
 )
 _LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
 _VALUES = re.compile(rf"\s*({_NUMBER}(?:[\s,;|]+{_NUMBER})*)\s*(.*)", re.DOTALL)
+_STEM = re.compile(r"(.*[^\s_])[\s_]*[xyzXYZ]")
+"""A label that ends with an axis, and what the other axes have before it."""
+
 _TICKS = re.compile(r"[EWIDV] \((\d+)\) [\w.-]+:\s*")
 """What ESP-IDF writes before a line: its level, ms since the start, and a name."""
 
@@ -104,10 +107,12 @@ def _with_unit(
     read: Sequence[tuple[str, str, str]], unit: str
 ) -> list[tuple[str, str, str]]:
     """What was read, with a unit behind the last of it: of all its axes."""
-    bare = read[-1][0].rpartition(" ")[0]
+    last = read[-1][0]
+    stem = _STEM.fullmatch(last)
 
     def mine(name: str) -> bool:
-        return name == read[-1][0] or bool(bare and name.rpartition(" ")[0] == bare)
+        other = _STEM.fullmatch(name)
+        return name == last or bool(stem and other and other[1] == stem[1])
 
     return [(n, v, u or (unit if mine(n) else "")) for n, v, u in read]
 

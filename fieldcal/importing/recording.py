@@ -219,6 +219,10 @@ class Recording(ABC):
         """Options under which outputs read so many times less; "" if there are none."""
         return ""
 
+    def files(self) -> list[Path]:
+        """The files that it is read from."""
+        return [self.path]
+
     def place(self, row: int) -> str:
         """Name a sample, counted from 0, as its file does."""
         return f"row {row + 1}"

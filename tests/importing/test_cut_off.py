@@ -19,7 +19,7 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.gzip_stream import pieces
 from fieldcal.session.folder import Session
 
-NO_STREAM = ("arrays", "parquet", "phone_zip")
+NO_STREAM = ("arrays", "parquet", "phone_zip", "workbook")
 """Formats that nothing can be read of without their end."""
 
 

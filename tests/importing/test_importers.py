@@ -436,7 +436,7 @@ def test_flags_of_a_px4_log_that_end_too_early_are_read_as_far_as_they_go(
 
 
 def test_every_format_is_tried() -> None:
-    assert set(SMALL) | {"wire"} == set(formats())
+    assert set(SMALL) | {"wire", "oxts"} == set(formats())
 
 
 @pytest.fixture(scope="module")

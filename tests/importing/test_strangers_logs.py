@@ -1,0 +1,338 @@
+"""Logs as strangers write them: each form is read as what it is, with nothing said."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from functools import reduce
+from operator import xor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from laid_about import G, turned
+from small_files import write_workbook
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Array
+from fieldcal.importing.cell_forms import HexCells, ListCells
+from fieldcal.importing.columns import wrapped
+from fieldcal.importing.line_forms import EchoedMessages
+from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.row_times import RowTimes
+from fieldcal.session.folder import Session
+
+ROWS = turned(5, 50.0, 2.0)
+T, A, W = ROWS[:, 0], ROWS[:, 1:4], ROWS[:, 4:]
+DEG, UP = np.rad2deg(W), A / np.linalg.norm(A, axis=1)[:, None]
+BEGAN = datetime(2024, 5, 3, 14, 20, 31)
+UNIX = 1714746031
+
+Writer = Callable[[], str]
+
+
+def lines(*columns: Array | list[str], sep: str = ",", head: str = "") -> str:
+    """Columns (n,) or (n, k) as text."""
+    cells = [c if isinstance(c, list) else [sep.join(f"{x:.10g}" for x in row)
+             for row in np.reshape(c, (len(c), -1))] for c in columns]  # fmt: skip
+    return "\n".join(
+        ([head] if head else []) + [sep.join(r) for r in zip(*cells, strict=True)]
+    )
+
+
+def each(text: str, *columns: Array) -> str:
+    """A text for each row, with its numbers."""
+    return "\n".join(text.format(*row) for row in np.column_stack(columns).tolist())
+
+
+def mixed() -> str:
+    found = []
+    for i, row in enumerate(ROWS.tolist()):
+        found.append("IMU," + ",".join(f"{x:.8g}" for x in row))
+        found += [f"GPS,{row[0]:.2f},48.1234,11.5678,512.3,8"] if i % 9 == 0 else []
+    return "\n".join(found)
+
+
+def in_turn() -> str:
+    found = ["# sensors: ACCE;t(s);Acc_X(m/s^2);Acc_Y(m/s^2);Acc_Z(m/s^2);3",
+             "% GYRO;t(s);Gyr_X(rad/s);Gyr_Y(rad/s);Gyr_Z(rad/s);3"]  # fmt: skip
+    for t, a, w in zip(T + 7, A, W, strict=True):
+        found.append(f"ACCE;{t:.4f};" + ";".join(f"{x:.8g}" for x in a) + ";3")
+        found.append(f"GYRO;{t + 1e-3:.4f};" + ";".join(f"{x:.8g}" for x in w) + ";3")
+    return "\n".join(found)
+
+
+def echoed() -> str:
+    parts = {"angular_velocity": W, "linear_acceleration": A}
+    found = []
+    for i, t in enumerate(T.tolist()):
+        found += ["header:", f"  seq: {i}", "  stamp:", f"    secs: {UNIX + int(t)}",
+                  f"    nsecs: {round(t % 1 * 1e9)}", '  frame_id: "imu"']  # fmt: skip
+        for name, three in parts.items():
+            values = zip("xyz", three[i], strict=True)
+            found += [f"{name}:", *(f"  {axis}: {x:.9g}" for axis, x in values)]
+        found += ["linear_acceleration_covariance: [0.0, 0.0, 0.0]", "---"]
+    return "\n".join(found)
+
+
+def checked() -> str:
+    bare = lines(["PIMU"] * len(T), T, A, W).split("\n")
+    return "\n".join(f"${b}*{reduce(xor, b.encode(), 0):02X}" for b in bare)
+
+
+def hexadecimal() -> str:
+    counts = np.round(np.hstack([A * 16384 / G, DEG * 131.072])).astype(int) & 0xFFFF
+    rows = [",".join(f"{x:04X}" for x in row) for row in counts]
+    return lines(T * 1e3, rows, head="ms,ax,ay,az,gx,gy,gz")
+
+
+def again() -> str:
+    rows, names = lines(ROWS).split("\n"), "t,ax,ay,az,gx,gy,gz"
+    return "\n".join(["ready", *rows[:3], names, *rows[3:300], names, *rows[300:]])
+
+
+def tables() -> str:
+    body = each("| {} | {} | {} | {} | {} | {} | {} |", ROWS)
+    return f"| t | ax | ay | az | gx | gy | gz |\n|---|---|---|---|---|---|---|\n{body}"
+
+
+def clock(form: str) -> list[str]:
+    return [(BEGAN + timedelta(seconds=t)).strftime(form) for t in T.tolist()]
+
+
+SIX = "ax,ay,az,gx,gy,gz"
+FORMS: dict[str, Writer] = {
+    "lines of several kinds": mixed,
+    "two sensors in turn": in_turn,
+    "messages as ROS shows them": echoed,
+    "lines with a checksum": checked,
+    "hexadecimal counts": hexadecimal,
+    "names between rows": again,
+    "between bars": tables,
+    "lists in cells": lambda: "t,accel,gyro\n"
+    + each('{},"[{}, {}, {}]","[{}, {}, {}]"', ROWS),
+    "as Python prints": lambda: "\n".join(
+        str({"t": r[0], "acc": dict(zip("xyz", r[1:4], strict=True)), "gyro": r[4:]})
+        for r in ROWS.tolist()
+    ),
+    "ESP-IDF": lambda: each(
+        "I ({:.0f}) IMU: ax={} ay={} az={} gx={} gy={} gz={}", T * 1e3, A, W
+    ),
+    "a program's log": lambda: "\n".join(
+        f"{c[:23].replace('.', ',')} INFO acc=({a[0]}, {a[1]}, {a[2]})"
+        f" gyro=({w[0]}, {w[1]}, {w[2]})"
+        for c, a, w in zip(clock("%Y-%m-%d %H:%M:%S.%f"), A, W, strict=True)
+    ),
+    "ST's units": lambda: lines(
+        T * 1e6, np.round(A / G * 1e3, 2), np.round(DEG * 1e3),
+        head="t[us],A_X[mg],A_Y[mg],A_Z[mg],G_X[mdps],G_Y[mdps],G_Z[mdps]",
+    ),
+    "thousandths without a word": lambda: lines(
+        T, np.round(A / G * 1e6), np.round(DEG * 1e3), head=f"t,{SIX}"
+    ),
+    "degrees an hour": lambda: lines(
+        T, A / G, DEG * 3600, head="time (s),fx (g),fy (g),fz (g),wx (deg/h),"
+        "wy (deg/h),wz (deg/h)",
+    ),
+    "steps": lambda: lines(
+        np.full(len(T), 20000.0), A, W, head=f"dt_us,{SIX}"
+    ),
+    "seconds and nanoseconds": lambda: lines(
+        UNIX + np.floor(T), ["imu"] * len(T), np.round(T % 1 * 1e9), A, W
+    ),
+    "hours in one number": lambda: lines(
+        [c[:-4] for c in clock("%H%M%S.%f")], A, W, head=f"time,{SIX}"
+    ),
+    "a counter that ends": lambda: lines(
+        np.mod(T * 1e6 + 2**32 - 9e6, 2**32), A, W, head=f"t_us,{SIX}"
+    ),
+    "days and hours": lambda: lines(
+        [f"0 days {c}" for c in clock("%H:%M:%S.%f")], A, W, head=f"time,{SIX}"
+    ),
+    "counts without a sign": lambda: lines(
+        T * 1e3,
+        np.mod(np.round(np.hstack([A * 8192 / G, DEG * 65.536])), 2**16),
+        head=f"time_ms,{SIX}",
+    ),
+    "gains": lambda: lines(455040 + T, W / 50, A / 50, sep=" "),
+    "gravity apart": lambda: lines(
+        T, W, UP, A / G - UP,
+        head="time(s),rotation_rate_x(radians/s),rotation_rate_y(radians/s),"
+        "rotation_rate_z(radians/s),gravity_x(G),gravity_y(G),gravity_z(G),"
+        "user_acc_x(G),user_acc_y(G),user_acc_z(G)",
+    ),
+    "a rate among words": lambda: lines(
+        A / G, DEG, head="# made by a logger at 50 Hz, filter 20\nax,ay,az,gx,gy,gz"
+    ),
+    "a rate in JSON": lambda: json.dumps(
+        {"interval_ms": 20, "values": np.round(ROWS[:, 1:], 6).tolist()}
+    ),
+    "names in Chinese": lambda: lines(
+        clock("%Y-%m-%d %H:%M:%S.%f"), ["WT901(ab:cd)"] * len(T), A / G, DEG,
+        head="时间,设备名称,加速度X(g),加速度Y(g),加速度Z(g),角速度X(°/s),角速度Y(°/s),"
+        "角速度Z(°/s)",
+    ),
+    "names in Spanish": lambda: lines(
+        T, A / G, DEG, head="Tiempo (s),Aceleración X (g),Aceleración Y (g),"
+        "Aceleración Z (g),Giroscopio X (°/s),Giroscopio Y (°/s),Giroscopio Z (°/s)",
+    ),
+}  # fmt: skip
+"""How each is written, of `ROWS`."""
+
+
+def imported(path: Path, *more: str) -> Path:
+    folder = path.parent / "out"
+    assert main(["import", str(path), "-o", str(folder), *more]) == 0
+    return folder
+
+
+def same(folder: Path, per_row: float = 0.02, tolerance: float = 1e-3) -> None:
+    block = Session.open(folder).block
+    n = len(block)
+    # the last of two sensors in turn may be alone
+    assert len(T) - 2 <= n <= len(T)
+    np.testing.assert_allclose(np.diff(block.t), per_row, atol=1.1e-3)
+    np.testing.assert_allclose(block.acc, A[:n], atol=10 * tolerance)
+    np.testing.assert_allclose(block.gyr, W[:n], atol=tolerance)
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_form_is_read_with_nothing_said(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text(FORMS[name]() + "\n", encoding="utf-8")
+    same(imported(path))
+
+
+def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = ["imu,t,ax,ay,az,gx,gy,gz"]
+    for row in ROWS.tolist():
+        for i in (0, 1):
+            own = [i, *row[:3], row[3] + i, *row[4:]]
+            rows.append(",".join(f"{x:.8g}" for x in own))
+    path.write_text("\n".join(rows) + "\n")
+    folder = imported(path)
+    same(folder / "0")
+    other = Session.open(folder / "1").block
+    np.testing.assert_allclose(other.acc[:, 2], A[:, 2] + 1, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "question"),
+    [
+        (lines(np.arange(float(len(T))), A / G, DEG,
+               head="Timestamp,Accel_X_g,Accel_Y_g,Accel_Z_g,Gyro_X_deg_per_s,"
+               "Gyro_Y_deg_per_s,Gyro_Z_deg_per_s"), "only count rows"),
+        (lines(T * 1e3, np.round(A * 16384 / G), np.round(DEG * 131.072),
+               np.full(len(T), -3900.0), head=f"time_ms,{SIX},temp"), "--temp-lsb 340"),
+        (lines(T, W, UP), "say what its columns are"),
+    ],
+    ids=["rows that are counted", "a thermometer's counts", "a direction"],
+)  # fmt: skip
+def test_what_would_be_wrong_in_silence_is_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text + "\n")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert question in capsys.readouterr().err
+
+
+def test_a_workbook_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "log.xlsx"
+    names = [
+        "Time (s)",
+        *(f"Accel {x} (g)" for x in "XYZ"),
+        *(f"Gyro {x} (dps)" for x in "XYZ"),
+    ]
+    write_workbook(path, [names, *np.column_stack([T, A / G, DEG]).tolist()])
+    same(imported(path))
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+def test_a_timetable_is_read(tmp_path: Path, version: str) -> None:
+    pandas, matio = pytest.importorskip("pandas"), pytest.importorskip("matio")
+    frame = pandas.DataFrame({"Acceleration": list(A), "AngularVelocity": list(W)},
+                             index=pandas.to_timedelta(T, unit="s"))  # fmt: skip
+    frame.index.name = "Time"
+    path = tmp_path / "log.mat"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        matio.save_to_mat(str(path), {"imu": frame}, version=version)
+    same(imported(path))
+
+
+def test_a_folder_of_oxts_samples_is_read(tmp_path: Path) -> None:
+    folder = tmp_path / "oxts"
+    (folder / "data").mkdir(parents=True)
+    stamps = clock("%Y-%m-%d %H:%M:%S.%f000")
+    (folder / "timestamps.txt").write_text("\n".join(stamps) + "\n")
+    for i, (a, w) in enumerate(zip(A.tolist(), W.tolist(), strict=True)):
+        row = [49.0, 8.4, 112.8, *[0.0] * 8, *a, *a, *w, *w, 0.5, 0.1, 4, 10, 4, 4, 0]
+        (folder / "data" / f"{i:010}.txt").write_text(" ".join(map(str, row)))
+    same(imported(folder))
+    (folder / "data" / "0000000000.txt").unlink()
+    out = tmp_path / "again"
+    assert main(["import", str(folder), "-o", str(out)]) == 2
+
+
+@given(st.lists(st.integers(-(2**15), 2**15 - 1), min_size=3, max_size=3))
+def test_hexadecimal_counts_keep_their_sign(counts: list[int]) -> None:
+    text = [" ".join(f"{x & 0xFFFF:04X}" for x in counts), *["ABCD 0ABC FFFF"] * 3]
+    form = HexCells.of(text, None)
+    assert form is not None
+    read = [[int(c) for c in line.split()] for line in form.reader()(text)]
+    assert read == [counts, *[[0xABCD - 2**16, 0x0ABC, -1]] * 3]
+    assert wrapped(np.mod(np.array(counts, dtype=float), 2**16)).tolist() == counts
+
+
+@given(
+    st.lists(st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=3), min_size=2),
+    st.sampled_from(["[]", "()", "{}"]), st.sampled_from([", ", " ", ","]),
+)  # fmt: skip
+def test_numbers_of_a_list_in_a_cell_are_cells(
+    rows: list[list[float]], brackets: str, between: str
+) -> None:
+    text = [f"{i},{brackets[0]}{between.join(map(repr, r))}{brackets[1]}"
+            for i, r in enumerate(rows)]  # fmt: skip
+    form = ListCells.of(["n,acc", *text], None)
+    assert form is not None and form.names == ("n", "acc_x", "acc_y", "acc_z")
+    read = [[float(c) for c in line.split(",")] for line in form.reader()(text)]
+    assert read == [[i, *row] for i, row in enumerate(rows)]
+
+
+@given(st.lists(st.dictionaries(st.sampled_from("abcdef"), st.integers(), min_size=3),
+                min_size=3), st.data())  # fmt: skip
+def test_messages_are_put_together_however_the_lines_come(
+    messages: list[dict[str, int]], data: st.DataObject
+) -> None:
+    text = []
+    for m in messages:
+        text += ["one:", *(f"  {name}: {x}" for name, x in m.items()), "---"]
+    form = EchoedMessages.of(text, None)
+    if form is None:
+        usual = [
+            k for k in "abcdef" if sum(k in m for m in messages) > len(messages) / 2
+        ]
+        assert len(usual) < 3
+        return
+    cut, read = data.draw(st.integers(0, len(text))), form.reader()
+    expected = [",".join(str(m.get(n[-1], "")) for n in form.names) for m in messages]
+    assert read(text[:cut]) + read(text[cut:]) == expected
+
+
+@given(st.sampled_from([16, 24, 32]), st.integers(1, 9), st.lists(st.integers(0, 400)))
+def test_a_counter_that_begins_again_goes_on(
+    bits: int, step: int, cuts: list[int]
+) -> None:
+    true = 2**bits - 200 * step + step * np.arange(400)
+    counts, times = np.mod(true, 2**bits).astype(float), RowTimes(ReadOptions())
+    edges = [0, *sorted(cuts), 400]
+    parts = [times.of({"t": counts[a:b]}, b - a)
+             for a, b in zip(edges, edges[1:], strict=False) if b > a]  # fmt: skip
+    np.testing.assert_array_equal(np.concatenate(parts), true)
+    assert len(times.says) == 1

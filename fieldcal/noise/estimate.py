@@ -17,7 +17,9 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, UNITS, Array
+from fieldcal.noise.averaging import Averaging, averaging
 from fieldcal.noise.covariates import explained, thermometer
+from fieldcal.noise.filters import TwoNumbers, two_numbers
 from fieldcal.noise.likelihood import Fit
 from fieldcal.noise.measured import MeasuredAllan, measured
 from fieldcal.noise.prediction import Draw, Prediction, draws, predict
@@ -66,6 +68,8 @@ class ChannelNoise:
     temperature : change per degree that was taken out, with its standard error
     drawn : sizes as they may be, for predictions
     measured : Allan deviation
+    pair : what filters with white noise and walk are told
+    averaging : error of a mean against its length
     dispersion : as in `Chosen`
     filtered_hz : above this frequency the outputs are filtered; inf where they are not
 
@@ -78,14 +82,20 @@ class ChannelNoise:
     temperature: tuple[float, float] | None
     drawn: tuple[Draw, ...]
     measured: MeasuredAllan
+    pair: TwoNumbers
+    averaging: Averaging
     dispersion: float
     filtered_hz: float
     dt: float
 
+    @property
+    def ramp(self) -> float:
+        """Ramp that was found, units per s."""
+        return self.processes["R"].value if "R" in self.processes else 0.0
+
     def predicted(self, tau: Array, length: float) -> Prediction:
         """Allan deviation (t,) that a recording of a length, s, will have."""
-        ramp = self.processes["R"].value if "R" in self.processes else 0.0
-        return predict(list(self.drawn), tau, length, self.dt, ramp)
+        return predict(list(self.drawn), tau, length, self.dt, self.ramp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +180,8 @@ def _channel(spectrum: Spectrum, i: int, warm: bool) -> ChannelNoise:
         left.found.get("temperature"),
         drawn,
         measured(spectrum.stretches, i, left.found.get("temperature", (0.0,))[0]),
+        two_numbers(spectrum, chosen, drawn),
+        averaging(drawn, left.found.get("R", (0.0,))[0], spectrum.dt, spectrum.seconds),
         chosen.dispersion,
         float(free.min()) if len(free) else np.inf,
         spectrum.dt,

@@ -14,11 +14,18 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.noise.likelihood import Fit, levels_of, likelihood
-from fieldcal.noise.processes import FAR, STEPS, covariances, freedom
+from fieldcal.noise.processes import (
+    FAR,
+    STEPS,
+    allan_variance,
+    covariances,
+    freedom,
+)
 from fieldcal.noise.spectrum import Spectrum
 from fieldcal.noise.terms import Chosen
 
 DRAWS = 200
+SHAPES = 8
 WIDER = 1.3
 """Standard deviations of what is drawn from, so that the tails are there."""
 
@@ -116,12 +123,18 @@ def predict(
     ramp : of the channel, units per s
 
     """
-    variance, nu = np.empty((2, len(tau), len(drawn)))
-    for j, one in enumerate(drawn):
-        for i, t in enumerate(tau.tolist()):
-            r = covariances(one.terms, one.x, t, dt, FAR * STEPS)
-            variance[i, j] = r[0] + ramp**2 * t * t / 2
-            nu[i, j] = freedom(r, t, length)
+    variance = np.array([allan_variance(d.terms, d.x, tau, dt) for d in drawn]).T
+    variance += ramp**2 * tau[:, None] ** 2 / 2
+    # how an estimate scatters depends on the sizes little: some of them tell it
+    some = drawn[:: max(1, len(drawn) // SHAPES)]
+    shapes = [
+        [
+            freedom(covariances(d.terms, d.x, t, dt, FAR * STEPS), t, length)
+            for d in some
+        ]
+        for t in tau.tolist()
+    ]
+    nu = np.repeat(np.mean(shapes, axis=1)[:, None], len(drawn), axis=1)
     rng = np.random.default_rng(0)
     scatter = variance[:, :, None] * rng.chisquare(nu[:, :, None], (*nu.shape, 16))
     measured = np.sqrt(scatter / nu[:, :, None]).reshape(len(tau), -1)

@@ -38,6 +38,9 @@ OF_UNIT = {
 STEPS = 8
 """Differences that are taken in each averaging time: more of them tell no more."""
 
+NODES = 33
+"""Correlation times in flicker that is cut off."""
+
 FAR = 12
 """Averaging times after which differences have nothing in common."""
 
@@ -54,7 +57,11 @@ def allan_variance(
     finest : shortest correlation time in flicker that is cut off, s
 
     """
-    return np.array([covariances(terms, x, float(t), finest, 1)[0] for t in tau])
+    at_two = generalised(terms, x, np.concatenate([tau, 2 * tau]), finest)
+    one, two = np.split(at_two, 2)
+    zero = generalised(terms, x, np.zeros(1), finest)[0]
+    variance: Array = (3 * zero - 4 * one + two) / tau**2  # (1) at h = 0
+    return variance
 
 
 def covariances(
@@ -91,17 +98,14 @@ def _of(term: str, s: Array, time: float, finest: float) -> Array:
         return _markov(s, time)
     if term == "B":
         return s * s * np.log(np.where(s > 0, s, 1.0)) / (2 * np.pi)
-    nodes = np.linspace(np.log(finest), np.log(time), 65)
-    weights = np.full(65, (nodes[1] - nodes[0]) / np.pi)
+    nodes = np.linspace(np.log(finest), np.log(time), NODES)
+    weights = np.full(NODES, (nodes[1] - nodes[0]) / np.pi)
     weights[[0, -1]] /= 2
-    total: Array = sum(
-        (w * _markov(s, float(t)) for w, t in zip(weights, np.exp(nodes), strict=True)),
-        np.zeros(len(s)),
-    )
+    total: Array = weights @ _markov(s, np.exp(nodes)[:, None])
     return total
 
 
-def _markov(s: Array, time: float) -> Array:
+def _markov(s: Array, time: Array | float) -> Array:
     u = s / time
     small = u**3 * (-1 / 6 + u * (1 / 24 - u / 120))
     whole = u + np.expm1(-u) - u * u / 2

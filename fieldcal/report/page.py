@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.resources import files
 from typing import Any
@@ -20,7 +21,7 @@ from fieldcal.report.gather import Material
 from fieldcal.report.gravity_norm import gravity_norm
 from fieldcal.report.history import history
 from fieldcal.report.noise import noise
-from fieldcal.report.overview import calibration, head
+from fieldcal.report.overview import Head, calibration, head
 from fieldcal.report.places import places
 from fieldcal.report.provenance import provenance
 from fieldcal.report.recording import recording
@@ -40,6 +41,11 @@ def render(material: Material, made: datetime | None = None) -> str:
     made : when the report is made; now by default
 
     """
+    return rendered(head(material), sections(material, made or datetime.now(UTC)))
+
+
+def rendered(top: Head, parts: Sequence[Section]) -> str:
+    """The page of some sections, with what stands on top of it."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -50,14 +56,14 @@ def render(material: Material, made: datetime | None = None) -> str:
         undefined=jinja2.StrictUndefined,
     )
     script = "\n".join(_part(name) for name in SCRIPTS)
-    parts: dict[str, Any] = {
-        "head": head(material),
-        "sections": sections(material, made or datetime.now(UTC)),
+    content: dict[str, Any] = {
+        "head": top,
+        "sections": parts,
         "style": _part("page.css"),
         "script": script,
         "policy": _policy(script),
     }
-    return environment.get_template("page.html").render(parts)
+    return environment.get_template("page.html").render(content)
 
 
 def sections(material: Material, made: datetime) -> list[Section]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import zlib
 from collections.abc import Iterator
+from mmap import mmap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -138,12 +139,12 @@ def whole(data: bytes) -> int:
         return end if batches else 0
 
 
-def decode(data: bytes, usual: pa.Schema | None = None) -> StreamContent:
+def decode(data: bytes | mmap, usual: pa.Schema | None = None) -> StreamContent:
     """Read what is whole of a stream.
 
     Parameters
     ----------
-    data : the file
+    data : the file, in memory or mapped
     usual : columns to go by where the head of the stream is damaged
 
     """
@@ -153,7 +154,7 @@ def decode(data: bytes, usual: pa.Schema | None = None) -> StreamContent:
 class _Decoder:
     """Reads a stream message by message."""
 
-    def __init__(self, data: bytes, usual: pa.Schema | None) -> None:
+    def __init__(self, data: bytes | mmap, usual: pa.Schema | None) -> None:
         import pyarrow as pa
 
         self._data = pa.py_buffer(data)

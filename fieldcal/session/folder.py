@@ -29,9 +29,9 @@ from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, too_quick
 from fieldcal.session import description, sample_files
-from fieldcal.session.clock import steadied
+from fieldcal.session.clock import SteadyClock, steadied
 from fieldcal.session.description import ACC_UNITS, GYR_UNITS, Description
-from fieldcal.session.installed import in_one_calibration
+from fieldcal.session.installed import in_one_calibration, stretches
 
 DESCRIPTION = "session.toml"
 MARKS = "marks.jsonl"
@@ -141,6 +141,23 @@ class Session:
         whole, changed = in_one_calibration(raw, self.marks())
         self.warnings += changed
         return self._steadied(_left_out(whole, self.marks()))
+
+    def blocks(self) -> Iterator[Block]:
+        """Samples as `block` has them, part by part, however long the recording is.
+
+        Where the device changed its own calibration meanwhile, all at once.
+        """
+        if len(stretches(self.marks())) > 1:
+            yield self.block
+            return
+        marks, clock = list(self.marks()), SteadyClock()
+        units, gauge = self.about.units, self.about.gauge.size
+        acc = ACC_UNITS[units["acceleration"]] / gauge[0]
+        gyr = GYR_UNITS[units["angular_rate"]] / gauge[1]
+        for raw in sample_files.blocks(sample_files.find(self.folder)):
+            part = replace(raw, acc=raw.acc * acc, gyr=raw.gyr * gyr)
+            yield clock.add(_left_out(part, marks))
+        yield clock.rest()
 
     def _steadied(self, raw: Block) -> Block:
         """Samples and windows without steps of the device's clock."""

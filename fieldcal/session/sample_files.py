@@ -8,7 +8,9 @@ are counted from 1, the row of names not among them.
 
 from __future__ import annotations
 
+import mmap
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +30,9 @@ COLUMNS = (
 """Every column a samples file can have, in the order they are written."""
 
 ENDINGS = (".arrows", ".parquet", ".csv", ".csv.gz")
+
+PART = 1 << 17
+"""Rows that are read together."""
 
 _GUNZIP = 16 + zlib.MAX_WBITS
 
@@ -71,6 +76,71 @@ def read(path: Path) -> tuple[Block, tuple[str, ...]]:
     _check_columns(path, columns)
     _check_rows(path, columns)
     return _block(columns), warnings
+
+
+def blocks(path: Path) -> Iterator[Block]:
+    """Samples of a file as `read` has them, part by part, however long it is.
+
+    Raises
+    ------
+    SessionError
+        As `read` does.
+
+    """
+    import pyarrow as pa
+
+    last = -np.inf
+    try:
+        for batch in _batches(path):
+            columns = {name: _numbers(path, batch, name) for name in batch.schema.names}
+            _check_columns(path, columns)
+            t = columns["t"]
+            if len(t) and not (t[0] > last and (np.diff(t) > 0).all()):
+                read(path)  # which says where
+            last = float(t[-1]) if len(t) else last
+            yield _block(columns)
+    except (pa.ArrowException, OSError):
+        read(path)  # which says what is wrong with it, and where
+        raise
+    if last == -np.inf:
+        raise SessionError(f"{path}: has no rows; record it again")
+
+
+def _batches(path: Path) -> Iterator[pa.RecordBatch]:
+    """Record batches of a file of any kind, with our columns."""
+    if path.name.endswith(".arrows"):
+        with open(path, "rb") as file:
+            if not file.seek(0, 2):
+                read(path)
+            mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+            yield from decode(mapped, schema()).batches
+    elif path.name.endswith(".parquet"):
+        import pyarrow.parquet
+
+        whole = pyarrow.parquet.ParquetFile(path, page_checksum_verification=True)
+        names = [n for n in whole.schema_arrow.names if n in COLUMNS]
+        yield from whole.iter_batches(batch_size=PART, columns=names)
+    else:
+        yield from _rows_of_text(path)
+
+
+def _rows_of_text(path: Path) -> Iterator[pa.RecordBatch]:
+    """Record batches of a text, unpacked as it is read."""
+    import pyarrow as pa
+    import pyarrow.csv
+
+    packed = path.name.endswith(".gz")
+    with pa.input_stream(path, compression="gzip" if packed else None) as stream:
+        reader = pyarrow.csv.open_csv(
+            stream,
+            read_options=pyarrow.csv.ReadOptions(use_threads=False, block_size=1 << 24),
+            convert_options=pyarrow.csv.ConvertOptions(
+                column_types={name: pa.float64() for name in COLUMNS},
+                null_values=["", "nan", "NaN"],
+            ),
+        )
+        for batch in reader:
+            yield batch.select([n for n in batch.schema.names if n in COLUMNS])
 
 
 def _table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
@@ -206,7 +276,7 @@ def _cut_off(path: Path, table: pa.Table) -> tuple[str, ...]:
     return (f"{path.name} was cut off; its {table.num_rows} whole rows are used",)
 
 
-def _numbers(path: Path, table: pa.Table, name: str) -> Array:
+def _numbers(path: Path, table: pa.Table | pa.RecordBatch, name: str) -> Array:
     import pyarrow as pa
 
     column = table.column(name)

@@ -15,7 +15,7 @@ from typing import Any
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """Return one of the schemas: session, plan, mark, result, diagnosis or export."""
+    """Return a schema: session, plan, mark, result, diagnosis, noise or export."""
     path = files("fieldcal").joinpath(f"schemas/{kind}.schema.json")
     found: dict[str, Any] = json.loads(path.read_text("utf-8"))
     return found

@@ -66,7 +66,7 @@ def test_long_recordings_are_known_as_well_as_their_levels_allow() -> None:
 def test_processes_that_are_there_are_named_and_no_others() -> None:
     rng = np.random.default_rng(6)
     seen = []
-    for _ in range(4):
+    for _ in range(3):
         values = np.hstack(
             [
                 noise(rng, 20_000, DT, 2, N=1.0),

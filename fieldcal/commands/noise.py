@@ -1,0 +1,181 @@
+"""`fieldcal noise`: say how noisy a device at rest is, and what follows from it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fieldcal.core.samples import Block
+    from fieldcal.noise import NoiseModel
+    from fieldcal.noise.document import NoiseResult
+    from fieldcal.noise.recalibration import HistoryStep, Recalibration
+    from fieldcal.session.folder import Session
+
+RARE = ("history", "limits")
+
+EXAMPLE = """\
+  fieldcal noise bench-7/overnight
+  fieldcal noise bench-7/monday bench-7/tuesday --json
+  fieldcal noise bench-7/overnight --report noise.html
+"""
+
+NOISE = "noise.json"
+
+JOINED = 3.0
+"""Windows no further apart are one stretch, s."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    what = "session folder of a device at rest; several of one device count together"
+    add("sessions", type=Path, nargs="+", metavar="SESSION", help=what)
+    add("--json", action="store_true", help="print noise.json instead of the view")
+    add("--report", type=Path, metavar="FILE", help="write a page with the curves")
+    add("--limits", type=Path, metavar="FILE", help="limits for recalibration")
+    add("--history", type=Path, metavar="FILE", help="instead of the usual history")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    from fieldcal.session.folder import Session
+
+    sessions = [Session.open(path) for path in args.sessions]
+    found = result(sessions, args.limits, args.history)
+    content = found.to_json()
+    path = sessions[0].write_json(NOISE, content)
+    for warning in dict.fromkeys(w for s in sessions for w in s.warnings):
+        sys.stderr.write(f"fieldcal noise: {warning}\n")
+    if args.json:
+        sys.stdout.write(json.dumps(content, allow_nan=False) + "\n")
+    else:
+        from fieldcal.commands.noise_view import show
+
+        show(found)
+        sys.stdout.write(f"written: {path}\n")
+    if args.report:
+        from fieldcal.report.noise_page import page
+        from fieldcal.session.folder import write_whole
+
+        written = write_whole(args.report, page(found))
+        (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")
+    return 0
+
+
+def result(
+    sessions: Sequence[Session], limits: Path | None = None, history: Path | None = None
+) -> NoiseResult:
+    """Everything that recordings of a device at rest tell of its noise.
+
+    Raises
+    ------
+    InputError
+        If the sessions are of several devices, or not long enough at rest.
+
+    """
+    from fieldcal.noise import estimate, reduced
+    from fieldcal.noise.alignment import alignment
+    from fieldcal.noise.document import NoiseResult
+
+    _check_same(sessions)
+    model = estimate([reduced(_at_rest(s)) for s in sessions])
+    about = sessions[0].about
+    grade = about.grade
+    serial = str(about.device.get("serial", ""))
+    recalibrate, since = _recalibrate(model, grade, serial, limits, history)
+    gyroscopes = [c.averaging for n, c in model.channels.items() if n[0] == "g"]
+    compass = None
+    if grade == "navigation" and gyroscopes:
+        compass = alignment(gyroscopes, about.latitude)
+    device = {k: str(about.device[k]) for k in ("name", "serial") if k in about.device}
+    return NoiseResult(
+        [str(s.folder) for s in sessions],
+        {**device, "grade": grade},
+        model,
+        recalibrate,
+        since,
+        compass,
+    )
+
+
+def _check_same(sessions: Sequence[Session]) -> None:
+    from fieldcal.core.errors import InputError
+
+    first = sessions[0]
+    for other in sessions[1:]:
+        one, two = (s.about.device.get("serial") for s in (first, other))
+        if one and two and one != two:
+            raise InputError(
+                f"{other.folder}: is of device {two}, {first.folder} of {one}: give"
+                " sessions of one device"
+            )
+
+
+def _at_rest(session: Session) -> Iterator[Block]:
+    """Samples of the windows; of all where the session has none."""
+    spans: list[list[float]] = []
+    for start, end in sorted(w for w in session.windows if w):
+        if spans and start - spans[-1][1] <= JOINED:
+            spans[-1][1] = max(spans[-1][1], end)
+        else:
+            spans.append([start, end])
+    for block in session.blocks():
+        if not spans:
+            yield block
+        for start, end in spans:
+            part = block.between(start, end)
+            if len(part):
+                yield part
+
+
+def _recalibrate(
+    model: NoiseModel,
+    grade: str,
+    serial: str,
+    limits: Path | None,
+    history: Path | None,
+) -> tuple[Mapping[str, Recalibration], str]:
+    """When each bias leaves the limit of the grade, and since when."""
+    from fieldcal.calibration import limits as bounds
+    from fieldcal.history.store import History, default_path
+    from fieldcal.noise.recalibration import recalibration
+
+    path = history or default_path()
+    runs = History(path).runs(serial) if serial and path.exists() else ()
+    allowed = bounds.read(grade, limits)
+    out = {}
+    for name, channel in model.channels.items():
+        group = "acc_bias" if name[0] == "a" else "gyr_bias"
+        steps = _steps(runs, f"{group}.{name[1]}")
+        limit = float(getattr(allowed, f"{group}_sigma"))
+        variance = channel.averaging.at(30.0)[0] ** 2
+        out[name] = recalibration(channel.drawn, channel.ramp, limit, variance, steps)
+    since = runs[-1].taken_at if runs else datetime.now(UTC).isoformat()
+    return out, str(since)
+
+
+def _steps(runs: Sequence[Any], name: str) -> list[HistoryStep]:
+    """Changes of a bias between calibrations that count as its family."""
+    from fieldcal.history.store import family
+    from fieldcal.noise.recalibration import HistoryStep
+
+    values = []
+    for one in family(runs):
+        found = one.calibration
+        if name in found.names:
+            i = found.names.index(name)
+            when = datetime.fromisoformat(one.taken_at).timestamp()
+            values.append((when, float(found.values[i]), float(found.sigma[i])))
+    return [
+        HistoryStep(then - when, after - before, one**2 + two**2)
+        for (when, before, one), (then, after, two) in zip(
+            values, values[1:], strict=False
+        )
+        if then > when
+    ]

@@ -1,0 +1,155 @@
+"""The noise of a device as noise.json has it; SI units, nan as null."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fieldcal.noise.alignment import Alignment
+from fieldcal.noise.averaging import Averaging
+from fieldcal.noise.estimate import ChannelNoise, NoiseModel, Size
+from fieldcal.noise.filters import FilterNoise, kalibr, of_program, ros
+from fieldcal.noise.recalibration import CHANCES, Recalibration
+
+FORMAT = 1
+WINDOWS = (10.0, 30.0, 60.0, 300.0)
+"""Averaging times whose error is told, s; 30 to 60 s is what the papers take."""
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseResult:
+    """What is told of a device.
+
+    Attributes
+    ----------
+    sessions : folders
+    device : name, serial number and grade, as far as they are known
+    model : the processes
+    recalibrate : when each channel's bias leaves its limit
+    since : date from which that counts, ISO 8601
+    alignment : gyrocompassing; None unless the gyroscopes are of navigation grade
+
+    """
+
+    sessions: Sequence[str]
+    device: Mapping[str, Any]
+    model: NoiseModel
+    recalibrate: Mapping[str, Recalibration]
+    since: str
+    alignment: Alignment | None
+
+    @property
+    def programs(self) -> dict[str, FilterNoise]:
+        """What other programs are told."""
+        channels = self.model.channels
+        pairs = {name: c.pair for name, c in channels.items()}
+        white = {n: (c.processes["N"].value, c.processes["N"].sigma)
+                 for n, c in channels.items()}  # fmt: skip
+        return {
+            "kalibr": kalibr(pairs),
+            "ros": ros(white, self.model.rate_hz),
+            "ardupilot": of_program("ardupilot", pairs),
+            "px4": of_program("px4", pairs),
+        }
+
+    def to_json(self) -> dict[str, Any]:
+        """As noise.json has it."""
+        model = self.model
+        out: dict[str, Any] = {
+            "format": FORMAT,
+            "sessions": list(self.sessions),
+            "device": dict(self.device),
+            "seconds": model.seconds,
+            "longest_s": model.longest,
+            "stretches": model.stretches,
+            "rate_hz": model.rate_hz,
+            "disturbed_share": model.bridged,
+            "channels": {n: _channel(c, model) for n, c in model.channels.items()},
+            "for": {
+                name: {
+                    key: {"value": value, "sigma": _known(sigma), "unit": unit}
+                    for key, (value, sigma, unit) in program.values.items()
+                }
+                for name, program in self.programs.items()
+            },
+            "recalibrate": {
+                "since": self.since,
+                "channels": {n: _times(r) for n, r in self.recalibrate.items()},
+            },
+        }
+        if self.alignment is not None:
+            seconds, sigma, spread = self.alignment.best
+            out["alignment"] = {
+                "best_s": seconds,
+                "heading_sigma_rad": sigma,
+                "spread_rad": spread,
+            }
+        return out
+
+
+def _channel(channel: ChannelNoise, model: NoiseModel) -> dict[str, Any]:
+    seen = channel.measured
+    said = channel.predicted(seen.tau, model.longest)
+    out: dict[str, Any] = {
+        "unit": channel.unit,
+        "processes": {n: _size(s) for n, s in channel.processes.items()},
+        "below": {
+            n: {"value": s.value, "unit": s.unit} for n, s in channel.limits.items()
+        },
+        "two_numbers": {
+            "N": channel.pair.white,
+            "K": channel.pair.walk,
+            "left_out": channel.pair.left_out,
+        },
+        "dispersion": channel.dispersion,
+        "filtered_above_hz": _known(channel.filtered_hz),
+        "allan": {
+            "tau_s": seen.tau.tolist(),
+            "deviation": seen.deviation.tolist(),
+            "low": said.low.tolist(),
+            "high": said.high.tolist(),
+        },
+        "averaging": _averaging(channel.averaging),
+    }
+    if channel.temperature is not None:
+        value, sigma = channel.temperature
+        unit = f"{channel.unit}/K"
+        out["temperature"] = {"value": value, "sigma": sigma, "unit": unit}
+    return out
+
+
+def _size(size: Size) -> dict[str, Any]:
+    out = {"value": size.value, "sigma": _known(size.sigma), "unit": size.unit}
+    if not math.isnan(size.time):
+        out |= {"time_s": _known(size.time), "time_sigma_s": _known(size.time_sigma)}
+    return out
+
+
+def _averaging(found: Averaging) -> dict[str, Any]:
+    last = float(found.seconds[-1])
+    windows = [w for w in WINDOWS if w <= last]
+    return {
+        "seconds": windows,
+        "sigma": [found.at(w)[0] for w in windows],
+        "spread": [found.at(w)[1] for w in windows],
+        "best_s": _known(found.best[0]),
+        "best_sigma": float(np.min(found.sigma)),
+        "white_until_s": _known(found.white_until[0]),
+    }
+
+
+def _times(found: Recalibration) -> dict[str, Any]:
+    return {
+        "limit": found.limit,
+        "chance": list(CHANCES),
+        "after_s": [_known(s) for s in found.seconds],
+        "from_history": found.from_history,
+    }
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

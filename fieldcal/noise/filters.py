@@ -1,0 +1,177 @@
+"""What filters of others are told: white noise and walk alone, of each triad.
+
+A filter has two numbers for a sensor, N and K, and processes may be more. The two are
+fitted to the recording by themselves, and what they leave out is measured,
+
+    f^2 = max over tau of sigma^2(tau) / (N^2 / tau + K^2 tau / 3), 1 at least     (1)
+
+with sigma the Allan deviation of all processes, tau from 1 s to a fourth of the
+recording; both numbers are multiplied by f, no more. Of a triad the noisiest axis
+counts. In a filter with the step h, where noise is held for a step,
+
+    white  N / sqrt(h),    bias  K / sqrt(h)   per second                          (2)
+
+h: EKF3 of ArduPilot 12 ms, EKF2 of PX4 10 ms. A covariance of single samples, as
+sensor_msgs/Imu has it, is N^2 times the rate. Sources: Kalibr wiki, IMU noise model;
+covariance prediction of EKF3 and EKF2, where a step adds (h w)^2 to an angle and
+(h h p)^2 to a bias times h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.noise.likelihood import fit
+from fieldcal.noise.prediction import Draw
+from fieldcal.noise.processes import allan_variance
+from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.terms import Chosen
+
+STEP_S = {"ardupilot": 0.012, "px4": 0.01}
+NAMES = {
+    "ardupilot": (
+        *("EK3_ACC_P_NSE", "EK3_ABIAS_P_NSE"),
+        *("EK3_GYRO_P_NSE", "EK3_GBIAS_P_NSE"),
+    ),
+    "px4": (
+        *("EKF2_ACC_NOISE", "EKF2_ACC_B_NOISE"),
+        *("EKF2_GYR_NOISE", "EKF2_GYR_B_NOISE"),
+    ),
+}
+"""Parameters for white noise and bias of accelerometers, and of gyroscopes."""
+
+UNITS = ("m/s^2", "m/s^3", "rad/s", "rad/s^2")
+
+
+@dataclass(frozen=True, slots=True)
+class TwoNumbers:
+    """White noise and walk that stand for all processes of a channel.
+
+    Attributes
+    ----------
+    white, white_sigma : N, times `left_out`
+    walk, walk_sigma : K, times `left_out`; where no walk is seen, the one that is not
+        exceeded in 95 of 100, with nan
+    left_out : f of (1)
+
+    """
+
+    white: float
+    white_sigma: float
+    walk: float
+    walk_sigma: float
+    left_out: float
+
+
+def two_numbers(
+    spectrum: Spectrum, chosen: Chosen, drawn: tuple[Draw, ...]
+) -> TwoNumbers:
+    """Fit white noise and walk to a channel, and measure what they leave out."""
+    tau = np.geomspace(1.0, max(spectrum.seconds / 4, 2.0), 24)
+    whole = np.mean(
+        [allan_variance(d.terms, d.x, tau, spectrum.dt) for d in drawn], axis=0
+    )
+    white = float(np.median([np.exp(d.x[d.terms.index("N")]) for d in drawn]))
+    start = np.log([white, whole[-1] / tau[-1]])
+    pair = fit(spectrum, chosen.powers, ("N", "K"), start)
+    if pair is None:
+        one = fit(spectrum, chosen.powers, ("N",), start[:1])
+        if one is None:
+            raise AssertionError("white noise is in every bin")
+        size = float(np.exp(one.x[0]))
+        factor = _left_out(whole, size / tau)
+        error = float(np.sqrt(one.covariance[0, 0])) / 2
+        n = float(np.sqrt(size)) * factor
+        return TwoNumbers(n, n * error, n * _not_exceeded(spectrum), np.nan, factor)
+    sizes, spread = np.exp(pair.x), np.sqrt(np.diag(pair.covariance)) / 2
+    factor = _left_out(whole, sizes[0] / tau + sizes[1] * tau / 3)
+    n, k = (np.sqrt(sizes) * factor).tolist()
+    return TwoNumbers(n, n * float(spread[0]), k, k * float(spread[1]), factor)
+
+
+def _left_out(whole: Array, pair: Array) -> float:
+    return float(np.sqrt(max(1.0, np.max(whole / pair))))  # (1)
+
+
+def _not_exceeded(spectrum: Spectrum) -> float:
+    """Walk, in units of white noise N = 1, that would show in 95 of 100 recordings.
+
+    Its part of the first coefficients would make their sum of squares larger than it
+    is in one of twenty by chance: of the first, 3.8 for 1.
+    """
+    ratio = spectrum.fixed["K"] / spectrum.fixed["N"]
+    return float(np.sqrt(2.8 / ratio.max()))
+
+
+@dataclass(frozen=True, slots=True)
+class FilterNoise:
+    """Parameters of a program.
+
+    Attributes
+    ----------
+    values : value, standard deviation (nan for a bound) and unit, by name
+
+    """
+
+    values: Mapping[str, tuple[float, float, str]]
+
+
+def worst(pairs: Mapping[str, TwoNumbers], triad: str) -> TwoNumbers | None:
+    """The largest of each number among the axes of a triad; None without any."""
+    some = [pair for name, pair in pairs.items() if name[0] == triad]
+    if not some:
+        return None
+    loud = max(some, key=lambda p: p.white)
+    slow = max(some, key=lambda p: p.walk)
+    return TwoNumbers(loud.white, loud.white_sigma, slow.walk, slow.walk_sigma,
+                      max(loud.left_out, slow.left_out))  # fmt: skip
+
+
+def of_program(program: str, pairs: Mapping[str, TwoNumbers]) -> FilterNoise:
+    """Parameters of ArduPilot or PX4, (2)."""
+    root = STEP_S[program] ** 0.5
+    out: dict[str, tuple[float, float, str]] = {}
+    for i, triad in enumerate("ag"):
+        if (both := worst(pairs, triad)) is None:
+            continue
+        white, bias = NAMES[program][2 * i : 2 * i + 2]
+        out[white] = both.white / root, both.white_sigma / root, UNITS[2 * i]
+        out[bias] = both.walk / root, both.walk_sigma / root, UNITS[2 * i + 1]
+    return FilterNoise(out)
+
+
+def kalibr(pairs: Mapping[str, TwoNumbers]) -> FilterNoise:
+    """Kalibr's four numbers."""
+    out: dict[str, tuple[float, float, str]] = {}
+    for triad, name, unit in (
+        ("a", "accelerometer", "m/s^2"),
+        ("g", "gyroscope", "rad/s"),
+    ):
+        if both := worst(pairs, triad):
+            density, walk = both.white, both.walk
+            out[f"{name}_noise_density"] = density, both.white_sigma, f"{unit}/sqrt(Hz)"
+            out[f"{name}_random_walk"] = walk, both.walk_sigma, f"{unit}*sqrt(Hz)"
+    return FilterNoise(out)
+
+
+def ros(white: Mapping[str, tuple[float, float]], rate_hz: float) -> FilterNoise:
+    """Variances of single samples for the diagonals of sensor_msgs/Imu.
+
+    Parameters
+    ----------
+    white : N and its standard deviation, by channel
+    rate_hz : samples a second
+
+    """
+    out: dict[str, tuple[float, float, str]] = {}
+    for name, (n, sigma) in white.items():
+        what = "linear_acceleration" if name[0] == "a" else "angular_velocity"
+        unit = "m^2/s^4" if name[0] == "a" else "rad^2/s^2"
+        place = 4 * "xyz".index(name[1])
+        value = n * n * rate_hz
+        out[f"{what}_covariance[{place}]"] = value, 2 * value * sigma / n, unit
+    return FilterNoise(out)

@@ -1,0 +1,145 @@
+"""When a bias will have left its limit: walk, flicker, ramp, and what history shows.
+
+After t a bias has changed by a normally distributed amount of variance
+
+    v(t) = K^2 t + D(t) + V,     mean R t                                          (1)
+
+with D the structure function of flicker and Gauss-Markov processes,
+2 s^2 (1 - exp(-t/T)) of each, and V the variance of the calibration itself. With L the
+limit of the grade the chance to be beyond it is
+
+    P(t) = 1 - Phi((L - R t)/sqrt v) + Phi((-L - R t)/sqrt v)                      (2)
+
+averaged over the sizes as they may be. Where the device's history has calibrations
+enough, their steps d over the time h between them say what months do:
+
+    d^2 - V_1 - V_2 = K_h^2 h                                                      (3)
+
+by maximum likelihood, and K_h stands in the place of K. Units: s, those of the channel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.noise.likelihood import TIMED
+from fieldcal.noise.prediction import Draw
+
+CHANCES = (0.05, 0.32)
+"""Chances to be beyond the limit for which a time is stated."""
+
+LONGEST = 20 * 365.25 * 86400.0
+"""No later than that anything is said, s."""
+
+STEPS = 3
+"""Steps of the history from which its walk is taken."""
+
+
+class HistoryStep(NamedTuple):
+    """Change of a bias from one calibration to the next.
+
+    Attributes
+    ----------
+    seconds : between them
+    change : in the channel's unit
+    variance : of both calibrations together
+
+    """
+
+    seconds: float
+    change: float
+    variance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Recalibration:
+    """When a bias leaves its limit.
+
+    Attributes
+    ----------
+    limit : in the channel's unit
+    seconds : after which it is beyond it with each of `CHANCES`; inf where later than
+        `LONGEST`
+    from_history : whether the device's own calibrations say so
+
+    """
+
+    limit: float
+    seconds: tuple[float, ...]
+    from_history: bool
+
+
+def recalibration(
+    drawn: tuple[Draw, ...],
+    ramp: float,
+    limit: float,
+    variance: float,
+    steps: Sequence[HistoryStep] = (),
+) -> Recalibration:
+    """When a bias leaves its limit, (1), (2).
+
+    Parameters
+    ----------
+    drawn : sizes of the processes as they may be
+    ramp : units per s; counts only where the history says nothing
+    limit : change that is too much
+    variance : V, of the calibration
+    steps : of the device's history
+
+    """
+    seconds = np.geomspace(60.0, LONGEST, 120)
+    known = walk_of(steps) if len(steps) >= STEPS else None
+    chance = np.zeros(len(seconds))
+    for one in drawn:
+        v = variance + _structure(one, seconds, known)
+        root, mean = np.sqrt(v), (0.0 if known is not None else ramp * seconds)
+        chance += _beyond(limit, mean, root) / len(drawn)
+    times = []
+    for level in CHANCES:
+        over = np.flatnonzero(chance > level)
+        times.append(float(seconds[over[0]]) if len(over) else np.inf)
+    return Recalibration(limit, tuple(times), known is not None)
+
+
+def walk_of(steps: Sequence[HistoryStep]) -> float:
+    """K^2 of (3) at its most likely."""
+    from scipy.optimize import minimize_scalar
+
+    h, d, v = np.array(steps).T
+
+    def cost(log_walk: float) -> float:
+        total = v + np.exp(log_walk) * h
+        return float(np.sum(np.log(total) + d**2 / total))
+
+    high = float(np.log(np.max(d**2 / h) + 1e-300))
+    found = minimize_scalar(cost, bounds=(high - 20, high + 2), method="bounded")
+    return float(np.exp(found.x))
+
+
+def _structure(one: Draw, seconds: Array, known: float | None) -> Array:
+    """Variance of the change, (1), without the calibration's own."""
+    total = np.zeros(len(seconds))
+    times = iter(range(len(one.terms), len(one.x)))
+    for i, term in enumerate(one.terms):
+        size = float(np.exp(one.x[i]))
+        time = float(np.exp(one.x[next(times)])) if term in TIMED else np.inf
+        if term == "K" and known is None:
+            total += size * seconds
+        elif term == "G":
+            total += -2 * size * np.expm1(-seconds / time)
+        elif term in ("B", "BT"):
+            # of each e-fold of correlation times up to T, those below t have moved
+            total += 2 * size / np.pi * np.log1p(np.minimum(seconds, time))
+    return total if known is None else total + known * seconds
+
+
+def _beyond(limit: float, mean: Array | float, root: Array) -> Array:
+    from scipy.special import ndtr
+
+    chance: Array = 1 - ndtr((limit - mean) / root) + ndtr((-limit - mean) / root)
+    return chance

@@ -1,0 +1,121 @@
+"""A page of the noise of a device: curves with their bands, sizes, what follows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fieldcal.calibration.wording import number, pretty
+from fieldcal.noise.document import WINDOWS, NoiseResult
+from fieldcal.noise.estimate import ChannelNoise
+from fieldcal.report.blocks import Block as Part
+from fieldcal.report.blocks import Figure, NameValues, Section, Table, table
+from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.overview import Head
+from fieldcal.report.page import rendered
+
+TRIADS = (("a", "accelerometers"), ("g", "gyroscopes"))
+
+
+def page(found: NoiseResult) -> str:
+    """The page as HTML."""
+    model = found.model
+    name = str(found.device.get("name", "noise at rest"))
+    facts = NameValues(
+        (
+            ("at rest", f"{model.seconds:.0f} s"),
+            ("stretches", f"{model.stretches}"),
+            ("rate", f"{model.rate_hz:.4g} Hz"),
+            ("disturbed", f"{100 * model.bridged:.2g} %"),
+        )
+    )
+    says = (
+        "Bars are what was measured, lines what the processes say, with the band that"
+        " holds 68 of 100 recordings of this length."
+    )
+    top = Head(name, " · ".join(found.sessions), "noise", "", says, facts)
+    return rendered(
+        top,
+        [
+            Section("allan", "Allan deviation", tuple(_figures(found))),
+            Section("processes", "Processes", (_processes(found),)),
+            Section("averaging", "How long to average", (_averaging(found),)),
+            Section("filters", "For other programs", (_programs(found),)),
+        ],
+    )
+
+
+def _figures(found: NoiseResult) -> list[Part]:
+    out: list[Part] = []
+    for triad, what in TRIADS:
+        some = [c for n, c in found.model.channels.items() if n[0] == triad]
+        if some:
+            out.append(Figure(_chart(what, some, found.model.longest), ""))
+    return out
+
+
+def _chart(what: str, some: list[ChannelNoise], length: float) -> Chart:
+    series = []
+    for i, channel in enumerate(some):
+        seen = channel.measured
+        said = channel.predicted(seen.tau, length)
+        series += [
+            Series(channel.name, seen.tau, seen.deviation, i + 1),
+            Series(f"{channel.name} model", said.tau, said.median, i + 1, "line",
+                   said.low, said.high),
+        ]  # fmt: skip
+    unit = pretty(some[0].unit)
+    least = [f"{c.name} {np.min(c.averaging.sigma):.2g} {unit}" for c in some]
+    return Chart(
+        f"allan-{what}",
+        f"Allan deviation, {what}",
+        f"Least: {', '.join(least)}.",
+        Axis("averaging time τ", "s", log=True),
+        Axis("Allan deviation", unit, log=True),
+        tuple(series),
+    )
+
+
+def _processes(found: NoiseResult) -> Table:
+    rows = []
+    for channel in found.model.channels.values():
+        for name, size in channel.processes.items():
+            value = f"{size.value:.4g} ± {size.sigma:.2g} {pretty(size.unit)}"
+            known = size.time_sigma < size.time < math.inf
+            time = f"{' ± '.join(number(size.time, size.time_sigma))} s"
+            rows.append([channel.name, name, value, time if known else ""])
+        for name, size in channel.limits.items():
+            rows.append(
+                [channel.name, name, f"< {size.value:.2g} {pretty(size.unit)}", ""]
+            )
+    columns = ("channel", "process", ">size ± 1σ (< 95 %)", ">correlation time")
+    return table("Sizes", columns, rows)
+
+
+def _averaging(found: NoiseResult) -> Table:
+    rows = []
+    for channel in found.model.channels.values():
+        one = channel.averaging
+        cells = [
+            f"{value:.2g} ± {spread:.1g}" if seconds <= one.seconds[-1] else ""
+            for seconds in WINDOWS
+            for value, spread in [one.at(seconds)]
+        ]
+        best = one.best[0]
+        until = f"{best:.0f} s" if math.isfinite(best) else f"> {one.seconds[-1]:.0f} s"
+        rows.append([channel.name, *cells, f"{np.min(one.sigma):.2g}", until,
+                     pretty(channel.unit)])  # fmt: skip
+    named = (f">{w:.0f} s" for w in WINDOWS)
+    columns = ("channel", *named, ">least", ">averaged", "unit")
+    return table("Error of a mean; the papers average for 30 to 60 s", columns, rows)
+
+
+def _programs(found: NoiseResult) -> Table:
+    rows = []
+    for program, values in found.programs.items():
+        for name, (value, sigma, unit) in values.values.items():
+            bound = not math.isfinite(sigma)
+            text = f"< {value:.2g}" if bound else f"{value:.3g} ± {sigma:.1g}"
+            rows.append([program, name, text, pretty(unit)])
+    return table("Parameters", ("program", "name", ">value ± 1σ", "unit"), rows)

@@ -1,0 +1,183 @@
+"""`fieldcal noise`: what it says, writes and refuses."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from processes_apart import noise, recording
+from pyarrow import csv, parquet
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Block, concat
+from fieldcal.noise.document import NoiseResult
+from fieldcal.session.folder import Session
+from fieldcal.session.recorder import Recorder
+from fieldcal.session.schemas import validator
+
+N, K = 1e-3, 1e-5
+
+
+def session(folder: Path, seconds: float = 1200, seed: int = 20, **about: str) -> Path:
+    """A device of navigation grade at rest, 10 Hz."""
+    rng = np.random.default_rng(seed)
+    values = noise(rng, int(10 * seconds), 0.1, 6, N=N, K=K)
+    device = {"name": "bench", "grade": "navigation", **about}
+    tables = {"format": 1, "device": device, "site": {"latitude_deg": 60.0}}
+    with Recorder(folder, tables) as recorder:
+        recorder.append(recording(values, 0.1))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return session(tmp_path_factory.mktemp("noise") / "night")
+
+
+def test_json_is_the_file_and_holds_to_its_schema(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["noise", str(folder), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said == json.loads((folder / "noise.json").read_text())
+    validator("noise").validate(said)
+    assert list(said["channels"]) == ["ax", "ay", "az", "gx", "gy", "gz"]
+    for channel in said["channels"].values():
+        white = channel["processes"]["N"]
+        assert abs(white["value"] - N) < 4 * white["sigma"]
+        means = channel["averaging"]
+        # (1) of the standard, and the walk's part
+        truth = [math.sqrt(N**2 / s + K**2 * s / 3) for s in means["seconds"]]
+        assert means["sigma"][:3] == pytest.approx(truth[:3], rel=0.3)
+
+
+def test_what_other_programs_are_told_follows_from_the_two_numbers(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["noise", str(folder), "--json"])
+    told = json.loads(capsys.readouterr().out)["for"]
+    density = told["kalibr"]["gyroscope_noise_density"]
+    assert abs(density["value"] / N - 1) < 0.1
+    # a step of 12 ms adds (h w)^2 to the variance of an angle: N^2 h
+    held = told["ardupilot"]["EK3_GYRO_P_NSE"]["value"]
+    assert (0.012 * held) ** 2 == pytest.approx(density["value"] ** 2 * 0.012)
+    bias = told["px4"]["EKF2_ACC_B_NOISE"]["value"]
+    walk = told["kalibr"]["accelerometer_random_walk"]["value"]
+    assert (0.01 * bias) ** 2 == pytest.approx(walk**2 * 0.01)
+    variance = told["ros"]["angular_velocity_covariance[8]"]["value"]
+    assert variance == pytest.approx(N**2 * 10, rel=0.1)
+
+
+def test_the_screen_fits_80_columns_and_every_number_has_its_uncertainty(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["noise", str(folder)]) == 0
+    out = capsys.readouterr().out
+    lines = out.splitlines()
+    tables = [x for x in lines if x[:3] in ("ax ", "ay ", "az ", "gx ", "gy ", "gz ")]
+    assert len(tables) == 12 and max(map(len, tables)) <= 80
+    assert all("±" in line for line in tables)
+    for word in ("instability", "over 60 s", "kalibr:", "EK3_GBIAS_P_NSE", "EKF2_ACC",
+                 "recalibrate:", "north by gyrocompassing", "written:"):  # fmt: skip
+        assert word in out
+
+
+def test_several_sessions_of_a_device_count_together(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = session(tmp_path / "second", 1200, 21)
+    main(["noise", str(folder), str(other), "--json"])
+    both = json.loads(capsys.readouterr().out)
+    main(["noise", str(folder), "--json"])
+    one = json.loads(capsys.readouterr().out)
+    assert both["stretches"] == 2 and both["seconds"] == pytest.approx(2400, abs=1)
+    sigma = [x["channels"]["ax"]["processes"]["N"]["sigma"] for x in (both, one)]
+    assert sigma[0] < 0.9 * sigma[1]
+
+
+def test_sessions_of_two_devices_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    paths = [str(session(tmp_path / name, 60, serial=name)) for name in ("A1", "B2")]
+    assert main(["noise", *paths]) == 2
+    assert "is of device B2" in capsys.readouterr().err
+
+
+def test_what_is_too_short_or_no_session_is_refused_with_a_remedy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["noise", str(session(tmp_path / "short", 20))]) == 2
+    assert "record 30 s at least" in capsys.readouterr().err
+    assert main(["noise", str(tmp_path / "nothing")]) == 2
+    assert "is no session" in capsys.readouterr().err
+
+
+def test_the_page_has_the_curves(folder: Path, tmp_path: Path) -> None:
+    page = tmp_path / "noise.html"
+    assert main(["noise", str(folder), "--report", str(page), "--json"]) == 0
+    text = page.read_text(encoding="utf-8")
+    for word in ("Allan deviation, gyroscopes", "gz model", "EKF2_GYR_NOISE", "bench"):
+        assert word in text
+    assert "src=" not in text and 'href="http' not in text
+
+
+@pytest.mark.parametrize("ending", ["csv", "csv.gz", "parquet"])
+def test_a_recording_of_any_kind_is_read_in_parts(tmp_path: Path, ending: str) -> None:
+    """The same samples, whatever file they are in and however it is read."""
+    source = session(tmp_path / "source", 200)
+    block = Session.open(source).block
+    target = tmp_path / "target"
+    target.mkdir()
+    (target / "session.toml").write_text("format = 1\n")
+    apply_to(block, target / f"samples.{ending}")
+    parts = concat(Session.open(target).blocks())
+    whole = Session.open(target).block
+    for name in ("t", "acc", "gyr"):
+        assert np.array_equal(getattr(parts, name), getattr(whole, name))
+    assert whole.acc == pytest.approx(block.acc)
+
+
+def apply_to(block: Block, path: Path) -> None:
+    """Write samples with another program's writer."""
+    columns = dict(zip(("ax", "ay", "az", "gx", "gy", "gz"), block.six.T, strict=True))
+    table = pa.table({"t": block.t, **columns, "mine": ["text"] * len(block)})
+    if path.name.endswith(".parquet"):
+        parquet.write_table(table, path)
+    else:
+        with pa.output_stream(path) as stream:  # packed by the name's ending
+            csv.write_csv(table, stream)
+
+
+def test_rows_out_of_order_are_named_when_read_in_parts(tmp_path: Path) -> None:
+    (tmp_path / "session.toml").write_text("format = 1\n")
+    rows = [f"{t},1,2,3" for t in (0.0, 0.1, 0.3, 0.2)]
+    (tmp_path / "samples.csv").write_text("\n".join(["t,ax,ay,az", *rows]) + "\n")
+    with pytest.raises(Exception, match="row 4, column t"):
+        concat(Session.open(tmp_path).blocks())
+
+
+def test_a_turn_between_windows_is_no_noise(tmp_path: Path) -> None:
+    rng = np.random.default_rng(22)
+    values = noise(rng, 3000, 0.1, 6, N=N)
+    values[1000:1400] += rng.standard_normal((400, 6))
+    values[1400:, 0] += 5.0
+    windows = [(0.0, 99.0), (141.0, 299.0)]
+    with Recorder(
+        tmp_path / "turned",
+        {
+            "format": 1,
+            "position": [{"start_s": a, "end_s": b} for a, b in windows],
+        },
+    ) as recorder:
+        recorder.append(recording(values, 0.1))
+    from fieldcal.commands.noise import result
+
+    found: NoiseResult = result([Session.open(tmp_path / "turned")])
+    assert found.model.stretches == 2
+    for channel in found.model.channels.values():
+        assert channel.processes["N"].value == pytest.approx(N, rel=0.1)

@@ -29,8 +29,9 @@ def mixing(off: Array, given: bool = True) -> Mixing:
 
 def wandering(seed: int) -> Array:
     rng = np.random.default_rng(seed)
-    off: Array = SD * rng.standard_normal((len(X), 6))
-    return off + (3.0 * D.unstable[:6] * rng.standard_normal((9, 6)))[X.position]
+    each = 3.0 * D.unstable[:6] * rng.standard_normal((9, 6))
+    off: Array = SD * rng.standard_normal((len(X), 6)) + each[X.position]
+    return off
 
 
 @pytest.mark.parametrize("triad", [(0, 1, 2), (3, 4, 5)])

@@ -4,6 +4,9 @@
         device = virtual_imu("serial", effects=["base_tilt:about_x_deg=1"])
         device.assert_calibration(our_procedure(device.url))
 
+    def test_our_simulator(simulator_matches):
+        simulator_matches("recordings/bench-7", "build/simulated.csv", acc_bias=0.02)
+
 pytest finds them by themselves once fieldcal is installed. Nothing else is loaded until
 a test asks for a device.
 """
@@ -242,3 +245,35 @@ def _option(name: str, value: Any) -> str:
     several = not isinstance(value, str) and isinstance(value, Sequence)
     text = ",".join(map(str, value)) if several else str(value)
     return f"--{name.replace('_', '-')}={text}"
+
+
+@pytest.fixture
+def simulator_matches() -> Callable[..., Any]:
+    """Fail unless a simulator still matches a recording within limits.
+
+    ``simulator_matches(recording, simulated, **limits)``: a session folder, and a
+    session folder or a file that ``fieldcal import`` reads. Whatever differs fails,
+    unless it has a limit: by id, a number in its unit or a text as ``"10 %"``;
+    ``chi2_per_dof`` is that of the recording as the simulator predicts it. The
+    comparison is returned, a `fieldcal.against.Match`.
+    """
+
+    def check(
+        recording: str | Path, simulated: str | Path, **limits: float | str
+    ) -> Any:
+        __tracebackhide__ = True
+        from fieldcal.against import compare, gate
+        from fieldcal.against.opening import opened
+        from fieldcal.session.folder import Session
+
+        allowed = gate.limits(limits)
+        session = Session.open(recording)
+        real = session.block, session.about
+        block, about, _ = opened(Path(simulated), real)
+        found = compare(real, (block, about), (str(recording), str(simulated)))
+        beyond = [one.says for one in gate.checks(found, allowed) if not one.ok]
+        if beyond:
+            pytest.fail(f"{simulated} does not match {recording}: {'; '.join(beyond)}")
+        return found
+
+    return check

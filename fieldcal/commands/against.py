@@ -15,18 +15,19 @@ if TYPE_CHECKING:
     from fieldcal.against.side import Side
     from fieldcal.session.folder import Session
 
-AGAINST = "against.json"
-
 PLAIN = "json"
 """Format of the patches of a command unless another is named."""
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the comparison: 0 if the two agree, 1 if they differ."""
+    """Carry out the comparison: 0 if the two agree within the limits, 1 if not."""
+    from fieldcal.against.gate import checks, limits, write_junit
     from fieldcal.against.rounds import is_command
     from fieldcal.against.side import side
+    from fieldcal.report.gather import AGAINST
     from fieldcal.session.folder import Session
 
+    allowed = limits(args.limit)
     session = Session.open(args.session)
     real = side(str(args.session), session.block, session.about)
     compared = _rounds if is_command(args.against) else _once
@@ -38,13 +39,20 @@ def run(args: argparse.Namespace) -> int:
     for warning in (*session.warnings, *said, *found.warnings):
         sys.stderr.write(f"fieldcal diagnose: {warning}\n")
     _say(args, found)
+    gate = checks(found, allowed)
+    if args.junit:
+        write_junit(args.junit, args.session.resolve().name, found, gate)
+        written.append(args.junit)
     if args.report:
         from fieldcal.commands.report import write
 
         written.append(write(args.session))
     for path in written:
         (sys.stderr if args.json else sys.stdout).write(f"written: {path}\n")
-    return 0 if found.verdict == "consistent" else 1
+    beyond = [one for one in gate if not one.ok]
+    for one in beyond if allowed else ():
+        sys.stderr.write(f"fieldcal diagnose: beyond its limit: {one.says}\n")
+    return 1 if beyond else 0
 
 
 def _once(

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 HELP = "say what physics the simulation leaves out of a recording"
 
+RARE = ("rounds", "limit", "junit")
+
 EXAMPLE = """\
   fieldcal diagnose bench-7/2026-03-01
   fieldcal diagnose bench-7/2026-03-01 --details
@@ -64,6 +66,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=3,
         metavar="N",
         help="patches that are tried on a command (default: 3)",
+    )
+    add(
+        "--limit",
+        action="append",
+        default=[],
+        metavar="ID=SIZE",
+        help="with --against: what may differ by that much, as acc_bias=0.02 or"
+        " noise=10%%, so that the exit code is 0",
+    )
+    add(
+        "--junit",
+        type=Path,
+        metavar="FILE",
+        help="with --against: write what was compared as JUnit XML",
     )
 
 

@@ -17,6 +17,7 @@ from fieldcal.evaluation.observations import Rests, rests
 from fieldcal.session.folder import RESULT, Session
 
 DIAGNOSIS = "diagnosis.json"
+AGAINST = "against.json"
 
 FAR = 1e6
 """Device time from which on its digits hide what happens in a chart, s."""
@@ -51,6 +52,7 @@ class Material:
     diagnosis : of diagnosis.json, None where there is none
     marks : what happened, in order
     earlier : calibrations of the same device, oldest first
+    against : of against.json, None where there is none
 
     """
 
@@ -62,6 +64,7 @@ class Material:
     diagnosis: Mapping[str, Any] | None
     marks: tuple[Mapping[str, Any], ...]
     earlier: tuple[EarlierCalibration, ...] = ()
+    against: Mapping[str, Any] | None = None
 
     @property
     def epoch(self) -> float:
@@ -107,6 +110,7 @@ def gather(folder: Path | str, earlier: Iterable[EarlierCalibration] = ()) -> Ma
         diagnosis=_read(session.folder / DIAGNOSIS),
         marks=tuple(session.marks()),
         earlier=tuple(earlier),
+        against=_read(session.folder / AGAINST),
     )
 
 

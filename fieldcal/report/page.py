@@ -14,6 +14,7 @@ from datetime import UTC, datetime
 from importlib.resources import files
 from typing import Any
 
+from fieldcal.report.against import against
 from fieldcal.report.agreement import agreement, correlation
 from fieldcal.report.blocks import Section
 from fieldcal.report.diagnosis import diagnosis
@@ -72,6 +73,7 @@ def sections(material: Material, made: datetime) -> list[Section]:
         calibration(material),
         gravity_norm(material),
         diagnosis(material),
+        against(material),
         places(material),
         recording(material),
         agreement(material),

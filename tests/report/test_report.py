@@ -331,6 +331,34 @@ def test_a_diagnosis_of_any_shape_gives_a_section(
             json.dumps(block.chart.to_json(), allow_nan=False)
 
 
+def test_a_comparison_with_a_simulator_is_a_section(material: Material) -> None:
+    quantity = {"value": 0.1, "sigma": 0.002, "unit": "m/s^2"}
+    found = {
+        "verdict": "left_out",
+        "against": "simulated.csv",
+        "differences": [
+            {
+                "id": "acc_bias",
+                "direction": "resized",
+                "parameters": {"x": {"real": quantity, "difference": quantity}},
+            },
+            {"id": "mounting", "parameters": {"axes": {"difference": {"value": "+x"}}}},
+        ],
+        "prediction": {"before": {"rms_acc": 0.1, "chi2_per_dof": 40.0}},
+    }
+    page = render(replace(material, against=found))
+    for said in ("Against a simulator", "simulated.csv", "acc bias", "0.1000", "40"):
+        assert said in page
+    assert "Against a simulator" not in render(material)
+
+
+@pytest.mark.parametrize("found", [{}, {"differences": [{}, 3]}, {"prediction": []}])
+def test_a_comparison_of_any_shape_gives_a_section(
+    material: Material, found: dict[str, Any]
+) -> None:
+    assert "Against a simulator" in render(replace(material, against=found))
+
+
 def _luminance(colour: str) -> float:
     part = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)

@@ -1,0 +1,157 @@
+"""Whether a simulator still matches a recording, within limits: for CI.
+
+Whatever differs fails, unless it has a limit and all its parameters differ by less. A
+limit is a number in the parameter's unit, or a part of the recording's value in per
+cent; `chi2_per_dof` is that of the recording as the simulator predicts it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+from fieldcal.against.result import Difference, Match, Pair
+from fieldcal.against.sensor_model import CALIBRATION
+from fieldcal.against.wording import named
+from fieldcal.core.errors import InputError
+from fieldcal.core.shown import shown
+from fieldcal.effects import catalogue
+from fieldcal.session.folder import write_whole
+
+PREDICTION = "chi2_per_dof"
+
+ALWAYS = (*CALIBRATION, "noise")
+"""What every recording is compared in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """How far something may differ: in its unit, or as a part of the recording's."""
+
+    size: float
+    relative: bool = False
+
+    def allows(self, pair: Pair) -> bool:
+        """Whether a parameter differs by no more."""
+        off = pair.difference.value
+        if isinstance(off, str):
+            return False
+        if not self.relative:
+            return abs(off) <= self.size
+        value = pair.real.value if pair.real is not None else 0.0
+        return not isinstance(value, str) and abs(off) <= self.size * abs(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that was compared, whether it is within its limit, and why not."""
+
+    name: str
+    ok: bool
+    says: str = ""
+
+
+def limits(given: Iterable[str] | Mapping[str, float | str]) -> dict[str, Limit]:
+    """Limits by id, of texts as "acc_bias=0.02" and "noise=10%", or of a mapping.
+
+    Raises
+    ------
+    InputError
+        If something has no limit, or a limit is no number.
+
+    """
+    if not isinstance(given, Mapping):
+        given = dict(_parted(text) for text in given)
+    known = (*ALWAYS, PREDICTION, *catalogue())
+    for name in given:
+        if name not in known:
+            raise InputError(
+                f"--limit {name}: nothing is called so; it is {', '.join(known)}"
+            )
+    return {name: _limit(name, str(text)) for name, text in given.items()}
+
+
+def _parted(text: str) -> tuple[str, str]:
+    name, is_one, size = text.partition("=")
+    if not is_one:
+        raise InputError(f"--limit {text}: write it as acc_bias=0.02 or noise=10%")
+    return name.strip(), size
+
+
+def _limit(name: str, text: str) -> Limit:
+    """A limit of a text, as 0.02 or 10 %."""
+    number = text.strip().removesuffix("%")
+    relative = number != text.strip()
+    try:
+        size = float(number)
+    except ValueError:
+        size = -1.0
+    if not size >= 0 or (relative and name == PREDICTION):
+        raise InputError(f"--limit {name}={text}: must be a number, as in {name}=0.02")
+    return Limit(size / 100 if relative else size, relative)
+
+
+def checks(found: Match, allowed: Mapping[str, Limit]) -> list[Check]:
+    """Everything that was compared, in the order of what every recording has."""
+    names = [*ALWAYS, *found.alike, *(d.id for d in found.differences)]
+    out = [_check(name, found, allowed) for name in dict.fromkeys(names)]
+    if (limit := allowed.get(PREDICTION)) is not None:
+        value = found.before.chi2_per_dof
+        says = f"it is predicted with χ²/dof {value:.3g}, at most {limit.size:g}"
+        out.append(Check(PREDICTION, value <= limit.size, says))
+    return out
+
+
+def _check(name: str, found: Match, allowed: Mapping[str, Limit]) -> Check:
+    """One id: nothing differs in it, or by no more than is allowed."""
+    beyond = [d for d in found.differences if d.id == name and not _within(d, allowed)]
+    lead = {"left_out": "left out", "added": "added", "resized": "differs"}
+    says = "; ".join(f"{lead[d.direction]}: {named(d)}" for d in beyond)
+    return Check(name, not beyond, says)
+
+
+def _within(one: Difference, allowed: Mapping[str, Limit]) -> bool:
+    limit = allowed.get(one.id)
+    sizes = [p for p in one.parameters.values() if not _tells_when(p)]
+    return limit is not None and bool(sizes) and all(limit.allows(p) for p in sizes)
+
+
+def _tells_when(pair: Pair) -> bool:
+    """Whether a parameter is an instant or a time constant, which is no size."""
+    return pair.difference.unit == "s"
+
+
+def write_junit(path: Path, name: str, found: Match, done: Iterable[Check]) -> None:
+    """Write checks as JUnit XML, with what is worth following from run to run.
+
+    Raises
+    ------
+    SessionError
+        If the file cannot be written.
+
+    """
+    suite = Element("testsuite", name="fieldcal.against")
+    values = SubElement(suite, "properties")
+    SubElement(
+        values, "property", name=PREDICTION, value=f"{found.before.chi2_per_dof:.6g}"
+    )
+    for one in found.differences:
+        for parameter, pair in one.parameters.items():
+            off = pair.difference.value
+            text = off if isinstance(off, str) else f"{off:.6g}"
+            SubElement(values, "property", name=f"{one.id}.{parameter}", value=text)
+    failed = 0
+    every = list(done)
+    for check in every:
+        case = SubElement(suite, "testcase", classname=name, name=check.name)
+        if not check.ok:
+            failed += 1
+            SubElement(case, "failure", message=check.says)
+    suite.set("tests", str(len(every)))
+    suite.set("failures", str(failed))
+    for element in suite.iter():
+        for key, value in element.items():
+            element.set(key, shown(value))
+    write_whole(path, tostring(suite, encoding="utf-8", xml_declaration=True))

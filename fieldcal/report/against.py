@@ -1,0 +1,74 @@
+"""How the recording compares with a simulator, as against.json says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fieldcal.calibration.wording import number, pretty
+from fieldcal.diagnosis.wording.lines import format_probability
+from fieldcal.report.blocks import Block, Section, Text, WarningBox, table
+from fieldcal.report.diagnosis import TONES
+from fieldcal.report.gather import Material
+from fieldcal.report.loose import (
+    Json,
+    format_number,
+    list_at,
+    objects_at,
+    real,
+    table_at,
+)
+
+DIRECTIONS = {
+    "left_out": "left out by the simulator",
+    "added": "added by the simulator",
+    "resized": "in both, another size",
+}
+
+COLUMNS = ("what", "", "parameter", ">real", ">simulator", ">real − simulator", "±", "")
+
+
+def against(material: Material) -> Section | None:
+    """Verdict, differences and prediction; None where nothing was compared."""
+    found = material.against
+    if found is None:
+        return None
+    verdict = str(found.get("verdict", "unknown"))
+    sure = format_probability(real(found.get("probability")))
+    lead = f"{verdict.replace('_', ' ').upper()}, probability {sure}"
+    blocks: list[Block] = [WarningBox(lead, TONES.get(verdict, "warn"))]
+    blocks.append(Text(f"Compared with {found.get('against', 'a simulator')}."))
+    if said := str(found.get("says", "")):
+        blocks.append(Text(said))
+    rows = [row for one in objects_at(found, "differences") for row in _rows(one)]
+    if rows:
+        blocks.append(table("What differs", COLUMNS, rows))
+    blocks.append(_prediction(table_at(found, "prediction")))
+    blocks += [WarningBox(str(w)) for w in list_at(found, "warnings")]
+    return Section("against", "Against a simulator", tuple(blocks))
+
+
+def _rows(one: Json) -> Iterator[tuple[str, ...]]:
+    """A row for each parameter of a difference."""
+    what = str(one.get("id", "")).replace("_", " ")
+    direction = DIRECTIONS.get(str(one.get("direction")), "")
+    parameters = table_at(one, "parameters")
+    for name in parameters:
+        pair = table_at(parameters, name)
+        off = table_at(pair, "difference")
+        value, sigma = real(off.get("value")), real(off.get("sigma"))
+        shown = number(value, sigma) if value == value else (str(off.get("value")), "")
+        sizes = [format_number(table_at(pair, side).get("value"), "{:.6g}")
+                 for side in ("real", "simulator")]  # fmt: skip
+        unit = str(off.get("unit", ""))
+        yield what, direction, name, *sizes, *shown, pretty("" if unit == "1" else unit)
+
+
+def _prediction(found: Json) -> Block:
+    """How the recording is predicted, as the simulator is and patched."""
+    columns = ("", ">rms m/s²", ">rms rad/s", ">χ²/dof")
+    rows = []
+    for label, key in (("simulator", "before"), ("patched", "after")):
+        one = table_at(found, key)
+        names = ("rms_acc", "rms_gyr", "chi2_per_dof")
+        rows.append((label, *(format_number(one.get(n), "{:.3g}") for n in names)))
+    return table("What was not fitted, predicted", columns, rows)

@@ -1,0 +1,110 @@
+"""What passes in CI, and what does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import strapdown
+from session_folders import write_session
+
+from fieldcal.against.gate import checks, limits, write_junit
+from fieldcal.against.result import (
+    Difference,
+    Direction,
+    Facts,
+    Match,
+    Pair,
+    Prediction,
+)
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Block
+from fieldcal.diagnosis.result import Quantity
+
+FACTS = Facts(100.0, np.nan, np.nan, 0.0, np.nan, {})
+
+
+def differing(
+    name: str,
+    real: float,
+    sim: float,
+    direction: Direction = "resized",
+    unit: str = "1",
+) -> Difference:
+    one, two, off = (Quantity(v, 1e-3, unit) for v in (real, sim, real - sim))
+    when = Pair(*(Quantity(v, 0.1, "s") for v in (60.0, 10.0, 50.0)))
+    return Difference(name, direction, 1.0, {"x": Pair(one, two, off), "at_s": when})
+
+
+def match(*differences: Difference) -> Match:
+    predicted = Prediction(0.1, 0.1, 3.0)
+    verdict: Any = "left_out" if differences else "consistent"
+    return Match(
+        verdict, 1.0, differences, ("quadratic",), predicted, predicted, FACTS, FACTS,
+        (), "",
+    )  # fmt: skip
+
+
+def failed(found: Match, *given: str) -> list[str]:
+    return [one.name for one in checks(found, limits(given)) if not one.ok]
+
+
+def test_whatever_differs_fails_unless_it_is_within_its_limit() -> None:
+    found = match(differing("acc_bias", 0.1, 0.08), differing("noise", 0.02, 0.021))
+    assert failed(found) == ["acc_bias", "noise"]
+    assert failed(found, "acc_bias=0.03") == ["noise"]
+    assert failed(found, "acc_bias=0.01", "noise=10%") == ["acc_bias"]
+    assert failed(found, "acc_bias=0.03", "noise = 1 %".replace(" ", "")) == ["noise"]
+    assert failed(found, "acc_bias=0.03", "noise=10%", "chi2_per_dof=2") == [
+        "chi2_per_dof"
+    ]
+    assert not failed(found, "acc_bias=0.03", "noise=10%", "chi2_per_dof=4")
+    assert not failed(match())
+
+
+def test_when_something_happened_is_no_size() -> None:
+    found = match(differing("bias_step", 0.02, 0.0, "left_out"))
+    assert not failed(found, "bias_step=0.03")
+    assert failed(found, "bias_step=0.01") == ["bias_step"]
+
+
+@pytest.mark.parametrize("given", ["acc_bias", "acc_bias=", "acc_bias=-1", "speed=1"])
+def test_limits_that_are_none_are_refused(given: str) -> None:
+    with pytest.raises(InputError, match="--limit"):
+        limits([given])
+
+
+def test_junit_has_a_case_for_everything_and_numbers_to_follow(tmp_path: Path) -> None:
+    found = match(differing("acc_bias", 0.1, 0.08))
+    path = tmp_path / "against.xml"
+    write_junit(path, "bench", found, checks(found, {}))
+    suite = ElementTree.parse(path).getroot()
+    cases = {c.get("name"): c.find("failure") for c in suite.iter("testcase")}
+    assert set(cases) >= {"acc_bias", "gyr_scale", "noise", "quadratic"}
+    assert [n for n, failure in cases.items() if failure is not None] == ["acc_bias"]
+    assert (suite.get("tests"), suite.get("failures")) == (str(len(cases)), "1")
+    values = {p.get("name"): p.get("value") for p in suite.iter("property")}
+    assert values["acc_bias.x"] == "0.02" and values["chi2_per_dof"] == "3"
+
+
+def test_the_fixture_fails_with_what_differs(
+    tmp_path: Path, simulator_matches: Callable[..., Match]
+) -> None:
+    folders: list[Path] = []
+    for name, bias in (("real", 0.0), ("simulated", 0.05)):
+        noise = {"acc": [0.02] * 3, "gyr": [1e-3] * 3}
+        device = {"noise": noise, "bias": {"acc": [bias, 0, 0]}, "seed": len(folders)}
+        table = strapdown.outputs(device)
+        none = np.full(len(table), np.nan)
+        block = Block.of(table[:, 0], table[:, 1:4], table[:, 4:], none, none, none)
+        site = {"gravity": strapdown.GRAVITY}
+        places = strapdown.schedule()
+        folders.append(write_session(tmp_path / name, block, places, site=site))
+    with pytest.raises(pytest.fail.Exception, match="differs: acc bias"):
+        simulator_matches(*folders)
+    found = simulator_matches(*folders, acc_bias=0.1)
+    assert [d.id for d in found.differences] == ["acc_bias"]

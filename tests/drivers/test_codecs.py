@@ -1,5 +1,7 @@
 """What every wire format must do; a new one needs its stream in wires.py."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -14,9 +16,14 @@ from fieldcal.drivers.options import Options
 N = 40
 KNOWN = {name: STREAMS[name](N, np.random.default_rng(7)) for name in STREAMS}
 FEW = {name: STREAMS[name](16, np.random.default_rng(7)) for name in STREAMS}
-LONG = {name: STREAMS[name](5_000, np.random.default_rng(8)) for name in STREAMS}
 
 every_format = pytest.mark.parametrize("name", formats())
+
+
+@cache
+def long(name: str) -> Stream:
+    """A minute of a stream, made where it is needed: every process reads this file."""
+    return STREAMS[name](5_000, np.random.default_rng(8))
 
 
 def decoder(name: str, stream: Stream) -> Codec:
@@ -130,7 +137,7 @@ def wrong(block: Block, truth: Block) -> int:
 
 @every_format
 def test_one_flipped_bit_a_sample_passes_no_check(name: str) -> None:
-    stream, rng = LONG[name], np.random.default_rng(3)
+    stream, rng = long(name), np.random.default_rng(3)
     pieces = [bytearray(piece) for piece in stream.pieces]
     for piece in pieces[::2]:
         piece[rng.integers(len(piece))] ^= 1 << rng.integers(8)
@@ -143,7 +150,7 @@ def test_one_flipped_bit_a_sample_passes_no_check(name: str) -> None:
 
 @every_format
 def test_random_damage_passes_no_more_than_the_check_lets(name: str) -> None:
-    stream, rng = LONG[name], np.random.default_rng(4)
+    stream, rng = long(name), np.random.default_rng(4)
     pieces = [np.frombuffer(piece, np.uint8).copy() for piece in stream.pieces]
     for piece in pieces:
         spoil = rng.integers(len(piece), size=4)

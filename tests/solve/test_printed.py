@@ -92,6 +92,13 @@ def test_what_is_printed_says_so_and_keeps_both_triads_apart() -> None:
     assert asked.names == two.names
 
 
+def test_the_method_that_is_asked_for_is_taken() -> None:
+    with pytest.raises(NotObservable, match="two positions with known angles are need"):
+        solve(observe(FIVE, outputs(FIVE)), as_printed=True, method="two_position")
+    with pytest.raises(NotObservable, match="separate bias, scale factor and tilt on"):
+        solve(observe(TWO, outputs(TWO)), as_printed=True, method="five_position")
+
+
 def test_what_the_print_has_not_is_refused() -> None:
     with pytest.raises(InputError) as error:
         solve(observe(FIVE, outputs(FIVE)), as_printed=True, method="joint")

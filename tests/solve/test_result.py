@@ -12,7 +12,7 @@ from observed import GYR_BIAS, observe, outputs
 
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.positions import FIVE, TWO, Position
-from fieldcal.solve import observations, result, words
+from fieldcal.solve import observations, result, solve, words
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.estimation import Estimated
 from fieldcal.solve.observations import Observations
@@ -218,6 +218,40 @@ def test_accelerometers_that_gave_nothing_are_no_result() -> None:
     assert not result._blind(estimated(), observed())
     turning = observed((FIVE[0], Position("", rate=(0.1, 0.0, 0.0))))
     assert not result._blind(found, turning)
+
+
+def test_conditions_are_those_that_were_given() -> None:
+    temperature = np.array([20.0, np.nan, 22.0, 24.0, 26.0])
+    seen = observed(latitude=0.7, temperature=temperature, gyr=False)
+    found = solve(seen, tilt="none", angle_sigma_deg=0.2).info
+    assert found["conditions"] == {
+        "positions": 5, "gravity": 9.81,
+        "latitude_deg": pytest.approx(40.107, abs=1e-3),
+        "temperature_degc": 23.0, "grade": "tactical",
+    }  # fmt: skip
+    assert found["angle_sigma_deg"] == 0.2 and "gyroscopes" not in found
+    plain = solve(observed(), tilt="none").info
+    assert plain["conditions"]["latitude_deg"] is None
+    assert plain["conditions"]["temperature_degc"] is None
+    assert plain["gyroscopes"]["unit"] == "rad/s" and plain["gyroscopes"]["dof"] == 12
+    assert "level_sigma_deg" not in plain
+    two = solve(observed(TWO, gyr=False), level_sigma_deg=0.3).info
+    assert two["level_sigma_deg"] == 0.3
+
+
+def test_a_window_that_is_off_for_certain_has_no_weight_and_is_named() -> None:
+    places = (*FIVE, Position.deg(-30, 10), Position.deg(60, -20), Position.deg(90, 0))
+    acc = outputs(places)
+    acc[3] += [0.5, -0.4, 0.6]
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(acc.shape)
+    found = solve(observe(places, acc + noise), tilt="none")
+    bad = found.info["bad_position"]
+    assert bad[3] == 1.0 and max(bad[:3] + bad[4:]) < 0.1
+    assert found.info["doubtful_position"] == {"name": FIVE[3].name, "probability": 1.0}
+    assert any(FIVE[3].name in w and "no weight" in w for w in found.warnings)
+    others = [i for i in range(len(places)) if i != 3]
+    left = solve(observe(places, acc + noise)[others], tilt="none")
+    np.testing.assert_allclose(found.values, left.values, atol=0.3 * left.sigma.max())
 
 
 # --- what estimators are given

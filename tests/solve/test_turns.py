@@ -3,6 +3,7 @@
 import doctest
 import json
 import shutil
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -246,6 +247,13 @@ def test_without_the_turns_there_is_no_scale_factor(tmp_path: Path) -> None:
     block, windows = record(4, many_ways(6, 9), ANYHOW)
     found = calibrated(tmp_path, block, windows, turns="no")
     assert "gyr_scale" not in found.groups and "turns" not in found.info
+
+
+def test_gyroscopes_that_turn_the_other_way_are_said_to(tmp_path: Path) -> None:
+    block, windows = record(4, many_ways(6, 9), ANYHOW)
+    found = calibrated(tmp_path, replace(block, gyr=-block.gyr), windows)
+    said = [w for w in found.warnings if "gyroscopes lead to another attitude" in w]
+    assert len(said) == 1 and not found.good
 
 
 def test_a_turn_with_samples_missing_is_left_out(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from fieldcal.core.errors import InputError, PlanError
 if TYPE_CHECKING:
     from fieldcal.core.positions import Position
     from fieldcal.planning.aliasing import Aliases
+    from fieldcal.planning.device_noise import DeviceNoise
     from fieldcal.planning.planner import Grade
 
 RARE = ("name", "serial", "grade", "gravity", "mounting")
@@ -22,6 +23,7 @@ RARE = ("name", "serial", "grade", "gravity", "mounting")
 EXAMPLE = """\
   fieldcal plan --noise tactical --positions 5 --minutes 5 -o plan.toml
   fieldcal plan --set five
+  fieldcal plan --noise-of bench-7/overnight
   fieldcal run plan.toml --device "serial:/dev/ttyUSB0?format=witmotion"
 """
 
@@ -42,6 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--alpha", type=float, default=45.0, metavar="DEG", help="limit (default: 45)")
     add("--beta", type=float, default=5.0, metavar="DEG", help="limit (default: 5)")
     add("--noise", default="tactical", choices=("consumer", "tactical", "navigation"))
+    add(
+        "--noise-of",
+        type=Path,
+        metavar="SESSION",
+        help="instead: as fieldcal noise found it (session folder, or its noise.json)",
+    )
     add(
         "--set",
         choices=("two", "five", "wide", "six_faces"),
@@ -72,7 +80,9 @@ def run(args: argparse.Namespace) -> int:
         else planner.best_positions(args.positions, ladder, gravity)
     )
     seconds = _seconds(args.minutes, len(chosen))
-    grade = planner.GRADES[args.noise]
+    device = _device(args.noise_of) if args.noise_of else None
+    grade = device.grade(seconds) if device else planner.GRADES[args.noise]
+    noise = "this device" if device else args.noise
     found = planner.expected(chosen, grade, seconds, gravity)
     paper = planner.expected(FIVE, grade, seconds, gravity)
     further = planner.extra_position(chosen, ladder, gravity)
@@ -82,13 +92,45 @@ def run(args: argparse.Namespace) -> int:
         _write(args.output, tables, chosen, seconds)
     if args.json:
         out = _json(chosen, seconds, found, confused, further, with_it)
+        if device:
+            out["averaging"] = device.to_json()
         sys.stdout.write(json.dumps(out) + "\n")
         return 0
-    _show(chosen, seconds, args.noise, grade, found, paper, with_it)
+    _show(chosen, seconds, noise, grade, found, paper, with_it)
     _tell(confused, further)
+    if device:
+        sys.stdout.write(f"{device.sentence(seconds)}\n")
     if args.output:
         sys.stdout.write(f"written: {args.output}\n")
     return 0
+
+
+def _device(path: Path) -> DeviceNoise:
+    """What `fieldcal noise` found of a device.
+
+    Raises
+    ------
+    SessionError
+        If there is no noise.json, or it is none.
+
+    """
+    from fieldcal.core.documents import load_json
+    from fieldcal.core.errors import SessionError
+    from fieldcal.planning.device_noise import of_document
+    from fieldcal.session.schemas import refusal, validator
+
+    file = path / "noise.json" if path.is_dir() else path
+    try:
+        content = load_json(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise SessionError(
+            f"{file}: is not there; run fieldcal noise on a recording at rest first"
+        ) from error
+    except (OSError, ValueError) as error:
+        raise SessionError(f"{file}: cannot be read: {error}") from error
+    if wrong := refusal(content, validator("noise")):
+        raise SessionError(f"{file}: {wrong}; run fieldcal noise again")
+    return of_document(content)
 
 
 def _seconds(minutes: float, n: int) -> float:

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Iterator
-from mmap import mmap
+from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -123,6 +122,37 @@ class StreamContent(NamedTuple):
     row: int
 
 
+def in_order(source: Any) -> Generator[pa.RecordBatch, None, bool]:
+    """Batches of a stream, one at a time, up to the first that is damaged.
+
+    Parameters
+    ----------
+    source : the file, as Arrow opens it
+
+    Returns
+    -------
+    Whether that was all; what is behind a damaged place, `decode` finds.
+
+    """
+    import pyarrow as pa
+
+    number = row = 0
+    try:
+        stream = pa.ipc.open_stream(source)
+        while True:
+            batch, said = _batch(stream)
+            if OURS & said.keys():
+                stated = int(said["number"]), int(said["row"]), int(said["crc32"], 16)
+                if stated != (number, row, checksum(batch, number, row)):
+                    return False
+            yield batch
+            number, row = number + 1, row + batch.num_rows
+    except StopIteration:
+        return True
+    except (pa.ArrowException, OSError, EOFError, ValueError, KeyError):
+        return False
+
+
 def whole(data: bytes) -> int:
     """Bytes up to the end of the last whole batch; 0 where there is none.
 
@@ -139,12 +169,12 @@ def whole(data: bytes) -> int:
         return end if batches else 0
 
 
-def decode(data: bytes | mmap, usual: pa.Schema | None = None) -> StreamContent:
+def decode(data: bytes, usual: pa.Schema | None = None) -> StreamContent:
     """Read what is whole of a stream.
 
     Parameters
     ----------
-    data : the file, in memory or mapped
+    data : the file
     usual : columns to go by where the head of the stream is damaged
 
     """
@@ -154,7 +184,7 @@ def decode(data: bytes | mmap, usual: pa.Schema | None = None) -> StreamContent:
 class _Decoder:
     """Reads a stream message by message."""
 
-    def __init__(self, data: bytes | mmap, usual: pa.Schema | None) -> None:
+    def __init__(self, data: bytes, usual: pa.Schema | None) -> None:
         import pyarrow as pa
 
         self._data = pa.py_buffer(data)

@@ -8,7 +8,6 @@ are counted from 1, the row of names not among them.
 
 from __future__ import annotations
 
-import mmap
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +17,7 @@ import numpy as np
 
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Array, Block
-from fieldcal.session.arrow_stream import decode, numbers
+from fieldcal.session.arrow_stream import decode, in_order, numbers
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -109,11 +108,7 @@ def blocks(path: Path) -> Iterator[Block]:
 def _batches(path: Path) -> Iterator[pa.RecordBatch]:
     """Record batches of a file of any kind, with our columns."""
     if path.name.endswith(".arrows"):
-        with open(path, "rb") as file:
-            if not file.seek(0, 2):
-                read(path)
-            mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-            yield from decode(mapped, schema()).batches
+        yield from _recorded(path)
     elif path.name.endswith(".parquet"):
         import pyarrow.parquet
 
@@ -122,6 +117,26 @@ def _batches(path: Path) -> Iterator[pa.RecordBatch]:
         yield from whole.iter_batches(batch_size=PART, columns=names)
     else:
         yield from _rows_of_text(path)
+
+
+def _recorded(path: Path) -> Iterator[pa.RecordBatch]:
+    """Batches of a stream; behind a damaged place, of all that is whole at once."""
+    import pyarrow as pa
+
+    rows = 0
+    with pa.OSFile(str(path)) as source:
+        batches = in_order(source)
+        while True:
+            try:
+                batch = next(batches)
+            except StopIteration as end:
+                finished = bool(end.value)
+                break
+            rows += batch.num_rows
+            yield batch
+    if not finished or not rows:
+        table, _ = _read_arrows(path)
+        yield from table.slice(rows).to_batches()
 
 
 def _rows_of_text(path: Path) -> Iterator[pa.RecordBatch]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from processes_apart import covariance
 from scipy.fft import dct
 
+from benchmarks.noise.processes import covariance
 from fieldcal.core.samples import Array
 from fieldcal.noise import cosine
 

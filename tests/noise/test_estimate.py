@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from processes_apart import bound, covariance, noise, recording
 
+from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.noise import estimate, reduced

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
-from processes_apart import noise, recording
 from pyarrow import csv, parquet
 
+from benchmarks.noise.processes import noise, recording
 from fieldcal.cli import main
 from fieldcal.core.samples import Block, concat
 from fieldcal.noise.document import NoiseResult
@@ -153,6 +153,27 @@ def apply_to(block: Block, path: Path) -> None:
             csv.write_csv(table, stream)
 
 
+def test_behind_a_damaged_place_it_goes_on(tmp_path: Path) -> None:
+    """As the whole recording is read, whatever byte is another."""
+    file = session(tmp_path / "night", 60) / "samples.arrows"
+    with Recorder(tmp_path / "parts", {"format": 1}) as recorder:
+        block = Session.open(file.parent).block
+        for first in range(0, len(block), 100):
+            recorder.append(block[first : first + 100])
+            recorder.flush()
+    file, good = tmp_path / "parts" / "samples.arrows", bytearray()
+    good[:] = file.read_bytes()
+    for place in (len(good) // 7, len(good) // 2, len(good) - 3000):
+        bad = good.copy()
+        bad[place : place + 8] = b"\x55" * 8
+        file.write_bytes(bad)
+        parts = concat(Session.open(file.parent).blocks())
+        whole = Session.open(file.parent).block
+        assert 0 < len(whole) < len(block)
+        assert np.array_equal(parts.t, whole.t)
+        assert np.array_equal(parts.acc, whole.acc)
+
+
 def test_rows_out_of_order_are_named_when_read_in_parts(tmp_path: Path) -> None:
     (tmp_path / "session.toml").write_text("format = 1\n")
     rows = [f"{t},1,2,3" for t in (0.0, 0.1, 0.3, 0.2)]
@@ -181,3 +202,23 @@ def test_a_turn_between_windows_is_no_noise(tmp_path: Path) -> None:
     assert found.model.stretches == 2
     for channel in found.model.channels.values():
         assert channel.processes["N"].value == pytest.approx(N, rel=0.1)
+
+
+def test_a_plan_says_how_long_this_device_is_worth_averaging(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["noise", str(folder), "--json"]) == 0
+    noisy = json.loads(capsys.readouterr().out)["channels"]
+    assert main(["plan", "--set", "two", "--noise-of", str(folder)]) == 0
+    out = capsys.readouterr().out
+    assert "this device" in out and "best after" in out
+    assert main(["plan", "--set", "two", "--noise-of", str(folder), "--json"]) == 0
+    sigma = json.loads(capsys.readouterr().out)["sigma"]
+    worst = max(noisy[n]["averaging"]["sigma"][2] for n in ("gx", "gy", "gz"))
+    # two means of 60 s of the same gyroscope
+    assert sigma["gyr_bias.x"] == pytest.approx(worst / math.sqrt(2), rel=0.05)
+    assert main(["plan", "--noise-of", str(tmp_path)]) == 2
+    assert "run fieldcal noise" in capsys.readouterr().err
+    (tmp_path / "noise.json").write_text('{"format": 2}')
+    assert main(["plan", "--noise-of", str(tmp_path)]) == 2
+    assert "noise.json" in capsys.readouterr().err

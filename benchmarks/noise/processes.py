@@ -1,4 +1,4 @@
-"""Random processes and what can be known of them, written apart from the estimator."""
+"""Random processes and what can be known of them, apart from the estimator."""
 
 from __future__ import annotations
 

@@ -1,0 +1,316 @@
+"""Noise: sizes beside the Cramer-Rao bound, prediction of what comes, and cost.
+
+    python -m benchmarks noise [RECORDINGS]
+
+First rmse over the bound, exactly from dense covariances, and the scatter of errors in
+stated sigma. Then recordings, simulated and real, cut in halves: how often the band of
+68 of 100 from the first half holds the Allan deviation of the second at 10 to 1000 s,
+and the mean log score, beside allantools (the first half's deviations as they are),
+avar and allan-variance (their fits), all with the scatter of the second half's estimate
+for white noise. Last the processor time and memory of ten million samples.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks._real import REAL
+from benchmarks.noise.processes import bound, covariance, noise, recording
+from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.noise import estimate, reduced
+from fieldcal.noise.levels import Levels
+from fieldcal.noise.likelihood import Powers, fit
+from fieldcal.noise.measured import measured
+from fieldcal.noise.spectrum import Spectrum
+
+DT, SHORT, EACH = 0.1, 600, 300
+CASES: list[dict[str, float]] = [
+    {"N": 1.0}, {"N": 1.0, "K": 1.0}, {"N": 1.0, "K": 0.3}, {"N": 1.0, "B": 1.0},
+    {"N": 1.0, "Q": 0.3}, {"N": 1.0, "Q": 0.1, "K": 1.0},
+]  # fmt: skip
+KINDS: dict[str, dict[str, float]] = {
+    "white": {"N": 1.0}, "white, walk": {"N": 1.0, "K": 0.03},
+    "white, flicker": {"N": 1.0, "B": 0.3},
+    "white, Gauss-Markov": {"N": 1.0, "s": 0.3, "T": 30.0},
+    "white, walk, ramp": {"N": 1.0, "K": 0.02, "R": 2e-4},
+}  # fmt: skip
+PEERS = {"quantization": "Q", "white": "N", "flicker": "B", "walk": "K"}
+FIRST, LAST = 10.0, 1000.0
+TEN_MILLION = 10_000_000
+
+
+def spectra(values: Array) -> Spectrum:
+    """All columns reduced."""
+    levels = Levels(DT, values.shape[1], values.shape[1])
+    levels.add(values)
+    return Spectrum([levels.reduced()], values.shape[1])
+
+
+def ours(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
+    """Sizes of each column (c, p) and stated relative errors."""
+    spectrum, start = spectra(values), 2 * np.log(list(sizes.values()))
+    found, sigma = [], []
+    for c in range(values.shape[1]):
+        power, count = spectrum.of(
+            c, spectrum.last.values[:, c], np.ones(len(spectrum.last.bin))
+        )
+        powers = Powers(power, count, np.zeros(len(power), dtype=bool))
+        one = fit(spectrum, powers, tuple(sizes), start)
+        names = tuple(sizes)
+        while one is None:  # the last is not there at all
+            names = names[:-1]
+            one = fit(spectrum, powers, names, start[: len(names)])
+        gone = len(sizes) - len(names)
+        found.append(np.append(np.exp(one.x / 2), np.zeros(gone)))
+        stated = np.sqrt(np.diag(one.covariance)) / 2
+        sigma.append(np.append(stated, np.full(gone, np.nan)))
+    return np.array(found), np.array(sigma)
+
+
+def allan_variance(values: Array, sizes: dict[str, float]) -> Array:
+    """Sizes by allan-variance, the processes being known, (c, p)."""
+    peer = import_module("allan_variance")
+    effects = [e for e, p in PEERS.items() if p in sizes]
+    tau, avar = peer.compute_avar(values, DT)
+    found, _ = peer.estimate_parameters(tau, avar, effects)
+    return np.array(found)[:, [effects.index(_word(p)) for p in sizes]]
+
+
+def _word(process: str) -> str:
+    return next(word for word, p in PEERS.items() if p == process)
+
+
+def beside_the_bound() -> None:
+    """Print rmse over the bound of each size."""
+    rng = np.random.default_rng(1)
+    peer = find_spec("allan_variance") is not None
+    print(f"rmse over the Cramer-Rao bound, {SHORT} samples, {EACH} recordings each")
+    print(f"{'truth':26} {'size':4} {'bound':>8} {'ours':>6} {'pull':>6} "
+          f"{'allan-variance':>15}")  # fmt: skip
+    for sizes in CASES:
+        whole = sum(s**2 * covariance(SHORT, DT, p) for p, s in sizes.items())
+        values = np.linalg.cholesky(whole) @ rng.standard_normal((SHORT, EACH))
+        found, sigma = ours(values, sizes)
+        theirs = allan_variance(values, sizes) if peer else np.full(found.shape, np.nan)
+        truth, best = np.array(list(sizes.values())), bound(SHORT, DT, sizes)
+        name = " ".join(f"{p}={s:g}" for p, s in sizes.items())
+        for i, process in enumerate(sizes):
+            there = found[:, i] > 0
+            pull = np.log(found[there, i] / truth[i]) / sigma[there, i]
+            rmse = [np.sqrt(np.mean((f[:, i] / truth[i] - 1) ** 2)) / best[i]
+                    for f in (found, theirs)]  # fmt: skip
+            print(f"{name:26} {process:4} {best[i]:8.4f} {rmse[0]:6.3f} "
+                  f"{np.std(pull):6.3f} {rmse[1]:15.3f}")  # fmt: skip
+
+
+def scored(variance: Array, freedom: Array, deviation: Array) -> tuple[Array, Array]:
+    """Log density of log deviations, and whether 68 of 100 hold them."""
+    from scipy.stats import chi2
+
+    ratio = freedom * deviation**2 / variance
+    density: Array = chi2.logpdf(ratio, freedom) + np.log(2 * ratio)
+    held = (chi2.ppf(0.16, freedom) < ratio) & (ratio < chi2.ppf(0.84, freedom))
+    return density, held
+
+
+def white_freedom(tau: Array, length: float, dt: float) -> Array:
+    """Degrees of freedom of an overlapping estimate of white noise, allantools'."""
+    tools = import_module("allantools")
+    return np.array(
+        [
+            tools.edf_greenhall(0, 2, round(t / dt), round(length / dt), True)
+            for t in tau.tolist()
+        ]
+    )
+
+
+def of_allantools(x: Array, dt: float, tau: Array) -> Array:
+    """Allan variances of the first half as they are; the last where it has none."""
+    tools = import_module("allantools")
+    there = tau[tau <= len(x) * dt / 4]
+    found = tools.oadev(x - x.mean(), 1 / dt, "freq", there)[1] ** 2
+    return np.append(found, np.full(len(tau) - len(found), found[-1]))
+
+
+def of_allan_variance(x: Array, dt: float, tau: Array) -> Array:
+    """Allan variance of all its five processes fitted."""
+    peer = import_module("allan_variance")
+    at, avar = peer.compute_avar(x, dt)
+    q, n, b, k, r = np.array(peer.estimate_parameters(at, avar)[0])
+    flicker = 2 * np.log(2) / np.pi * b**2
+    slow = flicker + k**2 * tau / 3 + r**2 * tau**2 / 2
+    whole: Array = 3 * q**2 / tau**2 + n**2 / tau + slow
+    return whole
+
+
+def of_avar(x: Array, dt: float, tau: Array) -> Array:
+    """Allan variance of its processes, their sizes by least squares of logarithms."""
+    from scipy.optimize import least_squares
+
+    peer = import_module("avar")
+    m = peer.windows(len(x))
+    m = m[m <= len(x) // 10]
+    with contextlib.redirect_stdout(io.StringIO()):
+        seen = peer.variance(x, m)
+    time = len(x) * dt / 30
+
+    def model(at: Array, logs: Array) -> Any:
+        q, n, g, k, r = np.exp(logs)
+        ks = [(-2, q), (-1, n), (0, g, time), (1, k), (2, r)]
+        return peer.ideal_variance(at, ks, dt)
+
+    last = float(seen[-1])
+    start = np.log([1e-3 * dt**2 * seen[0], seen[0] * dt, last,
+                    last / time, last / time**2])  # fmt: skip
+    best = least_squares(lambda v: np.log(model(m * dt, v) / seen), start)
+    return np.asarray(model(tau, best.x))
+
+
+THEIRS: dict[str, tuple[str, Callable[[Array, float, Array], Array]]] = {
+    "allantools": ("allantools", of_allantools),
+    "avar": ("avar", of_avar),
+    "allan-variance": ("allan_variance", of_allan_variance),
+}
+
+
+def halves(block: Block) -> dict[str, tuple[list[float], list[bool]]]:
+    """Log scores and whether bands hold, of each estimator."""
+    out: dict[str, tuple[list[float], list[bool]]] = {}
+    middle = len(block) // 2
+    model = estimate([reduced([block[:middle]])])
+    second = reduced([block[middle:]])
+    length = max(s.samples * s.dt for s in second.stretches)
+    dt = 1 / model.rate_hz
+    for name, channel in model.channels.items():
+        place = CHANNELS.index(name)
+        seen = measured(second.stretches, place)
+        asked = (seen.tau >= FIRST) & (seen.tau <= min(LAST, length / 4))
+        tau, deviation = seen.tau[asked], seen.deviation[asked]
+        said = channel.predicted(tau, length)
+        _add(out, "ours", said.log_score(deviation),
+             (said.low < deviation) & (deviation < said.high))  # fmt: skip
+        freedom = white_freedom(tau, length, dt)
+        x = block.six[:middle, place]
+        for peer, (module, of) in THEIRS.items():
+            if find_spec(module):
+                variance = of(x[np.isfinite(x)], dt, tau)
+                _add(out, peer, *scored(variance, freedom, deviation))
+    return out
+
+
+def _add(out: dict[str, Any], name: str, scores: Any, held: Any) -> None:
+    both = out.setdefault(name, ([], []))
+    both[0].extend(scores.tolist())
+    both[1].extend(held.tolist())
+
+
+def simulated(kind: str, number: int) -> Iterator[Block]:
+    """Recordings of an hour and of six, 10 Hz."""
+    rng = np.random.default_rng(sorted(KINDS).index(kind))
+    for i in range(number):
+        n = 36_000 if i % 2 else 216_000
+        yield recording(noise(rng, n, DT, 6, **KINDS[kind]), DT)
+
+
+def real() -> Iterator[Block]:
+    """Real recordings at rest that lie beside the project."""
+    import gzip
+
+    from fieldcal.core.gravity import G0
+
+    counts = REAL / "tomisuarez_mpu6050/example_data_tinit_calc.csv.gz"
+    if counts.is_file():
+        with gzip.open(counts, "rt") as text:
+            rows = np.genfromtxt(text, delimiter=",", skip_header=4)[:, :6]
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        rows *= np.repeat([G0 / 16384, np.pi / 180 / 131], 3)
+        yield recording(rows, 0.01)
+    stem = "sunsided_mpu6050_temp/set-2__unmoved-with-x-pointing-forward-10min__"
+    files = [REAL / f"{stem}{k}.mat" for k in ("accelerometer", "gyroscope")]
+    if all(f.is_file() for f in files) and find_spec("h5py"):
+        h5py = import_module("h5py")
+        parts = []
+        for file in files:
+            with h5py.File(file) as content:
+                parts.append(np.array(content[next(iter(content))]).T)
+        rows = np.hstack([parts[0][:, 1:4] * G0, np.deg2rad(parts[1][:, 1:4])])
+        yield recording(rows, float(parts[0][-1, 0] - parts[0][0, 0]) / (len(rows) - 1))
+
+
+def prediction(number: int) -> None:
+    """Print how often bands hold, and mean log scores."""
+    names = ["ours", *THEIRS]
+    print(f"\nsecond half from the first, {FIRST:g} to {LAST:g} s: held by 68 of 100,"
+          " and mean log score")  # fmt: skip
+    print(f"{'':22}" + "".join(f"{n:>18}" for n in names))
+    whole: dict[str, tuple[list[float], list[bool]]] = {}
+    sources: dict[str, Callable[[], Iterator[Block]]] = {
+        kind: lambda kind=kind: simulated(kind, number)  # type: ignore[misc]
+        for kind in KINDS
+    }
+    for kind, blocks in {**sources, "real, at rest": real}.items():
+        out: dict[str, tuple[list[float], list[bool]]] = {}
+        for block in blocks():
+            for name, (scores, held) in halves(block).items():
+                _add(out, name, np.array(scores), np.array(held))
+                if kind in KINDS:
+                    _add(whole, name, np.array(scores), np.array(held))
+        _row(kind, out, names)
+    _row("all simulated", whole, names)
+
+
+def _row(
+    kind: str, out: dict[str, tuple[list[float], list[bool]]], names: list[str]
+) -> None:
+    cells = [
+        f"{100 * np.mean(out[n][1]):8.0f} % {np.mean(out[n][0]):+7.2f}"
+        if n in out
+        else f"{'not there':>18}"
+        for n in names
+    ]
+    print(f"{kind:22}" + "".join(f"{c:>18}" for c in cells), flush=True)
+
+
+def cost() -> None:
+    """Print processor time and memory of ten million samples."""
+    from fieldcal.session.recorder import Recorder
+
+    part, rng = 1 << 17, np.random.default_rng(2)
+    with tempfile.TemporaryDirectory() as folder:
+        with Recorder(Path(folder) / "long", {"format": 1}) as recorder:
+            for first in range(0, TEN_MILLION, part):
+                n = min(part, TEN_MILLION - first)
+                block = recording(1e-3 * rng.standard_normal((n, 6)), 0.01)
+                block.t[:] += first * 0.01
+                recorder.append(block)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        words = [sys.executable, "-m", "fieldcal", "noise", str(Path(folder) / "long")]
+        subprocess.run(words, capture_output=True, check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime - before.ru_utime
+    most = after.ru_maxrss / 1e3
+    print(
+        f"\n{TEN_MILLION:.0e} samples: {spent:.1f} s of processor time, {most:.0f} MB"
+    )
+
+
+def main() -> None:
+    """Print all tables."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
+    beside_the_bound()
+    prediction(numbers[0] if numbers else 4)
+    cost()

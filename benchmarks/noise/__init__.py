@@ -22,6 +22,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -32,14 +33,14 @@ from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.noise import estimate, reduced
 from fieldcal.noise.levels import Levels
-from fieldcal.noise.likelihood import Powers, fit
+from fieldcal.noise.likelihood import Fit, Powers, fit
 from fieldcal.noise.measured import measured
 from fieldcal.noise.spectrum import Spectrum
 
-DT, SHORT, EACH = 0.1, 600, 300
+DT, SHORT, EACH = 0.1, 600, 1000
 CASES: list[dict[str, float]] = [
     {"N": 1.0}, {"N": 1.0, "K": 1.0}, {"N": 1.0, "K": 0.3}, {"N": 1.0, "B": 1.0},
-    {"N": 1.0, "Q": 0.3}, {"N": 1.0, "Q": 0.1, "K": 1.0},
+    {"N": 1.0, "Q": 0.3}, {"N": 1.0, "Q": 0.3, "K": 1.0},
 ]  # fmt: skip
 KINDS: dict[str, dict[str, float]] = {
     "white": {"N": 1.0}, "white, walk": {"N": 1.0, "K": 0.03},
@@ -61,23 +62,33 @@ def spectra(values: Array) -> Spectrum:
 
 def ours(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
     """Sizes of each column (c, p) and stated relative errors."""
-    spectrum, start = spectra(values), 2 * np.log(list(sizes.values()))
+    spectrum = spectra(values)
     found, sigma = [], []
     for c in range(values.shape[1]):
         power, count = spectrum.of(
             c, spectrum.last.values[:, c], np.ones(len(spectrum.last.bin))
         )
         powers = Powers(power, count, np.zeros(len(power), dtype=bool))
-        one = fit(spectrum, powers, tuple(sizes), start)
-        names = tuple(sizes)
-        while one is None:  # the last is not there at all
-            names = names[:-1]
-            one = fit(spectrum, powers, names, start[: len(names)])
-        gone = len(sizes) - len(names)
-        found.append(np.append(np.exp(one.x / 2), np.zeros(gone)))
-        stated = np.sqrt(np.diag(one.covariance)) / 2
-        sigma.append(np.append(stated, np.full(gone, np.nan)))
+        one = _most_likely(spectrum, powers, sizes)
+        value, stated = np.zeros(len(sizes)), np.full(len(sizes), np.nan)
+        places = [list(sizes).index(term) for term in one.terms]
+        value[places] = np.exp(one.x / 2)
+        stated[places] = np.sqrt(np.diag(one.covariance)) / 2
+        found.append(value)
+        sigma.append(stated)
     return np.array(found), np.array(sigma)
+
+
+def _most_likely(spectrum: Spectrum, powers: Powers, sizes: dict[str, float]) -> Fit:
+    """Fit the processes, less those that are not there at all."""
+    for gone in range(len(sizes)):
+        fits = [
+            fit(spectrum, powers, names, 2 * np.log([sizes[n] for n in names]))
+            for names in combinations(sizes, len(sizes) - gone)
+        ]
+        if some := [f for f in fits if f]:
+            return max(some, key=lambda f: f.log_likelihood)
+    raise AssertionError("one process is always there")
 
 
 def allan_variance(values: Array, sizes: dict[str, float]) -> Array:

@@ -95,7 +95,9 @@ class ChannelNoise:
 
     def predicted(self, tau: Array, length: float) -> Prediction:
         """Allan deviation (t,) that a recording of a length, s, will have."""
-        return predict(list(self.drawn), tau, length, self.dt, self.ramp)
+        found = self.processes.get("R")
+        ramp = (found.value, found.sigma) if found else (0.0, 0.0)
+        return predict(list(self.drawn), tau, length, self.dt, ramp)
 
 
 @dataclass(frozen=True, slots=True)

@@ -110,7 +110,11 @@ def _of_fit(
 
 
 def predict(
-    drawn: list[Draw], tau: Array, length: float, dt: float, ramp: float = 0.0
+    drawn: list[Draw],
+    tau: Array,
+    length: float,
+    dt: float,
+    ramp: tuple[float, float] = (0.0, 0.0),
 ) -> Prediction:
     """Predict the overlapping Allan deviation of a recording.
 
@@ -120,11 +124,13 @@ def predict(
     tau : (t,) averaging times, s
     length : of the recording, s
     dt : s between samples
-    ramp : of the channel, units per s
+    ramp : of the channel and its standard deviation, units per s
 
     """
     variance = np.array([allan_variance(d.terms, d.x, tau, dt) for d in drawn]).T
-    variance += ramp**2 * tau[:, None] ** 2 / 2
+    rng = np.random.default_rng(0)
+    slope = ramp[0] + ramp[1] * rng.standard_normal(len(drawn))
+    variance += slope**2 * tau[:, None] ** 2 / 2
     # how an estimate scatters depends on the sizes little: some of them tell it
     some = drawn[:: max(1, len(drawn) // SHAPES)]
     shapes = [
@@ -135,7 +141,6 @@ def predict(
         for t in tau.tolist()
     ]
     nu = np.repeat(np.mean(shapes, axis=1)[:, None], len(drawn), axis=1)
-    rng = np.random.default_rng(0)
     scatter = variance[:, :, None] * rng.chisquare(nu[:, :, None], (*nu.shape, 16))
     measured = np.sqrt(scatter / nu[:, :, None]).reshape(len(tau), -1)
     low, median, high = np.quantile(measured, [0.16, 0.5, 0.84], axis=1)

@@ -1,0 +1,118 @@
+"""What may stand in the place of a cause, on rows of which it is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_sessions import Session, ladder
+
+from fieldcal.model import thresholds
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior import probabilities
+from fieldcal.model.posterior.probabilities import Posterior, Standing
+from fieldcal.model.search.selection import Search
+
+KEYS = ("bias_drift:acc", "bias_drift:gyr", "temperature_bias:acc",
+        "temperature_bias:gyr", "cross_coupling", "settling:acc")  # fmt: skip
+SESSION = Session.of(ladder(), KEYS)
+CAUSES = {c.key: c for c in SESSION.dictionary.causes}
+
+
+def drifting(size: float = 0.3, gyr: float = 0.3) -> tuple[Search, Set]:
+    """Both triads drift, which a temperature that rises evenly does as well."""
+    rng = np.random.default_rng(3)
+    off = SESSION.noise(rng)
+    for key, by in (("bias_drift:acc", size), ("bias_drift:gyr", gyr)):
+        group = CAUSES[key].variants[0]
+        off += by * SESSION.design[:, :, group.columns] @ group.typical
+    search = SESSION.search(off)
+    return search, search.run()
+
+
+def test_an_evidence_is_a_score_without_the_chances() -> None:
+    search, best = drifting()
+    posterior = Posterior(search, best)
+    empty = search.evaluated(())
+    assert posterior.evidence(empty) == pytest.approx(empty.score)
+    settling = CAUSES["settling:acc"]
+    one = search.evaluated(((settling, settling.variants[0]),))
+    assert posterior.evidence(one) == pytest.approx(one.score - np.log(settling.chance))
+
+
+def test_what_stands_in_a_cause_s_place_stands_on_both_triads() -> None:
+    search, best = drifting()
+    assert len(best.members) == 2
+    posterior = Posterior(search, best)
+    (name,) = posterior.names(best)
+    other = {"bias_drift": "temperature_bias", "temperature_bias": "bias_drift"}[name]
+    assert set(posterior.instead[name]) == {other}
+    alias = posterior.instead[name][other]
+    assert alias.keys == {f"{other}:acc", f"{other}:gyr"}
+    near = posterior.evidence(best) - posterior.evidence(alias)
+    assert abs(near) < thresholds.SAME
+    assert posterior.without(name).members == ()
+    (found,) = posterior.standing()
+    assert (found.name, found.aliases) == (name, (other,))
+    assert found.triads == {"acc", "gyr"} and found.kind == "effect"
+    assert found.members == best.members
+    assert found.probability == pytest.approx(posterior.probability([name, other]))
+    assert posterior.probability([name]) < found.probability
+    assert posterior._kind("settling") == "effect"
+
+
+def test_the_weights_are_of_the_sets_and_of_what_was_refined() -> None:
+    search, best = drifting()
+    posterior = Posterior(search, best)
+    sets = [s for s, _ in posterior.weights]
+    assert len(sets) == len(search.visited)
+    score = np.array([s.score for s in sets])
+    share = np.exp(score - score.max())
+    weights = np.array([w for _, w in posterior.weights])
+    np.testing.assert_allclose(weights, share / share.sum(), rtol=1e-6, atol=1e-300)
+
+
+def test_what_fades_is_looked_at_between_the_points_of_its_grid() -> None:
+    """Only where it is no alias on them, and only what was not refined already."""
+    search, best = drifting()
+    settling = CAUSES["settling:acc"]
+    group = settling.variants[5]
+    assert probabilities._fades(group)
+    assert not probabilities._fades(CAUSES["cross_coupling"].variants[0])
+    asked: list[Set] = []
+
+    def refined(there: Set) -> Set:
+        asked.append(there)
+        return replace(there, score=there.score + 50.0)
+
+    posterior = Posterior(search, best, refined)
+    asked.clear()
+    there = search.evaluated((*best.members, (settling, group)))
+    bare = posterior.evidence(there)
+    assert posterior._at_best(there, bare + 4.0) == pytest.approx(bare)
+    assert asked == []
+    assert posterior._at_best(there, bare + 10.0) == pytest.approx(bare + 50.0)
+    assert asked == [there]
+    assert posterior._at_best(best, 1e9) == pytest.approx(posterior.evidence(best))
+    assert asked == [there], "nothing in it fades"
+    plain = Posterior(search, best)
+    assert plain._at_best(there, bare + 10.0) == pytest.approx(bare)
+
+
+def test_what_is_hardly_there_is_not_said() -> None:
+    search, best = drifting(0.0, 0.0)
+    assert best.members == ()
+    assert Posterior(search, best).standing() == []
+    there = search.evaluated(((CAUSES["cross_coupling"],
+                               CAUSES["cross_coupling"].variants[0]),))  # fmt: skip
+    assert Posterior(search, there).standing() == [], "another set is likelier"
+
+
+def test_an_effect_of_everything_is_on_both_triads() -> None:
+    cause = CAUSES["cross_coupling"]
+    one = Standing("a", ((cause, cause.variants[0]),), 1.0, ())
+    assert one.triads == {"acc", "gyr"}
+    acc = CAUSES["bias_drift:acc"]
+    assert Standing("a", ((acc, acc.variants[0]),), 1.0, ()).triads == {"acc"}
+    assert replace(one, members=((acc, acc.variants[0]),)).kind == "effect"

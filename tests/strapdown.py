@@ -58,8 +58,11 @@ def _angles(t: Any, knots: list[float], columns: Any) -> Any:
     return np.deg2rad([np.interp(t, knots, column) for column in columns]).T
 
 
-def motion(start: float = 3.0) -> tuple[Any, Any, Any]:
-    """Times (n,), specific force (n, 3), and angular rate (n, 3) in device axes."""
+def attitude(off: float = 0.0, start: float = 3.0) -> tuple[Any, Any]:
+    """Times (n,), and rows of the device's axes in the base a little later, (n, 3, 3).
+
+    `off` is by how much, s.
+    """
     tables = schedule(start)
     t = np.arange(0.0, tables[-1]["end_s"] + 3.0, 1 / RATE_HZ)
     knots, values = [], []
@@ -67,11 +70,15 @@ def motion(start: float = 3.0) -> tuple[Any, Any, Any]:
         knots += [one["start_s"] - 0.5, one["end_s"] + 0.5]
         values += [[one["alpha_deg"], one["beta_deg"]]] * 2
     columns = np.array(values, float).T
-    axes, before, after = (
-        np.array([_axes(*pair) for pair in _angles(t + off, knots, columns)])
-        for off in (0.0, -0.5 / RATE_HZ, 0.5 / RATE_HZ)
-    )
-    force = axes @ np.array([0.0, -GRAVITY, 0.0])
+    return t, np.array([_axes(*pair) for pair in _angles(t + off, knots, columns)])
+
+
+def motion(start: float = 3.0, gravity: float = GRAVITY) -> tuple[Any, Any, Any]:
+    """Times (n,), specific force (n, 3), and angular rate (n, 3) in device axes."""
+    half = 0.5 / RATE_HZ
+    t, axes = attitude(0.0, start)
+    before, after = (attitude(off, start)[1] for off in (-half, half))
+    force = axes @ np.array([0.0, -gravity, 0.0])
     # C(t + dt) C(t)^T = 1 - [w dt x] for the rate w in device axes
     step = after @ np.swapaxes(before, 1, 2)
     pairs = ((1, 2), (2, 0), (0, 1))
@@ -80,9 +87,11 @@ def motion(start: float = 3.0) -> tuple[Any, Any, Any]:
     return t, force, rate
 
 
-def outputs(device: Mapping[str, Any], start: float = 3.0) -> Any:
+def outputs(
+    device: Mapping[str, Any], start: float = 3.0, gravity: float = GRAVITY
+) -> Any:
     """Times and the six outputs, (n, 7)."""
-    t, force, rate = motion(start)
+    t, force, rate = motion(start, gravity)
     rng = np.random.default_rng(int(device.get("seed", 1)))
     columns = [t[:, None]]
     for triad, true in (("acc", force), ("gyr", rate)):

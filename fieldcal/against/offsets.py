@@ -1,4 +1,9 @@
-"""Differences in what every device has: bias, scale factor, the Earth's rate."""
+"""Differences in what every device has: bias and scale factor.
+
+Biases wander, and not only from window to window: flicker has as much power in every
+octave, so what they wander by within a session they do again from one to the next. Of a
+bias, that scatter is in the covariance of a difference.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,7 @@ from fieldcal.against.widened import Widened
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.findings.calibrated import GROUPS
 from fieldcal.diagnosis.result import Mismatch, Quantity
-from fieldcal.model import thresholds
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 
 DETERMINED = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
@@ -58,7 +63,16 @@ def calibration(there: Widened, name: str, axes: Index) -> tuple[Array, Array, A
         raise KeyError(name)
     values, covariance = there.estimate(first + axes)
     typical = group.typical[np.isin(group.columns, first + axes)]
+    if name.endswith("bias"):
+        covariance = covariance + np.diag(wander(there, axes) ** 2)
     return base[axes] + values, covariance, typical
+
+
+def wander(there: Widened, axes: Index) -> Array:
+    """What biases wander by from window to window, (k,) of some channels."""
+    size = np.array(there.set.sizes.instability)[axes]
+    out: Array = priors.SIZES[size] * there.search.unstable[axes]
+    return out
 
 
 def _group(there: Widened, name: str) -> Group | None:

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.against.causes import Decided
-from fieldcal.against.offsets import shared_axes
+from fieldcal.against.offsets import shared_axes, wander
 from fieldcal.against.result import Prediction
 from fieldcal.against.side import Side
 from fieldcal.against.widened import Widened
@@ -64,11 +64,13 @@ def _mean(values: Array) -> float:
 def _as_the_simulator(found: Decided) -> tuple[Index, Array, Array]:
     """Columns of the recording's dictionary, with what the simulator has there."""
     real, sim = found.pairing.asked[0], found.sim
-    columns, base, theirs = [], [], []
+    columns, base, theirs, wide = [], [], [], list[float]()
     for name, axes in shared_axes(real, sim):
         first = "bias" if name.endswith("bias") else "scale"
         here, there = (getattr(w.inference.dictionary, first) for w in (real, sim))
         nominal = [getattr(w.inference.nominal, first) for w in (real, sim)]
+        spread = wander(sim, axes) if first == "bias" else np.zeros(len(axes))
+        wide += spread.tolist()
         columns += (here + axes).tolist()
         theirs += (there + axes).tolist()
         base += (nominal[1][axes] - nominal[0][axes]).tolist()
@@ -87,6 +89,8 @@ def _as_the_simulator(found: Decided) -> tuple[Index, Array, Array]:
                 theirs.append(at)
                 base.append(0.0)
     values, covariance = sim.estimate(np.array(theirs, dtype=np.intp))
+    wide += [0.0] * (len(columns) - len(wide))
+    covariance = covariance + np.diag(np.square(wide))
     return np.array(columns, dtype=np.intp), values + np.array(base), covariance
 
 

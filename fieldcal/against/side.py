@@ -1,9 +1,10 @@
 """One of two recordings that are held against each other: samples, and what is in them.
 
-What a session says under [model] is of another simulation than the one it is compared
-with, so it counts for nothing here. Outputs without noise, as simulators have them, are
-given white noise of a part of the other recording's: repeated values are no proof of a
-fault there, and nothing is known better than the other recording can tell.
+Gravity is shared: what nobody knows of it is in the scale factors of both alike. What a
+session says under [model] is of another simulation than the one it is compared with, so
+it counts for nothing here. Outputs without noise, as simulators have them, are given
+white noise of a part of the other recording's: repeated values are no proof of a fault
+there, and nothing is known better than the other recording can tell.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ def side(
     noise, unsure = noise_of(block, about)
     if beside is not None:
         heard, quieted = _audible(block, noise, beside.noise)
-    prepared = prepare(heard, about)
+    prepared = _of_one_site(prepare(heard, about))
     if beside is not None:
         prepared = _from_one_temperature(prepared, beside.explanation.prepared)
     explanation = explain(prepared)
@@ -88,6 +89,12 @@ def side(
     return Side(
         name, block, explanation, found, noise, unsure, steps, rate_of(block), quieted
     )
+
+
+def _of_one_site(prepared: Prepared) -> Prepared:
+    """A recording where gravity is what it is said to be: both are measured by it."""
+    rows = prepared.rows
+    return replace(prepared, rows=replace(rows, x=replace(rows.x, gravity_sigma=0.0)))
 
 
 def _from_one_temperature(prepared: Prepared, other: Prepared) -> Prepared:

@@ -12,12 +12,15 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import inference_of
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.columns import RowView
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.priors import SIZES
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import Term
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
+from fieldcal.model.system.way_rows import WayRows
 from fieldcal.session.description import parse
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
@@ -206,6 +209,39 @@ def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
         sigma = noise / 2.0 * np.sqrt((TURN_S + 2.0) / 100.0)
         np.testing.assert_allclose(1 / np.sqrt(turn.info), sigma, rtol=0.3)
         assert not len(turn.way), "what windows say is not known yet"
+
+
+def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
+    """(1) of `way_rows`, against walks that are drawn and carried along the turn."""
+    one = ride("gyro_scale")
+    inference, state = one.inference, one.inference.nominal
+    assert inference.turns is not None
+    turning = inference.turns.turning
+    turn = next(iter(turning.turns(state)))
+    since = turning.after(turn.x.t, turn.positions[1])
+    view, noise = RowView(turn.x, turn.x, since, state), np.repeat([0.0, 1e-2], 3)
+    found = WayRows(turn, view, inference.dictionary, one.known, noise)._covariance()
+    rng, gaps = np.random.default_rng(1), np.diff(turn.x.t)
+    density = noise[3] * np.sqrt(turn.interval)
+    steps = density * rng.standard_normal((1500, len(gaps), 3)) * gaps[:, None] ** 0.5
+    phi = np.concatenate([np.zeros((1500, 1, 3)), np.cumsum(steps, axis=1)], axis=1)
+    phi -= turn.done[:, None] * phi[:, -1:]
+    rows = turn.means(turn.swung(np.moveaxis(phi, 0, 2)))
+    spread = np.cov(rows.reshape(-1, 1500))
+    sizes = SIZES[list(one.known.sizes.instability)][:3]
+    loose = sizes * inference.dictionary.unstable[:3]
+    cov = found - np.diag((turn.sd**2).ravel())
+    own = np.diag(cov).reshape(-1, 3) - 2 * loose**2
+    drawn = np.diag(spread).reshape(-1, 3)
+    some = drawn > 0.3 * drawn.max()  # at the ends a piece is no instant
+    np.testing.assert_allclose(own[some], drawn[some], rtol=0.15)
+    size = np.sqrt(np.diag(spread)) + 1e-12
+    middle = (turn.x.t[turn.cut[1:]] + turn.x.t[turn.cut[:-1]]) / 2
+    course = 1 + np.exp(-(np.subtract.outer(middle, middle) ** 2) / 8.0)
+    rest = cov - np.kron(course, np.diag(loose**2)) - spread
+    there = np.flatnonzero(some.ravel())
+    off = (rest / np.outer(size, size))[np.ix_(there, there)]
+    assert np.abs(off).max() < 0.15
 
 
 def test_a_copied_column_is_as_the_one_it_is_near() -> None:

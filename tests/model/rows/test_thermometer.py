@@ -64,3 +64,46 @@ def test_noise_alone_is_smoothed_and_no_change() -> None:
     off, found = value_error(noise, np.zeros(len(T)))
     assert off < 0.01
     assert not found.changes
+
+
+def test_means_over_a_second_and_longer_ones_of_a_long_recording() -> None:
+    """Instants and values are means of the samples that fall into each."""
+    rate = 5.0
+    t = 10.0 + np.arange(round(100 * rate)) / rate
+    values = 20.0 + 0.01 * (t - 10.0)
+    found = Thermometer.of(Block.of(t, np.zeros((len(t), 3)), None, values))
+    assert len(found.t) == 100
+    np.testing.assert_allclose(found.t, 10.4 + np.arange(100))
+    np.testing.assert_allclose(found.warming, 0.01 * (found.t - 10.0), atol=1e-9)
+    np.testing.assert_allclose(found.heating, 0.01, rtol=1e-6)
+    assert found.start_c == pytest.approx(20.0)
+    warming, heating = found.at(np.array([0.0, 30.0, 1e4]))
+    np.testing.assert_allclose(warming, [0.004, 0.2, 0.994], atol=1e-9)
+    np.testing.assert_allclose(heating, 0.01, rtol=1e-6)
+    t = np.arange(0.0, 7200.0, 0.5)
+    many = Thermometer.of(Block.of(t, np.zeros((len(t), 3)), None, 0.001 * t))
+    assert 3600 <= len(many.t) <= 3601
+
+
+def test_a_pause_makes_no_longer_steps() -> None:
+    t = np.concatenate([np.arange(0.0, 300.0, 0.5), 1e5 + np.arange(0.0, 300.0, 0.5)])
+    found = Thermometer.of(Block.of(t, np.zeros((len(t), 3)), None, 1e-4 * (t % 1e5)))
+    assert len(found.t) == 600
+
+
+def test_few_values_are_no_thermometer() -> None:
+    t, still = np.arange(20.0), np.zeros((20, 3))
+    for known in (7, 8):
+        values = np.where(np.arange(20) < known, 20.0, np.nan)
+        found = Thermometer.of(Block.of(t, still, still, values))
+        assert np.isfinite(found.start_c) == (known == 8)
+        assert not found.changes
+        assert np.isnan(found.at(t)[0]).all() == (known == 7)
+
+
+@pytest.mark.parametrize(("change", "shows"), [(0.08, False), (0.13, True)])
+def test_from_a_tenth_of_a_kelvin_a_change_is_one(change: float, shows: bool) -> None:
+    t = np.arange(0.0, 300.0, 0.5)
+    values = 20.0 + change * t / 300.0
+    found = Thermometer.of(Block.of(t, np.zeros((len(t), 3)), None, values))
+    assert found.changes == shows

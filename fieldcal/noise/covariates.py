@@ -91,7 +91,7 @@ def _fitted(spectrum: Spectrum, channel: int, used: dict[str, Array]) -> _Regres
         covariance = np.linalg.pinv(z.T @ white)
         beta = covariance @ (white.T @ values)  # (2)
         rest = values - z @ beta
-        h = np.einsum("ki,ij,kj->k", white, covariance, z)  # (3)
+        h = np.sum((white @ covariance) * z, axis=1)  # (3)
     powers = _powers(spectrum, channel, rest, one)
     total = likelihood(level, powers.power.sum(axis=1), powers.count.sum(axis=1))
     sigma = np.sqrt(np.diag(covariance))

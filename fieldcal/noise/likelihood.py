@@ -104,10 +104,8 @@ def levels_of(
             of = spectrum.markov if term == "G" else spectrum.flicker
             column, slope = of(float(x[j]))
             columns[:, j] = size * slope
-        elif term == "B":
-            column = spectrum.flicker()[0]
         else:
-            column = spectrum.fixed[term]
+            column = spectrum.column(term)
         columns[:, i] = size * column
     level = columns[:, : len(terms)].sum(axis=1)
     return level, columns / level[:, None]
@@ -162,7 +160,7 @@ def _bounds(spectrum: Spectrum, terms: tuple[str, ...]) -> tuple[Array, Array]:
 
 def _step(information: Array, gradient: Array, damping: float) -> Array:
     damped = information + damping * np.diag(np.diag(information) + 1e-12)
-    step = np.linalg.lstsq(damped, gradient, rcond=None)[0]
+    step = np.linalg.solve(damped, gradient)
     longest = float(np.max(np.abs(step)))
     out: Array = step * min(1.0, LONGEST_STEP / max(longest, 1e-300))
     return out

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import Fit, levels_of, likelihood
+from fieldcal.noise.likelihood import Fit, levels_of
 from fieldcal.noise.processes import (
     FAR,
     STEPS,
@@ -90,7 +90,7 @@ def _of_fit(
 ) -> list[Draw]:
     values, axes = np.linalg.eigh(one.covariance)
     spread = WIDER * axes * np.sqrt(np.maximum(values, 0.0))
-    standard = rng.standard_normal((3 * number, len(one.x)))
+    standard = rng.standard_normal((2 * number, len(one.x)))
     steps = np.clip(standard @ spread.T, -FURTHEST, FURTHEST)
     used = ~chosen.powers.free
     power = chosen.powers.power[used].sum(axis=1)
@@ -99,14 +99,21 @@ def _of_fit(
     bounds = np.array([[-np.inf, np.inf]] * len(one.terms)
                       + [[low, high]] * (len(one.x) - len(one.terms)))  # fmt: skip
     tried = np.clip(one.x + steps, *bounds.T)
-    weights = np.array(
-        [likelihood(levels_of(spectrum, one.terms, x)[0][used], power, count)
-         for x in tried]
-    )  # fmt: skip
+    levels = _levels(spectrum, one, tried)[:, used]
+    weights = -0.5 * (np.log(levels) @ count + (power / levels).sum(axis=1))
     weights += 0.5 * np.sum(standard**2, axis=1)
     chance = np.exp(weights - weights.max())
     picked = rng.choice(len(tried), number, p=chance / chance.sum())
     return [Draw(one.terms, tried[i]) for i in picked]
+
+
+def _levels(spectrum: Spectrum, one: Fit, tried: Array) -> Array:
+    """Expected powers (d, b) of sizes (d, p)."""
+    if one.timed:
+        return np.array([levels_of(spectrum, one.terms, x)[0] for x in tried])
+    columns = np.array([spectrum.column(term) for term in one.terms])
+    levels: Array = np.exp(tried) @ columns
+    return levels
 
 
 def predict(

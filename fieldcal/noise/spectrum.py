@@ -196,12 +196,18 @@ class Spectrum:
         """Column of a Gauss-Markov process of unit variance, and its derivative."""
         return self._markov(log_time), self._markov(log_time, 1)
 
-    def flicker(self, log_time: float | None = None) -> tuple[Array, Array]:
+    def flicker(self, log_time: float) -> tuple[Array, Array]:
         """Column of flicker with B = 1 up to a correlation time, and its derivative."""
-        ends = self._markov.x[[0, -1]]
-        to = ends[1] if log_time is None else log_time
-        column = self._summed(to) - self._summed(ends[0])
-        return column / np.pi, self._markov(to) / np.pi
+        column = self._summed(log_time) - self._summed(self._markov.x[0])
+        return column / np.pi, self._markov(log_time) / np.pi
+
+    @cached_property
+    def _endless(self) -> Array:
+        return self.flicker(float(self._markov.x[-1]))[0]
+
+    def column(self, process: str) -> Array:
+        """Column of a process without a correlation time."""
+        return self._endless if process == "B" else self.fixed[process]
 
     @property
     def log_times(self) -> tuple[float, float]:

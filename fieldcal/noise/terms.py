@@ -146,12 +146,11 @@ def _started(
     spectrum: Spectrum, powers: Powers, old: Fit, new: str, log_time: float | None
 ) -> Fit | None:
     """A fit that begins where the new process would explain what is left."""
-    if new == "G":
-        column = spectrum.markov(log_time or 0.0)[0]
-    elif new in ("B", "BT"):
-        column = spectrum.flicker(log_time)[0]
+    if log_time is None:
+        column = spectrum.column(new)
     else:
-        column = spectrum.fixed[new]
+        of = spectrum.markov if new == "G" else spectrum.flicker
+        column = of(log_time)[0]
     used = ~powers.free
     count = powers.count[used].sum(axis=1)
     share = column[used] / old.level[used]
@@ -224,8 +223,7 @@ def rich(spectrum: Spectrum, powers: Powers) -> Fit:
     """A fit of all processes without a correlation time that are there."""
     used = ~powers.free
     terms = list(RICH)
-    table = [spectrum.flicker()[0] if t == "B" else spectrum.fixed[t] for t in RICH]
-    columns = np.array(table)[:, used]
+    columns = np.array([spectrum.column(term) for term in RICH])[:, used]
     sizes = _multiplied(columns, powers.power[used].sum(axis=1),
                         powers.count[used].sum(axis=1))  # fmt: skip
     while len(terms) > 1:

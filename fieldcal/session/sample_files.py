@@ -31,7 +31,7 @@ COLUMNS = (
 ENDINGS = (".arrows", ".parquet", ".csv", ".csv.gz")
 
 PART = 1 << 17
-"""Rows that are read together."""
+"""Rows that are handed over together, at most."""
 
 _GUNZIP = 16 + zlib.MAX_WBITS
 
@@ -97,7 +97,9 @@ def blocks(path: Path) -> Iterator[Block]:
             if len(t) and not (t[0] > last and (np.diff(t) > 0).all()):
                 read(path)  # which says where
             last = float(t[-1]) if len(t) else last
-            yield _block(columns)
+            whole = _block(columns)
+            for first in range(0, len(whole), PART):
+                yield whole[first : first + PART]
     except (pa.ArrowException, OSError):
         read(path)  # which says what is wrong with it, and where
         raise

@@ -82,7 +82,7 @@ def test_processes_that_are_there_are_named_and_no_others() -> None:
 
 
 def test_a_slow_process_has_its_correlation_time() -> None:
-    values = noise(np.random.default_rng(7), 100_000, DT, 6, N=1.0, s=1.0, T=20.0)
+    values = noise(np.random.default_rng(7), 60_000, DT, 6, N=1.0, s=1.0, T=20.0)
     found = estimate([reduced([recording(values, DT)])]).channels
     times = [c.processes["G1"] for c in found.values() if "G1" in c.processes]
     assert len(times) >= 4
@@ -92,7 +92,7 @@ def test_a_slow_process_has_its_correlation_time() -> None:
 
 
 def test_everything_scales_with_the_unit() -> None:
-    values = noise(np.random.default_rng(8), 8000, DT, 6, N=1.0, K=0.2)
+    values = noise(np.random.default_rng(8), 4000, DT, 6, N=1.0, K=0.2)
     one = estimate([reduced([recording(values, DT)])]).channels["gz"]
     other = estimate([reduced([recording(1e-6 * values + 3.0, DT)])]).channels["gz"]
     assert one.processes.keys() == other.processes.keys()
@@ -102,9 +102,9 @@ def test_everything_scales_with_the_unit() -> None:
 
 def test_bumps_are_bridged_and_change_nothing() -> None:
     rng = np.random.default_rng(9)
-    values = noise(rng, 40_000, 0.01, 6, N=1.0, K=0.05)
+    values = noise(rng, 20_000, 0.01, 6, N=1.0, K=0.05)
     calm = estimate([reduced([recording(values, 0.01)])])
-    for at in range(2000, 40_000, 6000):
+    for at in range(2000, 20_000, 3000):
         values[at : at + 60] += 80 * rng.standard_normal((60, 6))
     bumped = estimate([reduced([recording(values, 0.01)])])
     assert 0.005 < bumped.bridged < 0.1 and calm.bridged < 0.005

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import math
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -33,20 +36,35 @@ def session(folder: Path, seconds: float = 1200, seed: int = 20, **about: str) -
     return folder
 
 
+class Told(NamedTuple):
+    """What the command said of a session: its folder, the screen, the page."""
+
+    folder: Path
+    screen: str
+    page: str
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What it wrote."""
+        found: dict[str, Any] = json.loads((self.folder / "noise.json").read_text())
+        return found
+
+
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return session(tmp_path_factory.mktemp("noise") / "night")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
+    place = tmp_path_factory.mktemp("noise")
+    folder, page = session(place / "night"), place / "noise.html"
+    screen = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(screen):
+        patch.setenv("COLUMNS", "80")
+        assert main(["noise", str(folder), "--report", str(page)]) == 0
+    return Told(folder, screen.getvalue(), page.read_text(encoding="utf-8"))
 
 
-def test_json_is_the_file_and_holds_to_its_schema(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["noise", str(folder), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said == json.loads((folder / "noise.json").read_text())
-    validator("noise").validate(said)
-    assert list(said["channels"]) == ["ax", "ay", "az", "gx", "gy", "gz"]
-    for channel in said["channels"].values():
+def test_what_is_written_holds_to_its_schema_and_is_true(told: Told) -> None:
+    validator("noise").validate(told.content)
+    assert list(told.content["channels"]) == ["ax", "ay", "az", "gx", "gy", "gz"]
+    for channel in told.content["channels"].values():
         white = channel["processes"]["N"]
         assert abs(white["value"] - N) < 4 * white["sigma"]
         means = channel["averaging"]
@@ -55,46 +73,52 @@ def test_json_is_the_file_and_holds_to_its_schema(
         assert means["sigma"][:3] == pytest.approx(truth[:3], rel=0.3)
 
 
-def test_what_other_programs_are_told_follows_from_the_two_numbers(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    main(["noise", str(folder), "--json"])
-    told = json.loads(capsys.readouterr().out)["for"]
-    density = told["kalibr"]["gyroscope_noise_density"]
+def test_json_is_the_file(told: Told, capsys: pytest.CaptureFixture[str]) -> None:
+    before = told.content
+    assert main(["noise", str(told.folder), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said == told.content
+    assert said["channels"] == before["channels"]
+
+
+def test_what_other_programs_are_told_follows_from_the_two_numbers(told: Told) -> None:
+    programs = told.content["for"]
+    density = programs["kalibr"]["gyroscope_noise_density"]
     assert abs(density["value"] / N - 1) < 0.1
     # a step of 12 ms adds (h w)^2 to the variance of an angle: N^2 h
-    held = told["ardupilot"]["EK3_GYRO_P_NSE"]["value"]
+    held = programs["ardupilot"]["EK3_GYRO_P_NSE"]["value"]
     assert (0.012 * held) ** 2 == pytest.approx(density["value"] ** 2 * 0.012)
-    bias = told["px4"]["EKF2_ACC_B_NOISE"]["value"]
-    walk = told["kalibr"]["accelerometer_random_walk"]["value"]
+    bias = programs["px4"]["EKF2_ACC_B_NOISE"]["value"]
+    walk = programs["kalibr"]["accelerometer_random_walk"]["value"]
     assert (0.01 * bias) ** 2 == pytest.approx(walk**2 * 0.01)
-    variance = told["ros"]["angular_velocity_covariance[8]"]["value"]
+    variance = programs["ros"]["angular_velocity_covariance[8]"]["value"]
     assert variance == pytest.approx(N**2 * 10, rel=0.1)
 
 
 def test_the_screen_fits_80_columns_and_every_number_has_its_uncertainty(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    told: Told,
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    assert main(["noise", str(folder)]) == 0
-    out = capsys.readouterr().out
-    lines = out.splitlines()
+    lines = told.screen.splitlines()
     tables = [x for x in lines if x[:3] in ("ax ", "ay ", "az ", "gx ", "gy ", "gz ")]
     assert len(tables) == 12 and max(map(len, tables)) <= 80
     assert all("±" in line for line in tables)
     for word in ("instability", "over 60 s", "kalibr:", "EK3_GBIAS_P_NSE", "EKF2_ACC",
                  "recalibrate:", "north by gyrocompassing", "written:"):  # fmt: skip
-        assert word in out
+        assert word in told.screen
+
+
+def test_the_page_has_the_curves(told: Told) -> None:
+    for word in ("Allan deviation, gyroscopes", "gz model", "EKF2_GYR_NOISE", "bench"):
+        assert word in told.page
+    assert "src=" not in told.page and 'href="http' not in told.page
 
 
 def test_several_sessions_of_a_device_count_together(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    told: Told, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    other = session(tmp_path / "second", 1200, 21)
-    main(["noise", str(folder), str(other), "--json"])
+    one, other = told.content, session(tmp_path / "second", 1200, 21)
+    assert main(["noise", str(other), str(told.folder), "--json"]) == 0
     both = json.loads(capsys.readouterr().out)
-    main(["noise", str(folder), "--json"])
-    one = json.loads(capsys.readouterr().out)
     assert both["stretches"] == 2 and both["seconds"] == pytest.approx(2400, abs=1)
     sigma = [x["channels"]["ax"]["processes"]["N"]["sigma"] for x in (both, one)]
     assert sigma[0] < 0.9 * sigma[1]
@@ -115,15 +139,6 @@ def test_what_is_too_short_or_no_session_is_refused_with_a_remedy(
     assert "record 30 s at least" in capsys.readouterr().err
     assert main(["noise", str(tmp_path / "nothing")]) == 2
     assert "is no session" in capsys.readouterr().err
-
-
-def test_the_page_has_the_curves(folder: Path, tmp_path: Path) -> None:
-    page = tmp_path / "noise.html"
-    assert main(["noise", str(folder), "--report", str(page), "--json"]) == 0
-    text = page.read_text(encoding="utf-8")
-    for word in ("Allan deviation, gyroscopes", "gz model", "EKF2_GYR_NOISE", "bench"):
-        assert word in text
-    assert "src=" not in text and 'href="http' not in text
 
 
 @pytest.mark.parametrize("ending", ["csv", "csv.gz", "parquet"])
@@ -205,10 +220,9 @@ def test_a_turn_between_windows_is_no_noise(tmp_path: Path) -> None:
 
 
 def test_a_plan_says_how_long_this_device_is_worth_averaging(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    told: Told, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["noise", str(folder), "--json"]) == 0
-    noisy = json.loads(capsys.readouterr().out)["channels"]
+    noisy, folder = told.content["channels"], told.folder
     assert main(["plan", "--set", "two", "--noise-of", str(folder)]) == 0
     out = capsys.readouterr().out
     assert "this device" in out and "best after" in out

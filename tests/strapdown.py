@@ -87,6 +87,12 @@ def motion(start: float = 3.0, gravity: float = GRAVITY) -> tuple[Any, Any, Any]
     return t, force, rate
 
 
+def earth(start: float = 3.0, latitude: float = 0.88) -> Any:
+    """The Earth's rate in device axes, (n, 3) rad/s; the fixture points north."""
+    base = 7.292115e-5 * np.array([0.0, -np.sin(latitude), np.cos(latitude)])
+    return attitude(0.0, start)[1] @ base
+
+
 def outputs(
     device: Mapping[str, Any], start: float = 3.0, gravity: float = GRAVITY
 ) -> Any:

@@ -174,6 +174,8 @@ def _quantities(there: Widened, member: Member) -> dict[str, Quantity]:
         for p, v, s, b in zip(names, values, sigma, before, strict=True)
         if s**2 < thresholds.DETERMINED * b**2
     }
+    if there.inference.dictionary.free.all():
+        out = found_effects.whatever_turned(there.told_from, group, out)
     for shape in group.effect.shapes:
         at = group.shape[shape.name]
         unsure = min(group.unsure, at) if np.isfinite(group.unsure) else None

@@ -44,6 +44,7 @@ def matched(real: Side, sim: Side) -> Match:
     apart = [
         *causes.differences(found),
         *offsets.differences(found),
+        *offsets.earth(found),
         *samples.lines_and_faults(real, sim),
         *samples.noise(real, sim),
     ]

@@ -1,4 +1,4 @@
-"""Differences in what every device has: bias and scale factor.
+"""Differences in what every device has: bias, scale factor, and the Earth's rate.
 
 Biases wander, and not only from window to window: flicker has as much power in every
 octave, so what they wander by within a session they do again from one to the next. Of a
@@ -13,8 +13,9 @@ import numpy as np
 
 from fieldcal.against.causes import Decided
 from fieldcal.against.joint import differs
-from fieldcal.against.result import Difference, Pair
+from fieldcal.against.result import Difference, Direction, Pair
 from fieldcal.against.widened import Widened
+from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.findings.calibrated import GROUPS
 from fieldcal.diagnosis.result import Mismatch, Quantity
@@ -29,6 +30,40 @@ def differences(found: Decided) -> Iterator[Difference]:
     """Groups of the calibration in which the two differ."""
     for name, axes in shared_axes(found.real, found.sim):
         yield from _difference(found, name, axes)
+
+
+def earth(found: Decided) -> Iterator[Difference]:
+    """The Earth's rate, where one feels it and the other does not, or turned otherwise.
+
+    In axes of the base: x East, y down, z north, where the fixture points north.
+    """
+    first = [w.inference.dictionary.earth for w in (found.real, found.sim)]
+    if min(first) < 0:
+        return
+    (one, cov), (two, more) = (
+        w.estimate(at + np.arange(3))
+        for w, at in zip((found.real, found.sim), first, strict=True)
+    )
+    total, typical = cov + more, np.full(3, EARTH_RATE)
+    probability = differs(one - two, total, typical)
+    if probability < thresholds.NAMED:
+        return
+    felt = [_felt(rate, its) for rate, its in ((one, cov), (two, more))]
+    direction: Direction = (
+        "resized" if all(felt) else "left_out" if felt[0] else "added"
+    )
+    unit, parameters = "rad/s", dict[str, Pair]()
+    for i, axis in enumerate("xyz"):
+        had = [Quantity(float(r[i]), float(np.sqrt(c[i, i])), unit)
+               for r, c in ((one, cov), (two, more))]  # fmt: skip
+        off = Quantity(float(one[i] - two[i]), float(np.sqrt(total[i, i])), unit)
+        parameters[axis] = Pair(had[0], had[1], off)
+    yield Difference("earth_rate", direction, probability, parameters)
+
+
+def _felt(rate: Array, covariance: Array) -> bool:
+    """Whether a rate of the base is likelier than none."""
+    return differs(rate, covariance, np.full(3, EARTH_RATE)) > thresholds.NAMED
 
 
 def shared_axes(one: Widened, two: Widened) -> Iterator[tuple[str, Index]]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fieldcal.against.result import Difference, Direction, Pair, Prediction
 from fieldcal.calibration.wording import pretty
 from fieldcal.diagnosis.result import Quantity, Verdict
-from fieldcal.diagnosis.wording.lines import pretty_quantity
+from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 SHOWN = 3.0
@@ -98,6 +98,28 @@ def signed(quantity: Quantity) -> str:
     return f"+{text}" if plus else text
 
 
+def lines(found: Sequence[Difference]) -> list[tuple[str, str, str, str, str]]:
+    """A row of a table for each; what happened often is one row, with its largest.
+
+    What, who has it, how big in each, the difference, and how sure.
+    """
+    alike: dict[tuple[str, str, str], list[Difference]] = {}
+    for one in found:
+        part = "".join(one.parameters) if one.id == "noise" else ""
+        alike.setdefault((one.id, one.direction, part), []).append(one)
+    out = []
+    for some in alike.values():
+        what, who, size, off = line(max(some, key=_clearest))
+        often = f" ({len(some)} times)" if len(some) > 1 else ""
+        sure = format_probability(min(one.probability for one in some))
+        out.append((what + often, who, size, off, sure))
+    return out
+
+
+def _clearest(one: Difference) -> float:
+    return max((_clear(p.difference) for p in one.parameters.values()), default=0.0)
+
+
 def line(one: Difference) -> tuple[str, str, str, str]:
     """What, how big in each, and the difference, for one row of a table."""
     told = {
@@ -110,17 +132,19 @@ def line(one: Difference) -> tuple[str, str, str, str]:
         what += f", or {' or '.join(a.replace('_', ' ') for a in one.aliases)}"
     if not told:
         return what, SHORT[one.direction], "", ""
+    sizes = {n: p for n, p in told.items() if p.difference.unit not in ("s", "Hz")}
+    told = sizes or told
     name = max(told, key=lambda n: _clear(told[n].difference))
     pair, more = (
         told[name],
         sum(_clear(p.difference) > SHOWN for p in told.values()) - 1,
     )
     also = f" (+{more})" if more > 0 else ""
-    sizes = "real " + _shown(pair.real) + ", simulator " + _shown(pair.simulator)
+    both = "real " + _shown(pair.real) + ", simulator " + _shown(pair.simulator)
     return (
         what,
         SHORT[one.direction],
-        f"{name}: {sizes}{also}",
+        f"{name}: {both}{also}",
         pretty(signed(pair.difference)),
     )
 

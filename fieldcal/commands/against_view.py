@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import IO
 
 from fieldcal.against.result import Match
-from fieldcal.against.wording import line
+from fieldcal.against.wording import lines
 from fieldcal.calibration.wording import position_numbers, pretty
 from fieldcal.commands.diagnosis_view import STYLES
 from fieldcal.diagnosis.findings.agreement import UNITS
@@ -52,8 +52,7 @@ def _lines(found: Match) -> object:
         table.add_column(name, ratio=ratio)
     table.add_column("real − simulator", ratio=4)
     table.add_column("how sure", no_wrap=True)
-    for one in found.differences:
-        cells = (*line(one), format_probability(one.probability))
+    for cells in lines(found.differences):
         table.add_row(*map(Text, cells))
     return table
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 import strapdown
 
-from fieldcal.against import Match, matched
+from fieldcal.against import Match, compare, matched
 from fieldcal.against.side import Side, side
 from fieldcal.core.samples import Array, Block
 from fieldcal.session import description
@@ -46,6 +47,19 @@ def real() -> Side:
 
 def against(real: Side, device: dict[str, Any], seed: int = 2) -> Match:
     return matched(real, side("simulator", *played(device, seed, LATER), real))
+
+
+def test_a_simulator_without_the_earths_rate() -> None:
+    quiet = {"noise": {"acc": [0.005] * 3, "gyr": [5e-5] * 3}}
+    block, about = played(quiet, 1)
+    felt = replace(block, gyr=block.gyr + strapdown.earth())
+    found = compare((felt, about), played(quiet, 2))
+    assert [(d.id, d.direction) for d in found.differences] == [
+        ("earth_rate", "left_out")
+    ]
+    north, sigma = value(found, "earth_rate", "z")
+    assert abs(north - 7.292e-5 * np.cos(0.88)) < 4 * sigma
+    assert found.before.chi2_per_dof > 2 > 1.2 > found.after.chi2_per_dof
 
 
 def value(found: Match, name: str, parameter: str) -> tuple[float, float]:

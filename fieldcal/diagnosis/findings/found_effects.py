@@ -122,7 +122,8 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
             if s**2 < thresholds.DETERMINED * wide**2:
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
-        own = _whatever_turned(explanation, group, own)
+        if explanation.dictionary.free.all():
+            own = whatever_turned(explanation.best.set, group, own)
         out |= _since_arrival(own, group)
     for shape in effect.shapes:
         known = [m for m in standing.members if shape.name in m[1].shape]
@@ -133,8 +134,8 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
     return out
 
 
-def _whatever_turned(
-    explanation: Explanation, group: Group, own: dict[str, Quantity]
+def whatever_turned(
+    found: Set, group: Group, own: dict[str, Quantity]
 ) -> dict[str, Quantity]:
     """Numbers of a device of which nobody knows how it stands.
 
@@ -142,10 +143,9 @@ def _whatever_turned(
     that is better known than either, it is in the place of both.
     """
     effect, out = group.effect, dict(own)
-    if effect is None or not explanation.dictionary.free.all():
+    if effect is None:
         return out
     names = [effect.params[j].name for j in group.params]
-    found = explanation.best.set
     for gone, kept in effect.turned_into.items():
         if not {gone, kept} <= set(names):
             continue

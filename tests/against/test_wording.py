@@ -1,0 +1,30 @@
+"""Rows of the table that the terminal shows."""
+
+from fieldcal.against.result import Difference, Pair
+from fieldcal.against.wording import lines
+from fieldcal.diagnosis.result import Quantity
+
+
+def bump(at: float, push: float) -> Difference:
+    parameters = {
+        name: Pair(q, None, q)
+        for name, q in (
+            ("at_s", Quantity(at, 0.01, "s")), ("push", Quantity(push, 0.1, "m/s^2"))
+        )
+    }  # fmt: skip
+    return Difference("bump", "left_out", 1.0, parameters)
+
+
+def test_what_happened_often_is_one_row_with_its_largest() -> None:
+    quantity = Quantity(-0.002, 0.0001, "1")
+    added = Pair(None, Quantity(0.002, 0.0001, "1"), quantity)
+    tied = Difference("quadratic", "added", 0.9, {"x": added}, ("cross_coupling",))
+    first, second = lines([bump(12.0, 1.0), bump(50.0, 3.0), tied])
+    assert first == (
+        "bump (2 times)", "left out",
+        "push: real 3.00 ± 0.10 m/s², simulator none", "+3.00 ± 0.10 m/s²",
+        "above 0.99",
+    )  # fmt: skip
+    assert second[0] == "quadratic, or cross coupling" and second[1] == "added"
+    assert second[2] == "x: real none, simulator 0.00200 ± 0.00010"
+    assert second[3:] == ("-0.00200 ± 0.00010", "0.90")

@@ -25,8 +25,6 @@ EXAMPLE = """\
   fieldcal noise bench-7/overnight --report noise.html
 """
 
-NOISE = "noise.json"
-
 JOINED = 3.0
 """Windows no further apart are one stretch, s."""
 
@@ -45,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.session.folder import Session
+    from fieldcal.session.noise_file import NOISE
 
     sessions = [Session.open(path) for path in args.sessions]
     found = result(sessions, args.limits, args.history)

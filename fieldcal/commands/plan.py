@@ -114,22 +114,15 @@ def _device(path: Path) -> DeviceNoise:
         If there is no noise.json, or it is none.
 
     """
-    from fieldcal.core.documents import load_json
     from fieldcal.core.errors import SessionError
     from fieldcal.planning.device_noise import of_document
-    from fieldcal.session.schemas import refusal, validator
+    from fieldcal.session.noise_file import read_noise
 
-    file = path / "noise.json" if path.is_dir() else path
-    try:
-        content = load_json(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
+    content = read_noise(path)
+    if content is None:
         raise SessionError(
-            f"{file}: is not there; run fieldcal noise on a recording at rest first"
-        ) from error
-    except (OSError, ValueError) as error:
-        raise SessionError(f"{file}: cannot be read: {error}") from error
-    if wrong := refusal(content, validator("noise")):
-        raise SessionError(f"{file}: {wrong}; run fieldcal noise again")
+            f"{path}: has no noise.json; run fieldcal noise on a recording at rest"
+        )
     return of_document(content)
 
 

@@ -14,18 +14,22 @@ The noise density is that of means over 1 s within the windows of the session,
     N^2 = <(y_k+1 - y_k)^2> / 2 * 1 s                                              (3)
 
 the largest axis of each triad. The random walk takes hours at rest to see: it is not
-filled in. Units: m/s^2, rad/s. Source: Kalibr wiki, IMU noise model and yaml formats.
+filled in. Where the session has a noise.json, all four numbers are that one's. Units:
+m/s^2, rad/s. Source: Kalibr wiki, IMU noise model and yaml formats.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import Session, write_whole
+from fieldcal.session.noise_file import read_noise
 
 WHAT = "Kalibr's imu.yaml (noise, M, C, bias)"
 ENDING = "_imu.yaml"
@@ -68,27 +72,13 @@ def _means(block: Block) -> Array:
 
 def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
-    noise = density(source.session)
     says = list(source.says)
     acc_bias, acc = source.linear("acc")
     gyr_bias, gyr = source.linear("gyr")
     lower, turn = parted(gyr)
     lines = ["# fieldcal: raw = M true + bias (true -> raw), m/s^2 and rad/s"]
-    for name, values in (("accelerometer", noise[:3]), ("gyroscope", noise[3:])):
-        known = values[np.isfinite(values)]
-        if len(known):
-            lines.append(f"{name}_noise_density: {known.max():.6g}")
-        else:
-            lines.append(f"# {name}_noise_density: not determined")
-            says.append(
-                f"{name}_noise_density was not determined: no window of the session "
-                "lasts 2 s"
-            )
-        lines.append(f"# {name}_random_walk: not determined")
-    says.append(
-        "the random walks are not determined by windows of seconds: fill them in from "
-        "hours at rest"
-    )
+    found = read_noise(source.session.folder)
+    lines += _of_windows(source.session, says) if found is None else _at_rest(found)
     rate = source.session.rate_hz
     lines += [
         "rostopic: /imu/raw",
@@ -105,6 +95,37 @@ def write(source: ExportSource, path: Path) -> list[str]:
     ]
     write_whole(path, "\n".join(lines) + "\n")
     return says
+
+
+def _of_windows(session: Session, says: list[str]) -> list[str]:
+    """Noise densities of the session's own windows, (3)."""
+    noise, lines = density(session), []
+    for name, values in (("accelerometer", noise[:3]), ("gyroscope", noise[3:])):
+        known = values[np.isfinite(values)]
+        if len(known):
+            lines.append(f"{name}_noise_density: {known.max():.6g}")
+        else:
+            lines.append(f"# {name}_noise_density: not determined")
+            says.append(
+                f"{name}_noise_density was not determined: no window of the session "
+                "lasts 2 s"
+            )
+        lines.append(f"# {name}_random_walk: not determined")
+    says.append(
+        "the random walks are not determined by windows of seconds: run fieldcal noise "
+        f"on hours at rest, and put its noise.json into {session.folder}"
+    )
+    return lines
+
+
+def _at_rest(found: Mapping[str, Any]) -> list[str]:
+    """Kalibr's four numbers as `fieldcal noise` found them, with their ±."""
+    lines = []
+    for name, told in found["for"]["kalibr"].items():
+        sigma = told.get("sigma")
+        how = "not exceeded in 95 of 100" if sigma is None else f"+- {sigma:.2g}"
+        lines.append(f"{name}: {_number(told['value'])}  # {how}")
+    return lines
 
 
 def written(array: Array) -> str:

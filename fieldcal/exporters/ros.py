@@ -8,18 +8,22 @@ so that its bias is behind the matrix. fieldcal has U = b + M f, hence
 
 exactly. SM is written row by row. imu_calib itself reads the accelerometers' two keys;
 those of the gyroscopes, gyro_SM and gyro_bias, mean the same for nodes that take them.
+Where the session has a noise.json, the covariances of single samples stand behind.
 Units: m/s^2, rad/s, as in sensor_msgs/Imu. Source: imu_calib's documentation.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_whole
+from fieldcal.session.noise_file import read_noise
 
 WHAT = "yaml of ROS imu_calib (SM, bias)"
 ENDING = "_imu_calib.yaml"
@@ -31,6 +35,17 @@ def matrices(bias: Array, matrix: Array) -> tuple[Array, Array]:
     return inverse, inverse @ bias  # (2)
 
 
+def _covariances(told: Mapping[str, Any]) -> list[str]:
+    """Row by row, as sensor_msgs/Imu has them, of single samples."""
+    lines = []
+    for what in ("linear_acceleration", "angular_velocity"):
+        name = f"{what}_covariance"
+        values = [told.get(f"{name}[{i}]", {}).get("value", 0.0) for i in range(9)]
+        if any(values):
+            lines += [f"{name}:", *(f"  - {x:.12e}" for x in values)]
+    return lines
+
+
 def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
     lines = ["# fieldcal: true = SM raw - bias (raw -> true), m/s^2 and rad/s"]
@@ -39,5 +54,7 @@ def write(source: ExportSource, path: Path) -> list[str]:
         for name, values in ((f"{prefix}SM", turned.ravel()), (f"{prefix}bias", bias)):
             lines.append(f"{name}:")
             lines += [f"  - {x:.12f}" for x in values]
+    if found := read_noise(source.session.folder):
+        lines += _covariances(found["for"]["ros"])
     write_whole(path, "\n".join(lines) + "\n")
     return source.says

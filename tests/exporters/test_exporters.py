@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -17,7 +18,7 @@ from calibrations import calibration
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
-from fieldcal.core.errors import InputError
+from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
 from fieldcal.exporters import ExportSource, ardupilot, exporter, formats, px4
@@ -297,3 +298,39 @@ def test_the_command_writes_every_format_and_overwrites_none(
     assert main(call) == 2
     assert "is there already" in capsys.readouterr().err
     assert (tmp_path / "o").read_bytes() == before
+
+
+def test_noise_that_was_measured_at_rest_goes_to_kalibr_and_ros(
+    made: tuple[ExportSource, Block, Block], tmp_path: Path
+) -> None:
+    source = made[0]
+    four = {
+        f"{n}_{what}": {"value": 1e-5 * i, "sigma": None, "unit": "1"}
+        for i, (n, what) in enumerate(
+            product(("accelerometer", "gyroscope"), ("noise_density", "random_walk")), 1
+        )
+    }
+    variance = {"value": 4e-6, "sigma": 1e-8, "unit": "m^2/s^4"}
+    content = {
+        **{"format": 1, "sessions": [], "device": {}, "seconds": 1.0, "longest_s": 1.0},
+        **{"stretches": 1, "rate_hz": 1.0, "disturbed_share": 0.0, "channels": {}},
+        "recalibrate": {"since": "", "channels": {}},
+        "for": {
+            "kalibr": four,
+            "ros": {"linear_acceleration_covariance[4]": variance},
+            "ardupilot": {},
+            "px4": {},
+        },
+    }
+    file = source.session.folder / "noise.json"
+    file.write_text(json.dumps(content))
+    try:
+        told = yaml.safe_load(written(source, "kalibr", tmp_path).read_text())
+        assert [told[n] for n in four] == pytest.approx([1e-5, 2e-5, 3e-5, 4e-5])
+        told = yaml.safe_load(written(source, "ros", tmp_path).read_text())
+        assert told["linear_acceleration_covariance"] == [0, 0, 0, 0, 4e-6, 0, 0, 0, 0]
+        file.write_text("{")
+        with pytest.raises(SessionError, match="run fieldcal noise again"):
+            written(source, "kalibr", tmp_path)
+    finally:
+        file.unlink()

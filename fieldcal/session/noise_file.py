@@ -1,0 +1,38 @@
+"""noise.json of a session: what `fieldcal noise` found, for whoever goes by it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fieldcal.core.documents import load_json
+from fieldcal.core.errors import SessionError
+from fieldcal.session.schemas import refusal, validator
+
+NOISE = "noise.json"
+
+
+def read_noise(path: Path) -> Mapping[str, Any] | None:
+    """Content of a noise.json, or of that of a session folder; None without one.
+
+    Raises
+    ------
+    SessionError
+        If it cannot be read, or does not hold to its schema.
+
+    """
+    file = path / NOISE if path.is_dir() else path
+    try:
+        content = load_json(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise SessionError(
+            f"{file}: cannot be read: {error}; run fieldcal noise again"
+        ) from error
+    if not isinstance(content, dict):
+        raise SessionError(f"{file}: holds no JSON object; run fieldcal noise again")
+    if wrong := refusal(content, validator("noise")):
+        raise SessionError(f"{file}: {wrong}; run fieldcal noise again")
+    return content

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import fit
+from fieldcal.noise.likelihood import fit, likelihood
 from fieldcal.noise.prediction import Draw
 from fieldcal.noise.processes import allan_variance
 from fieldcal.noise.spectrum import Spectrum
@@ -43,6 +43,9 @@ NAMES = {
     ),
 }
 """Parameters for white noise and bias of accelerometers, and of gyroscopes."""
+
+ONE_SIDED = 1.645
+"""Normal deviation that is exceeded in 5 of 100."""
 
 UNITS = ("m/s^2", "m/s^3", "rad/s", "rad/s^2")
 
@@ -86,7 +89,8 @@ def two_numbers(
         factor = _left_out(whole, size / tau)
         error = float(np.sqrt(one.covariance[0, 0])) / 2
         n = float(np.sqrt(size)) * factor
-        return TwoNumbers(n, n * error, n * _not_exceeded(spectrum), np.nan, factor)
+        walk = factor * _not_exceeded(spectrum, chosen, size)
+        return TwoNumbers(n, n * error, walk, np.nan, factor)
     sizes, spread = np.exp(pair.x), np.sqrt(np.diag(pair.covariance)) / 2
     factor = _left_out(whole, sizes[0] / tau + sizes[1] * tau / 3)
     n, k = (np.sqrt(sizes) * factor).tolist()
@@ -97,14 +101,21 @@ def _left_out(whole: Array, pair: Array) -> float:
     return float(np.sqrt(max(1.0, np.max(whole / pair))))  # (1)
 
 
-def _not_exceeded(spectrum: Spectrum) -> float:
-    """Walk, in units of white noise N = 1, that would show in 95 of 100 recordings.
+def _not_exceeded(spectrum: Spectrum, chosen: Chosen, white: float) -> float:
+    """K that is not exceeded in 95 of 100, beside white noise of variance N^2.
 
-    Its part of the first coefficients would make their sum of squares larger than it
-    is in one of twenty by chance: of the first, 3.8 for 1.
+    The largest whose likelihood is above that of none by no less than a one-sided
+    normal deviation of 1.64 allows.
     """
-    ratio = spectrum.fixed["K"] / spectrum.fixed["N"]
-    return float(np.sqrt(2.8 / ratio.max()))
+    used = ~chosen.powers.free
+    power = chosen.powers.power[used].sum(axis=1)
+    count = chosen.powers.count[used].sum(axis=1)
+    walk, flat = (spectrum.fixed[p][used] for p in ("K", "N"))
+    # from a walk that adds nothing to one that is a thousand times the noise
+    sizes = white * np.geomspace(1e-4, 1e4, 400) / float((walk / flat).max())
+    each = [likelihood(white * flat + k * walk, power, count) for k in sizes]
+    likely = np.flatnonzero(np.array(each) >= max(each) - ONE_SIDED**2 / 2)
+    return float(np.sqrt(sizes[likely[-1]]))
 
 
 @dataclass(frozen=True, slots=True)

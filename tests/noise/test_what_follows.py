@@ -1,0 +1,132 @@
+"""What follows from noise: averaging, filters, recalibration, north."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.noise.processes import noise, recording
+from fieldcal.noise import estimate, reduced
+from fieldcal.noise.alignment import EARTH_RATE, alignment
+from fieldcal.noise.averaging import averaging
+from fieldcal.noise.filters import TwoNumbers, kalibr, of_program, ros, worst
+from fieldcal.noise.prediction import Draw
+from fieldcal.noise.recalibration import HistoryStep, recalibration, walk_of
+
+DAY = 86400.0
+
+
+def drawn(**sizes: float) -> tuple[Draw, ...]:
+    """One draw: processes exactly so large."""
+    terms = tuple(sizes)
+    return (Draw(terms, 2 * np.log(list(sizes.values()))),)
+
+
+def test_averaging_is_best_where_white_noise_and_walk_meet() -> None:
+    """N^2/T = K^2 T/3 at T = sqrt(3) N/K; twice the white part there."""
+    found = averaging(drawn(N=1.0, K=0.05), 0.0, 0.01, 4000.0)
+    meet = math.sqrt(3) / 0.05
+    assert found.best[0] == pytest.approx(meet, rel=0.2)
+    assert found.white_until[0] == pytest.approx(meet, rel=0.4)
+    assert found.at(30.0)[0] == pytest.approx(
+        math.sqrt(1 / 30 + 0.05**2 * 10), rel=0.01
+    )
+
+
+def test_white_noise_is_worth_averaging_for_longer_than_is_known() -> None:
+    found = averaging(drawn(N=1.0), 0.0, 0.01, 400.0)
+    assert found.best[0] == math.inf and found.white_until[0] == math.inf
+    assert found.seconds[-1] == pytest.approx(100.0)
+
+
+def test_a_ramp_ends_averaging() -> None:
+    """N^2/T + R^2 T^2/2 is least at T^3 = N^2 / R^2."""
+    found = averaging(drawn(N=1.0), 1e-3, 0.01, 4000.0)
+    assert found.best[0] == pytest.approx(100.0, rel=0.2)
+
+
+@pytest.mark.statistical
+def test_the_stated_walk_is_not_exceeded_in_95_of_100() -> None:
+    """Where walk is too small to be seen, the bound lies above it nearly always."""
+    rng = np.random.default_rng(30)
+    above = []
+    for _ in range(6):
+        values = noise(rng, 3000, 0.1, 6, N=1.0, K=0.004)
+        for channel in estimate([reduced([recording(values, 0.1)])]).channels.values():
+            pair = channel.pair
+            bound = pair.walk + 1.645 * np.nan_to_num(pair.walk_sigma)
+            above.append(bound > 0.004)
+            assert pair.white / pair.left_out == pytest.approx(1.0, rel=0.1)
+    assert np.mean(above) > 0.9
+
+
+def test_two_numbers_are_as_much_larger_as_what_they_leave_out() -> None:
+    """A bump in the Allan deviation that no sum of two slopes has."""
+    values = noise(np.random.default_rng(31), 60_000, 0.1, 6, N=1.0, s=0.6, T=20.0)
+    for channel in estimate([reduced([recording(values, 0.1)])]).channels.values():
+        pair, tau = channel.pair, np.geomspace(1, 1500, 30)
+        covered = pair.white**2 / tau + pair.walk**2 * tau / 3
+        u = tau / 20.0
+        markov = 2 * 0.36 / u * (1 - (3 - 4 * np.exp(-u) + np.exp(-2 * u)) / (2 * u))
+        assert 1.0 < pair.left_out < 2.5
+        assert (covered > 0.8 * (1 / tau + markov)).all()
+
+
+def test_the_noisiest_axis_of_a_triad_counts() -> None:
+    pairs = {
+        "gx": TwoNumbers(2.0, 0.2, 1.0, 0.1, 1.1),
+        "gy": TwoNumbers(1.0, 0.1, 3.0, math.nan, 1.3),
+    }
+    found = worst(pairs, "g")
+    assert found and (found.white, found.walk, found.left_out) == (2.0, 3.0, 1.3)
+    assert worst(pairs, "a") is None
+    assert set(kalibr(pairs).values) == {"gyroscope_noise_density",
+                                         "gyroscope_random_walk"}  # fmt: skip
+    for program, step in (("ardupilot", 0.012), ("px4", 0.01)):
+        values = [v for v, _, _ in of_program(program, pairs).values.values()]
+        assert values == pytest.approx([2 / math.sqrt(step), 3 / math.sqrt(step)])
+    told = ros({"gy": (1e-3, 1e-5)}, 200.0).values
+    assert told["angular_velocity_covariance[4]"][:2] == pytest.approx((2e-4, 4e-6))
+
+
+@pytest.mark.statistical
+def test_a_walk_leaves_its_limit_when_it_is_said_to() -> None:
+    """The chance at the date, counted among simulated walks."""
+    k, limit = 1e-6, 5e-4
+    found = recalibration(drawn(N=1e-9, K=k), 0.0, limit, 0.0)
+    rng = np.random.default_rng(32)
+    for chance, seconds in zip((0.05, 0.32), found.seconds, strict=True):
+        walks = k * math.sqrt(seconds) * rng.standard_normal(20_000)
+        assert np.mean(np.abs(walks) > limit) == pytest.approx(chance, rel=0.2)
+    assert not found.from_history
+
+
+def test_a_ramp_leaves_its_limit_on_a_day() -> None:
+    found = recalibration(drawn(N=1e-9), 1e-9, 1e-4, 1e-14)
+    assert found.seconds == pytest.approx((1e5, 1e5), rel=0.2)
+    assert recalibration(drawn(N=1e-9), 0.0, 1.0, 1e-14).seconds == (math.inf,) * 2
+
+
+def test_what_history_shows_counts_more_than_an_hour() -> None:
+    rng = np.random.default_rng(33)
+    k = 1e-7
+    steps = [
+        HistoryStep(30 * DAY, k * math.sqrt(30 * DAY) * float(z), 1e-12)
+        for z in rng.standard_normal(400)
+    ]
+    assert math.sqrt(walk_of(steps)) == pytest.approx(k, rel=0.1)
+    found = recalibration(drawn(N=1e-6, K=1e-5), 1e-6, 1e-3, 0.0, steps)
+    assert found.from_history
+    # 1.96 k sqrt(t) = limit
+    assert found.seconds[0] == pytest.approx((1e-3 / 1.96 / k) ** 2, rel=0.25)
+
+
+def test_north_is_as_sure_as_the_worst_gyroscope_is_still() -> None:
+    good, bad = (averaging(drawn(N=n), 0.0, 0.01, 4000.0) for n in (1e-7, 1e-6))
+    found = alignment([good, bad], math.radians(60))
+    seconds, sigma, spread = found.best
+    expected = 1e-6 / math.sqrt(1000) / (EARTH_RATE * 0.5)
+    assert (seconds, sigma) == pytest.approx((1000.0, expected), rel=0.01)
+    assert spread == pytest.approx(0.0, abs=1e-9)

@@ -20,7 +20,8 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.codec import recognise
 from fieldcal.importing import columns
-from fieldcal.importing.column_recording import ColumnRecording, Heading
+from fieldcal.importing.column_clock import Heading
+from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.headings import Column
 from fieldcal.importing.instances import Instances, instances_in
@@ -39,9 +40,9 @@ from fieldcal.importing.text_lines import (
 from fieldcal.importing.text_source import TextSource
 from fieldcal.importing.text_top import (
     headings_above,
-    is_number,
     numbers_of,
     rate_above,
+    rows_begin,
     separator_of,
 )
 
@@ -251,7 +252,7 @@ class TextColumns(ColumnRecording):
         lines = [""]
         for many in (NAMED, TOP):
             lines = top_lines(data, many)
-            self._skip = self._heading(lines, use)
+            self._skip = rows_begin(lines, self.wanted, use)
             if 0 <= self._skip < len(lines):
                 break
         return lines
@@ -285,27 +286,6 @@ class TextColumns(ColumnRecording):
     def _top(self) -> list[str]:
         """First lines, as they stand in the file."""
         return self._text.top()
-
-    def _heading(self, lines: Sequence[str], use: Sequence[int]) -> int:
-        """How many lines at the top hold something else than numbers; -1 if all do."""
-        if self.wanted.skip is not None:
-            return self.wanted.skip
-        width = len(self.wanted.columns)
-        full = max(
-            (width_of(line, self._parted(line)) for line in lines[:50]), default=0
-        )
-        for i, line in enumerate(lines):
-            separator = self._parted(line)
-            cells = [c.strip() for c in line.split(separator)]
-            wanted = [cells[j] for j in use if j < len(cells)]
-            whole = separator is None or len(cells) == full or len(cells) == width
-            comma = separator != ","
-            if whole and any(wanted) and all(is_number(c, comma) for c in wanted if c):
-                return i
-        return -1
-
-    def _parted(self, line: str) -> str | None:
-        return self.wanted.separator or separator_of(line)
 
     def _check_width(self, line: str, separator: str | None) -> None:
         width, named = width_of(line, separator), len(self.wanted.columns)

@@ -6,59 +6,29 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from shlex import quote
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing import column_physics, columns, headings
-from fieldcal.importing.column_times import (
-    coarse_question,
-    counted_question,
-    counts_rows,
-    is_clock_number,
-    rates_of_turns,
-    split_seconds,
+from fieldcal.importing.column_clock import (
+    ColumnClock,
+    Heading,
+    ask_rate,
+    numbers_of,
 )
 from fieldcal.importing.gravity_size import are_means
 from fieldcal.importing.heading_words import meaning
-from fieldcal.importing.headings import Column, HeadingMatch
+from fieldcal.importing.headings import HeadingMatch
 from fieldcal.importing.means import scatter_columns
 from fieldcal.importing.recording import (
-    CLOCK_NUMBER,
     ImuStream,
     MeanScatter,
     ReadOptions,
     Recording,
 )
-from fieldcal.importing.row_times import FRACTIONS
-from fieldcal.importing.time_units import (
-    coarse_clock,
-    unit_by_rate,
-    unit_of_ticks,
-)
-
-TICK = "fine"
-"""Part of the name of times that count ticks: ``SampleTimeFine``."""
-
-
-BOSCH = ("sensortime", "39.0625us")
-"""Name of the counter of sensors by Bosch, and what it counts."""
-
-
-class Heading(NamedTuple):
-    """Columns of a file, as it names them.
-
-    Attributes
-    ----------
-    columns : in the order of the file
-    skip : what stands for a column that is not wanted; "" where columns have names
-
-    """
-
-    columns: Sequence[Column]
-    skip: str = ""
 
 
 class ColumnRecording(Recording):
@@ -88,7 +58,7 @@ class ColumnRecording(Recording):
         """Return the IMUs in it."""
         found = self.imus()
         for wanted in found.values():
-            self._check_time(wanted)
+            ask_rate(self, wanted)
             columns.check(wanted)
         return [
             ImuStream(name, f"columns in {columns.units(wanted)}")
@@ -114,8 +84,7 @@ class ColumnRecording(Recording):
             own = not self.wanted.columns
             found = self._found()
             self.imus_found = {
-                name: self._signed(self._rated(self._clocked(one) if own else one, own))
-                for name, one in found.items()
+                name: ColumnClock(self, one, own).settled for name, one in found.items()
             }
             if len(self.imus_found) == 1:
                 (self.wanted,) = self.imus_found.values()
@@ -127,7 +96,7 @@ class ColumnRecording(Recording):
     def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""
         table, wanted = self.beginning(), self.wanted
-        at = self._numbers_of(wanted)
+        at = numbers_of(self, wanted)
         if not {"ax", "ay", "az"} <= set(at) or not len(table):
             return None
         if not are_means(table[:, [at["a" + axis] for axis in "xyz"]]):
@@ -140,107 +109,6 @@ class ColumnRecording(Recording):
                 values[:, i] = table[:, where[channel]]
         count = table[:, where["n"]] if "n" in where else None
         return MeanScatter(values, count, columns.has_time(wanted.columns))
-
-    def _numbers_of(self, wanted: ReadOptions) -> dict[str, int]:
-        """Number of each channel's column among those of `beginning`."""
-        names = [c.partition("=") for c in wanted.columns]
-        if not any(place for _, _, place in names):
-            return {name: i for i, (name, _, _) in enumerate(names)}
-        places = [c.place for way in self.heading() for c in way.columns]
-        return {n: places.index(p) for n, _, p in names if p in places}
-
-    def _signed(self, wanted: ReadOptions) -> ReadOptions:
-        """Options with the kinds of channel whose sign was not read."""
-        table, at = self.beginning(), self._numbers_of(wanted)
-        threes = {k: [at[k + x] for x in "xyz" if k + x in at] for k in "ag"}
-        found = {kind for kind, three in threes.items()
-                 if three and max(three) < table.shape[1]
-                 and columns.are_unsigned(table[:, three])}  # fmt: skip
-        if found:
-            self.guessed["counts"] = "of 16 bits with a sign: 65535 is -1"
-        return replace(wanted, unsigned=frozenset(found))
-
-    def _clocked(self, wanted: ReadOptions) -> ReadOptions:
-        """Options with both columns of a clock that has its seconds in one of them."""
-        table, at = self.beginning(), self._numbers_of(wanted)
-        own = [at[name] for name in ("t", "dt") if name in at]
-        wholes = own or [i for i in range(table.shape[1]) if i not in at.values()]
-        split = split_seconds(table, wholes)
-        if split is None or wanted.rate_hz:
-            return wanted
-        named = [c for c in wanted.columns]
-        places = [c.place for way in self.heading() for c in way.columns]
-        for i, name in ((split.whole, "t"), (split.fraction, split.name)):
-            if len(named) == table.shape[1] and not any("=" in c for c in named):
-                named[i] = name
-            elif f"{name}={places[i]}" not in named:
-                named = [*(c for c in named if not c.endswith(f"={places[i]}")),
-                         f"{name}={places[i]}"]  # fmt: skip
-        self.says.append("its clock has whole seconds and what is beyond them apart")
-        return replace(wanted, columns=tuple(named), time_unit="s")
-
-    def _rated(self, wanted: ReadOptions, own: bool) -> ReadOptions:
-        """Options with the rate that the file says, or with the unit of its times.
-
-        Parameters
-        ----------
-        wanted : of one IMU
-        own : whether the columns are those that the file says
-
-        """
-        if columns.has_time(wanted.columns):
-            return self._ticked(wanted, own)
-        if wanted.rate_hz:
-            return wanted
-        said = self.rate_said()
-        if said is None:
-            at = self._numbers_of(wanted)
-            three = [at[c] for c in ("ax", "ay", "az") if c in at]
-            table = self.beginning() if len(three) == len("xyz") else np.empty((0, 0))
-            means = len(table) and are_means(table[:, three])
-            # of means nobody knows when: they are counted
-            return replace(wanted, rate_hz=1.0) if means else wanted
-        rate, where = said
-        sentence = f"it says the rate: {where!r}"
-        self.says += [sentence] if sentence not in self.says else []
-        return replace(wanted, rate_hz=rate)
-
-    def _ticked(self, wanted: ReadOptions, own: bool) -> ReadOptions:
-        """Options with the unit of times, where the rate or their name tells it.
-
-        Raises
-        ------
-        InputError
-            If its times are too coarse to say when a row was taken.
-
-        """
-        table, at = self.beginning(), self._numbers_of(wanted).get("t", -1)
-        if not 0 <= at < table.shape[1]:
-            return wanted
-        t = table[:, at]
-        both = any(name in self._numbers_of(wanted) for name in FRACTIONS)
-        if not both and (coarse := coarse_clock(t)) is not None:
-            raise InputError(f"{self.path}: {coarse_question(wanted, coarse, t)}")
-        if wanted.time_unit:
-            return wanted
-        if is_clock_number(t):
-            self.guessed["time"] = f"{CLOCK_NUMBER}: no second of a minute is beyond 60"
-            return replace(wanted, time_unit=CLOCK_NUMBER)
-        said = self.rate_said()
-        if own and said is None and counts_rows(t):
-            raise InputError(f"{self.path}: {counted_question(wanted, table)}")
-        names = [c.name for way in self.heading() for c in way.columns[at : at + 1]]
-        unit, why = "", "its name says ticks"
-        if said is not None:
-            unit, why = unit_by_rate(t, said[0]), f"it says the rate: {said[1]!r}"
-        elif any(TICK in name.lower() for name in names):
-            unit = unit_of_ticks(t)
-        elif any(BOSCH[0] in name.lower() for name in names):
-            unit, why = BOSCH[1], "its name is that of Bosch's counter"
-        if unit in ("", "s"):
-            return wanted
-        self.guessed["time"] = f"{unit}: {why}"
-        return replace(wanted, time_unit=unit)
 
     def _found(self) -> dict[str, ReadOptions]:
         if self.wanted.columns:
@@ -313,25 +181,6 @@ class ColumnRecording(Recording):
             f" nothing tells whether {which} are the accelerometers: add --columns"
             f" {quote(with_them)} if they are, or --columns"
             f" {quote(','.join(_as_option(known, places, way.skip)))}"
-        )
-
-    def _check_time(self, wanted: ReadOptions) -> None:
-        """Ask for the rate where no column is the time.
-
-        Raises
-        ------
-        InputError
-            With what the turns say of it.
-
-        """
-        if columns.has_time(wanted.columns) or wanted.rate_hz or not wanted.columns:
-            return
-        turns = rates_of_turns(wanted, self.beginning())
-        unit, about = next(iter(turns.items()), ("", 100.0))
-        hint = f", which its turns say about, if rates are in {unit}" if unit else ""
-        raise InputError(
-            f"{self.path}: no column is t, the time: give the rate, e.g. --rate"
-            f" {about:.3g}{hint}"
         )
 
 

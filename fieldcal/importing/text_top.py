@@ -13,10 +13,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.column_recording import Heading
+from fieldcal.importing.column_clock import Heading
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.heading_units import unit_in
 from fieldcal.importing.headings import Column
+from fieldcal.importing.recording import ReadOptions
 
 SEPARATORS = (";", "\t", ",")
 """Between columns; a comma in a line with one of the others is a decimal comma."""
@@ -26,6 +27,9 @@ ABOVE = 4
 
 LATEST = 50
 """Lines below the first of numbers among which their names are looked for."""
+
+FULL = 50
+"""Lines at the top by which the width of a row is judged."""
 
 NUMBERS = 0.5
 """Share of the cells of a line that are numbers, where names of columns are not."""
@@ -80,6 +84,30 @@ def first_numbers(lines: Sequence[str], separator: str | None) -> int:
         if many > NUMBERS * len(said) and many >= min(3, width) and wide:
             return i
     return len(lines)
+
+
+def rows_begin(lines: Sequence[str], wanted: ReadOptions, use: Sequence[int]) -> int:
+    """How many lines at the top hold something else than numbers; -1 if all do.
+
+    Parameters
+    ----------
+    lines : at the top
+    wanted : columns of the text, and its separator where the user says it
+    use : numbers of the columns that are read
+
+    """
+    if wanted.skip is not None:
+        return wanted.skip
+    parted = [wanted.separator or separator_of(line) for line in lines]
+    rows = [line.split(s) for line, s in zip(lines, parted, strict=True)]
+    width, full = len(wanted.columns), max(map(len, rows[:FULL]), default=0)
+    for i, (row, separator) in enumerate(zip(rows, parted, strict=True)):
+        said = [row[j].strip() for j in use if j < len(row)]
+        whole = separator is None or len(row) in (full, width)
+        numbers = all(is_number(cell, separator != ",") for cell in said if cell)
+        if whole and any(said) and numbers:
+            return i
+    return -1
 
 
 def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]:

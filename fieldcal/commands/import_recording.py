@@ -98,7 +98,11 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
         default="",
         help="rad/s, mrad/s, deg/s, mdeg/s, udeg/s, deg/h, V, count",
     )
-    add("--time-unit", default="", help="s, ms, 0.1ms, 39.0625us, us, ns, d, hhmmss")
+    add(
+        "--time-unit",
+        default="",
+        help="s, ms, us, ns, min, d, hhmmss …",
+    )
     add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--temp-unit", default="", help="degC, cdegC, K, count, none")

@@ -28,7 +28,13 @@ from fieldcal.importing.gravity_size import are_means
 from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
 from fieldcal.importing.row_times import FRACTIONS
-from fieldcal.importing.time_units import coarse_clock, unit_by_rate, unit_of_ticks
+from fieldcal.importing.time_units import (
+    TICKED,
+    coarse_clock,
+    counts_from_long_ago,
+    unit_by_rate,
+    unit_of_ticks,
+)
 
 TICK = "fine"
 """Part of the name of times that count ticks: ``SampleTimeFine``."""
@@ -167,6 +173,9 @@ class ColumnClock:
                 f"{CLOCK_NUMBER}: no second of a minute is beyond 60"
             )
             return replace(wanted, time_unit=CLOCK_NUMBER)
+        if counts_from_long_ago(t):
+            self._of.guessed["time"] = f"{TICKED}, as Windows and .NET count them"
+            return replace(wanted, time_unit=TICKED)
         said = self._of.rate_said()
         if self._own and said is None and counts_rows(t):
             raise InputError(f"{self._of.path}: {counted_question(wanted, table)}")

@@ -27,6 +27,7 @@ SPELLINGS = {
            "microsecond"),
     "ns": ("ns", "nsec", "nsecs", "nano", "nanos", "nanosec", "nanosecs",
            "nanoseconds", "nanosecond"),
+    "min": ("min", "mins", "minute", "minutes"),
     "deg C": ("c", "°c", "°", "degc", "deg c", "celsius", "℃", "degrees c", "deg.c",
               "ºc"),
 }  # fmt: skip
@@ -40,7 +41,7 @@ TELLING = ("m/s^2", "mm/s^2", "rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "d
 UNITS = {
     "a": ("m/s^2", "mm/s^2", "cm/s^2", "g", "mg", "ug"),
     "g": ("rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "deg/h"),
-    "t": ("s", "ms", "us", "ns"),
+    "t": ("s", "ms", "us", "ns", "min"),
     "dt": ("s", "ms", "us", "ns"),
     "temperature": ("deg C",),
     "m": (),

@@ -66,7 +66,7 @@ def labelled_values(line: str) -> list[Labelled]:
     rest = rest[ticks.end() :] if ticks else rest
     rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest
     parts = _LABEL.split(rest)
-    if len(parts) < len(AXES) or parts[0].strip(" \t,;|"):
+    if len(parts) < len(AXES) or parts[0].strip(" \t,;|#"):
         return []
     read: list[tuple[str, str, str]] = []
     for label, text in zip(parts[1::2], parts[2::2], strict=True):

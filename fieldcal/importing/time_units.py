@@ -22,6 +22,12 @@ SHORTEST = 5.0
 
 TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "d": 1 / 86400}
 
+TICKED = "100ns"
+"""Unit in which Windows and .NET count."""
+
+EPOCHS = (11644473600.0, 62135596800.0)
+"""Time from where they count, 1601 and the year 1, to 1970, s."""
+
 SHARED = 0.5
 """Part of the rows whose time is that of the row before, of a clock too coarse."""
 
@@ -46,10 +52,20 @@ def time_units(t: Array) -> list[str]:
     return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST] or usual
 
 
+def counts_from_long_ago(t: Array) -> bool:
+    """Whether times (n,) count 100 ns from 1601 or the year 1, and are today's.
+
+    >>> counts_from_long_ago(np.array([638503500000000000.0]))
+    True
+    """
+    since = float(np.nanmedian(t)) * TIME_UNITS[TICKED]
+    return any(UNIX[0] <= since - epoch < UNIX[1] for epoch in EPOCHS)
+
+
 def step_of(t: Array) -> float:
     """Usual distance of times (n,), s, if one unit alone fits them; else 0."""
     fits = time_units(t)
-    return _step(t) / TIME_SIZES[fits[0]] if len(fits) == 1 else 0.0
+    return _step(t) * TIME_UNITS[fits[0]] if len(fits) == 1 else 0.0
 
 
 TICKS = ("0.1ms", "us")

@@ -18,7 +18,7 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing.gravity_size import Gravity, are_means, gravity_in, with_length
 from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.recording import TIME_UNITS, ReadOptions, Recording
 from fieldcal.importing.scales import (
     ACC_OUT,
     ACC_SCALES,
@@ -29,7 +29,7 @@ from fieldcal.importing.scales import (
     gains,
 )
 from fieldcal.importing.thermometers import temperature_counts, temperature_fits
-from fieldcal.importing.time_units import TIME_SIZES, step_of, time_units
+from fieldcal.importing.time_units import step_of, time_units
 from fieldcal.importing.unit_answers import answers, as_written, unusual
 from fieldcal.importing.unit_doubts import SaidUnits, hold_own_units
 
@@ -164,11 +164,11 @@ class _Guess:
         steps = np.diff(t[np.isfinite(t)])
         step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
         if len(fits) == 1 and fits != ["s"]:
-            rate = TIME_SIZES[fits[0]] / step if step else np.nan
+            rate = 1 / (TIME_UNITS[fits[0]] * step) if step else np.nan
             self.said = replace(self.said, time_unit=fits[0])
             self.found["time"] = f"{fits[0]}, which makes {rate:.4g} Hz"
         elif len(fits) > 1:
-            rates = (f"{TIME_SIZES[u] / step:.4g} Hz in {u}" for u in fits)
+            rates = (f"{1 / (TIME_UNITS[u] * step):.4g} Hz in {u}" for u in fits)
             self._ask(
                 f"its times may be {' or '.join(rates)}",
                 [f"--time-unit {u}" for u in fits],

@@ -88,6 +88,8 @@ def matlab_arrays(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
     loaded: dict[str, Any] = loadmat(path, simplify_cells=True)
+    # where objects are kept is no array of the user's
+    loaded.pop("__function_workspace__", None)
     return loaded
 
 

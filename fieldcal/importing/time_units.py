@@ -58,7 +58,8 @@ def counts_from_long_ago(t: Array) -> bool:
     >>> counts_from_long_ago(np.array([638503500000000000.0]))
     True
     """
-    since = float(np.nanmedian(t)) * TIME_UNITS[TICKED]
+    known = t[np.isfinite(t)]
+    since = float(np.median(known)) * TIME_UNITS[TICKED] if len(known) else 0.0
     return any(UNIX[0] <= since - epoch < UNIX[1] for epoch in EPOCHS)
 
 

@@ -147,6 +147,11 @@ FORMS: dict[str, Writer] = {
     "hours in one number": lambda: lines(
         [c[:-4] for c in clock("%H%M%S.%f")], A, W, head=f"time,{SIX}"
     ),
+    "ticks of Windows": lambda: lines(
+        [f"{133600000000000000 + round(t * 1e7)}" for t in T.tolist()], A, W,
+        head=f"Timestamp,{SIX}",
+    ),
+    "minutes": lambda: lines(T / 60, A, W, head=f"time (min),{SIX}"),
     "a counter that ends": lambda: lines(
         np.mod(T * 1e6 + 2**32 - 9e6, 2**32), A, W, head=f"t_us,{SIX}"
     ),

@@ -51,7 +51,7 @@ def matched(real: Side, sim: Side) -> Match:
     differences = tuple(sorted(apart, key=lambda d: -d.probability))
     verdict = _verdict(differences)
     predicted = prediction.before(found), prediction.after(real)
-    warnings = (*_of(real), *_of(sim), *_quieted(sim))
+    warnings = (*_of(real), *_of(sim), *_quieted(sim), *_missing(found))
     return Match(
         verdict,
         _probability(found, differences),
@@ -83,6 +83,21 @@ def _probability(found: causes.Decided, differences: Sequence[Difference]) -> fl
 def _of(one: Side) -> list[str]:
     """Warnings of one diagnosis, with whose they are."""
     return [f"{one.name}: {warning}" for warning in one.diagnosis.warnings]
+
+
+def _missing(found: causes.Decided) -> list[str]:
+    """Outputs that one of the two has not."""
+    ours, theirs = found.real.observed, found.sim.observed
+    real, sim = found.pairing.real, found.pairing.sim
+    out = []
+    for one, lost in (
+        (sim, np.setdiff1d(ours, theirs)),
+        (real, np.setdiff1d(theirs, ours)),
+    ):
+        if len(lost):
+            names = ", ".join(CHANNELS[c] for c in lost)
+            out.append(f"{one.name}: has nothing of {names}, so they are not compared")
+    return out
 
 
 def _quieted(sim: Side) -> list[str]:

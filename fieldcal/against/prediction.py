@@ -13,6 +13,7 @@ With what was found, each position is left out and predicted from the others
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,18 +29,20 @@ from fieldcal.model import priors
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.system.fitted import Fitted, whole
 from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.window_rows import Linear
 
 
 def before(found: Decided) -> Prediction:
-    """The recording as the simulator is."""
+    """The recording as the simulator is; outputs that this has not are left aside."""
     real = found.pairing.asked[0]
     rows = found.pairing.real.explanation.rows
     columns, values, covariance = _as_the_simulator(found)
-    fitted = Fitted(rows, real.inference.dictionary, real.linear, real.values, real.set)
+    linear = [p for p in real.linear if p.channel in found.sim.observed]
+    fitted = Fitted(rows, real.inference.dictionary, linear, real.values, real.set)
     state = replace(real.set.state, columns=columns, estimate=values)
     residual = fitted.residual(whole(state, real.inference.dictionary))
-    squares = _squares(real, columns, values, covariance)
-    return _prediction(rows, residual, squares, sum(len(p.white) for p in real.linear))
+    squares = _squares(real, linear, columns, values, covariance)
+    return _prediction(rows, residual, squares, sum(len(p.white) for p in linear))
 
 
 def after(real: Side) -> Prediction:
@@ -81,7 +84,7 @@ def _as_the_simulator(found: Decided) -> tuple[Index, Array, Array]:
         base += [0.0] * 3
     for cause, group in sim.set.members:
         ours = real.member(cause.key)
-        if ours is None or not group.in_state or group.position >= 0:
+        if ours is None or cause.kind != "effect":  # what is random predicts nothing
             continue
         for j, at in zip(group.params, group.columns.tolist(), strict=True):
             if j in ours[1].params:
@@ -94,11 +97,17 @@ def _as_the_simulator(found: Decided) -> tuple[Index, Array, Array]:
     return np.array(columns, dtype=np.intp), values + np.array(base), covariance
 
 
-def _squares(real: Widened, columns: Index, values: Array, covariance: Array) -> float:
+def _squares(
+    real: Widened,
+    linear: Sequence[Linear],
+    columns: Index,
+    values: Array,
+    covariance: Array,
+) -> float:
     """Squares of what is predicted, windows alone, (1)."""
     d = real.inference.dictionary
     some = np.flatnonzero(real.inference.wanted(real.set.members) | (real.values != 0))
-    rows = gram(real.linear, d, real.values, (), some)
+    rows = gram(linear, d, real.values, (), some)
     tau = priors.SIZES[list(real.set.sizes.instability)] * real.search.unstable
     weighed = rows.weighed(tau)
     inner, pull = weighed.matrix(columns, columns), weighed.pull(columns)

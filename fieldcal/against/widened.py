@@ -47,6 +47,11 @@ class Widened:
     linear: Sequence[Linear]
     values: Array
 
+    @property
+    def observed(self) -> Index:
+        """Channels that say something."""
+        return self.inference.dictionary.observed
+
     def member(self, key: str) -> Member | None:
         """A cause by its key, with its variant."""
         return next((m for m in self.set.members if m[0].key == key), None)

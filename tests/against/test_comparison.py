@@ -49,6 +49,7 @@ def against(real: Side, device: dict[str, Any], seed: int = 2) -> Match:
     return matched(real, side("simulator", *played(device, seed, LATER), real))
 
 
+@pytest.mark.thorough
 def test_a_simulator_without_the_earths_rate() -> None:
     quiet = {"noise": {"acc": [0.005] * 3, "gyr": [5e-5] * 3}}
     block, about = played(quiet, 1)
@@ -60,6 +61,16 @@ def test_a_simulator_without_the_earths_rate() -> None:
     north, sigma = value(found, "earth_rate", "z")
     assert abs(north - 7.292e-5 * np.cos(0.88)) < 4 * sigma
     assert found.before.chi2_per_dof > 2 > 1.2 > found.after.chi2_per_dof
+
+
+@pytest.mark.thorough
+def test_outputs_that_the_simulator_has_not_are_left_aside(real: Side) -> None:
+    block, about = played(DEVICE, 2)
+    blind = replace(block, gyr=np.full_like(block.gyr, np.nan))
+    found = matched(real, side("simulator", blind, about, real))
+    assert found.verdict == "consistent"
+    assert found.before.chi2_per_dof == pytest.approx(1.0, abs=0.15)
+    assert any("nothing of gx, gy, gz" in warning for warning in found.warnings)
 
 
 def value(found: Match, name: str, parameter: str) -> tuple[float, float]:

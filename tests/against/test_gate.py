@@ -92,19 +92,27 @@ def test_junit_has_a_case_for_everything_and_numbers_to_follow(tmp_path: Path) -
 
 
 def test_the_fixture_fails_with_what_differs(
-    tmp_path: Path, simulator_matches: Callable[..., Match]
+    tmp_path: Path,
+    simulator_matches: Callable[..., Match],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    folders: list[Path] = []
-    for name, bias in (("real", 0.0), ("simulated", 0.05)):
-        noise = {"acc": [0.02] * 3, "gyr": [1e-3] * 3}
-        device = {"noise": noise, "bias": {"acc": [bias, 0, 0]}, "seed": len(folders)}
-        table = strapdown.outputs(device)
-        none = np.full(len(table), np.nan)
-        block = Block.of(table[:, 0], table[:, 1:4], table[:, 4:], none, none, none)
-        site = {"gravity": strapdown.GRAVITY}
-        places = strapdown.schedule()
-        folders.append(write_session(tmp_path / name, block, places, site=site))
+    """What is compared is what the files hold; how that differs is given here."""
+    table = strapdown.outputs({})
+    none = np.full(len(table), np.nan)
+    block = Block.of(table[:, 0], table[:, 1:4], table[:, 4:], none, none, none)
+    folders = [
+        write_session(tmp_path / name, block, strapdown.schedule())
+        for name in ("real", "simulated")
+    ]
+    given: list[tuple[Block, Any]] = []
+
+    def compared(*two: Any) -> Match:
+        given.extend(two[:2])
+        return match(differing("acc_bias", 0.1, 0.08))
+
+    monkeypatch.setattr("fieldcal.against.compare", compared)
     with pytest.raises(pytest.fail.Exception, match="differs: acc bias"):
         simulator_matches(*folders)
-    found = simulator_matches(*folders, acc_bias=0.1)
+    found = simulator_matches(*map(str, folders), acc_bias=0.1)
     assert [d.id for d in found.differences] == ["acc_bias"]
+    assert all(len(b) == len(block) and a.positions for b, a in given)

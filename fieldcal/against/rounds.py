@@ -39,7 +39,7 @@ class Round:
 
     Attributes
     ----------
-    patch : what it was run with
+    patch : what it was run with; of the last, with what the format has nothing for
     match : how its output compares
     says : what the user must know of the output
 
@@ -64,6 +64,8 @@ def rounds(
     tell: Callable[[int, Round], None],
 ) -> list[Round]:
     """Run and patch until nothing differs, or `most` patches were tried.
+
+    Where the format has nothing for what is left, a further patch would be the same.
 
     Parameters
     ----------
@@ -90,11 +92,14 @@ def rounds(
     for number in range(most + 1):
         block, placed, said = _run(command, real, about, form, model)
         found = matched(real, side(command, block, placed, real))
-        done.append(Round(model, found, tuple(said)))
+        after = patched(found, model)
+        left = {one.id for one in found.differences}
+        last = not left & set(patches.patch_format(form).HOLDS)
+        done.append(Round(after if last else model, found, tuple(said)))
         tell(number, done[-1])
-        if not found.differences:
+        if last:
             break
-        model = patched(found, model)
+        model = after
     return done
 
 

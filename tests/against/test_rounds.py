@@ -13,6 +13,7 @@ import sitl_like
 from session_folders import write_session
 from strapdown import GRAVITY, schedule
 
+from fieldcal.against import rounds as module
 from fieldcal.against.result import Difference, Facts, Match, Pair, Prediction
 from fieldcal.against.rounds import rounds
 from fieldcal.against.sensor_model import SensorModel, patched
@@ -108,6 +109,20 @@ def differing(*differences: Difference) -> Match:
     return Match(
         "left_out", 1.0, differences, (), nothing, nothing, facts, facts, (), ""
     )  # fmt: skip
+
+
+def test_what_a_format_has_nothing_for_ends_the_rounds(
+    folder: Path, real: Side, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    even = {"z": pair(3e-4, 0.0, "1/(m/s^2)")}
+    given = differing(Difference("quadratic", "left_out", 1.0, even))
+    monkeypatch.setattr(module, "_run", lambda *_: (real.block, None, []))
+    monkeypatch.setattr(module, "side", lambda *_: real)
+    monkeypatch.setattr(module, "matched", lambda *_: given)
+    about = Session.open(folder).about
+    for form, runs in (("px4", 1), ("json", 4)):
+        done = rounds("simulate {patch} {out}", real, about, form, 3, lambda *_: None)
+        assert len(done) == runs and done[-1].patch.changed == ("quadratic",)
 
 
 def test_what_a_simulator_has_beyond_its_parameters_is_made_up_for() -> None:

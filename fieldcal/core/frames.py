@@ -1,11 +1,13 @@
 """Turns, the mounting of the device, and what its sensors experience at rest.
 
-Procedure axes at home (alpha = beta = 0): x East, y down, z North, right-handed. The
-device is turned by alpha about z, then by beta about the turned x:
+Procedure axes at home (all angles 0): x East, y down, z North, right-handed. The device
+is turned by alpha about z, then by beta about the turned x, and where a third angle is
+given, by gamma about the y that both have turned:
 
     A1 = [[ca, sa, 0], [-sa, ca, 0], [0, 0, 1]]                     (1)
     A2 = [[1, 0, 0], [0, cb, sb], [0, -sb, cb]]                     (2)
-    A  = A2 A1                                                      (3)
+    A3 = [[cc, 0, -sc], [0, 1, 0], [sc, 0, cc]]
+    A  = A3 A2 A1                                                   (3)
     f  = A (0, -g, 0)                                               (4)
     w  = A Omega (0, -sin phi, cos phi)                             (39)
 
@@ -29,19 +31,44 @@ from fieldcal.core.samples import Array
 EARTH_RATE = 7.292115e-5
 """Angular rate of the Earth, rad/s (WGS84)."""
 
+UPRIGHT = 1e-9
+"""Cosine of beta below which alpha and gamma turn about the same axis."""
 
-def turn(alpha: ArrayLike, beta: ArrayLike) -> Array:
+
+def turn(alpha: ArrayLike, beta: ArrayLike, gamma: ArrayLike | None = None) -> Array:
     """Direction cosines from base to procedure axes after the turns, (..., 3, 3).
 
     Parameters
     ----------
-    alpha, beta : rad, broadcast against each other
+    alpha, beta, gamma : rad, broadcast against each other; no third turn if not given
 
     >>> np.round(turn(0.0, np.pi / 2) @ [0, -1, 0], 12) + 0.0
     array([0., 0., 1.])
     """
     alpha, beta = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(beta, float))
-    return np.stack([in_turned_axes(alpha, beta, axis) for axis in np.eye(3)], axis=-1)
+    columns = [in_turned_axes(alpha, beta, axis, gamma) for axis in np.eye(3)]
+    return np.stack(columns, axis=-1)
+
+
+def turns_of(matrix: ArrayLike) -> Array:
+    """Angles alpha, beta, gamma, rad, of direction cosines (..., 3, 3), (..., 3).
+
+    The inverse of `turn`; beta is in [-pi/2, pi/2]. Where it is a right angle alpha and
+    gamma turn about one axis, and gamma is 0.
+
+    >>> np.round(turns_of(turn(2.5, -0.4, -1.2)), 9).tolist()
+    [2.5, -0.4, -1.2]
+    """
+    a = np.asarray(matrix, float)
+    down = np.hypot(a[..., 1, 0], a[..., 1, 1])
+    one = down < UPRIGHT  # axis for both
+    alpha = np.where(
+        one,
+        np.arctan2(a[..., 0, 1], a[..., 0, 0]),
+        np.arctan2(-a[..., 1, 0], a[..., 1, 1]),
+    )
+    gamma = np.where(one, 0.0, np.arctan2(-a[..., 0, 2], a[..., 2, 2]))
+    return np.stack([alpha, np.arctan2(a[..., 1, 2], down), gamma], axis=-1)
 
 
 def way(before: Array, alpha: Array, beta: Array) -> Array:
@@ -59,7 +86,9 @@ def way(before: Array, alpha: Array, beta: Array) -> Array:
     return vectors
 
 
-def in_turned_axes(alpha: Array, beta: Array, vector: Array) -> Array:
+def in_turned_axes(
+    alpha: Array, beta: Array, vector: Array, gamma: ArrayLike | None = None
+) -> Array:
     """A vector (3,) of base axes in procedure axes after the turns, (..., 3).
 
     As `turn` times the vector, where only that is wanted.
@@ -74,7 +103,14 @@ def in_turned_axes(alpha: Array, beta: Array, vector: Array) -> Array:
     out[..., 0] = x * ca + y * sa  # (3)
     out[..., 1] = on * cb + z * sb
     out[..., 2] = z * cb - on * sb
-    return out
+    return out if gamma is None else about_y(out, np.asarray(gamma, float))
+
+
+def about_y(vector: Array, gamma: Array) -> Array:
+    """Vectors (..., 3) in axes that are turned about y by gamma, rad; A3 of (3)."""
+    c, s = np.cos(gamma), np.sin(gamma)
+    x, y, z = np.moveaxis(vector, -1, 0)
+    return np.stack([c * x - s * z, y + 0.0 * c, s * x + c * z], axis=-1)
 
 
 def force_home(gravity: float) -> Array:
@@ -82,13 +118,18 @@ def force_home(gravity: float) -> Array:
     return np.array([0.0, -gravity, 0.0])
 
 
-def force(alpha: ArrayLike, beta: ArrayLike, gravity: float) -> Array:
+def force(
+    alpha: ArrayLike,
+    beta: ArrayLike,
+    gravity: float,
+    gamma: ArrayLike | None = None,
+) -> Array:
     """Specific force at rest in procedure axes, (..., 3) m/s^2, (4).
 
     >>> np.round(force(0.0, 0.0, 9.81), 3) + 0.0
     array([ 0.  , -9.81,  0.  ])
     """
-    at_rest: Array = turn(alpha, beta) @ force_home(gravity)  # (4)
+    at_rest: Array = turn(alpha, beta, gamma) @ force_home(gravity)  # (4)
     return at_rest
 
 

@@ -21,6 +21,8 @@ class Position:
     name : shown to the operator
     alpha, beta : turns (1), (2) from home, rad
     rate : constant rate about the procedure axes on a rate table, rad/s
+    gamma : third turn, rad
+    sigma : how well all this is known, rad about any axis; None if the site says so
 
     """
 
@@ -28,14 +30,20 @@ class Position:
     alpha: float | None = None
     beta: float | None = None
     rate: tuple[float, float, float] | None = None
+    gamma: float = 0.0
+    sigma: float | None = None
 
     @classmethod
-    def deg(cls, alpha: float, beta: float, name: str = "") -> Position:
+    def deg(
+        cls, alpha: float, beta: float, name: str = "", gamma: float = 0.0
+    ) -> Position:
         """Position from angles in degrees."""
+        third = f", γ = {gamma:g}°" if gamma else ""
         return cls(
-            name or f"α = {alpha:g}°, β = {beta:g}°",
+            name or f"α = {alpha:g}°, β = {beta:g}°{third}",
             float(np.deg2rad(alpha)),
             float(np.deg2rad(beta)),
+            gamma=float(np.deg2rad(gamma)),
         )
 
     @property
@@ -45,8 +53,8 @@ class Position:
 
     @property
     def degrees(self) -> tuple[float, float] | None:
-        """Both angles in degrees, if known."""
-        if self.alpha is None or self.beta is None:
+        """Both angles in degrees, if known and all that there is to the position."""
+        if self.alpha is None or self.beta is None or self.gamma:
             return None
         alpha, beta = np.rad2deg([self.alpha, self.beta]).round(9).tolist()
         return alpha, beta
@@ -64,9 +72,20 @@ def angles(positions: Sequence[Position]) -> tuple[Array, Array]:
     return table[:, 0], table[:, 1]
 
 
+def third_angles(positions: Sequence[Position]) -> Array:
+    """Gamma of the positions, (n,) rad."""
+    return np.array([p.gamma for p in positions], dtype=float)
+
+
+def attitude_sigmas(positions: Sequence[Position]) -> Array:
+    """How well each position says that it is known, (n,) rad; nan where it does not."""
+    return np.array([p.sigma for p in positions], dtype=float)
+
+
 def forces(positions: Sequence[Position], gravity: float) -> Array:
     """Specific force at rest in procedure axes, (n, 3) m/s^2, nan where unknown."""
-    return force(*angles(positions), gravity)
+    gamma = third_angles(positions)
+    return force(*angles(positions), gravity, gamma if gamma.any() else None)
 
 
 def ladder(positions: Sequence[Position]) -> list[tuple[float, float]]:

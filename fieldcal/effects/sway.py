@@ -18,7 +18,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.frames import turn
 from fieldcal.physics.effect import Line, Param
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
@@ -44,7 +43,6 @@ class Sway(Line):
         axes = np.eye(3)[:, [0, 2]]
         force = -np.cross(axes.T, x.base_force).T
         pattern = np.vstack([force.astype(complex), 2j * np.pi * hz * axes])
-        to_device = x.mounting.T @ turn(x.alpha, x.beta)
-        six = [to_device @ pattern[:3], to_device @ pattern[3:]]
+        six = [x.to_device @ pattern[:3], x.to_device @ pattern[3:]]
         out = np.concatenate(six, axis=1).astype(np.complex128)
         return out * (np.pi / 180)

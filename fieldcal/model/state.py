@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fieldcal.core.frames import turn, turns_of
+from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
@@ -52,6 +54,7 @@ class State:
     small_rotation : (p, 2) small rotations of each position, rad
     earth : (3,) rad/s, rate of the base beyond what is known
     terms : effects
+    attitude : (p, 3) what measured attitudes are off by, rad about the axes of the base
 
     """
 
@@ -60,11 +63,14 @@ class State:
     small_rotation: Array
     earth: Array
     terms: tuple[Term, ...] = ()
+    attitude: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def experienced(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
         """What small rotations, the Earth's rate and motion effects make of rows."""
         if self.small_rotation.any():
             x = rotated(x, self.small_rotation)
+        if self.attitude.any():
+            x = leaned(x, self.attitude)
         if self.earth.any():
             x = x.turned(base_rate=x.base_rate + self.earth)
         terms = (*self.terms, *more) if more else self.terms
@@ -103,6 +109,25 @@ def rotated(x: Experience, small_rotation: Array) -> Experience:
         f[free] *= np.linalg.norm(x.f[free], axis=1, keepdims=True) / length
         x = replace(x, f=f)
     return x
+
+
+def leaned(x: Experience, attitude: Array) -> Experience:
+    """Rows of which each position is held otherwise by a little, (p, 3) rad.
+
+    About the axes of the base; all rows of a position are held alike.
+    """
+    moved = np.flatnonzero(attitude.any(axis=1))
+    first = np.array([int(np.argmax(x.position == p)) for p in moved])
+    there = x.position[first] == moved
+    first, moved = first[there], moved[there]
+    held = turn(x.alpha[first], x.beta[first], x.gamma[first])
+    angles = turns_of(held @ np.swapaxes(exponential(attitude[moved]), 1, 2))
+    table = np.full((len(attitude) + 1, 3), np.nan)
+    table[moved] = angles
+    new = table[x.position]
+    old = np.column_stack([x.alpha, x.beta, x.gamma])
+    alpha, beta, gamma = np.where(np.isnan(new), old, new).T
+    return x.turned(alpha=alpha, beta=beta, gamma=gamma)
 
 
 def across(f: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from fieldcal.core.frames import force_home, in_turned_axes, mean_rotation
+from fieldcal.core.frames import force_home, in_turned_axes, mean_rotation, turn
 from fieldcal.core.samples import Array
 
 STEADY = 1e-3
@@ -31,6 +31,7 @@ class Experience:
     Attributes
     ----------
     alpha, beta : (n,) rad, the turns; nan where not known
+    gamma : (n,) rad, the third turn; 0 where there is none
     f : (n, 3) m/s^2, specific force in device axes
     w : (n, 3) rad/s, angular rate in device axes
     w_dot : (n, 3) rad/s^2, angular acceleration in device axes
@@ -48,6 +49,8 @@ class Experience:
     mounting : (3, 3) P, procedure = P device
     latitude : rad; nan where unknown
     gravity_sigma : m/s^2, what is not known of gravity, 1 sigma
+    attitude_sigma : (n,) rad about any axis, how well the position itself says that its
+        turns are known; nan where it does not
 
     """
 
@@ -70,6 +73,8 @@ class Experience:
     mounting: Array
     latitude: float
     gravity_sigma: float
+    gamma: Array
+    attitude_sigma: Array
 
     @classmethod
     def at_rest(cls, alpha: Array, beta: Array, gravity: float, **known: Any) -> Self:
@@ -104,6 +109,8 @@ class Experience:
             "mounting": np.eye(3),
             "latitude": np.nan,
             "gravity_sigma": 0.0,
+            "gamma": np.zeros(n),
+            "attitude_sigma": np.full(n, np.nan),
         }
         return cls(alpha, beta, **(unknown | known)).turned()
 
@@ -137,17 +144,25 @@ class Experience:
         )
         return known
 
+    @property
+    def to_device(self) -> Array:
+        """Direction cosines from base to device axes, (n, 3, 3); nan where unknown."""
+        third = self.gamma if self.gamma.any() else None
+        return np.asarray(self.mounting.T @ turn(self.alpha, self.beta, third), float)
+
     def turned(self, **changes: Any) -> Self:
         """Make the changes and bring f and w of the oriented rows up to date.
 
-        `changes` are those of alpha, beta, base_force, base_rate, and of f elsewhere.
+        `changes` are those of the angles, base_force, base_rate, and of f elsewhere.
         """
         alpha, beta, base_force, base_rate = (
             changes.get(name, getattr(self, name))
             for name in ("alpha", "beta", "base_force", "base_rate")
         )
-        force = in_turned_axes(alpha, beta, base_force) @ self.mounting
-        earth = in_turned_axes(alpha, beta, base_rate) @ self.mounting
+        gamma = changes.get("gamma", self.gamma)
+        third = gamma if gamma.any() else None
+        force = in_turned_axes(alpha, beta, base_force, third) @ self.mounting
+        earth = in_turned_axes(alpha, beta, base_rate, third) @ self.mounting
         if self.rate.any():
             table = self.rate @ self.mounting
             earth = table + (mean_rotation(table) @ earth[:, :, None])[:, :, 0]

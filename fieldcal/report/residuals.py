@@ -22,7 +22,7 @@ from fieldcal.core.frames import (
     mean_rotation,
     turn,
 )
-from fieldcal.core.positions import rates
+from fieldcal.core.positions import rates, third_angles
 from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import observations
 from fieldcal.model.causes.planned import state_of
@@ -70,7 +70,11 @@ def residuals(material: Material) -> Residuals | None:
 def predicted(found: Calibration, seen: Observations) -> Array:
     """Outputs that the calibration predicts, (n, 6); nan where angles are unknown."""
     x = Experience.at_rest(
-        *seen.angles, seen.gravity, mounting=seen.mounting, rate=rates(seen.positions)
+        *seen.angles,
+        seen.gravity,
+        mounting=seen.mounting,
+        rate=rates(seen.positions),
+        gamma=third_angles(seen.positions),
     )
     if seen.grade == "navigation" and seen.latitude is not None:
         x = x.turned(base_rate=earth_rate_home(seen.latitude))
@@ -93,9 +97,9 @@ def _earth(seen: Observations, left: Array) -> Array:
     if seen.latitude is None or not known.any():
         return np.zeros((len(seen), 3))
     away = np.zeros((len(seen), 3, 3))
-    alpha, beta = seen.angles
+    turns = (*seen.angles, third_angles(seen.positions))
     away[known] = mean_rotation(seen.rates[known]) @ (
-        seen.mounting.T @ turn(alpha[known], beta[known])
+        seen.mounting.T @ turn(*(angle[known] for angle in turns))
     )
     down = away[..., 1] * earth_rate_home(seen.latitude)[1]
     level = away[known][..., [0, 2]].reshape(-1, 2)

@@ -99,7 +99,7 @@ def check_position(
     within = float(np.rad2deg(limit))
     if miss <= limit and not slipped:
         return PositionCheck(True, *seen, limit_deg=within)
-    problem = _explain(wanted, seen, slip if slipped else "")
+    problem = _explain(wanted, seen, slip if slipped else "", np.rad2deg(miss))
     return PositionCheck(False, *seen, problem, within)
 
 
@@ -143,7 +143,7 @@ def _nearest_slip(
 ) -> tuple[str, float]:
     """The slip that would put the device nearest to where it is, and how near, rad."""
     a, b = wanted.degrees or (0.0, 0.0)
-    slips = [
+    turned = [
         ((-a, b), "α is turned the wrong way"),
         ((a, -b), "β is turned the wrong way"),
         ((-a, -b), "both angles are turned the wrong way"),
@@ -153,18 +153,27 @@ def _nearest_slip(
         ((a, 0.0), "β is not turned yet"),
         ((0.0, b), "α is not turned yet"),
     ]
-    slips += [(p.degrees, said) for said, p in others.items() if p.degrees]
-    if held and held.position.degrees:
-        slips.insert(0, (held.position.degrees, "it has not been turned yet"))
-    there = forces([Position.deg(*angles) for angles, _ in slips], gravity)
+    slips = [(p, said) for said, p in others.items() if p.oriented]
+    if wanted.degrees:
+        slips = [*((Position.deg(*at), said) for at, said in turned), *slips]
+    if held and held.position.oriented:
+        slips.insert(0, (held.position, "it has not been turned yet"))
+    if not slips:
+        return "", np.inf
+    there = forces([p for p, _ in slips], gravity)
     away = _without_offset(f, gravity, held) - there
     misses = np.linalg.norm(away, axis=1) / gravity
     best = int(np.argmin(misses))
     return slips[best][1], float(misses[best])
 
 
-def _explain(wanted: Position, seen: tuple[float, float], slip: str) -> str:
-    a, b = wanted.degrees or (0.0, 0.0)
+def _explain(
+    wanted: Position, seen: tuple[float, float], slip: str, off_by: float
+) -> str:
+    if wanted.degrees is None:  # two angles do not say how it stands
+        asked = f"asked for is {wanted.name}"
+        return f"{slip or f'the device is {off_by:.1f}° off'}: {asked}"
+    a, b = wanted.degrees
     now = [round_to_tenth(angle) for angle in seen]
     where = f"the device is at α = {now[0]:.1f}°, β = {now[1]:.1f}°"
     asked = f"asked for is α = {a:g}°, β = {b:g}°"

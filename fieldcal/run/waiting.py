@@ -217,11 +217,16 @@ def _others(hold: Hold, about: Description) -> dict[str, Position]:
     """The plan's other positions, by what is said if the device is in one of them."""
     others = {}
     for i, position in enumerate(about.positions):
-        if position.degrees == hold.position.degrees:
+        if _same(position, hold.position):
             continue
         comes = f", position {hold.index + 1} comes first" if i > hold.index else ""
         others[f"this is position {i + 1}{comes}"] = position
     return others
+
+
+def _same(one: Position, other: Position) -> bool:
+    angles = [(p.alpha, p.beta, p.gamma) for p in (one, other)]
+    return angles[0] == angles[1]
 
 
 def force(acc: Array, about: Description) -> Array:

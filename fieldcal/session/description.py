@@ -25,6 +25,7 @@ from fieldcal.core.gravity import G0, gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.core.shown import one_line
+from fieldcal.session.attitude import held
 from fieldcal.session.schemas import refusal, validator
 
 FORMAT = 1
@@ -299,10 +300,7 @@ def _positions(
 
 def _position(number: int, table: Mapping[str, Any]) -> Position:
     label = one_line(str(table.get("name", "")))
-    if "alpha_deg" in table:
-        position = Position.deg(table["alpha_deg"], table["beta_deg"], label)
-    else:
-        position = Position(label or f"position {number}")
+    position = held(number, table, label)
     rate = table.get("rate_deg_s")
     if rate is None:
         return position

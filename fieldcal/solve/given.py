@@ -203,7 +203,9 @@ class Given(Dictionary):
 
     def _angles(self, sigma: float) -> Iterator[Cause]:
         """How well angles are set: anew in each position, and wherever repeated."""
-        oriented = [p for p in self.held if self.x.oriented[self.x.position == p].all()]
+        x = self.x
+        alike = x.oriented & ~np.isfinite(x.attitude_sigma)  # others have their own
+        oriented = [p for p in self.held if alike[x.position == p].all()]
         if not oriented:
             return
         size = sigma / np.sqrt(2.0)

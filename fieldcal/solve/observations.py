@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.calibration import Nominal
 from fieldcal.core.errors import InputError
-from fieldcal.core.frames import force
-from fieldcal.core.positions import Position, angles, rates
+from fieldcal.core.positions import Position, angles, forces, rates
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array
 from fieldcal.windows import Average
 
@@ -151,7 +150,7 @@ class Observations:
     @property
     def forces(self) -> Array:
         """Specific force at rest in device axes, (n, 3) m/s^2."""
-        seen: Array = force(*self.angles, self.gravity) @ self.mounting
+        seen: Array = forces(self.positions, self.gravity) @ self.mounting
         return seen
 
     @property

@@ -42,6 +42,11 @@ def solve(observations: Observations, asked: Asked) -> Calibration:
             f"the paper prints no {asked.method} method: as printed are two_position"
             " and five_position"
         )
+    if third := [p.name for p in observations.positions if p.gamma]:
+        raise InputError(
+            f"the paper prints formulas for two angles, and {third[0]} has three: leave"
+            " out --as-printed"
+        )
     still = np.flatnonzero(~observations.rotating)
     parts, sentences = [], []
     method = asked.method

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE, force_home
-from fieldcal.core.positions import rates
+from fieldcal.core.positions import attitude_sigmas, rates, third_angles
 from fieldcal.core.samples import ACC, Array
 from fieldcal.model.rows.reduce import Rows, free_force
 from fieldcal.physics.experience import Experience
@@ -32,6 +32,8 @@ def of_means(observations: Observations) -> Recorded:
         f=_force(observations),
         t=np.where(np.isfinite(observations.time), observations.time, index),
         position=index,
+        gamma=third_angles(observations.positions),
+        attitude_sigma=attitude_sigmas(observations.positions),
         rate=rates(observations.positions),
         base_force=force_home(observations.gravity),
         mounting=observations.mounting,

@@ -79,10 +79,10 @@ def windows(
 def _angles(state: State, x: Experience, felt: Array) -> tuple[float, float]:
     """Angles, rad, that the joints are asked for in a position.
 
-    Where none are known, those that bring about the force felt there, (3,) m/s^2, with
-    all that is amiss with the base and the gauges of the joints.
+    Where none are known, or three, those that bring about the force felt there, (3,)
+    m/s^2, with all that is amiss with the base and the gauges of the joints.
     """
-    if x.oriented[0]:
+    if x.oriented[0] and not x.gamma[0]:
         small = state.small_rotation[x.position[0]]
         return float(x.alpha[0] + small[0]), float(x.beta[0] + small[1])
     state = replace(state, small_rotation=np.zeros_like(state.small_rotation))

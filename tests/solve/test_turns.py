@@ -22,12 +22,13 @@ from fieldcal.cli import main
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.gravity import gravity
 from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.evaluation.observations import rests
 from fieldcal.evaluation.solution import Laid
 from fieldcal.evaluation.solution import solved as solve_session
 from fieldcal.model.turns import rotation
-from fieldcal.model.turns.rotation import carry, exponential, small_turns
+from fieldcal.model.turns.rotation import carry, small_turns
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 from fieldcal.windows import Average

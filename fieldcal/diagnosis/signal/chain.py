@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import earth_rate_home, force_home
-from fieldcal.core.positions import angles
+from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.reduce import masked, rate_of, spans, table_rate
@@ -179,12 +179,15 @@ def recording(
         noise = usual_noise(block, held, rate)
     if about.positions:
         alpha, beta = angles(about.positions)
+        gamma = third_angles(about.positions)
     else:
         alpha = beta = np.array([np.nan])
+        gamma = np.zeros(1)
     x = Experience.at_rest(
         alpha,
         beta,
         about.gravity,
+        gamma=gamma,
         rate=table_rate(about, np.arange(len(alpha))),
         base_force=force_home(about.gravity),
         base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.frames import turn
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.signal.pieces import Complex, Pieces
 from fieldcal.model import thresholds
@@ -186,8 +185,7 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
         return out
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
-        turned = turn(pieces.x.alpha, pieces.x.beta)
-        frames.append(np.moveaxis(pieces.x.mounting.T @ turned, 1, 2))
+        frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
     triads = [some for some in TRIADS if set(some) <= set(used)]
     out += [Spectrum(*_one_phase(pieces, frame), tuple(triads)) for frame in frames]
     return out

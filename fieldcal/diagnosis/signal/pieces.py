@@ -62,7 +62,12 @@ def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
     """Where the device is in windows that `held_in` gives."""
     x, some = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
     return Experience.at_rest(
-        x.alpha[some], x.beta[some], x.gravity, f=x.f[some], mounting=x.mounting
+        x.alpha[some],
+        x.beta[some],
+        x.gravity,
+        f=x.f[some],
+        mounting=x.mounting,
+        gamma=x.gamma[some],
     )
 
 

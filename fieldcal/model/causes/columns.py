@@ -204,6 +204,42 @@ def earth_anyhow(view: RowView) -> Array:
     return out
 
 
+def attitude(view: RowView) -> Array:
+    """Small turns of each position about x, y and z of the base, rad, (n, 6, 3 p).
+
+    What a measured attitude is off by: beside it the force and the Earth's rate lie
+    elsewhere. Turns between two positions are off by both.
+    """
+    places = len(view.state.small_rotation)
+    out = np.zeros((len(view.x), 6, 3 * places))
+    held = np.flatnonzero(view.plain.position >= 0)
+    axes = np.swapaxes(view.x.to_device[held], 1, 2)  # of the base, in device axes
+    at = 3 * view.plain.position[held]
+    for i in range(3):
+        off = [np.cross(v[held], axes[:, i]) for v in (view.x.f, view.x.w)]
+        out[held, :, at + i] = view.state.scale * np.nan_to_num(np.hstack(off))
+    return out
+
+
+def attitude_sides(plain: Experience, state: State) -> Iterator[Pair]:
+    """The same of one position after the other, where turns meet them."""
+    here, known = state.experienced(plain), state.attitude
+    places = len(state.small_rotation)
+    if not known.any():
+        known = np.zeros((places, 3))
+    for p in range(places):
+        for i in range(3):
+            if p not in plain.position:
+                yield here, here, SMALL
+                continue
+            ends = []
+            for sign in (1.0, -1.0):
+                there = known.copy()
+                there[p, i] += sign * SMALL
+                ends.append(replace(state, attitude=there).experienced(plain))
+            yield ends[0], ends[1], SMALL
+
+
 def small_rotation_sides(plain: Experience, state: State) -> Iterator[Pair]:
     """Two small turns of each position, rad, those of a position together."""
     here = state.experienced(plain)

@@ -86,9 +86,10 @@ class Dictionary(ColumnTable):
     ) -> None:
         super().__init__(x, used, since, unit, wander)
         self.common, self.turns = common, turns
-        self.earth = -1
+        self.earth = self.attitude = -1
         self.always: list[Group] = [
-            *self._calibration(), *self._gravity(), *self._earth_anyhow()
+            *self._calibration(), *self._gravity(), *self._earth_anyhow(),
+            *self._attitudes(),
         ]  # fmt: skip
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
@@ -176,6 +177,20 @@ class Dictionary(ColumnTable):
             at = self.add(General("gravity", columns.gravity), 1)
             size = np.array([self.x.gravity_sigma / self.x.gravity])
             yield Group("gravity", "acc", np.array([at]), size, fixed=1.0)
+
+    def _attitudes(self) -> Iterator[Group]:
+        """What attitudes are off by whose uncertainty is stated for each."""
+        sigma = np.array([self.x.attitude_sigma[self.x.position == p][0]
+                          for p in self.held])  # fmt: skip
+        if not np.isfinite(sigma).any():
+            return
+        sides = columns.attitude_sides
+        basis = General("attitude", columns.attitude, sides=sides)
+        self.attitude = self.add(basis, 3 * self.places)
+        known = np.isfinite(sigma)
+        at = self.attitude + 3 * self.held[known][:, None] + np.arange(3)
+        wide = np.repeat(sigma[known], 3)
+        yield Group("attitude", "", at.ravel(), wide, fixed=1.0, in_state=True)
 
     def _earth_anyhow(self) -> Iterator[Group]:
         """What the Earth may add alike wherever nobody knows the orientation.

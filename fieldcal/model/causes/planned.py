@@ -13,7 +13,7 @@ import numpy as np
 
 from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.frames import force_home, turn
-from fieldcal.core.positions import Position, angles
+from fieldcal.core.positions import Position, angles, third_angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
@@ -61,6 +61,7 @@ def predicted(
     state = state_of(names, values)
     x = Experience.at_rest(
         *angles(positions), gravity, base_force=force_home(gravity),
+        gamma=third_angles(positions),
         mounting=np.eye(3) if mounting is None else mounting,
     )  # fmt: skip
     view = RowView.of(x, np.zeros((1, len(x))), state)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home, force_home
-from fieldcal.core.positions import angles, rates
+from fieldcal.core.positions import angles, attitude_sigmas, rates, third_angles
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.noise import rounding
 from fieldcal.model.rows.thermometer import Thermometer
@@ -225,6 +225,7 @@ def averaged(
         mounting=about.mounting,
         latitude=about.latitude,
         gravity_sigma=gravity_sigma(about),
+        **_attitudes(about, position),
     )
     sd[~x.force_known, :3] = np.nan
     length = np.diff(bound, axis=1)[:, 0] / rate_of(block)
@@ -293,6 +294,17 @@ def _angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Arra
         return unknown, unknown
     alpha, beta = angles(about.positions)
     return alpha[position], beta[position]
+
+
+def _attitudes(about: Description, position: NDArray[np.intp]) -> dict[str, Array]:
+    """The third turn of each row, and how well its position is known."""
+    if not about.positions:
+        return {}
+    positions = about.positions
+    return {
+        "gamma": third_angles(positions)[position],
+        "attitude_sigma": attitude_sigmas(positions)[position],
+    }
 
 
 def table_rate(about: Description, position: NDArray[np.intp]) -> Array:

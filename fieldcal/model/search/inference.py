@@ -338,5 +338,12 @@ class Inference:
             small_rotation,
             values[d.earth : d.earth + 3] if d.earth >= 0 else np.zeros(3),
             tuple(terms),
+            *self._attitude(values),
         )
         return state, values
+
+    def _attitude(self, values: Array) -> Iterator[Array]:
+        """What measured attitudes are off by, (p, 3), where there are any."""
+        d = self.dictionary
+        if d.attitude >= 0:
+            yield values[d.attitude : d.attitude + 3 * d.places].reshape(-1, 3)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.frames import turn
 from fieldcal.core.samples import Array
 from fieldcal.model.turns.rotation import carry, small_turns
 from fieldcal.physics.experience import Experience
@@ -100,7 +99,7 @@ def geometry(
     p, q = (int(np.argmax(x.position == i)) for i in pair)
     f = between(attitude, done, x.f[p], x.f[q])
     if x.oriented[[p, q]].all():
-        known = x.mounting.T @ turn(x.alpha[[p, q]], x.beta[[p, q]])
+        known = x.to_device[[p, q]]
         off = attitude[-1].T @ known[1] @ known[0].T  # I + [phi]x
         if (np.trace(off) - 1) / 2 > np.cos(ASTRAY):
             return f, vee(off), np.eye(3)

@@ -239,7 +239,8 @@ def only(x: Experience, rows: Sequence[int]) -> Experience:
     per_row = {
         name: getattr(x, name)[list(rows)]
         for name in ("alpha", "beta", "f", "w", "w_dot", "t", "lasts", "since_start",
-                     "since_turn", "warming", "heating", "variance", "position", "rate")
+                     "since_turn", "warming", "heating", "variance", "position", "rate",
+                     "gamma", "attitude_sigma")
     }  # fmt: skip
     return replace(x, **per_row)
 

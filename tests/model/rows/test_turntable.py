@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array
 from fieldcal.model.rows.turntable import going_round
-from fieldcal.model.turns.rotation import exponential
 
 AXIS = np.array([1.0, 2.0, -2.0]) / 3.0
 SPEED = 0.5

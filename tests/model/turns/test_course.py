@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from small_sessions import ladder, nominal
 
+from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.state import State, Term
-from fieldcal.model.turns.rotation import exponential
 from fieldcal.model.turns.turn import Turn, moved, only, wrong
 
 M, STEP, INTERVAL = 12, 0.05, 0.01

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.frames import turn
+from fieldcal.core.rotation import cross_matrix, exponential
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
@@ -23,12 +24,7 @@ from fieldcal.model.turns.attitude import (
     vee,
 )
 from fieldcal.model.turns.integration import Leg, divided, integrated
-from fieldcal.model.turns.rotation import (
-    cross_matrix,
-    exponential,
-    mean_rates,
-    products,
-)
+from fieldcal.model.turns.rotation import mean_rates, products
 from fieldcal.physics.experience import Experience
 from fieldcal.session.description import parse
 

@@ -1,0 +1,91 @@
+"""How a session says where the device was held: angles, a rotation, or nothing.
+
+    alpha_deg, beta_deg, gamma_deg    turns about z, the turned x, the turned y
+    rotation_vector_deg               one turn from home, about x, y, z of the base
+    quaternion                        the same turn, w x y z
+
+The last two take the procedure axes from home to the position, in base axes (x East,
+y down, z North). All are put into the three angles, which are what positions have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.frames import turns_of
+from fieldcal.core.positions import Position
+
+FORMS = ("alpha_deg", "rotation_vector_deg", "quaternion")
+
+ROUNDED = 0.01
+"""How far the length of a quaternion may be off 1: more is another thing."""
+
+
+def held(number: int, table: Mapping[str, Any], name: str) -> Position:
+    """Where a [[position]] says that the device was held.
+
+    Parameters
+    ----------
+    number : of the position, from 1
+    table : of session.toml
+    name : that it is shown by, or empty
+
+    Raises
+    ------
+    InputError
+        If it says so twice, or what it says is no rotation.
+
+    """
+    given = [form for form in FORMS if form in table]
+    if len(given) > 1:
+        raise InputError(
+            f"[[position]] number {number} has {given[0]} and {given[1]}: give one of"
+            " them"
+        )
+    if not given:
+        position = Position(name or f"position {number}")
+    elif given[0] == "alpha_deg":
+        alpha, beta = float(table["alpha_deg"]), float(table["beta_deg"])
+        third = float(table.get("gamma_deg", 0.0))
+        position = Position.deg(alpha, beta, name, gamma=third)
+    else:
+        turned = _rotation(number, given[0], np.array(table[given[0]], dtype=float))
+        degrees = np.rad2deg(turns_of(turned.T)).round(9) + 0.0
+        alpha, beta, gamma = degrees.tolist()
+        shown = " ".join(f"{v:g}" for v in table[given[0]])
+        kind = "turned by" if given[0] == FORMS[1] else "quaternion"
+        unit = "°" if given[0] == FORMS[1] else ""
+        label = name or f"{kind} {shown}{unit}"
+        position = Position.deg(alpha, beta, label, gamma=gamma)
+    sigma = table.get("attitude_sigma_deg")
+    if sigma is None:
+        return position
+    if not given:
+        raise InputError(
+            f"[[position]] number {number} has attitude_sigma_deg and no attitude: give"
+            " both, or neither"
+        )
+    return replace(position, sigma=float(np.deg2rad(sigma)))
+
+
+def _rotation(number: int, form: str, values: np.ndarray) -> np.ndarray:
+    """Matrix (3, 3) of an active rotation in base axes."""
+    from scipy.spatial.transform import Rotation  # a quarter of a second to import
+
+    if form == "rotation_vector_deg":
+        matrix: np.ndarray = Rotation.from_rotvec(values, degrees=True).as_matrix()
+        return matrix
+    length = float(np.linalg.norm(values))
+    if not abs(length - 1) <= ROUNDED:
+        raise InputError(
+            f"[[position]] number {number} quaternion has length {length:.4g}: give w x"
+            " y z of a turn, whose length is 1"
+        )
+    w, x, y, z = values
+    matrix = Rotation.from_quat([x, y, z, w]).as_matrix()
+    return matrix

@@ -52,6 +52,15 @@ class Position:
         return self.alpha is not None and self.beta is not None
 
     @property
+    def all_degrees(self) -> tuple[float, float, float] | None:
+        """All three angles in degrees, if known."""
+        if self.alpha is None or self.beta is None:
+            return None
+        angles = np.rad2deg([self.alpha, self.beta, self.gamma]).round(9) + 0.0
+        alpha, beta, gamma = angles.tolist()
+        return alpha, beta, gamma
+
+    @property
     def degrees(self) -> tuple[float, float] | None:
         """Both angles in degrees, if known and all that there is to the position."""
         if self.alpha is None or self.beta is None or self.gamma:

@@ -15,7 +15,7 @@ from typing import IO, Self
 from fieldcal.core.errors import MoverFailed, MoverGone, PlanError
 from fieldcal.core.positions import Position
 
-PLACES = ("alpha", "beta", "position", "name")
+PLACES = ("alpha", "beta", "gamma", "position", "name")
 """What a command's template can name: angles in deg, number from 1, name."""
 
 LAST = 1.0
@@ -145,8 +145,8 @@ class CommandMover:
         return f": {lines[-1]}" if lines else " and said nothing"
 
     def _filled(self, position: Position, number: int) -> list[str]:
-        alpha, beta = position.degrees or (0.0, 0.0)
-        values = (f"{alpha:g}", f"{beta:g}", str(number + 1), position.name)
+        angles = position.all_degrees or (0.0, 0.0, 0.0)
+        values = (*(f"{a:g}" for a in angles), str(number + 1), position.name)
         known = dict(zip(PLACES, values, strict=True))
         for part in self._template:
             try:

@@ -202,10 +202,29 @@ def _check_further(about: Description, run: Mapping[str, Any], name: str) -> Non
             raise PlanError(f"{name}: {what} {twice[0]!r} is named twice: name it once")
 
 
+def _check_third_angles(made: Task, name: str) -> None:
+    """Refuse a third angle that nobody would turn to."""
+    third = [p for p in made.positions if p.gamma]
+    if not third:
+        return
+    if made.mover["kind"] == "virtual":
+        raise PlanError(
+            f"{name}: {third[0].name}: a virtual device turns about two axes: leave out"
+            " gamma_deg"
+        )
+    template = made.mover.get("command", ("{gamma}",))
+    if not any("{gamma}" in str(part) for part in template):
+        raise PlanError(
+            f"{name}: {third[0].name} has a third angle, which [run.mover] command does"
+            " not name: write {gamma} where the turntable wants it"
+        )
+
+
 def _check_mover(made: Task, name: str) -> None:
     from fieldcal.run.command_mover import CommandMover
 
     mover = made.mover
+    _check_third_angles(made, name)
     try:
         if mover["kind"] == "command":
             CommandMover(mover["command"], 1.0).close()

@@ -23,6 +23,7 @@ from fieldcal.commands.run import add_arguments
 from fieldcal.commands.run_task import make_task
 from fieldcal.core.errors import InputError, PlanError
 from fieldcal.run import plan_file
+from fieldcal.run.command_mover import CommandMover
 from fieldcal.run.movers import VirtualMover
 
 POSITIONS = [{"alpha_deg": 0.0, "beta_deg": 0.0}, {"alpha_deg": 45.0, "beta_deg": 5.0}]
@@ -245,3 +246,20 @@ def test_the_plan_of_the_readme_is_one() -> None:
     blocks = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
     assert len(blocks) == 1
     assert len(plan_file.task(tomllib.loads(blocks[0]), "README.md").positions) == 5
+
+
+def test_a_third_angle_wants_somebody_who_turns_it() -> None:
+    third = [*POSITIONS, {"alpha_deg": 10.0, "beta_deg": 5.0, "gamma_deg": 30.0}]
+
+    def of(**mover: Any) -> plan_file.Task:
+        run = {"mover": mover} if mover else {}
+        return plan_file.task({"position": third, "run": run}, "p.toml")
+
+    assert of().positions[2].all_degrees == (10.0, 5.0, 30.0)  # by hand
+    whole = of(kind="command", command=["tt", "{alpha}", "{beta}", "{gamma}"])
+    turned = CommandMover(whole.mover["command"], 1.0)
+    assert turned._filled(whole.positions[2], 2) == ["tt", "10", "5", "30"]
+    with pytest.raises(PlanError, match=r"write \{gamma\}"):
+        of(kind="command", command=["tt", "{alpha}", "{beta}"])
+    with pytest.raises(PlanError, match="turns about two axes"):
+        of(kind="virtual")

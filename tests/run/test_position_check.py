@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core.frames import force, turn
-from fieldcal.core.positions import FIVE, SETS, TWO, Position
+from fieldcal.core.positions import FIVE, SETS, TWO, Position, forces
 from fieldcal.core.samples import Array
 from fieldcal.run.position_check import AcceptedPosition, check_position
 
@@ -81,3 +81,15 @@ def test_angles_shown_are_the_angles_held(alpha: float, beta: float) -> None:
     seen = check_position(Position("x"), f, G, None)
     again = force(np.deg2rad(seen.alpha_deg), np.deg2rad(seen.beta_deg), G)
     np.testing.assert_allclose(again, f, atol=1e-6)
+
+
+def test_a_position_with_a_third_angle_is_found_and_missed() -> None:
+    wanted = Position.deg(20.0, 10.0, gamma=40.0)
+    there = forces([wanted], 9.81)[0]
+    assert check_position(wanted, there, 9.81, None).ok
+    away = forces([Position.deg(20.0, 10.0)], 9.81)[0]
+    found = check_position(wanted, away, 9.81, None)
+    assert not found.ok and "asked for is α = 20°, β = 10°, γ = 40°" in found.problem
+    assert "° off" in found.problem
+    held = AcceptedPosition(Position.deg(20.0, 10.0), away)
+    assert "not been turned yet" in check_position(wanted, away, 9.81, held).problem

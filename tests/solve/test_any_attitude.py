@@ -100,6 +100,27 @@ def test_attitudes_that_are_off_and_said_to_be_exact_are_not_believed() -> None:
     assert not found.good
 
 
+def test_example_1_of_the_earlier_paper() -> None:
+    """Three equal angles from 0 by 10 degrees, 40 positions; biases a tenth of 2.5."""
+    matrix = np.array([[1.0, 0.01, -0.01], [-0.01, 1.0, 0.01], [0.01, -0.01, 1.0]])
+    angles = np.arange(0.0, 400.0, 10.0)
+    names = ("alpha_deg", "beta_deg", "gamma_deg")
+    tables = [dict.fromkeys(names, float(angle)) for angle in angles]
+    places = tuple(held(i, table, "") for i, table in enumerate(tables, 1))
+    stood = Rotation.from_euler("ZXY", np.repeat(angles[:, None], 3, 1), degrees=True)
+    force = stood.inv().apply([0.0, -G, 0.0])
+    mean = np.hstack([0.25 + force @ matrix.T, np.zeros((40, 3))])
+    covariance = np.tile(np.diag(np.repeat([1e-4, 1e-6], 3) ** 2), (40, 1, 1))
+    seen = Observations(places, mean, covariance, G)
+    found = solve(seen, cross=True, tilt="none", angle_sigma_deg=1e-4)
+    np.testing.assert_allclose(found.vector("acc_bias")[0], 0.25, atol=1e-5)
+    for i in range(3):
+        for j in range(3):
+            name = f"cross_coupling.k{i + 1}{j + 1}"
+            value = found.value(f"acc_scale.{'xyz'[i]}" if i == j else name)
+            assert value == pytest.approx(matrix[i, j], abs=1e-6)
+
+
 def test_the_print_is_for_two_angles() -> None:
     place = held(1, {"alpha_deg": 45, "beta_deg": 5, "gamma_deg": 20}, "")
     mean, cov = np.ones((2, 6)), np.tile(np.eye(6), (2, 1, 1))

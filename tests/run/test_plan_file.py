@@ -84,8 +84,8 @@ def test_a_procedure_brings_its_positions(name: str) -> None:
             "[run.mover] command does not belong there: leave it out, or write",
         ),
         (
-            plan(mover={"kind": "command", "command": ["x", "{gamma}"]}),
-            "{gamma} is none of alpha, beta, position, name",
+            plan(mover={"kind": "command", "command": ["x", "{delta}"]}),
+            "{delta} is none of alpha, beta, gamma, position, name",
         ),
         (
             plan(mover={"kind": "command", "command": ["x", "{"]}),

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -23,6 +27,7 @@ EXAMPLE = """\
   fieldcal noise bench-7/overnight
   fieldcal noise bench-7/monday bench-7/tuesday --json
   fieldcal noise bench-7/overnight --report noise.html
+  fieldcal noise overnight.mcap
 """
 
 JOINED = 3.0
@@ -32,7 +37,7 @@ JOINED = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
-    what = "session folder of a device at rest; several of one device count together"
+    what = "session folder of a device at rest, or a file; several count together"
     add("sessions", type=Path, nargs="+", metavar="SESSION", help=what)
     add("--json", action="store_true", help="print noise.json instead of the view")
     add("--report", type=Path, metavar="FILE", help="write a page with the curves")
@@ -42,13 +47,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.session.folder import Session
     from fieldcal.session.noise_file import NOISE
 
-    sessions = [Session.open(path) for path in args.sessions]
-    found = result(sessions, args.limits, args.history)
+    with TemporaryDirectory(prefix="fieldcal-noise-") as place:
+        sessions = [
+            _opened(path, Path(place) / str(i)) for i, path in enumerate(args.sessions)
+        ]
+        found = result(sessions, args.limits, args.history)
+    found = replace(found, sessions=[str(path) for path in args.sessions])
     content = found.to_json()
-    path = sessions[0].write_json(NOISE, content)
+    folder = next((s for s, p in zip(sessions, args.sessions, strict=True)
+                   if p.is_dir()), None)  # fmt: skip
+    path = folder.write_json(NOISE, content) if folder else None
     for warning in dict.fromkeys(w for s in sessions for w in s.warnings):
         sys.stderr.write(f"fieldcal noise: {warning}\n")
     if args.json:
@@ -57,7 +67,8 @@ def run(args: argparse.Namespace) -> int:
         from fieldcal.commands.noise_view import show
 
         show(found)
-        sys.stdout.write(f"written: {path}\n")
+        if path:
+            sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.report.noise_page import page
         from fieldcal.session.folder import write_whole
@@ -65,6 +76,38 @@ def run(args: argparse.Namespace) -> int:
         written = write_whole(args.report, page(found))
         (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")
     return 0
+
+
+def _opened(path: Path, place: Path) -> Session:
+    """A session folder; of a file, what it imports as.
+
+    Raises
+    ------
+    InputError
+        If the file asks a question, or has several IMUs.
+
+    """
+    from fieldcal.commands import import_recording
+    from fieldcal.core.errors import InputError
+    from fieldcal.session.folder import Session
+
+    if not path.is_file():
+        return Session.open(path)
+    parser = argparse.ArgumentParser()
+    import_recording.add_arguments(parser)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            import_recording.run(parser.parse_args([str(path), "-o", str(place)]))
+    except InputError as error:
+        raise InputError(
+            f"{error}; fieldcal import takes that, and fieldcal noise its folder"
+        ) from error
+    if not (place / "session.toml").is_file():
+        raise InputError(
+            f"{path}: has several IMUs; run fieldcal import on it, and fieldcal noise"
+            " on the folder of one"
+        )
+    return Session.open(place)
 
 
 def result(

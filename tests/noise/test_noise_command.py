@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import math
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -187,6 +188,28 @@ def test_behind_a_damaged_place_it_goes_on(tmp_path: Path) -> None:
         assert 0 < len(whole) < len(block)
         assert np.array_equal(parts.t, whole.t)
         assert np.array_equal(parts.acc, whole.acc)
+
+
+def test_a_file_is_imported_on_the_way(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    values = noise(np.random.default_rng(23), 6000, 0.02, 6, N=N)
+    values[:, 2] += 9.81
+    rows = [f"{0.02 * i:.2f}," + ",".join(f"{x:.7f}" for x in row)
+            for i, row in enumerate(values)]  # fmt: skip
+    names = ["ax [m/s^2]", "ay [m/s^2]", "az [m/s^2]"]
+    names += ["gx [rad/s]", "gy [rad/s]", "gz [rad/s]"]
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join([",".join(["t [s]", *names]), *rows]) + "\n")
+    assert main(["noise", str(file), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["sessions"] == [str(file)] and os.listdir(tmp_path) == ["log.csv"]
+    assert told["channels"]["gy"]["processes"]["N"]["value"] == pytest.approx(
+        N, rel=0.1
+    )
+    file.write_text("\n".join(row.partition(",")[2] for row in rows) + "\n")
+    assert main(["noise", str(file)]) == 2
+    assert "fieldcal import takes that" in capsys.readouterr().err
 
 
 def test_rows_out_of_order_are_named_when_read_in_parts(tmp_path: Path) -> None:

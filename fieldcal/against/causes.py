@@ -136,8 +136,8 @@ def _difference(
 
 def _pairs(one: Member | None, two: Member | None, found: Decided) -> dict[str, Pair]:
     """Parameters of a cause in both sessions, as far as one determines them."""
-    real = _quantities(found.real, one) if one else {}
-    sim = _quantities(found.sim, two) if two else {}
+    real = quantities(found.real, one) if one else {}
+    sim = quantities(found.sim, two) if two else {}
     return {
         name: _pair(real.get(name), sim.get(name))
         for name in dict.fromkeys([*real, *sim])
@@ -158,7 +158,7 @@ def _pair(one: Quantity | None, two: Quantity | None) -> Pair:
     return Pair(one, two, off)
 
 
-def _quantities(there: Widened, member: Member) -> dict[str, Quantity]:
+def quantities(there: Widened, member: Member) -> dict[str, Quantity]:
     """Numbers of a cause, as far as the rows determine them."""
     cause, group = member
     if group.effect is None:

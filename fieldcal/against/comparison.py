@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.against import causes, offsets, prediction, samples
+from fieldcal.against.facts import facts
 from fieldcal.against.pairing import Pairing
 from fieldcal.against.result import Difference, Match
 from fieldcal.against.side import Side, side
@@ -58,8 +59,8 @@ def matched(real: Side, sim: Side) -> Match:
         differences,
         causes.alike(found),
         *predicted,
-        samples.facts(real),
-        samples.facts(sim),
+        facts(real, found.real),
+        facts(sim, found.sim),
         warnings,
         paragraph(verdict, differences, predicted),
     )

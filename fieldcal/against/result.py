@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from fieldcal.diagnosis.result import Mismatch, Quantity, Verdict, number
@@ -104,6 +104,8 @@ class Facts:
     start_s : first sample, s of device time
     start_c : temperature at the start, deg C; nan where unknown
     noise : by channel, from sample to sample at rest, m/s^2 and rad/s
+    calibration : by group and axis
+    effects : parameters of those with an equation, by id
 
     """
 
@@ -113,6 +115,8 @@ class Facts:
     start_s: float
     start_c: float
     noise: Mapping[str, Quantity]
+    calibration: Mapping[str, Mapping[str, Quantity]] = field(default_factory=dict)
+    effects: Mapping[str, Mapping[str, Quantity]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of against.json."""
@@ -122,8 +126,14 @@ class Facts:
             "step_gyr": number(self.step_gyr),
             "start_s": number(self.start_s),
             "start_c": number(self.start_c),
-            "noise": {n: q.to_json() for n, q in self.noise.items()},
+            "noise": _quantities(self.noise),
+            "calibration": {n: _quantities(g) for n, g in self.calibration.items()},
+            "effects": {n: _quantities(e) for n, e in self.effects.items()},
         }
+
+
+def _quantities(some: Mapping[str, Quantity]) -> dict[str, Any]:
+    return {name: quantity.to_json() for name, quantity in some.items()}
 
 
 @dataclass(frozen=True, slots=True)

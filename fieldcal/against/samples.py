@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.against.joint import differs
-from fieldcal.against.result import Difference, Facts, Pair
+from fieldcal.against.result import Difference, Pair
 from fieldcal.against.side import Side
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.findings.agreement import UNITS
@@ -20,7 +20,6 @@ from fieldcal.diagnosis.signal.moments import moments_of
 from fieldcal.diagnosis.signal.pieces import pieces_of
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
-from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.effect import Chain, Line
 
 LOUDER = 0.5
@@ -46,24 +45,7 @@ APART_HZ = 0.5
 """Cycles in the length of a recording by which two lines may be apart and be one."""
 
 
-def facts(one: Side) -> Facts:
-    """What a recording is made of."""
-    steps = [float(np.nan_to_num(one.steps[c : c + 3]).max()) for c in (0, 3)]
-    return Facts(
-        rate_hz=one.rate_hz,
-        step_acc=steps[0] or np.nan,
-        step_gyr=steps[1] or np.nan,
-        start_s=float(one.block.t[0]),
-        start_c=Thermometer.of(one.block).start_c,
-        noise={
-            name: _level(one, c)
-            for c, name in enumerate(CHANNELS)
-            if np.isfinite(one.noise[c])
-        },
-    )
-
-
-def _level(one: Side, c: int) -> Quantity:
+def level(one: Side, c: int) -> Quantity:
     """Noise of one channel."""
     level = float(one.noise[c])
     return Quantity(level, level * float(one.unsure[c]), UNITS[c // 3])
@@ -89,7 +71,7 @@ def _noise(real: Side, sim: Side, at: Sequence[int]) -> Iterator[Difference]:
         return
     pairs = dict[str, Pair]()
     for c in at:
-        had = [_level(s, c) for s in (real, sim)]
+        had = [level(s, c) for s in (real, sim)]
         spread = math.hypot(*(s.noise[c] * s.unsure[c] for s in (real, sim)))
         more = Quantity(float(real.noise[c] - sim.noise[c]), spread, UNITS[c // 3])
         pairs[CHANNELS[c]] = Pair(had[0], had[1], more)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fieldcal.against.result import Difference, Match
+from fieldcal.against.result import Difference, Facts, Match
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.effects import catalogue
 
@@ -43,6 +43,8 @@ class SensorModel:
     noise : by channel, standard deviation of a sample, m/s^2 and rad/s, likewise
     effects : parameters by id; those of what is to be taken out are 0, and instants
         count from the first sample
+    shown : the same of what is not to be changed, as the simulator shows it: formats
+        need it where one element of a file holds several things
     rate_hz : samples a second
     start_c : temperature at which the biases hold, deg C; nan where unknown
 
@@ -51,6 +53,7 @@ class SensorModel:
     calibration: Mapping[str, Array] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     effects: Mapping[str, Values] = field(default_factory=dict)
+    shown: SensorModel | None = None
     rate_hz: float = np.nan
     start_c: float = np.nan
 
@@ -62,20 +65,33 @@ class SensorModel:
 
     def group(self, name: str) -> Array:
         """A group of the calibration; that of a perfect sensor where it is not said."""
+        if name not in self.calibration and self.shown is not None:
+            return self.shown.group(name)
         return self.calibration.get(name, np.full(3, NEUTRAL[name]))
+
+    def level(self, channel: str) -> float:
+        """Noise of a channel; none where nothing is known of it."""
+        if channel not in self.noise and self.shown is not None:
+            return self.shown.level(channel)
+        return self.noise.get(channel, 0.0)
 
     def matrix(self, triad: str) -> Array:
         """Scale factors and cross-coupling of "acc" or "gyr", (3, 3)."""
         out = np.diag(self.group(f"{triad}_scale"))
         for effect in TRIADS[triad]:
-            for name, value in self.effects.get(effect, {}).items():
+            for name, value in self._values(effect).items():
                 row, column = int(name[1]) - 1, int(name[-1]) - 1  # k12, s3
                 out[row, column] += float(value)
         return out
 
     def number(self, effect: str, name: str) -> float:
         """A parameter of an effect, 0 where it has none."""
-        return float(self.effects.get(effect, {}).get(name, 0.0))
+        return float(self._values(effect).get(name, 0.0))
+
+    def _values(self, effect: str) -> Values:
+        if effect not in self.effects and self.shown is not None:
+            return self.shown.effects.get(effect, {})
+        return self.effects.get(effect, {})
 
 
 def patched(found: Match, present: SensorModel | None = None) -> SensorModel:
@@ -89,6 +105,8 @@ def patched(found: Match, present: SensorModel | None = None) -> SensorModel:
     """
     out = present or SensorModel()
     out = replace(out, rate_hz=found.real.rate_hz, start_c=found.real.start_c)
+    if out.shown is None:
+        out = replace(out, shown=_shown(found.simulator))
     for one in found.differences:
         if one.id in CALIBRATION:
             out = _with_calibration(out, one)
@@ -97,6 +115,24 @@ def patched(found: Match, present: SensorModel | None = None) -> SensorModel:
         elif one.id in catalogue():
             out = _with_effect(out, one, found)
     return out
+
+
+def _shown(simulator: Facts) -> SensorModel:
+    """What a simulator shows of itself."""
+    calibration = {
+        name: np.array(
+            [_number(axes[i]) if i in axes else NEUTRAL[name] for i in "xyz"]
+        )
+        for name, axes in simulator.calibration.items()
+    }
+    return SensorModel(
+        calibration,
+        {channel: _number(q) for channel, q in simulator.noise.items()},
+        {
+            name: {n: q.value for n, q in values.items()}
+            for name, values in simulator.effects.items()
+        },
+    )
 
 
 def _with_calibration(model: SensorModel, one: Difference) -> SensorModel:

@@ -91,8 +91,10 @@ def run(args: argparse.Namespace) -> int:
         if args.twin:
             raise InputError("name --twin or --against: each is an answer of its own")
         return against.run(args)
-    if args.patch:
-        raise InputError("--patch needs --against: say what is to be patched")
+    if args.patch or args.limit or args.junit:
+        raise InputError(
+            "--patch, --limit and --junit need --against: name a simulator"
+        )
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare
     from fieldcal.diagnosis.verdict import concluded

@@ -87,6 +87,16 @@ def test_the_command_writes_shows_and_ends_with_what_it_found(
     assert not (folder / "diagnosis.json").exists()
 
 
+@pytest.mark.parametrize(
+    "more", [["--patch", "json"], ["--limit", "noise=1"], ["--junit", "x.xml"]]
+)
+def test_what_needs_a_simulator_says_so(
+    folder: Path, more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["diagnose", str(folder), *more]) == 2
+    assert "need --against" in capsys.readouterr().err
+
+
 def test_a_twin_and_a_simulator_are_two_questions(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -28,8 +28,8 @@ MODEL = SensorModel(
         "temperature_bias": {"ax": 3e-3, "gz": -1e-5},
         "lever_arm": {"x": 0.1, "y": 0.0, "z": -0.05},
     },
-    100.0,
-    21.0,
+    rate_hz=100.0,
+    start_c=21.0,
 )
 ACC = SCALE * FORCE + BIAS
 GYR = (1 + np.array([0.01, 0, -0.02])) * RATE + GYRO
@@ -69,7 +69,7 @@ def test_sitl_makes_what_the_device_makes(tmp_path: Path) -> None:
 
 def test_gazebo_has_the_bias_where_it_keeps_its_sign(tmp_path: Path) -> None:
     steps = {"quantisation": {"acc": 0.01}}
-    model = SensorModel({"acc_bias": BIAS}, MODEL.noise, steps, 100.0)
+    model = SensorModel({"acc_bias": BIAS}, MODEL.noise, steps, rate_hz=100.0)
     text, says = written("gazebo", tmp_path, model)
     imu = ElementTree.fromstring(text)
     for i, axis in enumerate("xyz"):
@@ -132,6 +132,24 @@ def test_json_has_everything_with_its_equation(tmp_path: Path) -> None:
     warm = found["effects"]["temperature_bias"]
     assert warm["ax"] == 3e-3 and "T" in warm["equation"]
     assert not says
+
+
+def test_what_is_not_changed_stays_where_one_element_holds_several(
+    tmp_path: Path,
+) -> None:
+    """Gazebo's <noise> has bias and noise, Kalibr's M scale factors and the rest."""
+    shown = SensorModel({"acc_scale": SCALE}, MODEL.noise, {
+        "cross_coupling": {"k21": 0.002}
+    })  # fmt: skip
+    model = SensorModel({"acc_bias": BIAS}, shown=shown, rate_hz=100.0)
+    assert model.changed == ("acc_bias",)
+    imu = ElementTree.fromstring(written("gazebo", tmp_path, model)[0])
+    assert imu.findtext("linear_acceleration/z/noise/stddev") == "0.03"
+    assert imu.find("angular_velocity") is None
+    acc = yaml.safe_load(written("kalibr", tmp_path, model)[0])["accelerometers"]
+    assert acc["M"][1][:2] == [0.002, 0.997] and acc["bias"] == BIAS.tolist()
+    found = parameters(written("px4", tmp_path, model)[0], 2, 3)
+    np.testing.assert_allclose(axes(found, "CAL_ACC0_{}SCALE"), SCALE)
 
 
 @pytest.mark.parametrize("name", patches.formats())

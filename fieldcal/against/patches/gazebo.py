@@ -48,7 +48,7 @@ def _noise(axis: Element, model: SensorModel, triad: str, i: int) -> None:
     noise.set("type", "gaussian_quantized" if step else "gaussian")
     values = {
         "mean": model.group(f"{triad}_bias")[i],
-        "stddev": model.noise.get(f"{triad[0]}{'xyz'[i]}", 0.0),
+        "stddev": model.level(f"{triad[0]}{'xyz'[i]}"),
         **({"precision": step} if step else {}),
     }
     for name, value in values.items():

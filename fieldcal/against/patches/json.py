@@ -31,7 +31,7 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
     bias = {t: model.group(f"{t}_bias").tolist() for t in _changed(model, "bias")}
     matrix = {t: model.matrix(t).tolist() for t in _changed(model, "scale")}
     noise = {
-        triad: [model.noise[c] for c in model.noise if c[0] == triad[0]]
+        triad: [model.level(f"{triad[0]}{axis}") for axis in "xyz"]
         for triad in TRIADS
         if any(c[0] == triad[0] for c in model.noise)
     }

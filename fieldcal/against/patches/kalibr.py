@@ -27,8 +27,8 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
     lines = ["# fieldcal: raw = M true + bias (true -> raw), m/s^2 and rad/s"]
     says = ["random walks are as they were: no comparison of minutes shows them"]
     for name, letter in (("accelerometer", "a"), ("gyroscope", "g")):
-        levels = [v for c, v in model.noise.items() if c[0] == letter]
-        if levels and model.rate_hz > 0:
+        levels = [model.level(f"{letter}{axis}") for axis in "xyz"]
+        if model.noise and model.rate_hz > 0:
             density = max(levels) / np.sqrt(model.rate_hz)
             lines.append(f"{name}_noise_density: {density:.6g}")
     if model.rate_hz > 0:

@@ -41,7 +41,7 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
 
 def _noise(model: SensorModel) -> dict[str, list[float]]:
     """White noise by triad; what is random besides is an effect of its own."""
-    level = [model.noise.get(name, 0.0) for name in CHANNELS]
+    level = [model.level(name) for name in CHANNELS]
     none = [0.0, 0.0, 0.0]
     return {
         "acc": level[:3],

@@ -1,0 +1,52 @@
+"""What each of two recordings is made of: rate, steps, noise, calibration, effects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.against import causes, offsets
+from fieldcal.against.result import Facts
+from fieldcal.against.samples import level
+from fieldcal.against.side import Side
+from fieldcal.against.widened import Widened
+from fieldcal.core.samples import CHANNELS
+from fieldcal.diagnosis.findings.calibrated import GROUPS
+from fieldcal.diagnosis.result import Quantity
+from fieldcal.model.rows.thermometer import Thermometer
+
+
+def facts(one: Side, there: Widened) -> Facts:
+    """What a recording is made of, with the causes that it has."""
+    steps = [float(np.nan_to_num(one.steps[c : c + 3]).max()) for c in (0, 3)]
+    return Facts(
+        rate_hz=one.rate_hz,
+        step_acc=steps[0] or np.nan,
+        step_gyr=steps[1] or np.nan,
+        start_s=float(one.block.t[0]),
+        start_c=Thermometer.of(one.block).start_c,
+        noise={
+            name: level(one, c)
+            for c, name in enumerate(CHANNELS)
+            if np.isfinite(one.noise[c])
+        },
+        calibration=_calibration(there),
+        effects={
+            cause.name: causes.quantities(there, (cause, group))
+            for cause, group in there.set.members
+            if cause.kind == "effect"
+        },
+    )
+
+
+def _calibration(there: Widened) -> dict[str, dict[str, Quantity]]:
+    """Groups of the calibration by axis, as far as they are determined."""
+    out: dict[str, dict[str, Quantity]] = {}
+    for name, axes in offsets.shared_axes(there, there):
+        values, covariance, _ = offsets.calibration(there, name, axes)
+        sigma = np.sqrt(np.diag(covariance))
+        out[name] = {
+            "xyz"[c % 3]: Quantity(float(v), float(s), GROUPS[name])
+            for c, v, s in zip(axes.tolist(), values, sigma, strict=True)
+            if s < offsets.DETERMINED[name]
+        }
+    return out

@@ -187,6 +187,7 @@ def _as_text(log: Log, folder: Path, rng: np.random.Generator) -> Log:
 
 def _answers(log: Log, columns: Columns, head: str) -> dict[str, list[str]]:
     channels = {f"{k}{x}" for k in "ag" for x in "xyz"} | {"t"}
+    before = ["_"] if log.said["form"] == "tagged" else []
     thermal = "_" if head == "none" else "temperature"
     named = [n if n in channels else thermal for n, _, _ in columns]
     if log.said["form"] in NAMED:
@@ -199,7 +200,7 @@ def _answers(log: Log, columns: Columns, head: str) -> dict[str, list[str]]:
         "--gyr-unit": _option("gyr", str(log.said["gyr"])),
         "--time-unit": ["--time-unit", str(log.said["time"])],
         "--rate": ["--rate", str(log.said["rate"])],
-        "--columns": ["--columns", ",".join(named)],
+        "--columns": ["--columns", ",".join([*before, *named])],
     }
 
 

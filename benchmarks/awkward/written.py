@@ -13,7 +13,8 @@ import numpy as np
 
 from benchmarks.awkward.motion import Floats
 
-TEXTS = ("csv", "csv", "semicolon", "tab", "gz", "clock", "quoted", "utf-16", "monitor")
+TEXTS = ("csv", "csv", "semicolon", "tab", "gz", "clock", "quoted", "utf-16", "monitor",
+         "bars", "tagged", "begun again")  # fmt: skip
 NAMED = ("npz", "parquet", "labels", "json lines", "json lists", "structure")
 """Forms in which columns have names."""
 
@@ -77,10 +78,27 @@ def write(
         stamps = [row[0] if row[0][:1].isdigit() else first for row in rows]
         pairs = zip(stamps, rows, strict=True)
         lines = [f"{stamp} -> {separator.join(row[1:])}" for stamp, row in pairs]
+    lines = _dressed(form, lines, rows)
     data = ("\n".join(lines) + "\n").encode("utf-16" if form == "utf-16" else "utf-8")
     path = folder / ("log.csv.gz" if form == "gz" else "log.csv")
     path.write_bytes(gzip.compress(data, 1) if form == "gz" else data)
     return path
+
+
+def _dressed(form: str, lines: list[str], rows: list[list[str]]) -> list[str]:
+    """Lines with what a form puts about or between them."""
+    names = [line for line in lines if line[:1].isalpha()]
+    if form == "bars":
+        return [f"| {' | '.join(row)} |" for row in rows]
+    if form == "tagged":
+        # another sensor speaks as well, less often
+        pairs = ([f"IMU,{line}"] + (["GPS,48.1,11.5"] if i % 10 == 9 else [])
+                 for i, line in enumerate(lines))  # fmt: skip
+        return [line for pair in pairs for line in pair]
+    if form == "begun again" and len(names) == 1:
+        half = len(lines) // 2
+        return [*lines[:half], *names, *lines[half:]]
+    return lines
 
 
 def _cells(columns: Columns, form: str) -> list[list[str]]:

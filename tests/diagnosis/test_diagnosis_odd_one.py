@@ -67,7 +67,7 @@ def test_one_axis_in_one_position(window: int, tmp_path: Path) -> None:
     [
         (0, 1.0, 0.0),
         pytest.param(4, 0.0, -1.5, marks=pytest.mark.thorough),
-        (8, 22.5, 1.0),
+        pytest.param(8, 22.5, 1.0, marks=pytest.mark.thorough),
     ],
 )
 def test_angles_that_were_set_otherwise_are_said(

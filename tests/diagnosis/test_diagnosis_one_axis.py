@@ -67,7 +67,12 @@ def test_a_slow_line_does_not_pass_for_a_lever_arm_in_turns(
     ("concealed", "fault", "likewise"),
     [
         ("cross_coupling", coupled(0, 1, 9e-4), "quadratic"),
-        ("g_sensitivity", coupled(4, 1, 1e-5), "g2_sensitivity"),
+        pytest.param(
+            "g_sensitivity",
+            coupled(4, 1, 1e-5),
+            "g2_sensitivity",
+            marks=pytest.mark.thorough,
+        ),
     ],
 )
 def test_what_the_positions_cannot_tell_apart_is_said(

@@ -60,7 +60,7 @@ def later(block: Block, seconds: float) -> Block:
         pytest.param(
             "cross_coupling:k12=0.01,k31=-0.008,k32=0.02", marks=pytest.mark.thorough
         ),
-        "settling:ax=0.05,az=-0.04,tau_s=5",
+        pytest.param("settling:ax=0.05,az=-0.04,tau_s=5", marks=pytest.mark.thorough),
         pytest.param("settling:ax=0.05,gx=0.003,tau_s=5", marks=pytest.mark.thorough),
         "mounting:axes=+y-x+z",
         "stuck:channel=gy,from_s=40,to_s=43",
@@ -195,7 +195,11 @@ def test_what_settles_counts_from_one_instant() -> None:
     ("concealed", "triad"),
     [
         ("hum:ax=0.02,gz=0.002,hz=17.3,phase_deg=40", "rms_acceleration"),
-        ("sway:amplitude_deg=0.05,hz=0.4,azimuth_deg=30", "rms_angular_rate"),
+        pytest.param(
+            "sway:amplitude_deg=0.05,hz=0.4,azimuth_deg=30",
+            "rms_angular_rate",
+            marks=pytest.mark.thorough,
+        ),
     ],
 )
 def test_of_a_line_the_replay_leaves_little(
@@ -218,7 +222,12 @@ def test_of_a_line_the_replay_leaves_little(
             0.2,
             marks=pytest.mark.thorough,
         ),
-        ("gyro_cross_coupling:s12=0.02", "rms_turns_rad", 0.6),
+        pytest.param(
+            "gyro_cross_coupling:s12=0.02",
+            "rms_turns_rad",
+            0.6,
+            marks=pytest.mark.thorough,
+        ),
         pytest.param(
             "lever_arm:x=0.05,z=-0.03",
             "rms_turns_acceleration",

@@ -20,6 +20,8 @@ from fieldcal.noise.prediction import Draw
 from fieldcal.noise.processes import allan_variance
 
 PER_DECADE = 8
+EDGE = 0.01
+"""A recording of 30 s has a sample less, and tells of a mean over 30 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +58,7 @@ class Averaging:
 def averaging(
     drawn: tuple[Draw, ...], ramp: float, dt: float, longest: float
 ) -> Averaging:
-    """The error of means up to a fourth of what was recorded.
+    """The error of means up to the length of what was recorded.
 
     Parameters
     ----------
@@ -65,7 +67,7 @@ def averaging(
     dt, longest : s between samples, and of the longest stretch
 
     """
-    end = max(longest / 4, 4.0)
+    end = max(longest * (1 + EDGE), 4.0)
     count = int(np.log10(end) * PER_DECADE) + 2
     seconds = np.geomspace(1.0, end, count)
     each = np.array([allan_variance(d.terms, d.x, seconds, dt) for d in drawn])

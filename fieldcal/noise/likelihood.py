@@ -195,11 +195,14 @@ def _free_scores(powers: Powers) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         level = others / number
         each = -0.5 * (count * np.log(level) + power / level)
-    scores: Array = np.where(count > 0, each, 0.0).sum(axis=0)
+    known = (count > 0) & (number > 0) & (others > 0)
+    scores: Array = np.where(known, each, 0.0).sum(axis=0)
     return scores
 
 
 def _free_likelihood(powers: Powers) -> float:
     """Log likelihood of the bins that have a level of their own."""
     power, count = (a[powers.free].sum(axis=1) for a in (powers.power, powers.count))
+    there = (count > 0) & (power > 0)
+    power, count = power[there], count[there]
     return likelihood(power / count, power, count)

@@ -188,3 +188,19 @@ def test_too_short_a_recording_is_refused_with_what_to_do() -> None:
         estimate([reduced([])])
     with pytest.raises(InputError, match="none of ax"):
         estimate([reduced([recording(np.zeros((900, 6)), DT)])])
+
+
+def test_windows_of_half_a_minute_tell_of_means_over_half_a_minute() -> None:
+    """Short stretches, coefficients of some bins in none of them."""
+    rng = np.random.default_rng(24)
+    parts = []
+    for i in range(8):
+        block = recording(noise(rng, 1500, 0.02, 6, N=1.0), 0.02)
+        block.t[:] += 60.0 * i
+        parts.append(block)
+    found = estimate([reduced(parts)])
+    assert found.stretches == 8
+    for channel in found.channels.values():
+        value, spread = channel.averaging.at(30.0)
+        assert channel.averaging.seconds[-1] >= 30.0
+        assert abs(value - 1 / np.sqrt(30)) < 4 * spread + 0.05

@@ -38,7 +38,7 @@ def test_averaging_is_best_where_white_noise_and_walk_meet() -> None:
 def test_white_noise_is_worth_averaging_for_longer_than_is_known() -> None:
     found = averaging(drawn(N=1.0), 0.0, 0.01, 400.0)
     assert found.best[0] == math.inf and found.white_until[0] == math.inf
-    assert found.seconds[-1] == pytest.approx(100.0)
+    assert found.seconds[-1] == pytest.approx(400.0, rel=0.02)
 
 
 def test_a_ramp_ends_averaging() -> None:
@@ -124,9 +124,10 @@ def test_what_history_shows_counts_more_than_an_hour() -> None:
 
 
 def test_north_is_as_sure_as_the_worst_gyroscope_is_still() -> None:
-    good, bad = (averaging(drawn(N=n), 0.0, 0.01, 4000.0) for n in (1e-7, 1e-6))
+    good, bad = (averaging(drawn(N=n), 0.0, 0.01, 1000.0) for n in (1e-7, 1e-6))
     found = alignment([good, bad], math.radians(60))
     seconds, sigma, spread = found.best
-    expected = 1e-6 / math.sqrt(1000) / (EARTH_RATE * 0.5)
-    assert (seconds, sigma) == pytest.approx((1000.0, expected), rel=0.01)
+    expected = 1e-6 / math.sqrt(seconds) / (EARTH_RATE * 0.5)
+    assert seconds == pytest.approx(1000.0, rel=0.02)
+    assert sigma == pytest.approx(expected, rel=0.01)
     assert spread == pytest.approx(0.0, abs=1e-9)

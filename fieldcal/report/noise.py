@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
-from fieldcal.calibration.wording import number
+from fieldcal.calibration.wording import number, pretty
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS
 from fieldcal.report.blocks import Block as Part
 from fieldcal.report.blocks import Figure, Section, Table, Text, table
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
+from fieldcal.session.noise_file import read_noise
 from fieldcal.windows.allan import SHORTEST, AllanDeviation, allan_deviation
 from fieldcal.windows.stretches import still_stretches
 
@@ -19,7 +24,35 @@ MOST = 1_000_000
 
 
 def noise(material: Material) -> Section:
-    """Allan deviation of accelerometers and gyroscopes, or why there is none."""
+    """Allan deviation of accelerometers and gyroscopes, and what noise.json tells."""
+    section = _of_recording(material)
+    found = read_noise(material.session.folder)
+    if found is None:
+        return section
+    return replace(section, blocks=(*section.blocks, _averaging(found)))
+
+
+def _averaging(found: Mapping[str, Any]) -> Table:
+    """How long to average, as `fieldcal noise` found it."""
+    rows = []
+    for name, channel in found["channels"].items():
+        told, unit = channel["averaging"], pretty(channel["unit"])
+        errors = zip(told["seconds"], told["sigma"], told["spread"], strict=True)
+        best = told["best_s"]
+        rows.append(
+            [
+                name,
+                "; ".join(f"{s:.0f} s: {v:.2g} ± {e:.1g} {unit}" for s, v, e in errors),
+                f"{told['best_sigma']:.2g} {unit}",
+                "longer than is known" if best is None else f"{best:.0f} s",
+            ]
+        )
+    columns = ("channel", "error of a mean over", ">least error", ">averaged over")
+    return table("How long to average; the papers take 30 to 60 s", columns, rows)
+
+
+def _of_recording(material: Material) -> Section:
+    """Allan deviation of the session's longest stretch, or why there is none."""
     span = _longest(material)
     parts: tuple[Part, ...]
     if span[1] - span[0] < SHORTEST:

@@ -259,3 +259,12 @@ def test_a_plan_says_how_long_this_device_is_worth_averaging(
     (tmp_path / "noise.json").write_text('{"format": 2}')
     assert main(["plan", "--noise-of", str(tmp_path)]) == 2
     assert "noise.json" in capsys.readouterr().err
+
+
+def test_the_report_of_the_session_says_how_long_to_average(told: Told) -> None:
+    page = told.folder / "report.html"
+    assert main(["report", str(told.folder)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "How long to average; the papers take 30 to 60 s" in text
+    best = told.content["channels"]["gx"]["averaging"]["best_sigma"]
+    assert f"{best:.2g} rad/s" in text

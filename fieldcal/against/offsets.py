@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fieldcal.against.causes import Decided
+from fieldcal.against.causes import Decided, quantities
 from fieldcal.against.joint import differs
 from fieldcal.against.result import Difference, Direction, Pair
 from fieldcal.against.widened import Widened
@@ -33,9 +33,10 @@ def differences(found: Decided) -> Iterator[Difference]:
 
 
 def earth(found: Decided) -> Iterator[Difference]:
-    """The Earth's rate, where one feels it and the other does not, or turned otherwise.
+    """The Earth's rate, where one feels it and the other does not.
 
-    In axes of the base: x East, y down, z north, where the fixture points north.
+    In axes of the base: x East, y down, z north, where the fixture points north. That
+    both feel it, and one points elsewhere, is an effect of the catalogue.
     """
     first = [w.inference.dictionary.earth for w in (found.real, found.sim)]
     if min(first) < 0:
@@ -46,12 +47,10 @@ def earth(found: Decided) -> Iterator[Difference]:
     )
     total, typical = cov + more, np.full(3, EARTH_RATE)
     probability = differs(one - two, total, typical)
-    if probability < thresholds.NAMED:
-        return
     felt = [_felt(rate, its) for rate, its in ((one, cov), (two, more))]
-    direction: Direction = (
-        "resized" if all(felt) else "left_out" if felt[0] else "added"
-    )
+    if probability < thresholds.NAMED or felt[0] == felt[1]:
+        return
+    direction: Direction = "left_out" if felt[0] else "added"
     unit, parameters = "rad/s", dict[str, Pair]()
     for i, axis in enumerate("xyz"):
         had = [Quantity(float(r[i]), float(np.sqrt(c[i, i])), unit)
@@ -104,9 +103,18 @@ def calibration(there: Widened, name: str, axes: Index) -> tuple[Array, Array, A
 
 
 def wander(there: Widened, axes: Index) -> Array:
-    """What biases wander by from window to window, (k,) of some channels."""
+    """What biases wander by within a session, (k,) of some channels.
+
+    From window to window, and the mean of a walk by q sqrt(T / 3).
+    """
     size = np.array(there.set.sizes.instability)[axes]
-    out: Array = priors.SIZES[size] * there.search.unstable[axes]
+    square = (priors.SIZES[size] * there.search.unstable[axes]) ** 2
+    length = float(np.ptp(there.inference.dictionary.x.t))
+    for member in there.set.members:
+        for name, q in quantities(there, member).items():
+            if member[0].kind == "random" and name in CHANNELS:
+                square[axes == CHANNELS.index(name)] += float(q.value) ** 2 * length / 3
+    out: Array = np.sqrt(square)
     return out
 
 

@@ -14,10 +14,12 @@ from fieldcal.diagnosis.prepare import prepare
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.held_out import turns_held_out
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import Term
+from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.model.system.way_rows import WayRows
@@ -242,6 +244,25 @@ def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
     there = np.flatnonzero(some.ravel())
     off = (rest / np.outer(size, size))[np.ix_(there, there)]
     assert np.abs(off).max() < 0.15
+
+
+def test_turns_are_foretold_from_windows_and_the_other_turns() -> None:
+    """With the scale factors in the set: without them a closure is far off."""
+    one = ride("gyro_scale")
+    inference, d = one.inference, one.inference.dictionary
+    linear = inference.system.linearised(inference.nominal)
+    at_rest = np.zeros(d.width)
+    rows = gram(linear, d, at_rest, one.turns)
+    cause = next(c for c in d.causes if c.name == "gyro_scale")
+    search = Search(d, rows)
+    missed = []
+    for members in ((), ((cause, one.group),)):
+        there = search.evaluated(members)
+        fitted = Fitted(inference.system.rows, d, linear, at_rest, there)
+        missed.append(turns_held_out(fitted, one.turns))
+    assert len(missed[0]) == sum(len(t.closure) + len(t.way) for t in one.turns)
+    before, after = (np.sqrt(np.mean(m**2)) for m in missed)
+    assert after < 0.1 * before
 
 
 def test_a_copied_column_is_as_the_one_it_is_near() -> None:

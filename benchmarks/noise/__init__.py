@@ -32,10 +32,10 @@ from benchmarks._real import REAL
 from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.noise import estimate, reduced
-from fieldcal.noise.levels import Levels
-from fieldcal.noise.likelihood import Fit, Powers, fit
+from fieldcal.noise.levels import CosineLevels
+from fieldcal.noise.likelihood import NoiseFit, Powers, fit
 from fieldcal.noise.measured import measured
-from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.spectrum import CosineSpectrum
 
 DT, SHORT, EACH = 0.1, 600, 1000
 CASES: list[dict[str, float]] = [
@@ -53,11 +53,11 @@ FIRST, LAST = 10.0, 1000.0
 TEN_MILLION = 10_000_000
 
 
-def spectra(values: Array) -> Spectrum:
+def spectra(values: Array) -> CosineSpectrum:
     """All columns reduced."""
-    levels = Levels(DT, values.shape[1], values.shape[1])
+    levels = CosineLevels(DT, values.shape[1], values.shape[1])
     levels.add(values)
-    return Spectrum([levels.reduced()], values.shape[1])
+    return CosineSpectrum([levels.reduced()], values.shape[1])
 
 
 def ours(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
@@ -79,7 +79,9 @@ def ours(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
     return np.array(found), np.array(sigma)
 
 
-def _most_likely(spectrum: Spectrum, powers: Powers, sizes: dict[str, float]) -> Fit:
+def _most_likely(
+    spectrum: CosineSpectrum, powers: Powers, sizes: dict[str, float]
+) -> NoiseFit:
     """Fit the processes, less those that are not there at all."""
     for gone in range(len(sizes)):
         fits = [

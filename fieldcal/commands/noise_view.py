@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING
 
 from fieldcal.calibration.wording import number, pretty
 from fieldcal.noise.document import NoiseResult
-from fieldcal.noise.estimate import ChannelNoise, Size
+from fieldcal.noise.estimate import ChannelEstimate, Size
 from fieldcal.noise.recalibration import CHANCES
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def show(
     _follows(console, found)
 
 
-def _scale(channels: list[ChannelNoise]) -> tuple[float, str]:
+def _scale(channels: list[ChannelEstimate]) -> tuple[float, str]:
     """A prefix in which white noise is more than one."""
     largest = max(c.processes["N"].value for c in channels)
     return next((p for p in PREFIXES if largest >= p[0]), PREFIXES[-1])
@@ -62,7 +62,7 @@ def _cell(size: Size | None, below: Size | None, scale: float) -> str:
 
 
 def _sizes(
-    console: Console, what: str, some: list[ChannelNoise], scale: float, unit: str
+    console: Console, what: str, some: list[ChannelEstimate], scale: float, unit: str
 ) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -85,7 +85,7 @@ def _sizes(
             _line(console, f"  {channel.name}: {text}")
 
 
-def _more(channel: ChannelNoise, scale: float, unit: str) -> list[str]:
+def _more(channel: ChannelEstimate, scale: float, unit: str) -> list[str]:
     """What a channel has beside white noise, flicker and walk."""
     out = []
     for name, size in channel.processes.items():
@@ -114,7 +114,7 @@ def _more(channel: ChannelNoise, scale: float, unit: str) -> list[str]:
 
 
 def _windows(
-    console: Console, some: list[ChannelNoise], scale: float, unit: str
+    console: Console, some: list[ChannelEstimate], scale: float, unit: str
 ) -> None:
     """How long to average."""
     from rich.box import SIMPLE_HEAD

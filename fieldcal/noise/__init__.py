@@ -10,7 +10,7 @@ covariance in `processes`, the variance of its cosine coefficients in `cosine`.
 
 from __future__ import annotations
 
-from fieldcal.noise.estimate import ChannelNoise, NoiseModel, Size, estimate
+from fieldcal.noise.estimate import ChannelEstimate, NoiseModel, Size, estimate
 from fieldcal.noise.reduction import Reduction, reduced
 
-__all__ = ["ChannelNoise", "NoiseModel", "Reduction", "Size", "estimate", "reduced"]
+__all__ = ["ChannelEstimate", "NoiseModel", "Reduction", "Size", "estimate", "reduced"]

@@ -18,14 +18,14 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.noise.likelihood import Powers, likelihood
-from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import rich
 
 ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Explained:
+class TakenOut:
     """What covariates leave of a channel.
 
     Attributes
@@ -41,8 +41,8 @@ class Explained:
 
 
 def explained(
-    spectrum: Spectrum, channel: int, covariates: dict[str, Array]
-) -> Explained:
+    spectrum: CosineSpectrum, channel: int, covariates: dict[str, Array]
+) -> TakenOut:
     """Take out of a channel what follows its covariates.
 
     Parameters
@@ -64,7 +64,7 @@ def explained(
             break
         best = one
         left = {n: z for n, z in left.items() if n not in best.used}
-    return Explained(_powers(spectrum, channel, best.rest, best.weight), best.found)
+    return TakenOut(_powers(spectrum, channel, best.rest, best.weight), best.found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,9 @@ class _Regression:
     log_likelihood: float
 
 
-def _fitted(spectrum: Spectrum, channel: int, used: dict[str, Array]) -> _Regression:
+def _fitted(
+    spectrum: CosineSpectrum, channel: int, used: dict[str, Array]
+) -> _Regression:
     values = spectrum.last.values[:, channel]
     z = np.array(list(used.values())).reshape(len(used), len(values)).T
     rest: Array = values
@@ -99,12 +101,14 @@ def _fitted(spectrum: Spectrum, channel: int, used: dict[str, Array]) -> _Regres
     return _Regression(used, rest, np.clip(1 - h, 1e-9, 1), found, total)
 
 
-def _powers(spectrum: Spectrum, channel: int, rest: Array, weight: Array) -> Powers:
+def _powers(
+    spectrum: CosineSpectrum, channel: int, rest: Array, weight: Array
+) -> Powers:
     power, count = spectrum.of(channel, rest, weight)
     return Powers(power, count, np.zeros(len(power), dtype=bool))
 
 
-def thermometer(spectrum: Spectrum, values: Array) -> Array | None:
+def thermometer(spectrum: CosineSpectrum, values: Array) -> Array | None:
     """Coefficients of a temperature above its own noise; None where it is all noise.
 
     Parameters

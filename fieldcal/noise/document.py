@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldcal.noise.alignment import Alignment
 from fieldcal.noise.averaging import Averaging
-from fieldcal.noise.estimate import ChannelNoise, NoiseModel, Size
+from fieldcal.noise.estimate import ChannelEstimate, NoiseModel, Size
 from fieldcal.noise.filters import FilterNoise, kalibr, of_program, ros
 from fieldcal.noise.recalibration import CHANCES, Recalibration
 
@@ -91,7 +91,7 @@ class NoiseResult:
         return out
 
 
-def _channel(channel: ChannelNoise, model: NoiseModel) -> dict[str, Any]:
+def _channel(channel: ChannelEstimate, model: NoiseModel) -> dict[str, Any]:
     seen = channel.measured
     said = channel.predicted(seen.tau, model.longest)
     out: dict[str, Any] = {

@@ -20,13 +20,13 @@ from fieldcal.core.samples import CHANNELS, UNITS, Array
 from fieldcal.noise.averaging import Averaging, averaging
 from fieldcal.noise.covariates import explained, thermometer
 from fieldcal.noise.filters import TwoNumbers, two_numbers
-from fieldcal.noise.likelihood import Fit
+from fieldcal.noise.likelihood import NoiseFit
 from fieldcal.noise.measured import MeasuredAllan, measured
-from fieldcal.noise.prediction import Draw, Prediction, draws, predict
+from fieldcal.noise.prediction import DeviationBand, Draw, draws, predict
 from fieldcal.noise.processes import OF_UNIT
 from fieldcal.noise.reduction import CHANNELS as NOISY
 from fieldcal.noise.reduction import Reduction
-from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import FILTERED_HZ, choose
 
 SHORTEST = 30.0
@@ -57,7 +57,7 @@ class Size:
 
 
 @dataclass(frozen=True, slots=True)
-class ChannelNoise:
+class ChannelEstimate:
     """Noise of one channel.
 
     Attributes
@@ -93,7 +93,7 @@ class ChannelNoise:
         """Ramp that was found, units per s."""
         return self.processes["R"].value if "R" in self.processes else 0.0
 
-    def predicted(self, tau: Array, length: float) -> Prediction:
+    def predicted(self, tau: Array, length: float) -> DeviationBand:
         """Allan deviation (t,) that a recording of a length, s, will have."""
         found = self.processes.get("R")
         ramp = (found.value, found.sigma) if found else (0.0, 0.0)
@@ -115,7 +115,7 @@ class NoiseModel:
 
     """
 
-    channels: dict[str, ChannelNoise]
+    channels: dict[str, ChannelEstimate]
     seconds: float
     longest: float
     stretches: int
@@ -140,7 +140,7 @@ def estimate(recordings: Sequence[Reduction]) -> NoiseModel:
             f" {SHORTEST:.0f} s at least, an hour to see bias instability"
         )
     kept = [s for s in every if s.samples * s.dt >= min(SHORTEST, longest / 4)]
-    spectrum = Spectrum(kept, NOISY)
+    spectrum = CosineSpectrum(kept, NOISY)
     warm = all(r.warm for r in recordings)
     channels = {
         name: _channel(spectrum, i, warm)
@@ -160,7 +160,7 @@ def estimate(recordings: Sequence[Reduction]) -> NoiseModel:
     )
 
 
-def _channel(spectrum: Spectrum, i: int, warm: bool) -> ChannelNoise:
+def _channel(spectrum: CosineSpectrum, i: int, warm: bool) -> ChannelEstimate:
     covariates = {"R": spectrum.last.time}
     if warm:
         warmth = thermometer(spectrum, spectrum.last.values[:, NOISY])
@@ -174,7 +174,7 @@ def _channel(spectrum: Spectrum, i: int, warm: bool) -> ChannelNoise:
         value, sigma = left.found["R"]
         processes["R"] = Size(value, sigma, OF_UNIT["R"].format(UNITS[i]))
     free = spectrum.frequency[chosen.powers.free]
-    return ChannelNoise(
+    return ChannelEstimate(
         CHANNELS[i],
         UNITS[i],
         processes,
@@ -190,7 +190,7 @@ def _channel(spectrum: Spectrum, i: int, warm: bool) -> ChannelNoise:
     )
 
 
-def _sizes(best: Fit, unit: str) -> dict[str, Size]:
+def _sizes(best: NoiseFit, unit: str) -> dict[str, Size]:
     """Values of the processes with their uncertainty."""
     sigma = np.sqrt(np.diag(best.covariance))
     times = dict(zip(best.timed, range(len(best.terms), len(best.x)), strict=True))
@@ -213,7 +213,7 @@ def _sizes(best: Fit, unit: str) -> dict[str, Size]:
     return {name: out[name] for name in order if name in out}
 
 
-def _white(best: Fit, alone: Size) -> Size:
+def _white(best: NoiseFit, alone: Size) -> Size:
     """White noise as means over a second obey it, N^2 + 2 s^2 T of what is quicker.
 
     A device that filters its outputs has noise with a correlation time of some samples;

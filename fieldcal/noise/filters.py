@@ -28,7 +28,7 @@ from fieldcal.core.samples import Array
 from fieldcal.noise.likelihood import fit, likelihood
 from fieldcal.noise.prediction import Draw
 from fieldcal.noise.processes import allan_variance
-from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import Chosen
 
 STEP_S = {"ardupilot": 0.012, "px4": 0.01}
@@ -71,7 +71,7 @@ class TwoNumbers:
 
 
 def two_numbers(
-    spectrum: Spectrum, chosen: Chosen, drawn: tuple[Draw, ...]
+    spectrum: CosineSpectrum, chosen: Chosen, drawn: tuple[Draw, ...]
 ) -> TwoNumbers:
     """Fit white noise and walk to a channel, and measure what they leave out."""
     tau = np.geomspace(1.0, max(spectrum.seconds / 4, 2.0), 24)
@@ -101,7 +101,7 @@ def _left_out(whole: Array, pair: Array) -> float:
     return float(np.sqrt(max(1.0, np.max(whole / pair))))  # (1)
 
 
-def _not_exceeded(spectrum: Spectrum, chosen: Chosen, white: float) -> float:
+def _not_exceeded(spectrum: CosineSpectrum, chosen: Chosen, white: float) -> float:
     """K that is not exceeded in 95 of 100, beside white noise of variance N^2.
 
     The largest whose likelihood is above that of none by no less than a one-sided

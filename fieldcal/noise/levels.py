@@ -88,7 +88,7 @@ def bins(first: int, end: int) -> Index:
     return np.unique(np.append(np.round(edges[edges < end]), end)).astype(np.intp)
 
 
-class Levels:
+class CosineLevels:
     """Takes samples as they come; `reduced` at the end.
 
     Parameters

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.spectrum import CosineSpectrum
 
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
@@ -59,7 +59,7 @@ class Powers:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class NoiseFit:
     """Processes at their most likely sizes.
 
     Attributes
@@ -92,7 +92,7 @@ class Fit:
 
 
 def levels_of(
-    spectrum: Spectrum, terms: tuple[str, ...], x: Array
+    spectrum: CosineSpectrum, terms: tuple[str, ...], x: Array
 ) -> tuple[Array, Array]:
     """Expected powers (b,) and the gradient of their logarithms (b, p), (1)."""
     times = iter(range(len(terms), len(x)))
@@ -117,8 +117,8 @@ def likelihood(level: Array, power: Array, count: Array) -> float:
 
 
 def fit(
-    spectrum: Spectrum, powers: Powers, terms: tuple[str, ...], start: Array
-) -> Fit | None:
+    spectrum: CosineSpectrum, powers: Powers, terms: tuple[str, ...], start: Array
+) -> NoiseFit | None:
     """Most likely sizes; None where one of the processes is not there at all."""
     used = ~powers.free
     power, count = powers.power[used].sum(axis=1), powers.count[used].sum(axis=1)
@@ -149,7 +149,7 @@ def fit(
     return _finished(spectrum, powers, terms, x)
 
 
-def _bounds(spectrum: Spectrum, terms: tuple[str, ...]) -> tuple[Array, Array]:
+def _bounds(spectrum: CosineSpectrum, terms: tuple[str, ...]) -> tuple[Array, Array]:
     times = sum(term in TIMED for term in terms)
     low, high = spectrum.log_times
     return (
@@ -167,8 +167,8 @@ def _step(information: Array, gradient: Array, damping: float) -> Array:
 
 
 def _finished(
-    spectrum: Spectrum, powers: Powers, terms: tuple[str, ...], x: Array
-) -> Fit:
+    spectrum: CosineSpectrum, powers: Powers, terms: tuple[str, ...], x: Array
+) -> NoiseFit:
     level, slopes = levels_of(spectrum, terms, x)
     used = np.where(powers.free, 0.0, 1.0)
     count = powers.count * used[:, None]
@@ -184,7 +184,7 @@ def _finished(
         held_level = levels_of(spectrum, terms, held)[0]
         scores[f] = likelihood(held_level, power[:, f], count[:, f])
     scores += _free_scores(powers)
-    return Fit(terms, x, information, level, total, scores)
+    return NoiseFit(terms, x, information, level, total, scores)
 
 
 def _free_scores(powers: Powers) -> Array:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import Fit, levels_of
+from fieldcal.noise.likelihood import NoiseFit, levels_of
 from fieldcal.noise.processes import (
     FAR,
     STEPS,
@@ -21,7 +21,7 @@ from fieldcal.noise.processes import (
     covariances,
     freedom,
 )
-from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import Chosen
 
 DRAWS = 200
@@ -42,7 +42,7 @@ class Draw:
 
 
 @dataclass(frozen=True, slots=True)
-class Prediction:
+class DeviationBand:
     """What the Allan deviation of another recording will be.
 
     Attributes
@@ -74,7 +74,7 @@ class Prediction:
         return found
 
 
-def draws(spectrum: Spectrum, chosen: Chosen, seed: int = 0) -> list[Draw]:
+def draws(spectrum: CosineSpectrum, chosen: Chosen, seed: int = 0) -> list[Draw]:
     """Sizes of the processes of a channel as they may be."""
     rng = np.random.default_rng(seed)
     out: list[Draw] = []
@@ -86,7 +86,11 @@ def draws(spectrum: Spectrum, chosen: Chosen, seed: int = 0) -> list[Draw]:
 
 
 def _of_fit(
-    spectrum: Spectrum, chosen: Chosen, one: Fit, number: int, rng: np.random.Generator
+    spectrum: CosineSpectrum,
+    chosen: Chosen,
+    one: NoiseFit,
+    number: int,
+    rng: np.random.Generator,
 ) -> list[Draw]:
     values, axes = np.linalg.eigh(one.covariance)
     spread = WIDER * axes * np.sqrt(np.maximum(values, 0.0))
@@ -107,7 +111,7 @@ def _of_fit(
     return [Draw(one.terms, tried[i]) for i in picked]
 
 
-def _levels(spectrum: Spectrum, one: Fit, tried: Array) -> Array:
+def _levels(spectrum: CosineSpectrum, one: NoiseFit, tried: Array) -> Array:
     """Expected powers (d, b) of sizes (d, p)."""
     if one.timed:
         return np.array([levels_of(spectrum, one.terms, x)[0] for x in tried])
@@ -122,7 +126,7 @@ def predict(
     length: float,
     dt: float,
     ramp: tuple[float, float] = (0.0, 0.0),
-) -> Prediction:
+) -> DeviationBand:
     """Predict the overlapping Allan deviation of a recording.
 
     Parameters
@@ -151,4 +155,4 @@ def predict(
     scatter = variance[:, :, None] * rng.chisquare(nu[:, :, None], (*nu.shape, 16))
     measured = np.sqrt(scatter / nu[:, :, None]).reshape(len(tau), -1)
     low, median, high = np.quantile(measured, [0.16, 0.5, 0.84], axis=1)
-    return Prediction(tau, median, low, high, variance, nu)
+    return DeviationBand(tau, median, low, high, variance, nu)

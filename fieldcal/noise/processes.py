@@ -52,7 +52,7 @@ def allan_variance(
 
     Parameters
     ----------
-    terms, x : as a `Fit` has them
+    terms, x : as a `NoiseFit` has them
     tau : s
     finest : shortest correlation time in flicker that is cut off, s
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.noise.disturbed import calmed
-from fieldcal.noise.levels import Levels, Reduced
+from fieldcal.noise.levels import CosineLevels, Reduced
 
 GAP = 1.0
 """Time without samples that begins a new stretch, s."""
@@ -26,7 +26,7 @@ CHANNELS = 6
 
 @dataclass(frozen=True, slots=True)
 class Reduction:
-    """A recording as `Spectrum` takes it.
+    """A recording as `CosineSpectrum` takes it.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Reducer:
 
     def __init__(self) -> None:
         self._done: list[Reduced] = []
-        self._levels: Levels | None = None
+        self._levels: CosineLevels | None = None
         self._waiting: list[Block] = []
         self._rows = self._samples = self._bridged = 0
         self._last = self._first = np.nan
@@ -115,7 +115,7 @@ class Reducer:
             if calm.begins:
                 self._end(keep=True)
             if self._levels is None:
-                self._levels = Levels(1.0, CHANNELS + 1, CHANNELS)
+                self._levels = CosineLevels(1.0, CHANNELS + 1, CHANNELS)
             self._levels.add(calm.rows)
             self._bridged += calm.bridged
 

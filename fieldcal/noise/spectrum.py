@@ -51,7 +51,7 @@ class LastLevel:
     stretch: Index
 
 
-class Spectrum:
+class CosineSpectrum:
     """Powers of one device.
 
     Parameters

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import TIMED, Fit, Flags, Powers, fit
-from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.likelihood import TIMED, Flags, NoiseFit, Powers, fit
+from fieldcal.noise.spectrum import CosineSpectrum
 
 FILTERED_HZ = 1.0
 """From this frequency on a spectrum may be the device's filter, Hz."""
@@ -45,13 +45,13 @@ class Chosen:
 
     """
 
-    best: Fit
-    others: tuple[tuple[float, Fit], ...]
+    best: NoiseFit
+    others: tuple[tuple[float, NoiseFit], ...]
     powers: Powers
     dispersion: float
 
 
-def choose(spectrum: Spectrum, powers: Powers) -> Chosen:
+def choose(spectrum: CosineSpectrum, powers: Powers) -> Chosen:
     """Find the processes of a channel."""
     powers = _without_filter(spectrum, powers)
     best, seen = grown(spectrum, powers)
@@ -62,7 +62,7 @@ def choose(spectrum: Spectrum, powers: Powers) -> Chosen:
     return Chosen(best, _weighted(seen), powers, dispersion)
 
 
-def _weighted(fits: list[Fit]) -> tuple[tuple[float, Fit], ...]:
+def _weighted(fits: list[NoiseFit]) -> tuple[tuple[float, NoiseFit], ...]:
     """Each set of processes once, weighted by what it predicts (Geisser, Eddy 1979)."""
     sets = {tuple(sorted(f.terms)): f for f in fits}
     scores = np.array([f.scores.sum() for f in sets.values()])
@@ -76,7 +76,7 @@ def _weighted(fits: list[Fit]) -> tuple[tuple[float, Fit], ...]:
     )
 
 
-def grown(spectrum: Spectrum, powers: Powers) -> tuple[Fit, list[Fit]]:
+def grown(spectrum: CosineSpectrum, powers: Powers) -> tuple[NoiseFit, list[NoiseFit]]:
     """The set that no further process, and none less, would predict better.
 
     Beside it all that were tried.
@@ -98,14 +98,14 @@ def grown(spectrum: Spectrum, powers: Powers) -> tuple[Fit, list[Fit]]:
     return _simplest(seen), seen
 
 
-def _simplest(fits: list[Fit]) -> Fit:
+def _simplest(fits: list[NoiseFit]) -> NoiseFit:
     """The fit with fewest parameters that no other predicts clearly better than."""
     best = max(fits, key=lambda f: float(f.scores.sum()))
     fewer = [f for f in fits if len(f.x) < len(best.x) and not _better(best, f)]
     return _simplest(fewer) if fewer else best
 
 
-def _first(spectrum: Spectrum, powers: Powers) -> Fit:
+def _first(spectrum: CosineSpectrum, powers: Powers) -> NoiseFit:
     used = ~powers.free
     column = spectrum.fixed["N"][used]
     total = (powers.power[used].sum(axis=1) / column).sum() / powers.count[used].sum()
@@ -128,7 +128,9 @@ def _additions(terms: tuple[str, ...]) -> list[str]:
     return new
 
 
-def _with(spectrum: Spectrum, powers: Powers, old: Fit, new: str) -> Fit | None:
+def _with(
+    spectrum: CosineSpectrum, powers: Powers, old: NoiseFit, new: str
+) -> NoiseFit | None:
     """The most likely fit with one process more, or with flicker cut off."""
     low, high = spectrum.log_times
     if new not in TIMED:
@@ -143,8 +145,12 @@ def _with(spectrum: Spectrum, powers: Powers, old: Fit, new: str) -> Fit | None:
 
 
 def _started(
-    spectrum: Spectrum, powers: Powers, old: Fit, new: str, log_time: float | None
-) -> Fit | None:
+    spectrum: CosineSpectrum,
+    powers: Powers,
+    old: NoiseFit,
+    new: str,
+    log_time: float | None,
+) -> NoiseFit | None:
     """A fit that begins where the new process would explain what is left."""
     if log_time is None:
         column = spectrum.column(new)
@@ -163,7 +169,7 @@ def _started(
     return fit(spectrum, powers, (*old.terms, new), start)
 
 
-def _dropped(old: Fit, place: int) -> Fit:
+def _dropped(old: NoiseFit, place: int) -> NoiseFit:
     """The same without one process, not fitted again."""
     keep = [i for i in range(len(old.terms)) if i != place]
     if old.terms[place] in TIMED:
@@ -176,7 +182,7 @@ def _dropped(old: Fit, place: int) -> Fit:
     )
 
 
-def _pair(spectrum: Spectrum, powers: Powers, best: Fit) -> Fit | None:
+def _pair(spectrum: CosineSpectrum, powers: Powers, best: NoiseFit) -> NoiseFit | None:
     """Two processes more, of which neither may help alone."""
     new = [t for t in ("K", "B") if t not in best.terms and t + "T" not in best.terms]
     if len(new) < 2:
@@ -185,7 +191,7 @@ def _pair(spectrum: Spectrum, powers: Powers, best: Fit) -> Fit | None:
     return one and _with(spectrum, powers, one, new[1])
 
 
-def _better(more: Fit, less: Fit) -> bool:
+def _better(more: NoiseFit, less: NoiseFit) -> bool:
     """Whether held-out coefficients say so by more than the gain is uncertain.
 
     Twice the gain in likelihood is noncentral chi squared: its standard error is twice
@@ -196,7 +202,7 @@ def _better(more: Fit, less: Fit) -> bool:
     return bool(gain > np.sqrt(2 * likely))
 
 
-def _without_filter(spectrum: Spectrum, powers: Powers) -> Powers:
+def _without_filter(spectrum: CosineSpectrum, powers: Powers) -> Powers:
     """With the bins above a corner left to themselves, if that predicts better."""
     top = spectrum.frequency.max()
     best, chosen = rich(spectrum, powers), powers
@@ -211,7 +217,7 @@ def _without_filter(spectrum: Spectrum, powers: Powers) -> Powers:
     return _without_lines(spectrum, chosen, best)
 
 
-def _without_lines(spectrum: Spectrum, powers: Powers, rich: Fit) -> Powers:
+def _without_lines(spectrum: CosineSpectrum, powers: Powers, rich: NoiseFit) -> Powers:
     """Bins above 1 Hz in which something hums, left to themselves."""
     excess = _excess(powers, rich)
     usual = 1.4826 * np.median(np.abs(excess[~powers.free]))
@@ -219,7 +225,7 @@ def _without_lines(spectrum: Spectrum, powers: Powers, rich: Fit) -> Powers:
     return replace(powers, free=powers.free | odd)
 
 
-def rich(spectrum: Spectrum, powers: Powers) -> Fit:
+def rich(spectrum: CosineSpectrum, powers: Powers) -> NoiseFit:
     """A fit of all processes without a correlation time that are there."""
     used = ~powers.free
     terms = list(RICH)
@@ -250,7 +256,7 @@ def _multiplied(columns: Array, power: Array, count: Array) -> Array:
     return least
 
 
-def _excess(powers: Powers, found: Fit) -> Array:
+def _excess(powers: Powers, found: NoiseFit) -> Array:
     """By how many of its standard errors each bin is above the model, (b,)."""
     count = powers.count.sum(axis=1)
     ratio = powers.power.sum(axis=1) / np.maximum(count, 1e-300) / found.level
@@ -258,7 +264,7 @@ def _excess(powers: Powers, found: Fit) -> Array:
     return excess
 
 
-def _dispersion(powers: Powers, found: Fit) -> float:
+def _dispersion(powers: Powers, found: NoiseFit) -> float:
     """Mean squared excess of the bins that the model explains, at least 1."""
     some: Flags = ~powers.free & (powers.count.sum(axis=1) > 1)
     freedom = int(some.sum()) - len(found.x)

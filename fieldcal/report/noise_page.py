@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldcal.calibration.wording import number, pretty
 from fieldcal.noise.document import WINDOWS, NoiseResult
-from fieldcal.noise.estimate import ChannelNoise
+from fieldcal.noise.estimate import ChannelEstimate
 from fieldcal.report.blocks import Block as Part
 from fieldcal.report.blocks import Figure, NameValues, Section, Table, table
 from fieldcal.report.charts import Axis, Chart, Series
@@ -55,7 +55,7 @@ def _figures(found: NoiseResult) -> list[Part]:
     return out
 
 
-def _chart(what: str, some: list[ChannelNoise], length: float) -> Chart:
+def _chart(what: str, some: list[ChannelEstimate], length: float) -> Chart:
     series = []
     for i, channel in enumerate(some):
         seen = channel.measured

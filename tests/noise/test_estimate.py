@@ -9,18 +9,18 @@ from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.noise import estimate, reduced
-from fieldcal.noise.levels import Levels
+from fieldcal.noise.levels import CosineLevels
 from fieldcal.noise.likelihood import Powers, fit
-from fieldcal.noise.spectrum import Spectrum
+from fieldcal.noise.spectrum import CosineSpectrum
 
 DT = 0.1
 
 
 def fits(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
     """Relative errors of the sizes, (c, p), and stated ones."""
-    levels = Levels(DT, values.shape[1], values.shape[1])
+    levels = CosineLevels(DT, values.shape[1], values.shape[1])
     levels.add(values)
-    spectrum = Spectrum([levels.reduced()], values.shape[1])
+    spectrum = CosineSpectrum([levels.reduced()], values.shape[1])
     start = 2 * np.log(list(sizes.values()))
     errors, stated = [], []
     for c in range(values.shape[1]):

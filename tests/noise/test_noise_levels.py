@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.fft import dct
 
-from fieldcal.noise.levels import FOLDS, KEPT, SEGMENT, Levels, bins, neighbours
+from fieldcal.noise.levels import FOLDS, KEPT, SEGMENT, CosineLevels, bins, neighbours
 from fieldcal.noise.measured import measured
 
 
 def test_it_does_not_matter_how_samples_come() -> None:
     values = np.random.default_rng(1).standard_normal((40_000, 2))
-    whole, parts = Levels(0.1, 2, 1), Levels(0.1, 2, 1)
+    whole, parts = CosineLevels(0.1, 2, 1), CosineLevels(0.1, 2, 1)
     whole.add(values)
     for part in np.split(values, [1, 700, 701, 17_000, 17_001, 39_990]):
         parts.add(part)
@@ -30,7 +30,7 @@ def test_it_does_not_matter_how_samples_come() -> None:
 
 def test_powers_of_a_level_are_those_of_its_stretches() -> None:
     values = np.random.default_rng(2).standard_normal((KEPT + 1, 1))
-    levels = Levels(1.0, 1, 1)
+    levels = CosineLevels(1.0, 1, 1)
     levels.add(values)
     below = levels.reduced().levels[0]
     stretches = values[: 16 * SEGMENT].reshape(16, SEGMENT) - values[0]
@@ -45,7 +45,7 @@ def test_powers_of_a_level_are_those_of_its_stretches() -> None:
 
 def test_a_short_recording_is_kept_whole() -> None:
     values = np.arange(20.0).reshape(10, 2)
-    levels = Levels(1.0, 2, 2)
+    levels = CosineLevels(1.0, 2, 2)
     levels.add(values)
     found = levels.reduced()
     assert found.m == 1 and not found.levels
@@ -53,7 +53,7 @@ def test_a_short_recording_is_kept_whole() -> None:
 
 
 def test_memory_does_not_grow_with_length() -> None:
-    levels = Levels(0.01, 1, 1)
+    levels = CosineLevels(0.01, 1, 1)
     for _ in range(20):
         levels.add(np.zeros((1 << 16, 1)))
     found = levels.reduced()
@@ -70,7 +70,7 @@ def test_bins_cover_all_coefficients_once(first: int, more: int) -> None:
 def test_measured_deviations_are_those_of_allantools() -> None:
     tools = pytest.importorskip("allantools")
     values = np.random.default_rng(3).standard_normal((60_000, 1)).cumsum(axis=0)
-    levels = Levels(0.01, 2, 1)
+    levels = CosineLevels(0.01, 2, 1)
     levels.add(np.hstack([values, np.zeros_like(values)]))
     found = measured([levels.reduced()], 0)
     m = np.round(found.tau / 0.01).astype(int)

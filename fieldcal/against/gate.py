@@ -45,7 +45,7 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class MatchCheck:
     """One thing that was compared, whether it is within its limit, and why not."""
 
     name: str
@@ -93,23 +93,23 @@ def _limit(name: str, text: str) -> Limit:
     return Limit(size / 100 if relative else size, relative)
 
 
-def checks(found: Match, allowed: Mapping[str, Limit]) -> list[Check]:
+def checks(found: Match, allowed: Mapping[str, Limit]) -> list[MatchCheck]:
     """Everything that was compared, in the order of what every recording has."""
     names = [*ALWAYS, *found.alike, *(d.id for d in found.differences)]
     out = [_check(name, found, allowed) for name in dict.fromkeys(names)]
     if (limit := allowed.get(PREDICTION)) is not None:
         value = found.before.chi2_per_dof
         says = f"it is predicted with χ²/dof {value:.3g}, at most {limit.size:g}"
-        out.append(Check(PREDICTION, value <= limit.size, says))
+        out.append(MatchCheck(PREDICTION, value <= limit.size, says))
     return out
 
 
-def _check(name: str, found: Match, allowed: Mapping[str, Limit]) -> Check:
+def _check(name: str, found: Match, allowed: Mapping[str, Limit]) -> MatchCheck:
     """One id: nothing differs in it, or by no more than is allowed."""
     beyond = [d for d in found.differences if d.id == name and not _within(d, allowed)]
     lead = {"left_out": "left out", "added": "added", "resized": "differs"}
     says = "; ".join(f"{lead[d.direction]}: {named(d)}" for d in beyond)
-    return Check(name, not beyond, says)
+    return MatchCheck(name, not beyond, says)
 
 
 def _within(one: Difference, allowed: Mapping[str, Limit]) -> bool:
@@ -123,7 +123,9 @@ def _tells_when(pair: Pair) -> bool:
     return pair.difference.unit == "s"
 
 
-def write_junit(path: Path, name: str, found: Match, done: Iterable[Check]) -> None:
+def write_junit(
+    path: Path, name: str, found: Match, done: Iterable[MatchCheck]
+) -> None:
     """Write checks as JUnit XML, with what is worth following from run to run.
 
     Raises

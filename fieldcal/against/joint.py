@@ -44,7 +44,7 @@ calibration: what is wrong with it is usually one thing."""
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class EffectTold:
     """What one session says of an effect.
 
     Attributes
@@ -79,7 +79,7 @@ def _over_sizes(gain: Array) -> float:
 
 
 def weighed(
-    real: Told | None, sim: Told | None, chance: float, alike: float | None
+    real: EffectTold | None, sim: EffectTold | None, chance: float, alike: float | None
 ) -> dict[Relation, float]:
     """Probability of each relation between two sessions as to one effect.
 
@@ -105,7 +105,7 @@ def weighed(
     return {name: float(np.exp(s - total)) for name, s in score.items()}
 
 
-def both(real: Told, sim: Told) -> float:
+def both(real: EffectTold, sim: EffectTold) -> float:
     """Ln evidence of one and the same effect in both sessions (3)."""
     if real.inner.shape != sim.inner.shape:
         return -np.inf
@@ -118,7 +118,7 @@ def both(real: Told, sim: Told) -> float:
     return _over_sizes(there) + shift
 
 
-def as_large(real: Told, sim: Told) -> float:
+def as_large(real: EffectTold, sim: EffectTold) -> float:
     """Ln evidence of something random that is as large in both, by its size alone."""
     return _over_sizes(real.gain + sim.gain)
 
@@ -127,7 +127,7 @@ def differs(difference: Array, covariance: Array, typical: Array) -> float:
     """Probability that a difference (k,) of covariance (k, k) is none of chance."""
     information = np.linalg.inv(covariance)
     inner = information * typical * typical[:, None]
-    told = Told(
+    told = EffectTold(
         inner, typical * (information @ difference), float(np.diag(inner).max())
     )
     odds = np.log(DIFFERS) - np.log1p(-DIFFERS) + _over_sizes(told.gain)

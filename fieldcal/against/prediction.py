@@ -20,7 +20,7 @@ import numpy as np
 
 from fieldcal.against.causes import Decided
 from fieldcal.against.offsets import shared_axes, wander
-from fieldcal.against.result import Prediction
+from fieldcal.against.result import SimulatorPrediction
 from fieldcal.against.side import Side
 from fieldcal.against.widened import Widened
 from fieldcal.core.samples import Array, Index
@@ -32,7 +32,7 @@ from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import Linear
 
 
-def before(found: Decided) -> Prediction:
+def before(found: Decided) -> SimulatorPrediction:
     """The recording as the simulator is; outputs that this has not are left aside."""
     real = found.pairing.asked[0]
     rows = found.pairing.real.explanation.rows
@@ -45,7 +45,7 @@ def before(found: Decided) -> Prediction:
     return _prediction(rows, residual, squares, sum(len(p.white) for p in linear))
 
 
-def after(real: Side) -> Prediction:
+def after(real: Side) -> SimulatorPrediction:
     """The recording, each part as the others predict it."""
     explanation = real.explanation
     ahead = explanation.held_out.residual(explanation.in_question)
@@ -53,10 +53,12 @@ def after(real: Side) -> Prediction:
     return _prediction(explanation.rows, ahead, squares, count)
 
 
-def _prediction(rows: Rows, residual: Array, squares: float, count: int) -> Prediction:
+def _prediction(
+    rows: Rows, residual: Array, squares: float, count: int
+) -> SimulatorPrediction:
     sizes = rms(rows, residual)
     acc, gyr = (_mean(sizes[part]) for part in (slice(0, 3), slice(3, 6)))
-    return Prediction(acc, gyr, squares / count if count else np.nan)
+    return SimulatorPrediction(acc, gyr, squares / count if count else np.nan)
 
 
 def _mean(values: Array) -> float:

@@ -74,7 +74,7 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True)
-class Prediction:
+class SimulatorPrediction:
     """How a simulator predicts a recording that it was not fitted to.
 
     Attributes
@@ -158,8 +158,8 @@ class Match:
     probability: float
     differences: tuple[Difference, ...]
     alike: tuple[str, ...]
-    before: Prediction
-    after: Prediction
+    before: SimulatorPrediction
+    after: SimulatorPrediction
     real: Facts
     simulator: Facts
     warnings: tuple[str, ...]

@@ -34,7 +34,7 @@ SAID = 5
 
 
 @dataclass(frozen=True)
-class Round:
+class SimulatorRun:
     """One run of the simulator.
 
     Attributes
@@ -61,8 +61,8 @@ def rounds(
     about: Description,
     form: str,
     most: int,
-    tell: Callable[[int, Round], None],
-) -> list[Round]:
+    tell: Callable[[int, SimulatorRun], None],
+) -> list[SimulatorRun]:
     """Run and patch until nothing differs, or `most` patches were tried.
 
     Where the format has nothing for what is left, a further patch would be the same.
@@ -87,7 +87,7 @@ def rounds(
         raise InputError(
             f"{command}: has no {PATCH}, in the place of which the patch's file stands"
         )
-    done: list[Round] = []
+    done: list[SimulatorRun] = []
     model = SensorModel(rate_hz=real.rate_hz)
     for number in range(most + 1):
         block, placed, said = _run(command, real, about, form, model)
@@ -95,7 +95,7 @@ def rounds(
         after = patched(found, model)
         left = {one.id for one in found.differences}
         last = not left & set(patches.patch_format(form).HOLDS)
-        done.append(Round(after if last else model, found, tuple(said)))
+        done.append(SimulatorRun(after if last else model, found, tuple(said)))
         tell(number, done[-1])
         if last:
             break

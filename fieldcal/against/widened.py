@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.against.joint import Told
+from fieldcal.against.joint import EffectTold
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
@@ -56,7 +56,7 @@ class Widened:
         """A cause by its key, with its variant."""
         return next((m for m in self.set.members if m[0].key == key), None)
 
-    def told(self, key: str) -> Told | None:
+    def told(self, key: str) -> EffectTold | None:
         """What the session says of a cause, all else eliminated; None without it."""
         if (member := self.member(key)) is None:
             return None
@@ -67,7 +67,7 @@ class Widened:
         less = Eliminated.of(state.rows, state.columns[kept], state.sizes[kept])
         inner, pull = less.rest(columns, typical)
         own = np.diag(state.rows.matrix(columns, columns)) * typical**2
-        return Told(inner, pull, float(own.max()), self.evidence(key))
+        return EffectTold(inner, pull, float(own.max()), self.evidence(key))
 
     def evidence(self, key: str) -> float:
         """Rise of ln Z with a cause, its chance not counted."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from fieldcal.against.result import Difference, Direction, Pair, Prediction
+from fieldcal.against.result import Difference, Direction, Pair, SimulatorPrediction
 from fieldcal.calibration.wording import pretty
 from fieldcal.diagnosis.result import Quantity, Verdict
 from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
@@ -27,7 +27,7 @@ SHORT: Mapping[Direction, str] = {
 def paragraph(
     verdict: Verdict,
     differences: Sequence[Difference],
-    predicted: tuple[Prediction, Prediction],
+    predicted: tuple[SimulatorPrediction, SimulatorPrediction],
 ) -> str:
     """Say verdict, differences and what they do to the prediction."""
     if verdict == "consistent":
@@ -50,7 +50,7 @@ def paragraph(
     return " ".join([*out, _predicted(*predicted)])
 
 
-def _predicted(before: Prediction, after: Prediction) -> str:
+def _predicted(before: SimulatorPrediction, after: SimulatorPrediction) -> str:
     said = []
     for one, two, unit in (
         (before.rms_acc, after.rms_acc, "m/s^2"),

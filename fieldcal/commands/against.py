@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fieldcal.against import Match
-    from fieldcal.against.rounds import Round
+    from fieldcal.against.rounds import SimulatorRun
     from fieldcal.against.sensor_model import SensorModel
     from fieldcal.against.side import Side
     from fieldcal.session.folder import Session
@@ -81,7 +81,7 @@ def _rounds(
     return last.match, last.patch, list(last.says)
 
 
-def _tell(number: int, one: Round) -> None:
+def _tell(number: int, one: SimulatorRun) -> None:
     """A line for each run of the simulator."""
     differ = ", ".join(d.id.replace("_", " ") for d in one.match.differences)
     sys.stderr.write(

@@ -11,7 +11,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.row_times import FRACTIONS, RowTimes
 from fieldcal.importing.scales import FEWEST
-from fieldcal.session.sample_files import COLUMNS
+from fieldcal.session.text_files import COLUMNS
 
 SKIP = "_"
 """Name of a column to skip."""

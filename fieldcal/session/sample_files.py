@@ -8,7 +8,6 @@ are counted from 1, the row of names not among them.
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,22 +17,15 @@ import numpy as np
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Array, Block
 from fieldcal.session.arrow_stream import decode, in_order, numbers
+from fieldcal.session.text_files import COLUMNS, read_text, rows_of_text
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-COLUMNS = (
-    *("t", "ax", "ay", "az", "gx", "gy", "gz"),
-    *("temperature", "t_host", "seq"),
-)
-"""Every column a samples file can have, in the order they are written."""
 
 ENDINGS = (".arrows", ".parquet", ".csv", ".csv.gz")
 
 PART = 1 << 17
 """Rows that are handed over together, at most."""
-
-_GUNZIP = 16 + zlib.MAX_WBITS
 
 
 def find(folder: Path, stem: str = "samples") -> Path:
@@ -118,7 +110,7 @@ def _batches(path: Path) -> Iterator[pa.RecordBatch]:
         names = [n for n in whole.schema_arrow.names if n in COLUMNS]
         yield from whole.iter_batches(batch_size=PART, columns=names)
     else:
-        yield from _rows_of_text(path)
+        yield from rows_of_text(path)
 
 
 def _recorded(path: Path) -> Iterator[pa.RecordBatch]:
@@ -141,31 +133,12 @@ def _recorded(path: Path) -> Iterator[pa.RecordBatch]:
         yield from table.slice(rows).to_batches()
 
 
-def _rows_of_text(path: Path) -> Iterator[pa.RecordBatch]:
-    """Record batches of a text, unpacked as it is read."""
-    import pyarrow as pa
-    import pyarrow.csv
-
-    packed = path.name.endswith(".gz")
-    with pa.input_stream(path, compression="gzip" if packed else None) as stream:
-        reader = pyarrow.csv.open_csv(
-            stream,
-            read_options=pyarrow.csv.ReadOptions(use_threads=False, block_size=1 << 24),
-            convert_options=pyarrow.csv.ConvertOptions(
-                column_types={name: pa.float64() for name in COLUMNS},
-                null_values=["", "nan", "NaN"],
-            ),
-        )
-        for batch in reader:
-            yield batch.select([n for n in batch.schema.names if n in COLUMNS])
-
-
 def _table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     if path.name.endswith(".arrows"):
         return _read_arrows(path)
     if path.name.endswith(".parquet"):
         return _read_parquet(path), ()
-    return _read_csv(path)
+    return read_text(path)
 
 
 def _read_arrows(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
@@ -195,102 +168,6 @@ def _read_parquet(path: Path) -> pa.Table:
         raise SessionError(
             f"{path}: is not a whole Parquet file; copy it again from where it came"
         ) from error
-
-
-def _read_csv(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
-    import pyarrow as pa
-    import pyarrow.csv
-
-    data, cut = path.read_bytes(), False
-    if path.name.endswith(".gz"):
-        data, cut = _gunzip(path, data)
-    if cut:
-        data = data[: data.rfind(b"\n") + 1]
-    if not data.strip():
-        raise SessionError(f"{path}: is empty; it needs a row of names and samples")
-    data, short = _without_short_row(data)
-    names = _names(data)
-    if not set(names) & set(COLUMNS):
-        raise SessionError(
-            f"{path}: the first row must name the columns: {', '.join(COLUMNS)}"
-        )
-    try:
-        table = pyarrow.csv.read_csv(
-            pa.BufferReader(data),
-            read_options=pyarrow.csv.ReadOptions(
-                use_threads=False, skip_rows=1, column_names=names
-            ),
-            convert_options=pyarrow.csv.ConvertOptions(
-                column_types={name: pa.float64() for name in COLUMNS},
-                include_columns=[n for n in names if n in COLUMNS],
-                null_values=["", "nan", "NaN"],
-            ),
-        )
-    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        raise SessionError(f"{path}: {_place(data)}") from error
-    return table, _cut_off(path, table) if cut or short else ()
-
-
-def _names(data: bytes) -> list[str]:
-    first = data.split(b"\n", 1)[0].decode(errors="replace")
-    return [name.strip().strip('"') for name in first.split(",")]
-
-
-def _gunzip(path: Path, data: bytes) -> tuple[bytes, bool]:
-    """What can be unpacked, and whether the end is missing."""
-    unpack = zlib.decompressobj(_GUNZIP)
-    try:
-        out = unpack.decompress(data)
-    except zlib.error as error:
-        raise SessionError(
-            f"{path}: is not a gzip file ({error}); copy it again from where it came"
-        ) from error
-    while unpack.eof and unpack.unused_data.strip(b"\0"):
-        data, unpack = unpack.unused_data, zlib.decompressobj(_GUNZIP)
-        out += unpack.decompress(data)
-    return out, not unpack.eof
-
-
-def _without_short_row(data: bytes) -> tuple[bytes, bool]:
-    """Leave out a last row that was cut off in the middle."""
-    if data.endswith(b"\n"):
-        return data, False
-    head, _, last = data.rpartition(b"\n")
-    wanted = data.split(b"\n", 1)[0].count(b",")
-    if not head or last.count(b",") >= wanted:
-        return data, False
-    return head + b"\n", True
-
-
-def _place(data: bytes) -> str:
-    """Say where the first row that is none stands: the slow way, after a failure."""
-    lines = data.decode(errors="replace").splitlines()
-    names = _names(data)
-    for row, line in enumerate(lines[1:], start=1):
-        cells = line.split(",")
-        if line and len(cells) != len(names):
-            return (
-                f"row {row} has {len(cells)} columns, not {len(names)}; mend that row"
-            )
-        for name, cell in zip(names, cells, strict=False):
-            if name in COLUMNS and not _is_number(cell):
-                return (
-                    f"row {row}, column {name}: {cell.strip()[:20]!r} is not a number;"
-                    " mend it, or leave it empty where the value is missing"
-                )
-    return "is not a csv file with comma-separated columns"
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell or "nan")
-    except ValueError:
-        return False
-    return True
-
-
-def _cut_off(path: Path, table: pa.Table) -> tuple[str, ...]:
-    return (f"{path.name} was cut off; its {table.num_rows} whole rows are used",)
 
 
 def _numbers(path: Path, table: pa.Table | pa.RecordBatch, name: str) -> Array:

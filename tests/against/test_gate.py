@@ -19,7 +19,7 @@ from fieldcal.against.result import (
     Facts,
     Match,
     Pair,
-    Prediction,
+    SimulatorPrediction,
 )
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
@@ -41,7 +41,7 @@ def differing(
 
 
 def match(*differences: Difference) -> Match:
-    predicted = Prediction(0.1, 0.1, 3.0)
+    predicted = SimulatorPrediction(0.1, 0.1, 3.0)
     verdict: Any = "left_out" if differences else "consistent"
     return Match(
         verdict, 1.0, differences, ("quadratic",), predicted, predicted, FACTS, FACTS,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fieldcal.against.joint import (
-    Told,
+    EffectTold,
     apart,
     as_large,
     both,
@@ -26,9 +26,9 @@ def rows(value: Array, seed: int) -> tuple[Array, Array]:
     return design, design @ value + SIGMA * rng.standard_normal(30)
 
 
-def told(design: Array, y: Array) -> Told:
+def told(design: Array, y: Array) -> EffectTold:
     inner = design.T @ design / SIGMA**2
-    return Told(inner, design.T @ y / SIGMA**2, float(np.diag(inner).max()))
+    return EffectTold(inner, design.T @ y / SIGMA**2, float(np.diag(inner).max()))
 
 
 def density(design: Array, y: Array, v: float) -> float:

@@ -14,7 +14,7 @@ from session_folders import write_session
 from strapdown import GRAVITY, schedule
 
 from fieldcal.against import rounds as module
-from fieldcal.against.result import Difference, Facts, Match, Pair, Prediction
+from fieldcal.against.result import Difference, Facts, Match, Pair, SimulatorPrediction
 from fieldcal.against.rounds import rounds
 from fieldcal.against.sensor_model import SensorModel, patched
 from fieldcal.against.side import Side
@@ -104,7 +104,7 @@ def pair(real: float, sim: float, unit: str) -> Pair:
 
 
 def differing(*differences: Difference) -> Match:
-    nothing = Prediction(0.0, 0.0, 1.0)
+    nothing = SimulatorPrediction(0.0, 0.0, 1.0)
     facts = Facts(100.0, np.nan, np.nan, 5.0, 20.0, {})
     return Match(
         "left_out", 1.0, differences, (), nothing, nothing, facts, facts, (), ""

@@ -8,14 +8,14 @@ import pytest
 from benchmarks.against import LARGER, drawn, judged, pair
 from benchmarks.concealed.draws import FIXED, single
 from fieldcal.against import Match
-from fieldcal.against.result import Difference, Direction, Facts, Prediction
+from fieldcal.against.result import Difference, Direction, Facts, SimulatorPrediction
 from fieldcal.effects import catalogue
 
 FACTS = Facts(100.0, np.nan, np.nan, 0.0, np.nan, {})
 
 
 def match(*differences: Difference) -> Match:
-    predicted = Prediction(0.1, 0.1, 1.0)
+    predicted = SimulatorPrediction(0.1, 0.1, 1.0)
     return Match(
         "left_out", 1.0, differences, (), predicted, predicted, FACTS, FACTS, (), ""
     )  # fmt: skip

@@ -1,0 +1,149 @@
+"""Samples as text: comma-separated columns under a row of names, packed by gzip or not.
+
+A text that was cut off is read up to its last whole row; what is wrong otherwise names
+the row and the column.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fieldcal.core.errors import SessionError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+COLUMNS = (
+    *("t", "ax", "ay", "az", "gx", "gy", "gz"),
+    *("temperature", "t_host", "seq"),
+)
+"""Every column a samples file can have, in the order they are written."""
+
+_GUNZIP = 16 + zlib.MAX_WBITS
+
+
+def rows_of_text(path: Path) -> Iterator[pa.RecordBatch]:
+    """Record batches of a text, unpacked as it is read."""
+    import pyarrow as pa
+    import pyarrow.csv
+
+    packed = path.name.endswith(".gz")
+    with pa.input_stream(path, compression="gzip" if packed else None) as stream:
+        reader = pyarrow.csv.open_csv(
+            stream,
+            read_options=pyarrow.csv.ReadOptions(use_threads=False, block_size=1 << 24),
+            convert_options=pyarrow.csv.ConvertOptions(
+                column_types={name: pa.float64() for name in COLUMNS},
+                null_values=["", "nan", "NaN"],
+            ),
+        )
+        for batch in reader:
+            yield batch.select([n for n in batch.schema.names if n in COLUMNS])
+
+
+def read_text(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
+    """All of a text, and warnings about what was cut off.
+
+    Raises
+    ------
+    SessionError
+        If it is none, naming row and column.
+
+    """
+    import pyarrow as pa
+    import pyarrow.csv
+
+    data, cut = path.read_bytes(), False
+    if path.name.endswith(".gz"):
+        data, cut = _gunzip(path, data)
+    if cut:
+        data = data[: data.rfind(b"\n") + 1]
+    if not data.strip():
+        raise SessionError(f"{path}: is empty; it needs a row of names and samples")
+    data, short = _without_short_row(data)
+    names = _names(data)
+    if not set(names) & set(COLUMNS):
+        raise SessionError(
+            f"{path}: the first row must name the columns: {', '.join(COLUMNS)}"
+        )
+    try:
+        table = pyarrow.csv.read_csv(
+            pa.BufferReader(data),
+            read_options=pyarrow.csv.ReadOptions(
+                use_threads=False, skip_rows=1, column_names=names
+            ),
+            convert_options=pyarrow.csv.ConvertOptions(
+                column_types={name: pa.float64() for name in COLUMNS},
+                include_columns=[n for n in names if n in COLUMNS],
+                null_values=["", "nan", "NaN"],
+            ),
+        )
+    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
+        raise SessionError(f"{path}: {_place(data)}") from error
+    return table, cut_off(path, table) if cut or short else ()
+
+
+def _names(data: bytes) -> list[str]:
+    first = data.split(b"\n", 1)[0].decode(errors="replace")
+    return [name.strip().strip('"') for name in first.split(",")]
+
+
+def _gunzip(path: Path, data: bytes) -> tuple[bytes, bool]:
+    """What can be unpacked, and whether the end is missing."""
+    unpack = zlib.decompressobj(_GUNZIP)
+    try:
+        out = unpack.decompress(data)
+    except zlib.error as error:
+        raise SessionError(
+            f"{path}: is not a gzip file ({error}); copy it again from where it came"
+        ) from error
+    while unpack.eof and unpack.unused_data.strip(b"\0"):
+        data, unpack = unpack.unused_data, zlib.decompressobj(_GUNZIP)
+        out += unpack.decompress(data)
+    return out, not unpack.eof
+
+
+def _without_short_row(data: bytes) -> tuple[bytes, bool]:
+    """Leave out a last row that was cut off in the middle."""
+    if data.endswith(b"\n"):
+        return data, False
+    head, _, last = data.rpartition(b"\n")
+    wanted = data.split(b"\n", 1)[0].count(b",")
+    if not head or last.count(b",") >= wanted:
+        return data, False
+    return head + b"\n", True
+
+
+def _place(data: bytes) -> str:
+    """Say where the first row that is none stands: the slow way, after a failure."""
+    lines = data.decode(errors="replace").splitlines()
+    names = _names(data)
+    for row, line in enumerate(lines[1:], start=1):
+        cells = line.split(",")
+        if line and len(cells) != len(names):
+            return (
+                f"row {row} has {len(cells)} columns, not {len(names)}; mend that row"
+            )
+        for name, cell in zip(names, cells, strict=False):
+            if name in COLUMNS and not _is_number(cell):
+                return (
+                    f"row {row}, column {name}: {cell.strip()[:20]!r} is not a number;"
+                    " mend it, or leave it empty where the value is missing"
+                )
+    return "is not a csv file with comma-separated columns"
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def cut_off(path: Path, table: pa.Table) -> tuple[str, ...]:
+    """What is said of a file that was cut off."""
+    return (f"{path.name} was cut off; its {table.num_rows} whole rows are used",)

@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import observations
+from fieldcal.evaluation.observations import Rests, observations
 from fieldcal.report.blocks import Block as ReportBlock
 from fieldcal.report.blocks import Figure, Section, Text
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
+from fieldcal.solve.observations import Observations
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,18 +46,33 @@ class NormErrors:
         return float(before), float(after)
 
 
-def norm_errors(material: Material) -> NormErrors | None:
-    """What the norms miss gravity by; None without accelerometers or a calibration."""
+def true_forces(material: Material) -> tuple[Array, float] | None:
+    """Calibrated forces of the windows at rest, (n, 3), and gravity, m/s^2."""
+    held = _at_rest(material)
+    if held is None or material.calibration is None:
+        return None
+    _, seen = held
+    recorded = Block.of(seen.time, seen.mean[:, :3], seen.mean[:, 3:])
+    return material.calibration.apply(recorded, seen.nominal).acc, seen.gravity
+
+
+def _at_rest(material: Material) -> tuple[Rests, Observations] | None:
+    """The windows at rest, if there are accelerometers and a calibration of them."""
     found = material.calibration
     if found is None or material.still is None or "acc_bias" not in found.groups:
         return None
     still = material.still.at_rest(material.session)
     seen = observations(material.session.about, still.averages, still.rows)
-    if not seen.has_acc or not len(seen):
+    return (still, seen) if seen.has_acc and len(seen) else None
+
+
+def norm_errors(material: Material) -> NormErrors | None:
+    """What the norms miss gravity by; None without accelerometers or a calibration."""
+    held, forces = _at_rest(material), true_forces(material)
+    if held is None or forces is None:
         return None
+    (still, seen), (true, _) = held, forces
     nominal = (seen.mean[:, :3] - seen.nominal.acc_bias) / seen.nominal.acc_scale
-    recorded = Block.of(seen.time, seen.mean[:, :3], seen.mean[:, 3:])
-    true = found.apply(recorded, seen.nominal).acc
     along = true / np.linalg.norm(true, axis=1, keepdims=True)
     spread = np.einsum("ni,nij,nj->n", along, seen.covariance[:, :3, :3], along)
     before, after = (

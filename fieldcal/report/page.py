@@ -17,6 +17,7 @@ from typing import Any
 from fieldcal.report.against import against
 from fieldcal.report.agreement import agreement, correlation
 from fieldcal.report.blocks import Section
+from fieldcal.report.coverage import coverage
 from fieldcal.report.diagnosis import diagnosis
 from fieldcal.report.gather import Material
 from fieldcal.report.gravity_norm import gravity_norm
@@ -72,6 +73,7 @@ def sections(material: Material, made: datetime) -> list[Section]:
     found = [
         calibration(material),
         gravity_norm(material),
+        coverage(material),
         diagnosis(material),
         against(material),
         places(material),

@@ -26,6 +26,9 @@ FEWEST = 5
 BESIDE = 4.0
 """How much more often the rail is taken than the value next to it."""
 
+CHANCE = 3.0
+"""Standard deviations of a difference of two counts that chance does not make."""
+
 
 def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
     """Samples at each rail of a channel; none where there is no rail.
@@ -35,27 +38,30 @@ def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
     """
     out = []
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    alike = low < 0 and abs(high + low) < 1e-3 * high
-    if alike and not coarse and not np.isfinite(limit):
-        limit = high  # as far down as up: full scale, if it is taken again and again
+    alike = low < 0 and abs(high + low) < 1e-3 * high and not np.isfinite(limit)
     for edge in (low, high):
         at = np.flatnonzero(values == edge)
+        if len(at) < FEWEST:
+            continue
         declared = abs(abs(edge) - limit) < 1e-3 * limit
-        if len(at) >= FEWEST and (
-            declared or (not coarse and _repeated(values, edge, at))
-        ):
+        beside = _beside(values, edge)
+        places = 1 + int((np.diff(at) > 1).sum())
+        often = places >= 2 and 0 < BESIDE * beside + FEWEST < len(at)
+        # as far down as up is full scale only if more is there than beside it: gravity
+        # on both faces of a box is as much up as down, and its noise thins outwards
+        chance = CHANCE * (len(at) + beside) ** 0.5
+        piled = alike and 0 < beside < len(at) - chance
+        if declared or (not coarse and (often or piled)):
             out.append(at)
     return out
 
 
-def _repeated(values: Array, edge: float, at: Rows) -> bool:
-    places = 1 + int((np.diff(at) > 1).sum())
+def _beside(values: Array, edge: float) -> int:
+    """How often the value next to an edge is taken; 0 where there is no other."""
     inner = values[np.isfinite(values) & (values != edge)]
     if not len(inner):
-        return False
-    beside = inner[np.argmin(np.abs(inner - edge))]
-    often = len(at) > BESIDE * int((inner == beside).sum()) + FEWEST
-    return places >= 2 and often
+        return 0
+    return int((inner == inner[np.argmin(np.abs(inner - edge))]).sum())
 
 
 class Saturation(Chain):

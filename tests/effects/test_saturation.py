@@ -1,0 +1,43 @@
+"""Rails: what stops at full scale, and what gravity makes as much up as down."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.effects.saturation import rails
+
+STEP = 1e-3
+
+
+def box(seed: int, noise: float) -> np.ndarray:
+    """An axis laid up, down and level, with hardly a bias, on a grid of values."""
+    rng = np.random.default_rng(seed)
+    held = np.repeat([9.79, 0.0, -9.79, 6.92, -6.92], 1000)
+    return np.round((held + rng.normal(0, noise, len(held))) / STEP) * STEP
+
+
+def test_gravity_as_much_up_as_down_is_no_full_scale() -> None:
+    """Noise of a few steps takes the outermost values more than once, by chance."""
+    alike = 0
+    for seed in range(400):
+        values = box(seed, 1.2 * STEP)
+        alike += abs(values.max() + values.min()) < 1e-3 * values.max()
+        assert not rails(values, np.nan)
+    assert alike > 300
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_clipped_as_far_down_as_up_is_found(seed: int) -> None:
+    values = np.clip(box(seed, 3 * STEP), -9.789, 9.789)
+    found = rails(values, np.nan)
+    assert len(found) == 2
+    for at in found:
+        assert set(np.abs(values[at])) == {9.789}
+        assert len(at) > 300
+
+
+def test_the_declared_range_needs_no_more_than_a_few() -> None:
+    values = np.concatenate([np.linspace(-1.0, 8.0, 500), np.full(5, 9.8)])
+    assert [len(at) for at in rails(values, 9.8)] == [5]
+    assert not rails(values, 19.6)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fieldcal.calibration.wording import number, pretty
-from fieldcal.diagnosis.wording.lines import format_probability
 from fieldcal.report.blocks import Block, Section, Text, WarningBox, table
-from fieldcal.report.diagnosis import TONES
+from fieldcal.report.diagnosis import verdict_box
 from fieldcal.report.gather import Material
 from fieldcal.report.loose import (
     Json,
@@ -32,10 +31,7 @@ def against(material: Material) -> Section | None:
     found = material.against
     if found is None:
         return None
-    verdict = str(found.get("verdict", "unknown"))
-    sure = format_probability(real(found.get("probability")))
-    lead = f"{verdict.replace('_', ' ').upper()}, probability {sure}"
-    blocks: list[Block] = [WarningBox(lead, TONES.get(verdict, "warn"))]
+    blocks: list[Block] = [verdict_box(found)]
     blocks.append(Text(f"Compared with {found.get('against', 'a simulator')}."))
     if said := str(found.get("says", "")):
         blocks.append(Text(said))

@@ -52,15 +52,20 @@ TONES: dict[str, Tone] = {
 }
 
 
+def verdict_box(found: Mapping[str, Any]) -> WarningBox:
+    """The verdict of a diagnosis, or of a comparison, with its probability."""
+    verdict = str(found.get("verdict", "unknown"))
+    sure = format_probability(real(found.get("probability")))
+    lead = f"{verdict.replace('_', ' ').upper()}, probability {sure}"
+    return WarningBox(lead, TONES.get(verdict, "warn"))
+
+
 def diagnosis(material: Material) -> Section | None:
     """Verdict, what to do, effects, and why; None where no diagnosis was made."""
     found = material.diagnosis
     if found is None:
         return None
-    verdict = str(found.get("verdict", "unknown"))
-    sure = format_probability(real(found.get("probability")))
-    lead = f"{verdict.replace('_', ' ').upper()}, probability {sure}"
-    blocks: list[Block] = [WarningBox(lead, TONES.get(verdict, "warn"))]
+    blocks: list[Block] = [verdict_box(found)]
     blocks += evidence.next_steps(found)
     blocks += _lines(objects_at(found, "lines"))
     effects = objects_at(found, "effects")

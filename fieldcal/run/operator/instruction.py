@@ -14,6 +14,15 @@ TURN = "TURN TO"
 Colour = Literal["", "cyan", "yellow", "green", "red"]
 
 
+def numbered(hold: Hold | None, count: int, most: int | None) -> str:
+    """Number of the position asked for, of how many; empty where none is.
+
+    `most` is how many there are at most, where they are found on the way.
+    """
+    many = str(count) if most is None else f"at most {max(most, count)}"
+    return f"position {hold.index + 1} of {many}" if hold else ""
+
+
 @dataclass(frozen=True, slots=True)
 class Instruction:
     """What to do.

@@ -17,7 +17,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.operator import widgets
 from fieldcal.run.operator.banner import drawable, large
 from fieldcal.run.operator.box import pictures
-from fieldcal.run.operator.instruction import TURN, Instruction
+from fieldcal.run.operator.instruction import TURN, Instruction, numbered
 from fieldcal.run.operator.keyboard import HELP, SHORT_HELP
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.operator.widgets import alert
@@ -65,10 +65,7 @@ class ScreenContent:
     @property
     def number(self) -> str:
         """Number of the position asked for, and how many there are."""
-        many = str(len(self.positions))
-        if self.most is not None:
-            many = f"at most {max(self.most, len(self.positions))}"
-        return f"position {self.hold.index + 1} of {many}" if self.hold else ""
+        return numbered(self.hold, len(self.positions), self.most)
 
 
 class Screen:

@@ -14,7 +14,7 @@ from fieldcal.core.positions import Position
 from fieldcal.core.shown import shown
 from fieldcal.planning.steps import Hold
 from fieldcal.run.operator import widgets
-from fieldcal.run.operator.instruction import Instruction
+from fieldcal.run.operator.instruction import Instruction, numbered
 from fieldcal.run.operator.protocol import OperatorView
 
 TOLD = 2
@@ -120,14 +120,8 @@ class Board:
     def _instruction(self) -> Instruction:
         if self._ended is not None:
             return Instruction(self._ended["words"], "", self._ended["colour"])
-        return Instruction.of(self._hold, self._view, self._number)
-
-    @property
-    def _number(self) -> str:
-        many = str(len(self._positions))
-        if self._most is not None:
-            many = f"at most {max(self._most, len(self._positions))}"
-        return f"position {self._hold.index + 1} of {many}" if self._hold else ""
+        number = numbered(self._hold, len(self._positions), self._most)
+        return Instruction.of(self._hold, self._view, number)
 
     def _sentences(self) -> list[str]:
         why = widgets.alert(self._view) if self._view else ""

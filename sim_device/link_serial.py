@@ -145,7 +145,15 @@ class SerialLink(Link):
             forget(self.port)
 
     def hang_up(self) -> None:
-        """Close the pty: the host reads an end of file or an error."""
+        """Close the pty: the host reads an end of file or an error.
+
+        Its name goes first. The system gives the number of a pty that is gone to the
+        next one, and a host that tries the old name again would read a stranger.
+        """
+        if self._port_link is not None:
+            with contextlib.suppress(OSError):
+                if os.readlink(self._port_link) == self.port:
+                    self._port_link.unlink()
         if self._ours >= 0:
             os.close(self._ours)
             self._ours = -1
@@ -164,10 +172,6 @@ class SerialLink(Link):
     def close(self) -> None:
         """Close the pty and take the symbolic link away."""
         self.hang_up()
-        if self._port_link is not None:
-            with contextlib.suppress(OSError):
-                if os.readlink(self._port_link) == self.port:
-                    self._port_link.unlink()
 
 
 def _point(link: Path, port: str) -> None:

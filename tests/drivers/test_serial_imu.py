@@ -135,11 +135,11 @@ def test_unplugged_and_back_resumes_with_a_gap(tmp_path: Path) -> None:
     with open_driver(f"serial:{link}?reconnect=600") as imu:
         os.write(first[0], b"".join(CYCLES[:50]) + CYCLES[50][:20])
         assert len(collect(imu, 50)) == 50
+        link.unlink()
         os.close(first[0])
         os.close(first[1])
         while not imu.reconnecting:
             imu.receive(0.01)
-        link.unlink()
         link.symlink_to(os.ttyname(second[1]))
         while imu.reconnecting:
             imu.receive(0.01)

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,11 @@ from processes import SIM
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Array, concat
 from fieldcal.sim_device import Profile, VirtualDevice
+from fieldcal.sim_device.line_faults import LineFaults
+from fieldcal.sim_device.link_serial import SerialLink
 from fieldcal.sim_device.remote import Remote
 from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.wire import open_wire
 
 LSB = np.array([16 * 9.80665 / 32768] * 3 + [np.deg2rad(2000) / 32768] * 3)
 SAMPLE = 33
@@ -297,6 +301,26 @@ def test_a_stale_link_is_replaced_and_a_file_is_not(
     code, said = sim.ended()
     assert code == 2 and "is there already" in said
     assert link.read_text() == "precious"
+
+
+def test_a_port_that_hung_up_has_no_name_until_it_is_back(tmp_path: Path) -> None:
+    name = tmp_path / "imu"
+    link = SerialLink(open_wire("witmotion"), LineFaults(1), name)
+    link.hang_up()
+    with pty_of_somebody_else() as stranger:
+        assert stranger and not name.is_symlink()
+        link.come_back()
+        assert os.readlink(name) == link.port != stranger
+    link.close()
+    assert not name.is_symlink()
+
+
+@contextmanager
+def pty_of_somebody_else() -> Iterator[str]:
+    ends = os.openpty()
+    yield os.ttyname(ends[1])
+    for end in ends:
+        os.close(end)
 
 
 @pytest.mark.parametrize(

@@ -51,11 +51,13 @@ def title(name: str) -> str:
 def pretty(unit: str) -> str:
     """A unit with raised figures; none for a plain number.
 
-    >>> pretty("m/s^2"), pretty("1/(m/s^2)^2"), pretty("1")
-    ('m/s²', '1/(m/s²)²', '')
+    >>> pretty("m/s^2*sqrt(Hz)"), pretty("1/(m/s^2)^2"), pretty("1")
+    ('m/s²·√Hz', '1/(m/s²)²', '')
     """
-    raised = unit.replace("^2", "²").replace("^3", "³").replace("sqrt(s)", "√s")
-    return "" if raised == "1" else raised.replace("degC", "°C")
+    raised = unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
+    for plain, shown in (("sqrt(s)", "√s"), ("sqrt(Hz)", "√Hz"), ("degC", "°C")):
+        raised = raised.replace(plain, shown)
+    return "" if raised == "1" else raised.replace("*", "·")
 
 
 def position_numbers(indices: Iterable[int]) -> str:

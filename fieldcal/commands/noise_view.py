@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 from typing import IO, TYPE_CHECKING
 
 from fieldcal.calibration.wording import number, pretty
-from fieldcal.noise.document import NoiseResult
+from fieldcal.noise.document import TRIADS, NoiseResult, value_or_bound
 from fieldcal.noise.estimate import ChannelEstimate, Size
 from fieldcal.noise.recalibration import CHANCES
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-TRIADS = (("a", "accelerometers"), ("g", "gyroscopes"))
 COLUMNS = (
     ("N", "white N, {}/√Hz"),
     ("B", "instability B, {}"),
@@ -157,11 +156,9 @@ def _until(times: tuple[float, float, float], last: float) -> str:
 def _follows(console: Console, found: NoiseResult) -> None:
     for program in ("kalibr", "ardupilot", "px4"):
         console.print(f"{program}:", style="bold")
-        for name, (value, sigma, unit) in found.programs[program].values.items():
-            bound = not math.isfinite(sigma)
-            text = f"< {value:.2g}" if bound else f"{value:.3g} ± {sigma:.1g}"
-            shown = pretty(unit).replace("sqrt(Hz)", "√Hz").replace("*", "·")
-            console.print(f"  {name:30} {text} {shown}")
+        for name, (value, sigma, unit) in found.programs[program].items():
+            text = f"{value_or_bound(value, sigma)} {pretty(unit)}"
+            console.print(f"  {name:30} {text}")
     left = max(c.pair.left_out for c in found.model.channels.values())
     _line(
         console,

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.noise.averaging import Averaging
 
-EARTH_RATE = 7.292115e-5
-"""Rad/s, WGS 84."""
+NO_NORTH = np.pi / 3**0.5
+"""Standard deviation of a heading of which nothing is known, rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +46,16 @@ class Alignment:
         return float(self.seconds[i]), float(self.sigma[i]), float(spread)
 
 
-def alignment(gyroscopes: list[Averaging], latitude: float) -> Alignment:
-    """Heading from gyroscopes at rest at a latitude, rad, (1)."""
+def alignment(gyroscopes: list[Averaging], latitude: float) -> Alignment | None:
+    """Heading from gyroscopes at rest at a latitude, rad, (1); None if they find none.
+
+    Near a pole nothing of the Earth's rate is level, and north is not found at all.
+    """
     turn = EARTH_RATE * float(np.cos(latitude))
     sigma, low, high = (
         np.max([getattr(g, name) for g in gyroscopes], axis=0) / turn
         for name in ("sigma", "low", "high")
     )
+    if not sigma.min() < NO_NORTH:
+        return None
     return Alignment(gyroscopes[0].seconds, sigma, low, high)

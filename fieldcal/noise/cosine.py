@@ -61,15 +61,10 @@ def markov(n: int, m: int, dt: float, time: float) -> Array:
 
 def _of_a_mean(m: int, a: float) -> float:
     """Variance of a mean over m samples of exp(-a |h|)."""
-    if m == 1:
-        return 1.0
-    h = np.arange(1, m) if m <= 4096 else None
-    if h is not None:
-        return float((1 + 2 * np.sum((1 - h / m) * np.exp(-a * h))) / m)
-    z, x = np.exp(-a), m * a
-    if x < 1e-3:
-        return float(1 - x / 3 + x * x / 12)
-    g = z / (1 - z) + z * np.expm1(-x) / (m * np.expm1(-a) ** 2)
+    if m * a < 1e-3:  # the sum below would cancel
+        return 1 - a * (m * m - 1) / (3 * m) + a * a * (m * m - 1) / 12
+    one = -np.expm1(-a)
+    g = np.exp(-a) / one * (1 + np.expm1(-m * a) / (m * one))
     return float((1 + 2 * g) / m)
 
 

@@ -22,6 +22,10 @@ from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import rich
 
 ROUNDS = 3
+"""Fits of beta and S in turn."""
+
+NOISY = 2.0
+"""A thermometer's bins count as noise up to so many times its quickest ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +132,3 @@ def thermometer(spectrum: CosineSpectrum, values: Array) -> Array | None:
     if not (share > 0.5).any():
         return None
     return values * share[where]
-
-
-NOISY = 2.0
-"""A thermometer's bins count as noise up to so many times its quickest ones."""

@@ -26,6 +26,9 @@ FEWEST = 8
 ODD = 6.0
 """Robust z beyond which a cell is disturbed: one in a thousand million by chance."""
 
+MOST = 0.5
+"""Where a greater part is disturbed it is no disturbance, but how the device is."""
+
 LONGEST = 10.0
 """Disturbances that last longer part a recording, s."""
 
@@ -74,9 +77,10 @@ def calmed(rows: Array, dt: float, noisy: int) -> list[Calm]:
     scale = _scale(bends)
     odd = (np.abs(bends) > ODD * scale).any(axis=1)
     odd |= (_z(np.cbrt(squares)) > ODD).any(axis=1)
-    if not odd.any():
+    odd = _spread(odd)
+    if not odd.any() or odd.mean() > MOST:
         return [Calm(rows, False, 0)]
-    return _parted(rows, _spread(odd), size, dt, scale)
+    return _parted(rows, odd, size, dt, scale)
 
 
 def _z(values: Array) -> Array:
@@ -128,11 +132,8 @@ def _another(before: Array, behind: Array, scale: Array, size: int) -> bool:
 
 def _bridge(before: Array, behind: Array, length: int) -> Array:
     """Samples in the place of `length` disturbed ones."""
-    sides = [side for side in (before, behind) if len(side)]
-    if not sides:
-        raise AssertionError("not every cell is disturbed")
-    ends = [side.mean(axis=0) for side in (sides[0], sides[-1])]
-    source = sides[0] if len(before) >= len(behind) or len(sides) == 1 else behind
+    source = before if len(before) >= len(behind) else behind
+    ends = [(side if len(side) else source).mean(axis=0) for side in (before, behind)]
     noise = source - source.mean(axis=0)
     back: Index = len(source) - 1 - np.arange(length) % len(source)
     share = (np.arange(length) + 0.5)[:, None] / length

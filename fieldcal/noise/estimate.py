@@ -32,6 +32,9 @@ from fieldcal.noise.terms import FILTERED_HZ, choose
 SHORTEST = 30.0
 """Shortest stretch from which noise is estimated, s."""
 
+FEWEST = 5
+"""Draws with a process from which a limit for it is stated."""
+
 QUICK = 1 / (2 * np.pi * FILTERED_HZ)
 """Correlation time below which noise is white to a mean over a second, s."""
 
@@ -248,7 +251,3 @@ def _limits(
             high = float(np.sqrt(np.quantile(sizes, 0.95)))
             out[name] = Size(high, np.nan, OF_UNIT[name].format(unit))
     return out
-
-
-FEWEST = 5
-"""Draws with a process from which a limit for it is stated."""

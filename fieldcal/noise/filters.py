@@ -49,6 +49,9 @@ ONE_SIDED = 1.645
 
 UNITS = ("m/s^2", "m/s^3", "rad/s", "rad/s^2")
 
+FilterNoise = dict[str, tuple[float, float, str]]
+"""Parameters by name: value, standard deviation (nan for a bound) and unit."""
+
 
 @dataclass(frozen=True, slots=True)
 class TwoNumbers:
@@ -118,19 +121,6 @@ def _not_exceeded(spectrum: CosineSpectrum, chosen: Chosen, white: float) -> flo
     return float(np.sqrt(sizes[likely[-1]]))
 
 
-@dataclass(frozen=True, slots=True)
-class FilterNoise:
-    """Parameters of a program.
-
-    Attributes
-    ----------
-    values : value, standard deviation (nan for a bound) and unit, by name
-
-    """
-
-    values: Mapping[str, tuple[float, float, str]]
-
-
 def worst(pairs: Mapping[str, TwoNumbers], triad: str) -> TwoNumbers | None:
     """The largest of each number among the axes of a triad; None without any."""
     some = [pair for name, pair in pairs.items() if name[0] == triad]
@@ -145,19 +135,19 @@ def worst(pairs: Mapping[str, TwoNumbers], triad: str) -> TwoNumbers | None:
 def of_program(program: str, pairs: Mapping[str, TwoNumbers]) -> FilterNoise:
     """Parameters of ArduPilot or PX4, (2)."""
     root = STEP_S[program] ** 0.5
-    out: dict[str, tuple[float, float, str]] = {}
+    out: FilterNoise = {}
     for i, triad in enumerate("ag"):
         if (both := worst(pairs, triad)) is None:
             continue
         white, bias = NAMES[program][2 * i : 2 * i + 2]
         out[white] = both.white / root, both.white_sigma / root, UNITS[2 * i]
         out[bias] = both.walk / root, both.walk_sigma / root, UNITS[2 * i + 1]
-    return FilterNoise(out)
+    return out
 
 
 def kalibr(pairs: Mapping[str, TwoNumbers]) -> FilterNoise:
     """Kalibr's four numbers."""
-    out: dict[str, tuple[float, float, str]] = {}
+    out: FilterNoise = {}
     for triad, name, unit in (
         ("a", "accelerometer", "m/s^2"),
         ("g", "gyroscope", "rad/s"),
@@ -166,7 +156,7 @@ def kalibr(pairs: Mapping[str, TwoNumbers]) -> FilterNoise:
             density, walk = both.white, both.walk
             out[f"{name}_noise_density"] = density, both.white_sigma, f"{unit}/sqrt(Hz)"
             out[f"{name}_random_walk"] = walk, both.walk_sigma, f"{unit}*sqrt(Hz)"
-    return FilterNoise(out)
+    return out
 
 
 def ros(white: Mapping[str, tuple[float, float]], rate_hz: float) -> FilterNoise:
@@ -178,11 +168,11 @@ def ros(white: Mapping[str, tuple[float, float]], rate_hz: float) -> FilterNoise
     rate_hz : samples a second
 
     """
-    out: dict[str, tuple[float, float, str]] = {}
+    out: FilterNoise = {}
     for name, (n, sigma) in white.items():
         what = "linear_acceleration" if name[0] == "a" else "angular_velocity"
         unit = "m^2/s^4" if name[0] == "a" else "rad^2/s^2"
         place = 4 * "xyz".index(name[1])
         value = n * n * rate_hz
         out[f"{what}_covariance[{place}]"] = value, 2 * value * sigma / n, unit
-    return FilterNoise(out)
+    return out

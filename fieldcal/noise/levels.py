@@ -28,6 +28,10 @@ LOWEST, HIGHEST = SEGMENT // 16, SEGMENT // 2
 
 FOLDS = 10
 PER_OCTAVE = 8
+"""Bins."""
+
+LAGS = (1, 2, 4)
+"""Lengths of means whose differences each level below the last is asked for."""
 
 
 class LevelSums(NamedTuple):
@@ -134,10 +138,6 @@ class CosineLevels:
             np.array([FACTOR**lv.level * lag for lv in below[1:] for lag in LAGS],
                      dtype=np.intp),
         )  # fmt: skip
-
-
-LAGS = (1, 2, 4)
-"""Lengths of means whose differences each level below the last is asked for."""
 
 
 class _Level:

@@ -29,26 +29,30 @@ def noise(material: Material) -> Section:
     found = read_noise(material.session.folder)
     if found is None:
         return section
-    return replace(section, blocks=(*section.blocks, _averaging(found)))
+    return replace(section, blocks=(*section.blocks, averaging(found)))
 
 
-def _averaging(found: Mapping[str, Any]) -> Table:
-    """How long to average, as `fieldcal noise` found it."""
+def averaging(found: Mapping[str, Any]) -> Table:
+    """How long to average, of the content of a noise.json."""
+    every = [(name, c, c["averaging"]) for name, c in found["channels"].items()]
+    windows = sorted({s for _, _, told in every for s in told["seconds"]})
     rows = []
-    for name, channel in found["channels"].items():
-        told, unit = channel["averaging"], pretty(channel["unit"])
-        errors = zip(told["seconds"], told["sigma"], told["spread"], strict=True)
-        best = told["best_s"]
+    for name, channel, told in every:
+        errors = zip(told["sigma"], told["spread"], strict=True)
+        cells = [f"{value:.2g} ± {spread:.1g}" for value, spread in errors]
+        best, unit = told["best_s"], pretty(channel["unit"])
         rows.append(
             [
                 name,
-                "; ".join(f"{s:.0f} s: {v:.2g} ± {e:.1g} {unit}" for s, v, e in errors),
-                f"{told['best_sigma']:.2g} {unit}",
+                *cells + [""] * (len(windows) - len(cells)),
+                f"{told['best_sigma']:.2g}",
                 "longer than is known" if best is None else f"{best:.0f} s",
+                unit,
             ]
         )
-    columns = ("channel", "error of a mean over", ">least error", ">averaged over")
-    return table("How long to average; the papers take 30 to 60 s", columns, rows)
+    columns = ("channel", *(f">{w:.0f} s" for w in windows), ">least", ">averaged")
+    caption = "Error of a mean; the papers average for 30 to 60 s"
+    return table(caption, (*columns, "unit"), rows)
 
 
 def _of_recording(material: Material) -> Section:

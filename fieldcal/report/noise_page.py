@@ -7,15 +7,14 @@ import math
 import numpy as np
 
 from fieldcal.calibration.wording import number, pretty
-from fieldcal.noise.document import WINDOWS, NoiseResult
+from fieldcal.noise.document import TRIADS, NoiseResult, value_or_bound
 from fieldcal.noise.estimate import ChannelEstimate
 from fieldcal.report.blocks import Block as Part
 from fieldcal.report.blocks import Figure, NameValues, Section, Table, table
 from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.noise import averaging
 from fieldcal.report.overview import Head
 from fieldcal.report.page import rendered
-
-TRIADS = (("a", "accelerometers"), ("g", "gyroscopes"))
 
 
 def page(found: NoiseResult) -> str:
@@ -40,7 +39,7 @@ def page(found: NoiseResult) -> str:
         [
             Section("allan", "Allan deviation", tuple(_figures(found))),
             Section("processes", "Processes", (_processes(found),)),
-            Section("averaging", "How long to average", (_averaging(found),)),
+            Section("averaging", "How long to average", (averaging(found.to_json()),)),
             Section("filters", "For other programs", (_programs(found),)),
         ],
     )
@@ -93,29 +92,9 @@ def _processes(found: NoiseResult) -> Table:
     return table("Sizes", columns, rows)
 
 
-def _averaging(found: NoiseResult) -> Table:
-    rows = []
-    for channel in found.model.channels.values():
-        one = channel.averaging
-        cells = [
-            f"{value:.2g} ± {spread:.1g}" if seconds <= one.seconds[-1] else ""
-            for seconds in WINDOWS
-            for value, spread in [one.at(seconds)]
-        ]
-        best = one.best[0]
-        until = f"{best:.0f} s" if math.isfinite(best) else f"> {one.seconds[-1]:.0f} s"
-        rows.append([channel.name, *cells, f"{np.min(one.sigma):.2g}", until,
-                     pretty(channel.unit)])  # fmt: skip
-    named = (f">{w:.0f} s" for w in WINDOWS)
-    columns = ("channel", *named, ">least", ">averaged", "unit")
-    return table("Error of a mean; the papers average for 30 to 60 s", columns, rows)
-
-
 def _programs(found: NoiseResult) -> Table:
     rows = []
     for program, values in found.programs.items():
-        for name, (value, sigma, unit) in values.values.items():
-            bound = not math.isfinite(sigma)
-            text = f"< {value:.2g}" if bound else f"{value:.3g} ± {sigma:.1g}"
-            rows.append([program, name, text, pretty(unit)])
+        for name, (value, sigma, unit) in values.items():
+            rows.append([program, name, value_or_bound(value, sigma), pretty(unit)])
     return table("Parameters", ("program", "name", ">value ± 1σ", "unit"), rows)

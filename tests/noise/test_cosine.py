@@ -33,13 +33,20 @@ def test_variances_are_those_of_the_covariance(m: int) -> None:
         assert found == pytest.approx(dense("G", m, time), rel=1e-7)
 
 
-def test_a_mean_over_many_samples_is_summed_in_closed_form() -> None:
-    """Where samples are so many, their sum is an integral."""
-    m, time = 8192, 5.0  # a mean tells next to nothing of the following one
-    span = m * DT / time
-    continuous = 2 / span**2 * (span + np.expm1(-span))
-    found = cosine.markov(4, m, DT, time)
-    assert found == pytest.approx(continuous, rel=0.02)
+@pytest.mark.parametrize("m", [1, 8, 4096, 32768])
+@pytest.mark.parametrize("spans", [1e-4, 9.9e-4, 1.01e-3, 0.1, 160.0])
+def test_what_two_means_differ_by_is_exact_however_slow_a_process(
+    m: int, spans: float
+) -> None:
+    """Of two means over m samples the coefficient is (y_0 - y_1) / sqrt 2.
+
+    Its weights add to nothing, so 1 - exp(-a h) may stand in the place of exp(-a h).
+    """
+    h = np.arange(1, 2 * m)
+    weight = np.where(h <= m, 2 * m - 3 * h, h - 2 * m) / m**2 / 2
+    exact = 2 * np.sum(weight * np.expm1(-spans / m * h))
+    found = cosine.markov(2, m, DT, m * DT / spans)
+    assert found == pytest.approx(exact, rel=1e-6)
 
 
 def test_white_noise_and_walk_are_independent_in_cosines() -> None:

@@ -114,6 +114,17 @@ def test_bumps_are_bridged_and_change_nothing() -> None:
         assert channel.processes["N"].value == pytest.approx(1.0, rel=0.05)
 
 
+def test_what_goes_on_all_the_time_is_no_disturbance() -> None:
+    """A pump that beats every 1.5 s leaves no cell that is like it was without."""
+    values = noise(np.random.default_rng(25), 6000, 0.01, 6, N=1.0)
+    for at in range(20, 6000, 150):
+        values[at : at + 10] *= 12
+    found = estimate([reduced([recording(values, 0.01)])])
+    assert found.seconds == pytest.approx(60, abs=0.1) and not found.bridged
+    found = estimate([reduced([recording(values[:3050], 0.01)])])
+    assert found.longest > 30
+
+
 def test_what_follows_the_temperature_is_taken_out() -> None:
     rng = np.random.default_rng(10)
     t = np.arange(30_000) * DT

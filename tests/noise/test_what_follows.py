@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.noise.processes import noise, recording
+from fieldcal.core.frames import EARTH_RATE
 from fieldcal.noise import estimate, reduced
-from fieldcal.noise.alignment import EARTH_RATE, alignment
+from fieldcal.noise.alignment import alignment
 from fieldcal.noise.averaging import averaging
 from fieldcal.noise.filters import TwoNumbers, kalibr, of_program, ros, worst
 from fieldcal.noise.prediction import Draw
@@ -82,12 +83,12 @@ def test_the_noisiest_axis_of_a_triad_counts() -> None:
     found = worst(pairs, "g")
     assert found and (found.white, found.walk, found.left_out) == (2.0, 3.0, 1.3)
     assert worst(pairs, "a") is None
-    assert set(kalibr(pairs).values) == {"gyroscope_noise_density",
+    assert set(kalibr(pairs)) == {"gyroscope_noise_density",
                                          "gyroscope_random_walk"}  # fmt: skip
     for program, step in (("ardupilot", 0.012), ("px4", 0.01)):
-        values = [v for v, _, _ in of_program(program, pairs).values.values()]
+        values = [v for v, _, _ in of_program(program, pairs).values()]
         assert values == pytest.approx([2 / math.sqrt(step), 3 / math.sqrt(step)])
-    told = ros({"gy": (1e-3, 1e-5)}, 200.0).values
+    told = ros({"gy": (1e-3, 1e-5)}, 200.0)
     assert told["angular_velocity_covariance[4]"][:2] == pytest.approx((2e-4, 4e-6))
 
 
@@ -126,8 +127,15 @@ def test_what_history_shows_counts_more_than_an_hour() -> None:
 def test_north_is_as_sure_as_the_worst_gyroscope_is_still() -> None:
     good, bad = (averaging(drawn(N=n), 0.0, 0.01, 1000.0) for n in (1e-7, 1e-6))
     found = alignment([good, bad], math.radians(60))
+    assert found is not None
     seconds, sigma, spread = found.best
     expected = 1e-6 / math.sqrt(seconds) / (EARTH_RATE * 0.5)
     assert seconds == pytest.approx(1000.0, rel=0.02)
     assert sigma == pytest.approx(expected, rel=0.01)
     assert spread == pytest.approx(0.0, abs=1e-9)
+
+
+def test_at_a_pole_no_gyroscope_finds_north() -> None:
+    good = averaging(drawn(N=1e-7), 0.0, 0.01, 1000.0)
+    assert alignment([good], math.radians(89.9)) is not None
+    assert alignment([good], math.pi / 2) is None

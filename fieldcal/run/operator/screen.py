@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 from rich.console import Console, Group, RenderableType
@@ -13,14 +12,12 @@ from rich.table import Table
 from rich.text import Text
 
 from fieldcal.core.positions import Position
-from fieldcal.planning.steps import Hold
 from fieldcal.run.operator import widgets
 from fieldcal.run.operator.banner import drawable, large
 from fieldcal.run.operator.box import pictures
-from fieldcal.run.operator.instruction import TURN, Instruction, numbered
+from fieldcal.run.operator.content import RunContent
+from fieldcal.run.operator.instruction import TURN
 from fieldcal.run.operator.keyboard import HELP, SHORT_HELP
-from fieldcal.run.operator.protocol import OperatorView
-from fieldcal.run.operator.widgets import alert
 
 TALL = 32
 """Lines from which there is room for letters three lines tall."""
@@ -32,42 +29,6 @@ FEWEST = 3
 """Positions that are listed however little room there is."""
 
 
-@dataclass(slots=True)
-class ScreenContent:
-    """What there is to show.
-
-    Attributes
-    ----------
-    title : what is being done, and where it is recorded
-    positions : all that will be asked for
-    verification : number of the position that is not fitted, None without one
-    keys : whether there are keys to press
-    most : positions that there are at most, None where `positions` has them all
-    taken : standard error of each position taken, m/s^2, by number
-    said : sentences that must not be missed
-    reminder : what stands before the reason for waiting
-    view : what the engine is at
-    hold : the position asked for
-
-    """
-
-    title: str
-    positions: list[Position]
-    verification: int | None
-    keys: Callable[[], bool]
-    most: int | None = None
-    taken: dict[int, float] = field(default_factory=dict)
-    said: list[str] = field(default_factory=list)
-    reminder: str = ""
-    view: OperatorView | None = None
-    hold: Hold | None = None
-
-    @property
-    def number(self) -> str:
-        """Number of the position asked for, and how many there are."""
-        return numbered(self.hold, len(self.positions), self.most)
-
-
 class Screen:
     """Lays out what there is to show.
 
@@ -75,18 +36,27 @@ class Screen:
     ----------
     console : whose width, height and letters there are
     shown : what is drawn
+    verification : number of the position that is not fitted, None without one
+    keys : whether there are keys to press
 
     """
 
-    def __init__(self, console: Console, shown: ScreenContent) -> None:
+    def __init__(
+        self,
+        console: Console,
+        shown: RunContent,
+        verification: int | None,
+        keys: Callable[[], bool],
+    ) -> None:
         self._console, self._shown = console, shown
+        self._verification, self._keys = verification, keys
 
     def drawn(self) -> RenderableType:
         """Draw it; as high as the terminal, so that nothing jumps."""
         columns, rows = SMALL
         if self._console.width < columns or self._console.height < rows:
             return self._small()
-        view, now = self._shown.view, self._shown.hold.index if self._shown.hold else -1
+        view = self._shown.view
         above: list[RenderableType] = [*self._instruction(), Text()]
         if view and self._shown.hold is view.hold:
             above.append(widgets.gauges(view))
@@ -94,19 +64,12 @@ class Screen:
         below: list[RenderableType] = []
         if view:
             below.append(widgets.link(view))
-        if self._shown.keys():
+        if self._keys():
             below.append(Text(HELP))
         rows = max(FEWEST, self._console.height - 2 - self._lines_of(*above, *below))
-        listed = widgets.listing(
-            self._shown.positions,
-            self._shown.taken,
-            now,
-            rows,
-            self._shown.verification,
-        )
         drawn = self._drawing() if rows > FEWEST else []
         beside = Table.grid(padding=(0, 3))
-        beside.add_row(listed, Text("\n".join(drawn[:rows])))
+        beside.add_row(self._listing(rows), Text("\n".join(drawn[:rows])))
         parts = Layout()
         foot = self._lines_of(*below) if below else 0
         parts.split_column(
@@ -119,23 +82,25 @@ class Screen:
     def _small(self) -> RenderableType:
         """Instruction, reason, seconds and keys, and nothing else."""
         view, hold = self._shown.view, self._shown.hold
-        words, detail, colour = self._words()
+        what = self._shown.instruction
         number = f"  {hold.index + 1}" if hold else ""
         if hold and self._shown.most is None:
             number += f"/{len(self._shown.positions)}"
-        style = f"bold reverse {colour}".strip()
+        style = f"bold reverse {what.colour}".strip()
         width = self._console.width
-        lines: list[RenderableType] = [Text(f" {words}{number}".ljust(width), style)]
-        what = detail.partition(": ")[2] or detail  # the number stands above
-        name = hold.position.name if hold and words == TURN else what
+        lines: list[RenderableType] = [
+            Text(f" {what.words}{number}".ljust(width), style)
+        ]
+        name = what.detail.partition(": ")[2] or what.detail  # the number stands above
+        if hold and what.words == TURN:
+            name = hold.position.name
         lines.append(Text(f" {name}".ljust(width), style))
         if view and hold is view.hold:
             lines += [Text(line) for line in widgets.short(view)]
         lines += self._sentences()
-        now = hold.index if hold else -1
-        lines.append(
-            Text(widgets.progress(self._shown.taken, now, len(self._shown.positions)))
-        )
+        number_of = len(self._shown.positions)
+        taken = widgets.progress(self._shown.taken, self._shown.now, number_of)
+        lines.append(Text(taken))
         parts = Layout()
         parts.split_column(
             Layout(Group(*lines), ratio=1), Layout(Text(SHORT_HELP), size=1)
@@ -144,9 +109,20 @@ class Screen:
 
     def _sentences(self) -> list[RenderableType]:
         """What must not be missed, and why it waits."""
-        why = alert(self._shown.view) if self._shown.view else ""
-        said = [*self._shown.said, self._shown.reminder + why]
-        return [Text(f"! {text}", style="bold yellow") for text in said if text]
+        said = self._shown.sentences
+        return [Text(f"! {text}", style="bold yellow") for text in said]
+
+    def _listing(self, rows: int) -> RenderableType:
+        """The positions around the present one, with what was reached in each."""
+        positions, now = self._shown.positions, self._shown.now
+        table = Table.grid(padding=(0, 2))
+        first = int(np.clip(now - rows // 2, 0, max(0, len(positions) - rows)))
+        for i in range(first, min(len(positions), first + rows)):
+            style = "bold" if i == now else ""
+            apart = " (verification)" if i == self._verification else ""
+            name = positions[i].name + apart
+            table.add_row(f"{i + 1}", name, self._shown.state(i), style=style)
+        return table
 
     def _drawing(self) -> list[str]:
         """The box as it should stand, where the terminal has the letters."""
@@ -160,21 +136,17 @@ class Screen:
 
     def _instruction(self) -> list[Text]:
         """The one thing to do now, in large letters, and what belongs to it."""
-        words, detail, colour = self._words()
-        turn = self._shown.hold.position if words == TURN and self._shown.hold else None
-        style = f"bold reverse {colour}".strip()
+        what, hold = self._shown.instruction, self._shown.hold
+        turn = hold.position if what.words == TURN and hold else None
+        style = f"bold reverse {what.colour}".strip()
         width = self._console.width - 4
         if self._console.height >= TALL:
-            lines = ["", *large(words), *_angles(turn, width - 4), "", detail, ""]
+            angles = _angles(turn, width - 4)
+            lines = ["", *large(what.words), *angles, "", what.detail, ""]
         else:
-            lines = [_spaced(words) + (f"   {turn.name}" if turn else ""), detail]
+            at = f"   {turn.name}" if turn else ""
+            lines = [_spaced(what.words) + at, what.detail]
         return [Text(f"  {line}".ljust(width), style=style) for line in lines]
-
-    def _words(self) -> tuple[str, str, str]:
-        """What is said large, what small, and its colour."""
-        shown = self._shown
-        now = Instruction.of(shown.hold, shown.view, shown.number)
-        return now.words, now.detail, now.colour
 
 
 def _angles(position: Position | None, width: int) -> list[str]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from time import monotonic
 
-import numpy as np
 from rich.console import Console, RenderableType
 from rich.live import Live
 
@@ -18,9 +17,10 @@ from fieldcal.core.positions import Position
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import Mover
 from fieldcal.run.operator import widgets
+from fieldcal.run.operator.content import RunContent
 from fieldcal.run.operator.keyboard import Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Wish
-from fieldcal.run.operator.screen import Screen, ScreenContent
+from fieldcal.run.operator.screen import Screen
 from fieldcal.run.operator.widgets import alert
 from fieldcal.run.wait_reason import WaitReason, reminder
 
@@ -61,11 +61,8 @@ class ConsoleOperator:
         self._mover = mover
         self._console = console
         self._keyboard = keyboard
-        self._shown = ScreenContent(
-            title, list(positions), verification, self._has_keys, most
-        )
-        self._screen = Screen(console, self._shown)
-        self._said_before: list[str] = []
+        self._shown = RunContent(title, positions, most)
+        self._screen = Screen(console, self._shown, verification, self._has_keys)
         self._skips = -ASKED_AGAIN
         self._drawn = 0.0
         self._lines: set[str] = set()
@@ -92,12 +89,8 @@ class ConsoleOperator:
 
     def place(self, hold: Hold) -> None:
         """Ask for a position."""
-        self._shown.hold = hold
-        if hold.index >= len(self._shown.positions):  # found on the way
-            self._shown.positions.append(hold.position)
-        self._shown.said = self._said_before = self._shown.said[-1:]
+        self._shown.asked(hold)
         self._lines.clear()
-        self._shown.taken.pop(hold.index, None)
         self._bell()
         if self._keyboard:
             self._keyboard.forget()
@@ -109,13 +102,13 @@ class ConsoleOperator:
 
     def tell(self, text: str) -> None:
         """Keep a sentence on the screen."""
-        self._shown.said = [*(t for t in self._shown.said[-1:] if t != text), text]
+        self._shown.told(text)
         self._ring(text)
 
     def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
         """Ring for the reason that stands on the screen."""
-        self._shown.reminder = reminder(waited)
-        self._ring(self._shown.reminder + reason.text)
+        self._shown.alarmed(waited)
+        self._ring(reminder(waited) + reason.text)
 
     def _ring(self, text: str) -> None:
         self._bell()
@@ -134,16 +127,8 @@ class ConsoleOperator:
 
     def show(self, view: OperatorView) -> None:
         """Draw the view, unless the last drawing is too recent."""
-        begins = view.phase == "averaging" and self._phase != "averaging"
-        self._shown.view = view
-        self._shown.reminder = self._shown.reminder if alert(view) else ""
-        if begins:
-            self._shown.said = self._said_before  # what was said of the turn is done
+        self._shown.seen(view)
         if view.phase == "taken":
-            known = view.sigma[:3][np.isfinite(view.sigma[:3])]
-            sigma = float(known.max()) if len(known) else np.nan
-            self._shown.taken[view.hold.index] = sigma
-            self._shown.said = []
             self._bell()
         if self._live is None:
             self._log_view(view)
@@ -153,10 +138,6 @@ class ConsoleOperator:
     def _bell(self) -> None:
         if self._live:
             self._console.bell()
-
-    @property
-    def _phase(self) -> str:
-        return self._shown.view.phase if self._shown.view else ""
 
     def _log_state(self, text: str) -> None:
         """Log a state once for each time that a position is asked for."""

@@ -5,14 +5,12 @@ All of it reads without colour, and fits into 76 columns.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
-from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from fieldcal.core.positions import Position
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.position_check import round_to_tenth
 
@@ -134,37 +132,6 @@ def gauges(view: OperatorView) -> Table:
     if view.phase != "silent":
         grid.add_row("stillness", stillness(view.stillness))
     return grid
-
-
-def listing(
-    positions: Sequence[Position],
-    taken: Mapping[int, float],
-    now: int,
-    rows: int,
-    verification: int | None,
-) -> RenderableType:
-    """The positions around the present one, with what was reached in each.
-
-    Parameters
-    ----------
-    positions : all of them
-    taken : standard error of the accelerometers by number, m/s^2
-    now : number of the present one
-    rows : most that there is room for
-    verification : number of the one that is not fitted
-
-    """
-    table = Table.grid(padding=(0, 2))
-    first = int(np.clip(now - rows // 2, 0, max(0, len(positions) - rows)))
-    for i in range(first, min(len(positions), first + rows)):
-        if i in taken:
-            state = f"taken   ± {1e3 * taken[i]:.2f} mm/s²"
-        else:
-            state = "now" if i == now else ""
-        style = "bold" if i == now else ""
-        name = positions[i].name + (" (verification)" if i == verification else "")
-        table.add_row(f"{i + 1}", name, state, style=style)
-    return table
 
 
 def progress(taken: Mapping[int, float], now: int, number: int) -> str:

@@ -87,7 +87,7 @@ class PageServer:
     def __exit__(self, *exc: object) -> None:
         until = monotonic() + LINGER
         while monotonic() < until and any(
-            seen < self.board.version for seen in self._seen.values()
+            seen < self.board.version for seen in tuple(self._seen.values())
         ):
             sleep(EVERY)
         self._server.should_exit = True

@@ -6,7 +6,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.operator.protocol import Operator, OperatorView, Wish
 from fieldcal.run.page.board import Board
 from fieldcal.run.page.buttons import Buttons
-from fieldcal.run.wait_reason import WaitReason, reminder
+from fieldcal.run.wait_reason import WaitReason
 
 
 class WatchedOperator:
@@ -36,7 +36,7 @@ class WatchedOperator:
 
     def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
         """Call the operator."""
-        self._board.alarmed(reminder(waited))
+        self._board.alarmed(waited)
         self._inner.alarm(reason, waited)
 
     def show(self, view: OperatorView) -> None:

@@ -49,8 +49,8 @@ def test_a_turn_is_shown_with_where_it_is_and_where_it_should_be() -> None:
 
 def test_a_window_fills_and_is_listed_when_it_is_taken() -> None:
     board = Board("fieldcal", FIVE)
-    board.asked(HOLD)
     board.told("the device was moved")
+    board.asked(HOLD)
     board.seen(view("averaging"))
     now = board.content()
     assert now["words"] == "HOLD STILL" and now["colour"] == "green"
@@ -60,15 +60,31 @@ def test_a_window_fills_and_is_listed_when_it_is_taken() -> None:
     board.seen(view("taken"))
     now = board.content()
     assert now["words"] == "TAKEN" and now["told"] == []
-    assert [row["taken"] for row in now["positions"]] == [
-        "",
-        "",
-        "",
-        "± 3.00 mm/s²",
-        "",
-    ]
+    states = ["", "", "", "taken   ± 3.00 mm/s²", ""]
+    assert [row["state"] for row in now["positions"]] == states
     board.asked(HOLD)  # once more
-    assert not any(row["taken"] for row in board.content()["positions"])
+    states[3] = "now"
+    assert [row["state"] for row in board.content()["positions"]] == states
+
+
+def test_gyroscopes_alone_have_no_error_of_a_force() -> None:
+    board = Board("fieldcal", FIVE)
+    board.asked(HOLD)
+    board.seen(view("taken", sigma=np.array([np.nan, np.nan, np.nan, 1, 1, 1])))
+    assert board.content()["positions"][3]["state"] == "taken"
+
+
+def test_what_was_said_of_the_turn_is_done_when_the_window_begins() -> None:
+    board = Board("fieldcal", FIVE)
+    board.asked(HOLD)
+    board.seen(view("turning"))
+    board.told("press s once more")
+    board.alarmed(60.0)
+    board.seen(view("averaging"))
+    assert board.content()["told"] == []
+    wrong = WaitReason(WaitState.MISPLACED, "it is off")
+    board.seen(view("turning", reason=wrong))  # for the first time since
+    assert board.content()["told"] == ["it is off"]
 
 
 def test_what_needs_the_operator_is_said_with_how_long_it_waits() -> None:
@@ -76,7 +92,7 @@ def test_what_needs_the_operator_is_said_with_how_long_it_waits() -> None:
     board.asked(HOLD)
     wrong = WaitReason(WaitState.MISPLACED, "the device is at α = 3.0°")
     board.seen(view("turning", reason=wrong))
-    board.alarmed("still waiting, 60 s: ")
+    board.alarmed(60.0)
     now = board.content()
     assert now["colour"] == "yellow"
     assert now["told"] == ["still waiting, 60 s: the device is at α = 3.0°"]

@@ -177,6 +177,24 @@ def test_a_change_is_sent_without_being_asked_for(server: PageServer) -> None:
     server.board.asked(Hold(1, FIVE[1], 30.0))
 
 
+def test_whoever_opens_the_page_as_a_run_ends_does_not_break_it() -> None:
+    class Opened(Board):
+        """A board that somebody else looks at while it is asked for its version."""
+
+        others = iter("bc")
+
+        @property
+        def version(self) -> int:
+            if name := next(self.others, ""):
+                there.look(name)
+            return 0
+
+    with PageServer(LOCAL) as there:
+        there.look("a")
+        there.board = Opened("fieldcal", [])
+    assert there.watched
+
+
 def test_an_address_that_is_not_here_or_taken_is_said() -> None:
     with PageServer(LOCAL) as there:
         port = int(there.access.hosts[0].rpartition(":")[2])

@@ -97,7 +97,7 @@ function show(now) {
     line.textContent = `${item.name} `;
     const reached = document.createElement("span");
     reached.className = "reached";
-    reached.textContent = item.taken ? `taken ${item.taken}`.replace("taken taken", "taken") : i === now.now ? "now" : "";
+    reached.textContent = item.state;
     line.append(reached);
     if (i === now.now) line.setAttribute("aria-current", "step");
   });

@@ -1,0 +1,105 @@
+"""What every display shows of a run, console and page alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.core.positions import Position
+from fieldcal.planning.steps import Hold
+from fieldcal.run.operator.instruction import Instruction, numbered
+from fieldcal.run.operator.protocol import OperatorView
+from fieldcal.run.operator.widgets import alert
+from fieldcal.run.wait_reason import reminder
+
+TOLD = 2
+"""Sentences that are kept in sight."""
+
+
+class RunContent:
+    """What there is to show.
+
+    Parameters
+    ----------
+    title : what is being done, and where it is recorded
+    positions : all that will be asked for
+    most : positions that there are at most, None where `positions` has them all
+
+    Attributes
+    ----------
+    taken : standard error of each position taken, m/s^2, by number; nan where the
+        device has no accelerometers
+    view : what the engine is at
+    hold : the position asked for
+
+    """
+
+    def __init__(
+        self, title: str, positions: Sequence[Position], most: int | None = None
+    ) -> None:
+        self.title, self.positions, self.most = title, list(positions), most
+        self.taken: dict[int, float] = {}
+        self.view: OperatorView | None = None
+        self.hold: Hold | None = None
+        self._told: list[str] = []
+        self._told_before: list[str] = []
+        self._reminder = ""
+
+    def asked(self, hold: Hold) -> None:
+        """A position is asked for."""
+        self.hold = hold
+        if hold.index >= len(self.positions):  # found on the way
+            self.positions.append(hold.position)
+        self._told = self._told_before = self._told[-1:]
+        self._reminder = ""
+        self.taken.pop(hold.index, None)
+
+    def told(self, text: str) -> None:
+        """A sentence must not be missed."""
+        self._told = [*(t for t in self._told if t != text), text][-TOLD:]
+
+    def alarmed(self, waited: float) -> None:
+        """The reason for waiting is repeated after so many s."""
+        self._reminder = reminder(waited)
+
+    def seen(self, view: OperatorView) -> None:
+        """The engine is at something."""
+        if view.phase == "averaging" and self.phase != "averaging":
+            self._told = self._told_before  # what was said of the turn is done
+        if view.phase == "taken":
+            known = view.sigma[:3][np.isfinite(view.sigma[:3])]
+            self.taken[view.hold.index] = float(known.max()) if len(known) else np.nan
+            self._told = []
+        if not alert(view):
+            self._reminder = ""
+        self.view = view
+
+    @property
+    def phase(self) -> str:
+        """What the engine waits for; empty before there is a view."""
+        return self.view.phase if self.view else ""
+
+    @property
+    def now(self) -> int:
+        """Number of the position asked for, from 0; -1 before there is one."""
+        return self.hold.index if self.hold else -1
+
+    @property
+    def instruction(self) -> Instruction:
+        """The one thing to do now."""
+        number = numbered(self.hold, len(self.positions), self.most)
+        return Instruction.of(self.hold, self.view, number)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What must not be missed, and why it waits."""
+        why = alert(self.view) if self.view else ""
+        return [*self._told, *([self._reminder + why] if why else [])]
+
+    def state(self, i: int) -> str:
+        """How it stands with a position: taken, now, or nothing yet."""
+        if i not in self.taken:
+            return "now" if i == self.now else ""
+        sigma = self.taken[i]
+        return f"taken   ± {1e3 * sigma:.2f} mm/s²" if np.isfinite(sigma) else "taken"

@@ -14,6 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
+from fieldcal.model.causes.cause import Cause
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed, gains
 from fieldcal.model.evidence.sets import Set, Sets
@@ -27,6 +28,12 @@ FALLING = ((0, 1, 2), (3, 4, 5, 6))
 
 Less = tuple[int, ...]
 """Indices of instabilities in `priors.SIZES`, (7,)."""
+
+Level = tuple[Less, Eliminated, float]
+"""An instability, a set eliminated beside it, and the set's score then."""
+
+Best = dict[Cause, tuple[float, int, int]]
+"""Of each cause what it would add, ln, the number of its variant, the index of size."""
 
 Asked = tuple[tuple[tuple[str, int], ...], Less | None]
 """A set by its key, and the instability beside which it is asked what it may be given,
@@ -124,35 +131,30 @@ class Offers(Sets):
         key = self.key(there.members)
         asked = key, None if (key, None) in self._tables else beside
         if asked not in self._tables:
+            levels = list(self._levels(there, beside))
+            found = self._found(levels, self._chances(there))
             self._tables[asked] = [
-                OfferTable(
-                    less, state, score, self._at_level(there, state, score, less)
-                )
-                for less, state, score in self._levels(there, beside)
+                OfferTable(less, state, score, _offered(there, score, less, best))
+                for (less, state, score), best in zip(levels, found, strict=True)
             ]
         return self._tables[asked]
 
-    def _at_level(
-        self, there: Set, state: Eliminated, score: float, less: Less
-    ) -> list[Offer]:
-        """Every cause that a set has not, beside one instability, the best first."""
-        d, chances = self.dictionary, self._chances(there)
-        best: dict[int, tuple[float, int, int]] = {}
-        for alike, gain in zip(d.by_width, self._screen(state, less), strict=True):
-            at, variant = alike.cause, alike.variant
+    def _found(self, levels: Sequence[Level], chances: Array) -> list[Best]:
+        """Every cause's best variant beside each level of a set."""
+        found: list[Best] = [{} for _ in levels]
+        screened = self._screen(levels)
+        for alike, gain in zip(self.dictionary.by_width, screened, strict=True):
+            at = alike.cause
             profile = gain + DENSITY
-            size = profile.argmax(axis=1)
-            evidence = np.logaddexp.reduce(profile, axis=1) + chances[at]
-            evidence[np.take_along_axis(gain, size[:, None], 1)[:, 0] < LEAST] = -np.inf
-            for m in np.flatnonzero(evidence > LOST + chances[at].min()).tolist():
-                if int(at[m]) not in best or evidence[m] > best[int(at[m])][0]:
-                    best[int(at[m])] = float(evidence[m]), int(variant[m]), int(size[m])
-        offers = [
-            Offer((c, c.variants[v]), score + evidence, size, less)
-            for c, (evidence, v, size) in ((d.causes[i], b) for i, b in best.items())
-            if c.key not in there.keys
-        ]
-        return sorted(offers, key=lambda o: -o.score)
+            size = profile.argmax(axis=2)
+            evidence = np.logaddexp.reduce(profile, axis=2) + chances[at]
+            taken = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
+            near = (taken >= LEAST) & (evidence > LOST + chances[at].min())
+            for i, m in np.argwhere(near).tolist():
+                cause, worth = self.dictionary.causes[at[m]], float(evidence[i, m])
+                if cause not in found[i] or worth > found[i][cause][0]:
+                    found[i][cause] = worth, int(alike.variant[m]), int(size[i, m])
+        return found
 
     def _chances(self, there: Set) -> Array:
         """Of every cause beside a set, by its number, ln."""
@@ -165,7 +167,7 @@ class Offers(Sets):
 
     def _levels(
         self, there: Set, beside: Less | None
-    ) -> Iterator[tuple[Less, Eliminated, float]]:
+    ) -> Iterator[Level]:
         """The set with its instability as it is and another, and its score then."""
         sizes = there.sizes
         base = there.score - there.state.score
@@ -229,19 +231,26 @@ class Offers(Sets):
             self._at[less] = Seen(rows, rows.pull(None), blocks)
         return self._at[less]
 
-    def _screen(self, state: Eliminated, less: Less) -> Iterator[Array]:
-        """Gains over sizes of every variant of every cause, (m, sizes) by width."""
-        there = self._seen(less)
-        shared = there.rows.matrix(state.columns, None)
-        half = state.half @ shared
-        rest = there.pull - shared.T @ state.estimate
-        for alike, own in zip(self.dictionary.by_width, there.blocks, strict=True):
-            part = np.moveaxis(half[:, alike.blocks], 0, 1)  # (b, a, k)
+    def _screen(self, levels: Sequence[Level]) -> Iterator[Array]:
+        """Gains over sizes of every variant beside each level, (l, m, sizes) by width.
+
+        All levels at once: their number would otherwise cost more than their sums.
+        """
+        seen = [self._seen(less) for less, _, _ in levels]
+        half, rest = [], []
+        for there, (_, state, _) in zip(seen, levels, strict=True):
+            shared = there.rows.matrix(state.columns, None)
+            half.append(state.half @ shared)
+            rest.append(there.pull - shared.T @ state.estimate)
+        halves, rests = np.stack(half), np.stack(rest)
+        for w, alike in enumerate(self.dictionary.by_width):
+            own = np.stack([there.blocks[w] for there in seen])
+            part = np.moveaxis(halves[:, :, alike.blocks], 1, 2)  # (l, b, a, k)
             typical, block = alike.typical, alike.block
-            inner = (own - np.swapaxes(part, 1, 2) @ part)[block]
+            inner = (own - np.swapaxes(part, 2, 3) @ part)[:, block]
             inner *= typical[:, :, None] * typical[:, None, :]
-            top = (np.diagonal(own, 0, 1, 2)[block] * typical**2).max(axis=-1)
-            yield self._gains(inner, rest[alike.blocks[block]] * typical, top)
+            top = (np.diagonal(own, 0, 2, 3)[:, block] * typical**2).max(axis=-1)
+            yield self._gains(inner, rests[:, alike.blocks[block]] * typical, top)
 
     def _gains(self, inner: Array, pull: Array, own: Array) -> Array:
         """Gains of groups; of wide ones only where no other instability gave the same.
@@ -251,13 +260,16 @@ class Offers(Sets):
         """
         if inner.shape[-1] < WIDE:
             return gains(inner, pull, own)
+        shape, k = pull.shape[:-1], pull.shape[-1]
+        inner, pull, own = inner.reshape(-1, k, k), pull.reshape(-1, k), own.ravel()
         keys = [
             hash(m.tobytes() + q.tobytes()) for m, q in zip(inner, pull, strict=True)
         ]
-        new = [i for i, key in enumerate(keys) if key not in self._known]
-        found = gains(inner[new], pull[new], own[new])
-        self._known.update(zip((keys[i] for i in new), found, strict=True))
-        return np.array([self._known[key] for key in keys])
+        new = {key: i for i, key in enumerate(keys) if key not in self._known}
+        some = list(new.values())
+        found = gains(inner[some], pull[some], own[some])
+        self._known.update(zip(new, found, strict=True))
+        return np.array([self._known[key] for key in keys]).reshape(*shape, -1)
 
     def taken(self, there: Set, *offers: Offer) -> Set:
         """The set with what was offered."""
@@ -266,6 +278,16 @@ class Offers(Sets):
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluated((*there.members, *(o.member for o in offers)), start)
+
+
+def _offered(there: Set, score: float, less: Less, best: Best) -> list[Offer]:
+    """What was found for a set that has not got it, the best first."""
+    offers = [
+        Offer((cause, cause.variants[v]), score + worth, size, less)
+        for cause, (worth, v, size) in best.items()
+        if cause.key not in there.keys
+    ]
+    return sorted(offers, key=lambda o: -o.score)
 
 
 def fallen(instability: Less, some: Sequence[int], down: int) -> Less:

@@ -57,16 +57,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--png", type=Path, metavar="FILE", help="plot into a picture")
     add("--limits", type=Path, metavar="FILE", help="limits for what is out of family")
-    add("--history", type=Path, metavar="FILE", help="instead of the usual history")
+    add("--history", metavar="FILE", help="instead of the usual history")
     add("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.core.errors import InputError
-    from fieldcal.history.store import History, default_path
+    from fieldcal.history.place import default_place
+    from fieldcal.history.store import History
 
-    history = History(args.history or default_path())
+    history = History(args.history or default_place())
     if args.serial is None:
         return _devices(args, history)
     if args.accept is not None:
@@ -75,7 +76,8 @@ def run(args: argparse.Namespace) -> int:
     if not runs:
         known = ", ".join(s for s, _, _ in history.serials()) or "none yet"
         raise InputError(
-            f"{history.path} has no calibration of {args.serial}; it has {known}"
+            f"{history.database.shown} has no calibration of {args.serial}; it has"
+            f" {known}"
         )
     if args.compare:
         return _compare(args, runs)
@@ -91,7 +93,8 @@ def _devices(args: argparse.Namespace, history: History) -> int:
         return 0
     if not devices:
         sys.stdout.write(
-            f"{history.path}: no calibration yet; fieldcal run --serial keeps them\n"
+            f"{history.database.shown}: no calibration yet; fieldcal run --serial keeps"
+            " them\n"
         )
     for serial, count, last in devices:
         sys.stdout.write(
@@ -217,7 +220,7 @@ def lines(points: Sequence[TrendPoint]) -> list[str]:
         cells[first : last + 1] = "-" * (last + 1 - first)
         cells[round((p.value - low) / step)] = "o"
         value, sigma = number(p.value, p.sigma)
-        word = "OUT" if p.odd else "" if p.run.go else "no-go"
+        word = "OUT" if p.odd else "no-go" if p.run.go is False else ""
         word = "accepted" if p.run.accepted else word
         out.append(
             f"  {p.run.number:3d} {p.run.taken_at[:10]} {_warm(p.run):>8}"

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fieldcal.core.samples import Block
+    from fieldcal.history.place import Place
     from fieldcal.noise import NoiseModel
     from fieldcal.noise.document import NoiseResult
     from fieldcal.noise.recalibration import HistoryStep, Recalibration
@@ -42,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--json", action="store_true", help="print noise.json instead of the view")
     add("--report", type=Path, metavar="FILE", help="write a page with the curves")
     add("--limits", type=Path, metavar="FILE", help="limits for recalibration")
-    add("--history", type=Path, metavar="FILE", help="instead of the usual history")
+    add("--history", metavar="FILE", help="instead of the usual history")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -111,7 +112,9 @@ def _opened(path: Path, place: Path) -> Session:
 
 
 def result(
-    sessions: Sequence[Session], limits: Path | None = None, history: Path | None = None
+    sessions: Sequence[Session],
+    limits: Path | None = None,
+    history: Place | None = None,
 ) -> NoiseResult:
     """Everything that recordings of a device at rest tell of its noise.
 
@@ -181,15 +184,15 @@ def _recalibrate(
     grade: str,
     serial: str,
     limits: Path | None,
-    history: Path | None,
+    history: Place | None,
 ) -> tuple[Mapping[str, Recalibration], str]:
     """When each bias leaves the limit of the grade, and since when."""
     from fieldcal.calibration import limits as bounds
-    from fieldcal.history.store import History, default_path
+    from fieldcal.history.place import default_place
+    from fieldcal.history.store import History
     from fieldcal.noise.recalibration import recalibration
 
-    path = history or default_path()
-    runs = History(path).runs(serial) if serial and path.exists() else ()
+    runs = History(history or default_place()).runs(serial) if serial else ()
     allowed = bounds.read(grade, limits)
     out = {}
     for name, channel in model.channels.items():
@@ -210,7 +213,7 @@ def _steps(runs: Sequence[Any], name: str) -> list[HistoryStep]:
     values = []
     for one in family(runs):
         found = one.calibration
-        if name in found.names:
+        if name in found.names and one.taken_at:
             i = found.names.index(name)
             when = datetime.fromisoformat(one.taken_at).timestamp()
             values.append((when, float(found.values[i]), float(found.sigma[i])))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from fieldcal.history.place import Place
     from fieldcal.report import EarlierCalibration
 
 EXAMPLE = """\
@@ -67,7 +68,7 @@ def write(
     session: Path,
     output: Path | None = None,
     earlier: Sequence[Path] = (),
-    history: Path | None = None,
+    history: Place | None = None,
 ) -> Path:
     """Write the report of a session and return where it is.
 
@@ -76,7 +77,7 @@ def write(
     session : its folder
     output : the page; in the session's folder if not given
     earlier : results to compare with; those of the device's history if none are given
-    history : another file than the user's
+    history : another store than the user's
 
     Raises
     ------
@@ -93,18 +94,18 @@ def write(
     return write_whole(output or session / REPORT, render(gather(session, before)))
 
 
-def _before(folder: Path, history: Path | None) -> list[EarlierCalibration]:
+def _before(folder: Path, history: Place | None) -> list[EarlierCalibration]:
     """What the history knows of the device, without this session."""
-    from fieldcal.history.store import History, default_path
+    from fieldcal.history.place import default_place
+    from fieldcal.history.store import History
     from fieldcal.report import EarlierCalibration
     from fieldcal.session.folder import Session
 
-    path = history or default_path()
     serial = Session.open(folder).about.device.get("serial")
-    if not serial or not path.exists():
+    if not serial:
         return []
     return [
         EarlierCalibration(run.taken_at[:10], run.calibration)
-        for run in History(path).runs(str(serial))
+        for run in History(history or default_place()).runs(str(serial))
         if Path(run.session).resolve() != folder.resolve()
     ]

@@ -134,7 +134,7 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
     )
     add("--verify", action="store_true", help="one more position, which is not fitted")
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
-    add("--history", type=Path, metavar="FILE", help="instead of the usual history")
+    add("--history", metavar="FILE", help="instead of the usual history")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -174,11 +174,12 @@ def _shown_on(
         first_result,
         further_results,
     )
-    from fieldcal.history.store import History, default_path
+    from fieldcal.history.place import default_place
+    from fieldcal.history.store import History
 
     file = args.limits or task.run.get("limits")
     bounds = limits.read(task.about.grade, Path(file) if file else None)
-    history = History(args.history or default_path())
+    history = History(args.history or default_place())
     try:
         found, truth, others = _record(args, task, folder, bounds, page)
         found = first_result(found, folder, bounds, history)
@@ -196,7 +197,7 @@ def _shown_on(
         run_view.show_results(found, folder, truth, further)
     if not args.no_report:
         for each in (folder, *(folder / name for name in further)):
-            report = run_view.write_report(each, history.path)
+            report = run_view.write_report(each, history.place)
             if report and not args.json:
                 sys.stdout.write(f"report:   {report}\n")
     if not args.json:

@@ -12,6 +12,7 @@ from fieldcal.core.errors import FieldcalError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
+    from fieldcal.history.place import Place
 
 
 def show_json(
@@ -64,7 +65,7 @@ def is_go(found: Calibration) -> bool:
     return found.good and bool(found.info["decision"]["go"])
 
 
-def write_report(folder: Path, history: Path) -> Path | None:
+def write_report(folder: Path, history: Place) -> Path | None:
     """Write the report; the calibration stands without it."""
     from fieldcal.commands.report import write
 

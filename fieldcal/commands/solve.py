@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         add(option, type=float, metavar="DEG", help=what)
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
-    add("--history", type=Path, metavar="FILE", help="instead of the usual history")
+    add("--history", metavar="FILE", help="instead of the usual history")
     add(
         "--as-printed",
         action="store_true",
@@ -117,10 +117,11 @@ def _decided(
     """GO or NO-GO, where the session was a recalibration or limits are given."""
     from fieldcal.acceptance.assessment import assess, limits_path, unassessed
     from fieldcal.calibration import limits
-    from fieldcal.history.store import History, default_path
+    from fieldcal.history.place import default_place
+    from fieldcal.history.store import History
 
     bounds = limits.read(session.grade, limits_path(session, args.limits))
     if args.limits is None and "run" not in session.about.raw:
         return unassessed(found, session, still, bounds)
-    history = History(args.history or default_path())
+    history = History(args.history or default_place())
     return assess(found, session, still, bounds, history)

@@ -1,5 +1,6 @@
-"""Calibrations of all devices in SQLite, and how parameters change in time.
+"""The store: sessions of all devices in SQL, and how parameters change in time.
 
 History judges whether a result fits the earlier ones of its device; it never enters an
-estimate. Only `store` reads and writes the database.
+estimate. Only this room reads and writes the database, through
+`database`, whose transactions are whole or not at all.
 """

@@ -1,4 +1,4 @@
-"""Every calibration of every device, by its serial number: a SQLite file.
+"""Every calibration of every device, by its serial number: the store's older half.
 
 It is written after a calibration is done and read to judge the next one; nothing in it
 ever enters an estimate. A calibration belongs to the family of its device if it was GO,
@@ -7,50 +7,19 @@ or was accepted by hand; an accepted one begins a new family, as after a repair.
 
 from __future__ import annotations
 
-import contextlib
-import json
-import os
-import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError
+from fieldcal.history.place import Place
 
-VERSION = 1
-PLACE = "FIELDCAL_HISTORY"
-"""Variable of the environment that names the file."""
-
-WAIT = 10.0
-"""How long another program may hold the file, s."""
-
-TABLES = """
-CREATE TABLE run (
-    id INTEGER PRIMARY KEY,
-    serial TEXT NOT NULL,
-    taken_at TEXT NOT NULL,
-    session TEXT NOT NULL,
-    go INTEGER NOT NULL,
-    accepted INTEGER NOT NULL DEFAULT 0,
-    temperature REAL,
-    latitude_deg REAL,
-    height_m REAL,
-    software TEXT NOT NULL,
-    result TEXT NOT NULL,
-    UNIQUE (serial, session)
-);
-CREATE TABLE parameter (
-    run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE,
-    name TEXT NOT NULL,
-    value REAL NOT NULL,
-    sigma REAL NOT NULL,
-    unit TEXT NOT NULL,
-    PRIMARY KEY (run, name)
-);
-"""
+if TYPE_CHECKING:
+    from fieldcal.history.database import Database
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +30,9 @@ class HistoryRun:
     ----------
     number : by which it is named
     serial : of the device
-    taken_at : when, ISO 8601 in UTC
+    taken_at : when, ISO 8601 in UTC; empty where unknown
     session : folder it was recorded in
-    go : whether it was GO
+    go : whether it was GO; None where nobody judged
     accepted : whether it was accepted by hand, and begins a family
     temperature : mean, deg C; None where unknown
     latitude_deg, height_m : the place; None where unknown
@@ -76,21 +45,13 @@ class HistoryRun:
     serial: str
     taken_at: str
     session: str
-    go: bool
+    go: bool | None
     accepted: bool
     temperature: float | None
     latitude_deg: float | None
     height_m: float | None
     software: str
     calibration: Calibration
-
-
-def default_path() -> Path:
-    """The file: $FIELDCAL_HISTORY, or history.sqlite among the user's data."""
-    if named := os.environ.get(PLACE):
-        return Path(named)
-    data = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
-    return Path(data) / "fieldcal" / "history.sqlite"
 
 
 def family(runs: Sequence[HistoryRun]) -> tuple[HistoryRun, ...]:
@@ -100,16 +61,23 @@ def family(runs: Sequence[HistoryRun]) -> tuple[HistoryRun, ...]:
 
 
 class History:
-    """The file, opened when it is asked.
+    """The store, opened when it is asked.
 
     Parameters
     ----------
-    path : where; made at the first calibration
+    place : file, made at the first calibration; or a database's address
 
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, place: Place) -> None:
+        self.place = place
+
+    @cached_property
+    def database(self) -> Database:
+        """What transactions go to; loaded when it is needed."""
+        from fieldcal.history.database import Database
+
+        return Database(self.place)
 
     def add(self, taken_at: str, session: Path, found: Calibration) -> None:
         """Keep a calibration; one of the same session is replaced.
@@ -117,49 +85,32 @@ class History:
         Raises
         ------
         InputError
-            If the file cannot be written, or the device has no serial number.
+            If the store cannot be written, or the device has no serial number.
 
         """
+        from fieldcal.history import sessions
+
         document = found.to_json()
         serial = str(document.get("device", {}).get("serial", ""))
         if not serial:
             raise InputError("no history without a serial number: give --serial")
-        conditions, site = document.get("conditions", {}), document.get("site", {})
-        row = (
-            serial,
-            taken_at,
-            str(session.resolve()),
-            bool(document.get("decision", {}).get("go", False)),
-            conditions.get("temperature_degc"),
-            conditions.get("latitude_deg"),
-            site.get("height_m"),
-            str(document.get("software", "")),
-            json.dumps(document),
-        )
-        with self._opened(write=True) as db:
-            db.execute(
-                "DELETE FROM run WHERE serial = ? AND session = ?", (row[0], row[2])
-            )
-            made = db.execute(
-                "INSERT INTO run (serial, taken_at, session, go, temperature,"
-                " latitude_deg, height_m, software, result)"
-                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                row,
-            )
-            sigmas, numbers = found.sigma.tolist(), found.values.tolist()
-            rows = zip(found.names, numbers, sigmas, found.units, strict=True)
-            db.executemany(
-                "INSERT INTO parameter VALUES (?, ?, ?, ?, ?)",
-                [(made.lastrowid, *r) for r in rows],
-            )
+        one = sessions.of_calibration(session, found, taken_at)
+        self.database.done(lambda db: sessions.keep(db, one), write=True)
 
     def serials(self) -> list[tuple[str, int, str]]:
         """Each device, how many calibrations it has, and when the last was."""
-        with self._opened() as db:
-            rows = db.execute(
-                "SELECT serial, count(*), max(taken_at) FROM run GROUP BY serial"
-            ).fetchall()
-        return [(str(s), int(n), str(last)) for s, n, last in rows]
+        from sqlalchemy import func, select
+
+        from fieldcal.history.tables import SESSION
+
+        query = (
+            select(SESSION.c.serial, func.count(), func.max(SESSION.c.taken_at))
+            .where(SESSION.c.serial != "", SESSION.c.result.is_not(None))
+            .group_by(SESSION.c.serial)
+            .order_by(SESSION.c.serial)
+        )
+        rows = self.database.done(lambda db: db.execute(query).all())
+        return [(str(s), int(n), str(last or "")) for s, n, last in rows]
 
     def runs(self, serial: str) -> tuple[HistoryRun, ...]:
         """All calibrations of a device, oldest first.
@@ -167,16 +118,19 @@ class History:
         Raises
         ------
         InputError
-            If the file cannot be read.
+            If the store cannot be read.
 
         """
-        with self._opened() as db:
-            rows = db.execute(
-                "SELECT id, serial, taken_at, session, go, accepted, temperature,"
-                " latitude_deg, height_m, software, result FROM run"
-                " WHERE serial = ? ORDER BY taken_at, id",
-                (serial,),
-            ).fetchall()
+        from sqlalchemy import select
+
+        from fieldcal.history.tables import SESSION
+
+        query = (
+            select(SESSION)
+            .where(SESSION.c.serial == serial, SESSION.c.result.is_not(None))
+            .order_by(SESSION.c.taken_at, SESSION.c.id)
+        )
+        rows = self.database.done(lambda db: db.execute(query).all())
         return tuple(self._run(row) for row in rows)
 
     def accept(self, serial: str, number: int) -> None:
@@ -188,74 +142,39 @@ class History:
             If the device has no such calibration.
 
         """
-        with self._opened(write=True) as db:
-            done = db.execute(
-                "UPDATE run SET accepted = 1 WHERE id = ? AND serial = ?",
-                (number, serial),
-            )
-            if not done.rowcount:
-                raise InputError(
-                    f"{serial} has no calibration number {number}: see fieldcal"
-                    f" history {serial}"
-                )
+        from sqlalchemy import update
 
-    def _run(self, row: tuple[Any, ...]) -> HistoryRun:
+        from fieldcal.history.tables import SESSION
+
+        change = (
+            update(SESSION)
+            .where(SESSION.c.id == number, SESSION.c.serial == serial)
+            .values(accepted=True)
+        )
+        if not self.database.done(lambda db: db.execute(change).rowcount, write=True):
+            raise InputError(
+                f"{serial} has no calibration number {number}: see fieldcal"
+                f" history {serial}"
+            )
+
+    def _run(self, row: Any) -> HistoryRun:
         try:
-            found = Calibration.from_json(load_json(row[-1]))
+            found = Calibration.from_json(load_json(row.result))
         except (ValueError, InputError) as error:
             raise InputError(
-                f"{self.path}: calibration {row[0]} cannot be read ({error}); move the"
-                " file away, or name another with --history"
+                f"{self.database.shown}: calibration {row.id} cannot be read ({error});"
+                " move the file away, or name another with --history"
             ) from error
-        number, serial, at, session, go, accepted, *place, software = row[:10]
-        temperature, latitude, height = place
         return HistoryRun(
-            number,
-            serial,
-            at,
-            session,
-            bool(go),
-            bool(accepted),
-            temperature,
-            latitude,
-            height,
-            software,
+            row.id,
+            row.serial,
+            row.taken_at or "",
+            row.folder,
+            row.go,
+            row.accepted,
+            row.temperature,
+            row.latitude_deg,
+            row.height_m,
+            row.software,
             found,
         )
-
-    @contextlib.contextmanager
-    def _opened(self, write: bool = False) -> Iterator[sqlite3.Connection]:
-        """Open the file for one transaction; an empty one where there is none yet."""
-        db: sqlite3.Connection | None = None
-        try:
-            if write:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-            there = write or self.path.exists()
-            db = sqlite3.connect(
-                self.path if there else ":memory:", timeout=WAIT, isolation_level=None
-            )
-            db.execute("PRAGMA foreign_keys = ON")
-            db.execute("BEGIN IMMEDIATE" if write or not there else "BEGIN")
-            self._prepare(db, write or not there)
-            yield db
-            db.execute("COMMIT")
-        except (sqlite3.Error, OSError) as error:
-            raise InputError(
-                f"{self.path}: the history cannot be used ({error}); move the file"
-                " away, or name another with --history"
-            ) from error
-        finally:
-            if db is not None:
-                db.close()
-
-    def _prepare(self, db: sqlite3.Connection, may_make: bool) -> None:
-        (version,) = db.execute("PRAGMA user_version").fetchone()
-        if version == 0 and may_make:
-            for statement in filter(str.strip, TABLES.split(";")):
-                db.execute(statement)
-            db.execute(f"PRAGMA user_version = {VERSION}")
-        elif version != VERSION:
-            raise InputError(
-                f"{self.path}: is no history of this version (found {version}, this is"
-                f" {VERSION}); name another with --history"
-            )

@@ -19,7 +19,8 @@ from fieldcal.commands.history import lines
 from fieldcal.commands.report import write
 from fieldcal.core.errors import InputError
 from fieldcal.evaluation.observations import observe, rests
-from fieldcal.history.store import History, default_path, family
+from fieldcal.history.place import default_place
+from fieldcal.history.store import History, family
 from fieldcal.history.trend import trend
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile
@@ -127,10 +128,10 @@ def test_the_place_is_that_of_the_user_unless_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("FIELDCAL_HISTORY", "/x/h.sqlite")
-    assert default_path() == Path("/x/h.sqlite")
+    assert default_place() == Path("/x/h.sqlite")
     monkeypatch.delenv("FIELDCAL_HISTORY")
     monkeypatch.setenv("XDG_DATA_HOME", "/data")
-    assert default_path() == Path("/data/fieldcal/history.sqlite")
+    assert default_place() == Path("/data/fieldcal/history.sqlite")
 
 
 def bench(folder: Path) -> Session:
@@ -220,8 +221,8 @@ def test_the_command_lists_plots_compares_and_accepts(
 def test_the_report_shows_what_the_history_of_the_device_has(tmp_path: Path) -> None:
     session = bench(tmp_path / "s")
     assert main(["solve", str(session.folder)]) in (0, 1)
-    history = filled(tmp_path / "h.sqlite", 0.2, 0.21)
-    page = write(session.folder, history=history.path).read_text()
+    filled(tmp_path / "h.sqlite", 0.2, 0.21)
+    page = write(session.folder, history=tmp_path / "h.sqlite").read_text()
     assert "2026-03-01" in page and "2026-03-02" in page
     alone = write(session.folder, history=tmp_path / "none.sqlite").read_text()
     assert "2026-03-01" not in alone

@@ -1,0 +1,239 @@
+"""Sessions as the store keeps them, and how they are put in and found again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sqlalchemy import Connection, Row, and_, delete, insert, or_, select, update
+
+from fieldcal.calibration import Calibration
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
+from fieldcal.history.tables import PARAMETER, REDUCED, SESSION
+
+LEVELS = ("model", "lot", "station", "operator")
+"""What sessions of several devices may have in common, as session.toml says it."""
+
+FILTERS = ("serial", *LEVELS, "since", "until")
+"""By what sessions may be asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSession:
+    """One session.
+
+    Attributes
+    ----------
+    folder : where it is recorded
+    serial : of the device, empty where unknown
+    levels : what it has in common with others, by the names in `LEVELS`
+    taken_at : when, ISO 8601 in UTC; None where unknown
+    go : the decision, None where nobody judged
+    good : whether its numbers may be used; None where there are none
+    result, diagnosis : documents of those names
+    parameters : value, standard uncertainty and unit by full name
+    fingerprint : of the files it was made of
+    error : why there is no result, or none of these files
+    reduced : what it says of effects that it may share with others
+
+    """
+
+    folder: str
+    serial: str = ""
+    levels: Mapping[str, str] = field(default_factory=dict)
+    taken_at: str | None = None
+    go: bool | None = None
+    good: bool | None = None
+    result: Mapping[str, Any] | None = None
+    diagnosis: Mapping[str, Any] | None = None
+    parameters: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
+    fingerprint: str | None = None
+    error: str | None = None
+    reduced: bytes | None = None
+
+
+def of_calibration(
+    folder: Path, found: Calibration, taken_at: str | None
+) -> StoredSession:
+    """A session with its calibration and nothing else."""
+    document = found.to_json()
+    device = document.get("device", {})
+    rows = zip(found.values.tolist(), found.sigma.tolist(), found.units, strict=True)
+    decision = document.get("decision")
+    return StoredSession(
+        str(folder.resolve()),
+        str(device.get("serial", "")),
+        {},
+        taken_at,
+        None if decision is None else bool(decision.get("go", False)),
+        found.good,
+        document,
+        parameters=dict(zip(found.names, rows, strict=True)),
+    )
+
+
+def keep(db: Connection, one: StoredSession) -> None:
+    """Put a session in; of the same folder and device the earlier one is replaced.
+
+    A failure takes no result away: it is noted beside it.
+    """
+    here = SESSION.c.folder == one.folder
+    same = and_(here, SESSION.c.serial == one.serial)
+    if one.result is None:
+        row = {"fingerprint": one.fingerprint, "error": one.error}
+        if db.execute(update(SESSION).where(here).values(row)).rowcount:
+            return
+    else:
+        db.execute(delete(SESSION).where(here, SESSION.c.result.is_(None)))
+    number = db.execute(select(SESSION.c.id).where(same)).scalar()
+    if number is None:
+        made = db.execute(insert(SESSION).values(**_row(one), accepted=False))
+        (number,) = made.inserted_primary_key or (None,)
+    else:
+        db.execute(update(SESSION).where(same).values(_row(one)))
+        db.execute(delete(PARAMETER).where(PARAMETER.c.session == number))
+        db.execute(delete(REDUCED).where(REDUCED.c.session == number))
+    rows = [
+        {"session": number, "name": n, "value": v, "sigma": s, "unit": u}
+        for n, (v, s, u) in one.parameters.items()
+    ]
+    if rows:
+        db.execute(insert(PARAMETER), rows)
+    if one.reduced is not None:
+        db.execute(insert(REDUCED).values(session=number, data=one.reduced))
+
+
+def _row(one: StoredSession) -> dict[str, Any]:
+    result = one.result or {}
+    conditions, site = result.get("conditions", {}), result.get("site", {})
+    return {
+        "serial": one.serial,
+        "folder": one.folder,
+        **{name: one.levels.get(name) for name in LEVELS},
+        "taken_at": one.taken_at,
+        "go": one.go,
+        "good": one.good,
+        "temperature": conditions.get("temperature_degc"),
+        "latitude_deg": conditions.get("latitude_deg"),
+        "height_m": site.get("height_m"),
+        "software": str(result.get("software", "")),
+        "fingerprint": one.fingerprint,
+        "error": one.error,
+        "result": json.dumps(one.result) if one.result is not None else None,
+        "diagnosis": json.dumps(one.diagnosis) if one.diagnosis is not None else None,
+    }
+
+
+def fingerprints(db: Connection) -> dict[str, str]:
+    """Of what each folder's row was made."""
+    rows = db.execute(select(SESSION.c.folder, SESSION.c.fingerprint))
+    return {folder: mark for folder, mark in rows if mark is not None}
+
+
+def parsed(words: Iterable[str]) -> dict[str, str]:
+    """Conditions from words such as ``lot=7``.
+
+    Raises
+    ------
+    InputError
+        If a word is none.
+
+    """
+    found = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not equals or name not in FILTERS:
+            raise InputError(
+                f"{word}: is no condition; write one of {', '.join(FILTERS)} and a"
+                " value, as in lot=7 or since=2026-03-01"
+            )
+        found[name] = value
+    return found
+
+
+def found(
+    db: Connection,
+    wanted: Mapping[str, str] | None = None,
+    folders: Iterable[str] | None = None,
+    documents: bool = False,
+) -> list[StoredSession]:
+    """Sessions that meet conditions, the oldest first.
+
+    Parameters
+    ----------
+    db : the store
+    wanted : by the names in `FILTERS`; `since` and `until` are dates
+    folders : only these
+    documents : whether with result, diagnosis and reduced rows
+
+    """
+    some = [_condition(name, value) for name, value in (wanted or {}).items()]
+    kept = None if folders is None else set(folders)
+    columns = [c for c in SESSION.c if c.name not in ("result", "diagnosis")]
+    columns += [SESSION.c.result, SESSION.c.diagnosis] if documents else []
+    query = select(*columns).where(and_(True, *some))
+    query = query.order_by(SESSION.c.taken_at, SESSION.c.folder)
+    rows = [r for r in db.execute(query) if kept is None or r.folder in kept]
+    parameters = _parameters(db, some)
+    reduced: dict[int, bytes] = {}
+    if documents:
+        blobs = select(REDUCED).join(SESSION).where(and_(True, *some))
+        reduced = {r.session: r.data for r in db.execute(blobs)}
+    return [_stored(r, parameters.get(r.id, {}), reduced.get(r.id)) for r in rows]
+
+
+def _condition(name: str, value: str) -> Any:
+    if name == "since":
+        return SESSION.c.taken_at >= value
+    if name == "until":
+        return or_(SESSION.c.taken_at < value, SESSION.c.taken_at.startswith(value))
+    return SESSION.c[name] == value
+
+
+def _parameters(
+    db: Connection, some: list[Any]
+) -> dict[int, dict[str, tuple[float, float, str]]]:
+    query = select(PARAMETER).join(SESSION).where(and_(True, *some))
+    out: dict[int, dict[str, tuple[float, float, str]]] = {}
+    for session, name, value, sigma, unit in db.execute(query):
+        out.setdefault(session, {})[name] = (value, sigma, unit)
+    return out
+
+
+def _stored(
+    row: Row[Any],
+    parameters: Mapping[str, tuple[float, float, str]],
+    reduced: bytes | None,
+) -> StoredSession:
+    result, diagnosis = (
+        json.loads(text) if (text := getattr(row, name, None)) else None
+        for name in ("result", "diagnosis")
+    )
+    levels = {n: getattr(row, n) for n in LEVELS if getattr(row, n) is not None}
+    return StoredSession(
+        row.folder,
+        row.serial,
+        levels,
+        row.taken_at,
+        row.go,
+        row.good,
+        result,
+        diagnosis,
+        parameters,
+        row.fingerprint,
+        row.error,
+        reduced,
+    )
+
+
+def values(sessions: Iterable[StoredSession], name: str) -> tuple[Array, Array]:
+    """A parameter and its uncertainty in each session, nan where it has none."""
+    missing = (np.nan, np.nan, "")
+    rows = [one.parameters.get(name, missing)[:2] for one in sessions]
+    value, sigma = np.array(rows, dtype=float).reshape(-1, 2).T
+    return value, sigma

@@ -1,0 +1,283 @@
+"""The store: whole or not at all, whoever writes and whatever fails meanwhile."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import shutil
+import socket
+import sqlite3
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from multiprocessing.context import ForkServerProcess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from alembic.script import ScriptDirectory
+from sqlalchemy import inspect
+
+from fieldcal.calibration import Calibration
+from fieldcal.core.errors import InputError
+from fieldcal.history import database, sessions
+from fieldcal.history.database import Database
+from fieldcal.history.place import Place
+from fieldcal.history.sessions import StoredSession
+from fieldcal.history.store import History
+from fieldcal.history.tables import METADATA
+
+FORMER = """
+CREATE TABLE run (
+    id INTEGER PRIMARY KEY, serial TEXT NOT NULL, taken_at TEXT NOT NULL,
+    session TEXT NOT NULL, go INTEGER NOT NULL, accepted INTEGER NOT NULL DEFAULT 0,
+    temperature REAL, latitude_deg REAL, height_m REAL, software TEXT NOT NULL,
+    result TEXT NOT NULL, UNIQUE (serial, session));
+CREATE TABLE parameter (
+    run INTEGER NOT NULL REFERENCES run (id) ON DELETE CASCADE, name TEXT NOT NULL,
+    value REAL NOT NULL, sigma REAL NOT NULL, unit TEXT NOT NULL,
+    PRIMARY KEY (run, name));
+PRAGMA user_version = 1;
+"""
+
+
+def calibration(bias: float = 0.2, serial: str = "A1") -> Calibration:
+    info = {"device": {"serial": serial}, "decision": {"go": True}}
+    names, units = ("acc_bias.x", "gyr_bias.x"), ("m/s^2", "rad/s")
+    covariance = np.diag([1e-6, 1e-10])
+    return Calibration(
+        "joint", names, np.array([bias, 0.01]), covariance, units, 1.0, 1, 1e-3,
+        info=info,
+    )  # fmt: skip
+
+
+def stored(number: int, **other: object) -> StoredSession:
+    one = sessions.of_calibration(Path(f"/s/{number}"), calibration(0.1 * number), None)
+    return replace(one, reduced=bytes([number % 256]) * 100, **other)  # type: ignore[arg-type]
+
+
+def put(place: Place, *some: StoredSession) -> None:
+    data = Database(place)
+    for one in some:
+        data.done(lambda db, one=one: sessions.keep(db, one), write=True)  # type: ignore[misc]
+
+
+def everything(place: Place, **wanted: str) -> list[StoredSession]:
+    return Database(place).done(lambda db: sessions.found(db, wanted, documents=True))
+
+
+def test_a_session_comes_back_as_it_was(tmp_path: Path) -> None:
+    levels = {"lot": "7", "station": "B"}
+    one = stored(1, levels=levels, diagnosis={"verdict": "consistent"}, fingerprint="f")
+    put(tmp_path / "h", one, stored(2))
+    assert everything(tmp_path / "h", lot="7") == [one]
+    assert everything(tmp_path / "h", lot="8") == []
+    values, sigmas = sessions.values(everything(tmp_path / "h"), "acc_bias.x")
+    np.testing.assert_allclose(np.sort(values), [0.1, 0.2])
+    np.testing.assert_allclose(sigmas, 1e-3)
+
+
+def test_a_failure_takes_no_result_away(tmp_path: Path) -> None:
+    place = tmp_path / "h"
+    put(place, stored(1), StoredSession("/s/1", fingerprint="g", error="is gone"))
+    (kept,) = everything(place)
+    assert kept.error == "is gone" and kept.result == stored(1).result
+    put(place, StoredSession("/s/2", error="no"), stored(2), stored(1))
+    assert [one.error for one in everything(place)] == [None, None]
+
+
+def test_a_history_of_before_the_store_is_taken_over(tmp_path: Path) -> None:
+    place = tmp_path / "h.sqlite"
+    result = json.dumps(calibration().to_json())
+    with closing(sqlite3.connect(place)) as db:
+        db.executescript(FORMER)
+        row = (7, "A1", "2026-03-01", "/s/1", 0, 1, 21.5, 50.0, 170.0, "9", result)
+        db.execute(f"INSERT INTO run VALUES ({', '.join('?' * len(row))})", row)
+        db.execute("INSERT INTO parameter VALUES (7, 'acc_bias.x', 0.2, 0.001, 'g')")
+        db.commit()
+    (run,) = History(place).runs("A1")
+    assert run.number == 7 and run.go is False and run.accepted
+    assert (run.temperature, run.latitude_deg, run.height_m) == (21.5, 50.0, 170.0)
+    assert (run.taken_at, run.session, run.software) == ("2026-03-01", "/s/1", "9")
+    np.testing.assert_array_equal(run.calibration.covariance, calibration().covariance)
+    (one,) = everything(place)
+    assert one.parameters == {"acc_bias.x": (0.2, 0.001, "g")}
+    History(place).add("2026-03-02", Path("/s/2"), calibration())
+    assert [r.number for r in History(place).runs("A1")] == [7, 8]
+    with closing(sqlite3.connect(place)) as db:
+        tables = {n for (n,) in db.execute("SELECT name FROM sqlite_master")}
+        assert "run" not in tables and "run_parameter" not in tables
+
+
+def test_migrations_make_the_tables_that_the_program_uses(tmp_path: Path) -> None:
+    put(tmp_path / "h", stored(1))
+
+    def columns(db: object) -> dict[str, set[str]]:
+        look = inspect(db)
+        return {t: {c["name"] for c in look.get_columns(t)}
+                for t in METADATA.tables}  # fmt: skip
+
+    made = Database(tmp_path / "h").done(columns)
+    assert made == {
+        name: {c.name for c in table.c} for name, table in METADATA.tables.items()
+    }
+    scripts = ScriptDirectory.from_config(database._config())  # type: ignore[arg-type]
+    assert scripts.get_current_head() == database.HEAD
+
+
+def write(place: Place, name: int) -> None:
+    put(place, *(replace(stored(i), folder=f"/{name}/{i}") for i in range(6)))
+
+
+def writers(place: Place, count: int) -> list[ForkServerProcess]:
+    """Processes that write some sessions each."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([__name__])
+    some = [context.Process(target=write, args=(place, n)) for n in range(count)]
+    for one in some:
+        one.start()
+    return some
+
+
+def ended(some: list[ForkServerProcess]) -> list[int | None]:
+    for one in some:
+        one.join()
+    return [one.exitcode for one in some]
+
+
+def test_eight_writers_at_once_lose_nothing(tmp_path: Path) -> None:
+    some = writers(tmp_path / "h", 8)
+    assert ended(some) == [0] * 8
+    found = everything(tmp_path / "h")
+    assert len(found) == 48
+    assert all(len(f.parameters) == 2 and len(f.reduced or b"") == 100 for f in found)
+
+
+FILLING = """
+import resource, sys
+sys.path[:0] = sys.argv[2:]
+from test_store import put, stored
+from fieldcal.core.errors import InputError
+put(sys.argv[1], stored(0))
+resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
+for i in range(1, 1000):
+    try:
+        put(sys.argv[1], stored(i))
+    except InputError as error:
+        sys.exit(f"{i}: {error}")
+"""
+
+
+def test_a_full_disk_leaves_what_was_there_and_nothing_half(tmp_path: Path) -> None:
+    here = [str(folder) for folder in Path(__file__).parents[:3:2]]
+    call = [sys.executable, "-c", FILLING, str(tmp_path / "h"), *here]
+    told = subprocess.run(call, capture_output=True, text=True).stderr
+    count = int(told.split(":")[0])
+    assert count > 5 and "the history cannot be used" in told and "mend that" in told
+    found = everything(tmp_path / "h")
+    assert len(found) == count
+    assert all(len(f.parameters) == 2 and f.reduced for f in found)
+    put(tmp_path / "h", stored(count))
+    assert len(everything(tmp_path / "h")) == count + 1
+
+
+def test_a_word_that_is_no_condition_is_refused() -> None:
+    assert sessions.parsed(["lot=7", "since=2026"]) == {"lot": "7", "since": "2026"}
+    for wrong in ("lot", "colour=red"):
+        with pytest.raises(InputError, match="is no condition"):
+            sessions.parsed([wrong])
+
+
+def test_an_address_that_is_none_is_said_without_its_password() -> None:
+    with pytest.raises(InputError, match="is no address of a store"):
+        everything("nothing://x/y")
+    with pytest.raises(InputError, match="cannot be used") as told:
+        everything("postgresql://lab:secret@127.0.0.1:1/imus")
+    assert "secret" not in str(told.value)
+
+
+# -- a real PostgreSQL
+
+
+def programs() -> Path:
+    """Folder of PostgreSQL's programs, as Debian's package has it."""
+    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
+    found += [Path(p) for p in [shutil.which("initdb")] if p]
+    if not found:
+        pytest.skip("PostgreSQL is not installed: apt install postgresql")
+    if os.geteuid() == 0 and not shutil.which("runuser"):
+        pytest.skip("PostgreSQL does not run as root, and there is no runuser")
+    return found[-1].parent
+
+
+class Server:
+    """A PostgreSQL of its own in a folder, on a free port."""
+
+    def __init__(self, folder: Path) -> None:
+        self.programs, self.folder = programs(), folder
+        with closing(socket.socket()) as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self.place = f"postgresql://tester@127.0.0.1:{self.port}/postgres"
+        self._call("initdb", "-U", "tester", "-A", "trust", "--no-sync", "--locale=C")
+
+    def _call(self, name: str, *words: str) -> None:
+        as_user = []
+        if os.geteuid() == 0:
+            for part in (self.folder, *list(self.folder.parents)[:3]):
+                part.chmod(0o755)
+            shutil.chown(self.folder, "nobody")
+            self.folder.chmod(0o700)
+            as_user = ["runuser", "-u", "nobody", "--"]
+        call = [*as_user, str(self.programs / name), "-D", str(self.folder), *words]
+        subprocess.run(call, check=True, stdout=subprocess.DEVNULL, cwd="/")
+
+    def start(self) -> None:
+        options = f"-p {self.port} -k {self.folder} -c listen_addresses=127.0.0.1"
+        self._call("pg_ctl", "-w", "-s", "-l", str(self.folder / "log"),
+                   "-o", options, "start")  # fmt: skip
+
+    def stop(self) -> None:
+        self._call("pg_ctl", "-w", "-s", "-m", "immediate", "stop")
+
+
+@contextmanager
+def running(folder: Path) -> Iterator[Server]:
+    folder.mkdir()
+    server = Server(folder)
+    server.start()
+    try:
+        yield server
+    finally:
+        if (folder / "postmaster.pid").exists():
+            server.stop()
+
+
+def test_postgresql_restarted_among_eight_writers_loses_nothing(tmp_path: Path) -> None:
+    pytest.importorskip("psycopg")
+    with running(tmp_path / "pg") as server:
+        put(server.place, stored(200))
+        some = writers(server.place, 7)
+        data = Database(server.place)
+        for i in range(12):
+            one = replace(stored(i), folder=f"/own/{i}")
+            if i == 6:
+                server.stop()
+                back = threading.Timer(0.3, server.start)
+                back.start()
+            data.done(lambda db, one=one: sessions.keep(db, one), write=True)  # type: ignore[misc]
+        back.join()
+        # writers that had not reached the server yet may have found it away
+        codes = ended(some)
+        found = everything(server.place)
+        assert len([f for f in found if f.folder.startswith("/own/")]) == 12
+        for n, code in enumerate(codes):
+            whole = [f for f in found if f.folder.startswith(f"/{n}/")]
+            assert len(whole) == 6 or code != 0
+        assert all(len(f.parameters) == 2 and f.reduced for f in found)
+        assert len({f.folder for f in found}) == len(found)
+        assert History(server.place).runs("A1")[0].calibration.names

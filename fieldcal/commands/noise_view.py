@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from datetime import datetime, timedelta
 from typing import IO, TYPE_CHECKING
 
 from fieldcal.calibration.wording import number, pretty
-from fieldcal.noise.document import TRIADS, NoiseResult, value_or_bound
+from fieldcal.noise.document import NoiseResult
 from fieldcal.noise.estimate import ChannelEstimate, Size
-from fieldcal.noise.recalibration import CHANCES
+from fieldcal.noise.wording import PROCESSES, TRIADS, follows, value_or_bound
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,7 +19,7 @@ COLUMNS = (
     ("B", "instability B, {}"),
     ("K", "walk K, {}·√Hz"),
 )
-OTHERS = {"Q": "quantisation", "R": "ramp", "G": "Gauss-Markov"}
+OTHERS = {name: PROCESSES[name] for name in "QRG"}
 PAPERS = (30.0, 60.0)
 """Averaging times of the papers, s."""
 
@@ -159,40 +158,13 @@ def _follows(console: Console, found: NoiseResult) -> None:
         for name, (value, sigma, unit) in found.programs[program].items():
             text = f"{value_or_bound(value, sigma)} {pretty(unit)}"
             console.print(f"  {name:30} {text}")
-    left = max(c.pair.left_out for c in found.model.channels.values())
-    _line(
-        console,
-        f"  both numbers are {left:.2f} times the fitted ones at most: what white noise"
-        " and walk leave out",
-    )
-    _due(console, found)
-    if found.alignment is not None:
-        seconds, sigma, spread = found.alignment.best
-        angle = " ± ".join(number(math.degrees(sigma), math.degrees(spread)))
-        _line(console, f"north by gyrocompassing: {angle}° after {seconds:.0f} s")
-
-
-def _due(console: Console, found: NoiseResult) -> None:
-    """When to recalibrate: the first bias that leaves its limit."""
-    first = min(found.recalibrate, key=lambda n: found.recalibrate[n].seconds[0])
-    when = found.recalibrate[first]
-    said = "history" if when.from_history else "this recording"
-    text = f"recalibrate: {first} is beyond its limit with"
-    for chance, seconds in zip(CHANCES, when.seconds, strict=True):
-        text += f" {100 * chance:.0f} % by {_date(found.since, seconds)},"
-    _line(console, f"{text} says {said}")
+    for text in follows(found):
+        _line(console, f"  {text}")
 
 
 def _line(console: Console, text: str) -> None:
     """Print a sentence: between words on a terminal, else as one line."""
     console.print(text, soft_wrap=not console.is_terminal)
-
-
-def _date(since: str, seconds: float) -> str:
-    if not math.isfinite(seconds):
-        return "20 years from now or later"
-    then = datetime.fromisoformat(since) + timedelta(seconds=seconds)
-    return f"{then:%Y-%m-%d %H:%M}" if seconds < 3 * 86400 else f"{then:%Y-%m-%d}"
 
 
 def _span(seconds: float) -> str:

@@ -16,7 +16,6 @@ from fieldcal.noise.filters import FilterNoise, kalibr, of_program, ros
 from fieldcal.noise.recalibration import CHANCES, Recalibration
 
 FORMAT = 1
-TRIADS = (("a", "accelerometers"), ("g", "gyroscopes"))
 WINDOWS = (10.0, 30.0, 60.0, 300.0)
 """Averaging times whose error is told, s; 30 to 60 s is what the papers take."""
 
@@ -90,11 +89,6 @@ class NoiseResult:
                 "spread_rad": spread,
             }
         return out
-
-
-def value_or_bound(value: float, sigma: float) -> str:
-    """A parameter of another program with its ±; as a bound where sigma is nan."""
-    return f"{value:.3g} ± {sigma:.1g}" if math.isfinite(sigma) else f"< {value:.2g}"
 
 
 def _channel(channel: ChannelEstimate, model: NoiseModel) -> dict[str, Any]:

@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from fieldcal.calibration.wording import number, pretty
-from fieldcal.noise.document import TRIADS, NoiseResult, value_or_bound
+from fieldcal.noise.document import NoiseResult
 from fieldcal.noise.estimate import ChannelEstimate
+from fieldcal.noise.wording import PROCESSES, TRIADS, follows, value_or_bound
 from fieldcal.report.blocks import Block as Part
-from fieldcal.report.blocks import Figure, NameValues, Section, Table, table
+from fieldcal.report.blocks import Figure, NameValues, Section, Table, Text, table
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.noise import averaging
 from fieldcal.report.overview import Head
@@ -30,8 +31,8 @@ def page(found: NoiseResult) -> str:
         )
     )
     says = (
-        "Bars are what was measured, lines what the processes say, with the band that"
-        " holds 68 of 100 recordings of this length."
+        "Points are what was measured, lines what the processes say, with the band"
+        " that holds 68 of 100 recordings of this length."
     )
     top = Head(name, " · ".join(found.sessions), "noise", "", says, facts)
     return rendered(
@@ -40,7 +41,7 @@ def page(found: NoiseResult) -> str:
             Section("allan", "Allan deviation", tuple(_figures(found))),
             Section("processes", "Processes", (_processes(found),)),
             Section("averaging", "How long to average", (averaging(found.to_json()),)),
-            Section("filters", "For other programs", (_programs(found),)),
+            Section("filters", "What follows", (*_follows(found), _programs(found))),
         ],
     )
 
@@ -83,13 +84,20 @@ def _processes(found: NoiseResult) -> Table:
             value = f"{size.value:.4g} ± {size.sigma:.2g} {pretty(size.unit)}"
             known = size.time_sigma < size.time < math.inf
             time = f"{' ± '.join(number(size.time, size.time_sigma))} s"
-            rows.append([channel.name, name, value, time if known else ""])
+            rows.append([channel.name, _named(name), value, time if known else ""])
         for name, size in channel.limits.items():
-            rows.append(
-                [channel.name, name, f"< {size.value:.2g} {pretty(size.unit)}", ""]
-            )
+            bound = f"< {size.value:.2g} {pretty(size.unit)}"
+            rows.append([channel.name, _named(name), bound, ""])
     columns = ("channel", "process", ">size ± 1σ (< 95 %)", ">correlation time")
     return table("Sizes", columns, rows)
+
+
+def _named(process: str) -> str:
+    return f"{PROCESSES[process[0]]} {process}"
+
+
+def _follows(found: NoiseResult) -> list[Part]:
+    return [Text(f"{text[0].upper()}{text[1:]}.") for text in follows(found)]
 
 
 def _programs(found: NoiseResult) -> Table:
@@ -97,4 +105,5 @@ def _programs(found: NoiseResult) -> Table:
     for program, values in found.programs.items():
         for name, (value, sigma, unit) in values.items():
             rows.append([program, name, value_or_bound(value, sigma), pretty(unit)])
-    return table("Parameters", ("program", "name", ">value ± 1σ", "unit"), rows)
+    columns = ("program", "name", ">value ± 1σ", "unit")
+    return table("Parameters of other programs", columns, rows)

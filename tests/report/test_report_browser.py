@@ -6,13 +6,18 @@ import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from bench import five_positions
 from observed import SHARED
 from test_report import HOSTILE
 
 from fieldcal.cli import main
+from fieldcal.report.blocks import Figure, NameValues, Section
 from fieldcal.report.browser import Browser, find
+from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.overview import Head
+from fieldcal.report.page import rendered
 
 ERRORS = ("Runtime.exceptionThrown", "Log.entryAdded", "Runtime.consoleAPICalled")
 RECORD = "document.querySelector('#record .canvas')"
@@ -41,6 +46,16 @@ def practice(folder: Path, name: str, code: int) -> Path:
         shutil.copyfile(file, session / file.name)
     main(["solve", str(session)])
     assert main(["diagnose", str(session), "--report"]) == code
+    return session / "report.html"
+
+
+def own(folder: Path) -> Path:
+    """Five positions of a device whose name is a script, with an earlier session."""
+    session = folder / "own"
+    if not session.exists():
+        five_positions(session, {"device": {"name": HOSTILE}})
+        assert main(["solve", str(session)]) == 0
+        assert main(["report", str(session), "--earlier", str(session)]) == 0
     return session / "report.html"
 
 
@@ -82,7 +97,14 @@ def view(browser: Browser) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(
-    "make", [pytest.param(consistent, marks=pytest.mark.thorough), left_out, real]
+    "make",
+    [
+        own,
+        *(
+            pytest.param(m, marks=pytest.mark.thorough)
+            for m in (consistent, left_out, real)
+        ),
+    ],
 )
 def test_every_plot_is_drawn_and_can_be_zoomed(
     browser: Browser, folder: Path, make: Callable[[Path], Path]
@@ -113,6 +135,25 @@ def test_every_plot_is_drawn_and_can_be_zoomed(
     assert view(browser) == pytest.approx(whole)
 
 
+def test_the_band_of_a_model_is_drawn_about_its_line(
+    browser: Browser, folder: Path
+) -> None:
+    """However few points it has: that of what the noise of a device will be."""
+    tau = np.array([0.1, 1.0, 10.0])
+    model = Series("model", tau, 1 / tau, 1, "line", 0.5 / tau, 2 / tau)
+    axes = Axis("τ", "s", log=True), Axis("σ", "rad/s", log=True)
+    figure = Figure(Chart("allan", "Allan deviation", "", *axes, (model,)), "")
+    top = Head("a device with a long name", "", "noise", "", "said " * 99,
+               NameValues(()))  # fmt: skip
+    page = folder / "band.html"
+    page.write_text(rendered(top, [Section("allan", "Allan", (figure,))]), "utf-8")
+    opened(browser, page)
+    band = "document.querySelector('.canvas .cover').getBBox()"
+    line = "document.querySelector('.canvas .line').getBBox()"
+    assert browser.value(f"{band}.height") > browser.value(f"{line}.height") > 0
+    assert browser.value("document.querySelector('h1').offsetWidth") > 250
+
+
 def drag(browser: Browser, start: int, end: int) -> None:
     """Drag over the recording from one x to another, CSS pixels."""
     browser.value(f"{RECORD}.scrollIntoView({{block: 'center'}})")
@@ -130,19 +171,13 @@ def drag(browser: Browser, start: int, end: int) -> None:
 def test_hostile_names_do_nothing_and_break_nothing(
     browser: Browser, folder: Path
 ) -> None:
-    session = five_positions(folder / "hostile", {"device": {"name": HOSTILE}})
-    assert main(["solve", str(session)]) == 0
-    assert main(["report", str(session), "--earlier", str(session)]) == 0
-    opened(browser, session / "report.html")
+    opened(browser, own(folder))
     assert browser.value("typeof hacked") == "undefined"
     assert browser.value("document.querySelector('h1').textContent") == HOSTILE
 
 
 def test_it_fits_a_phone_and_can_be_filed(browser: Browser, folder: Path) -> None:
-    session = five_positions(folder / "filed")
-    assert main(["solve", str(session)]) == 0
-    assert main(["report", str(session)]) == 0
-    opened(browser, session / "report.html")
+    opened(browser, own(folder))
     browser.resize(390, 844, mobile=True)
     assert browser.value("document.documentElement.scrollWidth") == 390
     assert browser.value(f"{RECORD}.firstChild.viewBox.baseVal.width") < 390

@@ -213,7 +213,7 @@ function drawChart(plot) {
 function drawSeries(g, one, s) {
   const tone = "tone" + one.tone, rows = one.u.map((u, i) => [s.px(u), s.py(one.v[i]), i]).filter((r) => r[1] === r[1]);
   if (one.draw !== "points") {
-    if (one.lo && one.draw === "both" && rows.length > 12) {
+    if (one.lo && (one.draw === "line" || rows.length > 12)) {
       const there = rows.map(([x, , i]) => x + " " + s.py(one.hi[i])), back = rows.map(([x, , i]) => x + " " + s.py(one.lo[i]));
       el(g, "path", { class: "cover " + tone, d: "M" + there.concat(back.reverse()).join("L") + "Z" });
     }

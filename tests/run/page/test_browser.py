@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import cos, radians, sin
-from pathlib import Path
 
 import pytest
-from browser import CHROMIUM, Browser, browser
+from browser import Screen
 
 from fieldcal.core.positions import FIVE
 from fieldcal.planning.steps import Hold
+from fieldcal.report.browser import find
 from fieldcal.run.page.board import Board
 from fieldcal.run.page.server import PageServer
 
 pytestmark = pytest.mark.skipif(
-    not CHROMIUM, reason="there is no Chromium to show the page in"
+    find() is None, reason="there is no Chromium to show the page in"
 )
 
 PHONE, TABLET = (390, 844), (1180, 820)
@@ -23,8 +23,8 @@ WORDS = "document.getElementById('words')?.textContent"
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("browser")) as made:
+def page() -> Iterator[Screen]:
+    with Screen() as made:
         yield made
 
 
@@ -36,18 +36,18 @@ def server() -> Iterator[PageServer]:
         yield made
 
 
-def opened(page: Browser, server: PageServer) -> None:
-    page.open(server.address)
+def opened(page: Screen, server: PageServer) -> None:
+    page.go(server.address)
     page.until(f"{WORDS} === 'TURN TO'")
 
 
-def tap(page: Browser, what: str) -> None:
+def tap(page: Screen, what: str) -> None:
     page.value(f"document.querySelector({what!r}).click()")
 
 
 @pytest.mark.parametrize("size", [PHONE, TABLET])
 def test_it_shows_what_to_do_on_any_screen(
-    page: Browser, server: PageServer, size: tuple[int, int]
+    page: Screen, server: PageServer, size: tuple[int, int]
 ) -> None:
     server.board.told("<b>not carried out</b> " + "x" * 300)
     page.size(*size)
@@ -66,7 +66,7 @@ def test_it_shows_what_to_do_on_any_screen(
 
 @pytest.mark.parametrize(("alpha", "beta"), [(22.5, 2.5), (-45.0, 90.0)])
 def test_the_box_stands_as_the_position_says(
-    page: Browser, server: PageServer, alpha: float, beta: float
+    page: Screen, server: PageServer, alpha: float, beta: float
 ) -> None:
     """Of the box at home, east to the right, down, and towards who looks north."""
     opened(page, server)
@@ -80,7 +80,7 @@ def test_the_box_stands_as_the_position_says(
     assert south == pytest.approx([-sin(a) * sin(b), cos(a) * sin(b), cos(b)], abs=1e-5)
 
 
-def test_it_is_dark_where_the_screen_is(page: Browser, server: PageServer) -> None:
+def test_it_is_dark_where_the_screen_is(page: Screen, server: PageServer) -> None:
     ground = (
         "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
     )
@@ -93,7 +93,7 @@ def test_it_is_dark_where_the_screen_is(page: Browser, server: PageServer) -> No
 
 
 def test_buttons_are_taken_pressed_and_pressed_twice(
-    page: Browser, server: PageServer
+    page: Screen, server: PageServer
 ) -> None:
     opened(page, server)
     assert page.value("document.getElementById('mine').hidden")
@@ -117,7 +117,7 @@ def test_buttons_are_taken_pressed_and_pressed_twice(
     assert "take them over" in page.text("take")
 
 
-def test_a_link_that_is_lost_comes_back(page: Browser, server: PageServer) -> None:
+def test_a_link_that_is_lost_comes_back(page: Screen, server: PageServer) -> None:
     opened(page, server)
     lost = "!document.getElementById('lost').hidden"
     assert not page.value(lost)
@@ -133,9 +133,7 @@ def test_a_link_that_is_lost_comes_back(page: Browser, server: PageServer) -> No
     assert page.text("angles") == FIVE[2].name
 
 
-def test_the_end_stays_though_nothing_is_served_any_more(
-    page: Browser, tmp_path: Path
-) -> None:
+def test_the_end_stays_though_nothing_is_served_any_more(page: Screen) -> None:
     with PageServer("127.0.0.1") as server:
         server.board = Board("fieldcal", FIVE)
         server.board.asked(Hold(0, FIVE[0], 30.0))

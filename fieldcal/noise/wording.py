@@ -1,0 +1,57 @@
+"""What terminal and page say of the noise of a device in the same words."""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime, timedelta
+
+from fieldcal.calibration.wording import number
+from fieldcal.noise.document import NoiseResult
+from fieldcal.noise.recalibration import CHANCES
+
+PROCESSES = {
+    "N": "white",
+    "B": "instability",
+    "K": "walk",
+    "Q": "quantisation",
+    "R": "ramp",
+    "G": "Gauss-Markov",
+}
+TRIADS = (("a", "accelerometers"), ("g", "gyroscopes"))
+
+
+def value_or_bound(value: float, sigma: float) -> str:
+    """A parameter of another program with its ±; as a bound where sigma is nan."""
+    return f"{value:.3g} ± {sigma:.1g}" if math.isfinite(sigma) else f"< {value:.2g}"
+
+
+def follows(found: NoiseResult) -> list[str]:
+    """What the two numbers leave out, when to recalibrate, and how well north is found.
+
+    The date is of the first bias that leaves its limit.
+    """
+    left = max(c.pair.left_out for c in found.model.channels.values())
+    first = min(found.recalibrate, key=lambda n: found.recalibrate[n].seconds[0])
+    when = found.recalibrate[first]
+    by = "".join(
+        f" {100 * chance:.0f} % by {_date(found.since, seconds)},"
+        for chance, seconds in zip(CHANCES, when.seconds, strict=True)
+    )
+    whose = "history" if when.from_history else "this recording"
+    out = [
+        f"white noise and walk that filters are told are {left:.2f} times the fitted"
+        " ones at most: what the two leave out",
+        f"recalibrate: {first} is beyond its limit with{by} says {whose}",
+    ]
+    if found.alignment is not None:
+        seconds, sigma, spread = found.alignment.best
+        angle = " ± ".join(number(math.degrees(sigma), math.degrees(spread)))
+        out.append(f"north by gyrocompassing: {angle}° after {seconds:.0f} s")
+    return out
+
+
+def _date(since: str, seconds: float) -> str:
+    if not math.isfinite(seconds):
+        return "20 years from now or later"
+    then = datetime.fromisoformat(since) + timedelta(seconds=seconds)
+    return f"{then:%Y-%m-%d %H:%M}" if seconds < 3 * 86400 else f"{then:%Y-%m-%d}"

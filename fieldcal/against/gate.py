@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fieldcal.against.result import Difference, Match, Pair
 from fieldcal.against.sensor_model import CALIBRATION
-from fieldcal.against.wording import named
+from fieldcal.against.wording import SHORT, named
 from fieldcal.core.errors import InputError
 from fieldcal.core.shown import shown
 from fieldcal.effects import catalogue
@@ -107,20 +107,13 @@ def checks(found: Match, allowed: Mapping[str, Limit]) -> list[MatchCheck]:
 def _check(name: str, found: Match, allowed: Mapping[str, Limit]) -> MatchCheck:
     """One id: nothing differs in it, or by no more than is allowed."""
     beyond = [d for d in found.differences if d.id == name and not _within(d, allowed)]
-    lead = {"left_out": "left out", "added": "added", "resized": "differs"}
-    says = "; ".join(f"{lead[d.direction]}: {named(d)}" for d in beyond)
+    says = "; ".join(f"{SHORT[d.direction]}: {named(d)}" for d in beyond)
     return MatchCheck(name, not beyond, says)
 
 
 def _within(one: Difference, allowed: Mapping[str, Limit]) -> bool:
-    limit = allowed.get(one.id)
-    sizes = [p for p in one.parameters.values() if not _tells_when(p)]
+    limit, sizes = allowed.get(one.id), one.sizes.values()
     return limit is not None and bool(sizes) and all(limit.allows(p) for p in sizes)
-
-
-def _tells_when(pair: Pair) -> bool:
-    """Whether a parameter is an instant or a time constant, which is no size."""
-    return pair.difference.unit == "s"
 
 
 def write_junit(

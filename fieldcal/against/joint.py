@@ -136,8 +136,8 @@ def differs(difference: Array, covariance: Array, typical: Array) -> float:
 
 def likeliest(found: Mapping[Relation, float]) -> Relation:
     """The relation of a difference that is likeliest: neither and same are none."""
-    apart: list[Relation] = ["real", "simulator", "other"]
-    return max(apart, key=lambda name: found.get(name, 0.0))
+    differing: list[Relation] = ["real", "simulator", "other"]
+    return max(differing, key=lambda name: found.get(name, 0.0))
 
 
 def apart(found: Mapping[Relation, float]) -> float:

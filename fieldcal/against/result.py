@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from fieldcal.diagnosis.result import Mismatch, Quantity, Verdict, number
+from fieldcal.effects import catalogue
 
 Direction = Literal["left_out", "added", "resized"]
 """What the recording has alone, what the simulator has alone, what both have."""
@@ -58,6 +59,13 @@ class Difference:
     where: tuple[Mismatch, ...] = ()
     shown: bool = True
     explained: bool = True
+
+    @property
+    def sizes(self) -> dict[str, Pair]:
+        """Parameters that are no instant, frequency or time constant."""
+        effect = catalogue().get(self.id)
+        shapes = {shape.name for shape in effect.shapes} if effect else ()
+        return {n: p for n, p in self.parameters.items() if n not in shapes}
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of against.json."""

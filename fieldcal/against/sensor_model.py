@@ -169,7 +169,8 @@ def _with_effect(model: SensorModel, one: Difference, found: Match) -> SensorMod
         if name in {*shapes, *INSTANTS} or isinstance(there.value, str):
             values[name] = there.value
             if name in INSTANTS and not isinstance(there.value, str):
-                values[name] = there.value - found.real.start_s
+                clock = found.real if pair.real else found.simulator
+                values[name] = there.value - clock.start_s
             continue
         before = _number(pair.simulator)
         if known is not None:

@@ -74,13 +74,14 @@ def named(one: Difference) -> str:
             told.append(f"{name} {off.value}")
         elif not off.sigma or abs(off.value) > SHOWN * off.sigma:
             told.append(_said(name, one.direction, pair))
-    name = one.id.replace("_", " ")
-    others = (
-        f", or {' or '.join(a.replace('_', ' ') for a in one.aliases)}"
-        if one.aliases
-        else ""
-    )
-    return f"{name} ({', '.join(told)}){others}" if told else f"{name}{others}"
+    name, sizes = one.id.replace("_", " "), f" ({', '.join(told)})" if told else ""
+    return f"{name}{sizes}{_or_else(one)}"
+
+
+def _or_else(one: Difference) -> str:
+    """What may stand in its place."""
+    names = " or ".join(alias.replace("_", " ") for alias in one.aliases)
+    return f", or {names}" if names else ""
 
 
 def _said(name: str, direction: Direction, pair: Pair) -> str:
@@ -124,21 +125,15 @@ def line(one: Difference) -> tuple[str, str, str, str]:
     """What, how big in each, and the difference, for one row of a table."""
     told = {
         n: p
-        for n, p in one.parameters.items()
+        for n, p in (one.sizes or one.parameters).items()
         if not isinstance(p.difference.value, str)
     }
-    what = one.id.replace("_", " ")
-    if one.aliases:
-        what += f", or {' or '.join(a.replace('_', ' ') for a in one.aliases)}"
+    what = one.id.replace("_", " ") + _or_else(one)
     if not told:
         return what, SHORT[one.direction], "", ""
-    sizes = {n: p for n, p in told.items() if p.difference.unit not in ("s", "Hz")}
-    told = sizes or told
     name = max(told, key=lambda n: _clear(told[n].difference))
-    pair, more = (
-        told[name],
-        sum(_clear(p.difference) > SHOWN for p in told.values()) - 1,
-    )
+    pair = told[name]
+    more = sum(_clear(p.difference) > SHOWN for p in told.values()) - 1
     also = f" (+{more})" if more > 0 else ""
     both = "real " + _shown(pair.real) + ", simulator " + _shown(pair.simulator)
     return (

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fieldcal.against import Match
@@ -38,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
         written.append(_patch(args.patch or PLAIN, session, model, said))
     for warning in (*session.warnings, *said, *found.warnings):
         sys.stderr.write(f"fieldcal diagnose: {warning}\n")
-    _say(args, found)
+    _say(args, found, content)
     gate = checks(found, allowed)
     if args.junit:
         write_junit(args.junit, args.session.resolve().name, found, gate)
@@ -99,10 +100,10 @@ def _patch(form: str, session: Session, model: SensorModel, said: list[str]) -> 
     return path
 
 
-def _say(args: argparse.Namespace, found: Match) -> None:
+def _say(args: argparse.Namespace, found: Match, content: Mapping[str, Any]) -> None:
     """Show what was found, as it was asked for."""
     if args.json:
-        sys.stdout.write(json.dumps(found.to_json(), allow_nan=False) + "\n")
+        sys.stdout.write(json.dumps(content, allow_nan=False) + "\n")
         return
     from fieldcal.commands.against_view import show
 

@@ -10,6 +10,7 @@ from fieldcal.calibration.wording import position_numbers, pretty
 from fieldcal.commands.diagnosis_view import STYLES
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.wording.lines import format_probability
+from fieldcal.report.against import VERDICTS
 
 
 def show(
@@ -27,7 +28,8 @@ def show(
     from fieldcal.commands.console import ShownConsole
 
     console = ShownConsole(file=out, width=width)
-    head = Text(found.verdict.replace("_", " ").upper(), style=STYLES[found.verdict])
+    verdict = VERDICTS.get(found.verdict, found.verdict)
+    head = Text(verdict.upper(), style=STYLES[found.verdict])
     sure = format_probability(found.probability)
     console.print(head + Text(f"  probability {sure}"))
     if found.differences:

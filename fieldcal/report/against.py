@@ -23,6 +23,9 @@ DIRECTIONS = {
     "resized": "in both, another size",
 }
 
+VERDICTS = {"left_out": "different"}
+"""What a verdict of a diagnosis is called of a comparison, where it is otherwise."""
+
 COLUMNS = ("what", "", "parameter", ">real", ">simulator", ">real − simulator", "±", "")
 
 
@@ -31,7 +34,7 @@ def against(material: Material) -> Section | None:
     found = material.against
     if found is None:
         return None
-    blocks: list[Block] = [verdict_box(found)]
+    blocks: list[Block] = [verdict_box(found, VERDICTS)]
     blocks.append(Text(f"Compared with {found.get('against', 'a simulator')}."))
     if said := str(found.get("says", "")):
         blocks.append(Text(said))

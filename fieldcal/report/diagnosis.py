@@ -52,11 +52,14 @@ TONES: dict[str, Tone] = {
 }
 
 
-def verdict_box(found: Mapping[str, Any]) -> WarningBox:
-    """The verdict of a diagnosis, or of a comparison, with its probability."""
+def verdict_box(
+    found: Mapping[str, Any], called: Mapping[str, str] | None = None
+) -> WarningBox:
+    """The verdict of a diagnosis, or as it is called else, with its probability."""
     verdict = str(found.get("verdict", "unknown"))
     sure = format_probability(real(found.get("probability")))
-    lead = f"{verdict.replace('_', ' ').upper()}, probability {sure}"
+    name = (called or {}).get(verdict, verdict).replace("_", " ")
+    lead = f"{name.upper()}, probability {sure}"
     return WarningBox(lead, TONES.get(verdict, "warn"))
 
 

@@ -36,8 +36,10 @@ def differing(
     unit: str = "1",
 ) -> Difference:
     one, two, off = (Quantity(v, 1e-3, unit) for v in (real, sim, real - sim))
-    when = Pair(*(Quantity(v, 0.1, "s") for v in (60.0, 10.0, 50.0)))
-    return Difference(name, direction, 1.0, {"x": Pair(one, two, off), "at_s": when})
+    pairs = {"x": Pair(one, two, off)}
+    if name == "bias_step":
+        pairs["at_s"] = Pair(*(Quantity(v, 0.1, "s") for v in (60.0, 10.0, 50.0)))
+    return Difference(name, direction, 1.0, pairs)
 
 
 def match(*differences: Difference) -> Match:
@@ -70,6 +72,13 @@ def test_when_something_happened_is_no_size() -> None:
     found = match(differing("bias_step", 0.02, 0.0, "left_out"))
     assert not failed(found, "bias_step=0.03")
     assert failed(found, "bias_step=0.01") == ["bias_step"]
+
+
+def test_a_delay_has_a_limit_in_s_though_instants_have_none() -> None:
+    delay = Pair(*(Quantity(v, 1e-4, "s") for v in (0.02, 0.015, 0.005)))
+    found = match(Difference("time_delay", "resized", 1.0, {"seconds": delay}))
+    assert not failed(found, "time_delay=0.006")
+    assert failed(found, "time_delay=0.004") == ["time_delay"]
 
 
 @pytest.mark.parametrize("given", ["acc_bias", "acc_bias=", "acc_bias=-1", "speed=1"])
@@ -111,7 +120,7 @@ def test_the_fixture_fails_with_what_differs(
         return match(differing("acc_bias", 0.1, 0.08))
 
     monkeypatch.setattr("fieldcal.against.compare", compared)
-    with pytest.raises(pytest.fail.Exception, match="differs: acc bias"):
+    with pytest.raises(pytest.fail.Exception, match="another size: acc bias"):
         simulator_matches(*folders)
     found = simulator_matches(*map(str, folders), acc_bias=0.1)
     assert [d.id for d in found.differences] == ["acc_bias"]

@@ -11,9 +11,17 @@ import pytest
 import yaml
 
 from fieldcal.against import patches
-from fieldcal.against.sensor_model import SensorModel
+from fieldcal.against.result import (
+    Difference,
+    Facts,
+    Match,
+    Pair,
+    SimulatorPrediction,
+)
+from fieldcal.against.sensor_model import SensorModel, patched
 from fieldcal.commands import diagnose
 from fieldcal.core.samples import Array
+from fieldcal.diagnosis.result import Quantity
 from fieldcal.sim_device import profile_file
 
 BIAS, SCALE = np.array([0.05, -0.03, 0.1]), np.array([1.004, 0.997, 1.001])
@@ -150,6 +158,24 @@ def test_what_is_not_changed_stays_where_one_element_holds_several(
     assert acc["M"][1][:2] == [0.002, 0.997] and acc["bias"] == BIAS.tolist()
     found = parameters(written("px4", tmp_path, model)[0], 2, 3)
     np.testing.assert_allclose(axes(found, "CAL_ACC0_{}SCALE"), SCALE)
+
+
+def test_an_instant_counts_from_the_start_of_the_recording_that_has_it(
+    tmp_path: Path,
+) -> None:
+    """A step that only the simulator has, whose clock is far behind the recording's."""
+    here, there = (
+        Facts(100.0, np.nan, np.nan, start, np.nan, {}) for start in (1e5, 10.0)
+    )
+    step, at = Quantity(0.1, 1e-3, "m/s^2"), Quantity(60.0, 0.1, "s")
+    away, before = Quantity(-0.1, 1e-3, "m/s^2"), Quantity(-60.0, 0.1, "s")
+    pairs = {"ax": Pair(None, step, away), "at_s": Pair(None, at, before)}
+    none = SimulatorPrediction(0.0, 0.0, 1.0)
+    found = Match("left_out", 1.0, (Difference("bias_step", "added", 1.0, pairs),), (),
+                  none, none, here, there, (), "")  # fmt: skip
+    model = patched(found)
+    assert model.effects["bias_step"] == {"ax": 0.0, "at_s": 50.0}
+    assert "bias step" not in written("toml", tmp_path, model)[1]
 
 
 @pytest.mark.parametrize("name", patches.formats())

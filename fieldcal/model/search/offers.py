@@ -165,9 +165,7 @@ class Offers(Sets):
                 out[i] += np.log(priors.AGAIN / cause.chance)
         return out
 
-    def _levels(
-        self, there: Set, beside: Less | None
-    ) -> Iterator[Level]:
+    def _levels(self, there: Set, beside: Less | None) -> Iterator[Level]:
         """The set with its instability as it is and another, and its score then."""
         sizes = there.sizes
         base = there.score - there.state.score

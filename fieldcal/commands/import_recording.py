@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 RARE = (
     *("join", "options", "sigma", "skip", "separator", "acc_lsb", "gyr_lsb"),
     *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
+    *("lot", "station", "operator"),
 )
 
 EXAMPLE = """\

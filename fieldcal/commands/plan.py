@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from fieldcal.planning.device_noise import DeviceNoise
     from fieldcal.planning.planner import Grade
 
-RARE = ("name", "serial", "grade", "gravity", "mounting")
+RARE = (
+    *("name", "serial", "lot", "station", "operator"),
+    *("grade", "gravity", "mounting"),
+)
 
 EXAMPLE = """\
   fieldcal plan --noise tactical --positions 5 --minutes 5 -o plan.toml

@@ -45,7 +45,7 @@ EXAMPLE = """\
 
 RARE = (
     *("seed", "patience", "sigma", "history", "limits", "junit", "no_report"),
-    *("name", "grade", "gravity", "angles_from"),
+    *("name", "lot", "station", "operator", "grade", "gravity", "angles_from"),
 )
 
 INTERRUPTED = 130

@@ -19,6 +19,9 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
         add("--serial", action=StoreSeveral, help=what)
     else:
         add("--serial", help="its serial number, the key of its history")
+    add("--lot", metavar="NAME", help="what it was made in, for fieldcal lot")
+    add("--station", metavar="NAME", help="where it is recorded, likewise")
+    add("--operator", metavar="NAME", help="who records it, likewise")
     add("--grade", choices=("tactical", "navigation"), help="default: tactical")
     add("--latitude", type=float, metavar="DEG", help="says how strong gravity is")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
@@ -45,8 +48,15 @@ def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
     """Only what the options say."""
     axes = args.mounting and [axis.strip() for axis in args.mounting.split(",")]
     tables = {
-        "device": {"name": args.name, "serial": args.serial, "grade": args.grade},
+        "device": {
+            "name": args.name,
+            "serial": args.serial,
+            "lot": args.lot,
+            "grade": args.grade,
+        },
         "site": {
+            "station": args.station,
+            "operator": args.operator,
             "latitude_deg": args.latitude,
             "height_m": args.height,
             "gravity": args.gravity,

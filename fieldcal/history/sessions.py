@@ -173,12 +173,13 @@ def found(
 
     """
     some = [_condition(name, value) for name, value in (wanted or {}).items()]
-    kept = None if folders is None else set(folders)
+    if folders is not None:
+        some.append(SESSION.c.folder.in_(list(folders)))
     columns = [c for c in SESSION.c if c.name not in ("result", "diagnosis")]
     columns += [SESSION.c.result, SESSION.c.diagnosis] if documents else []
     query = select(*columns).where(and_(True, *some))
     query = query.order_by(SESSION.c.taken_at, SESSION.c.folder)
-    rows = [r for r in db.execute(query) if kept is None or r.folder in kept]
+    rows = db.execute(query).all()
     parameters = _parameters(db, some)
     reduced: dict[int, bytes] = {}
     if documents:

@@ -1,0 +1,147 @@
+"""`fieldcal batch`: solve, judge and diagnose whole trees of sessions."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.shown import one_line
+
+if TYPE_CHECKING:
+    from fieldcal.fleet.batch import Batch
+    from fieldcal.fleet.workers import Pool
+    from fieldcal.history.sessions import StoredSession
+
+RARE = ("scheduler", "history", "limits")
+
+EXAMPLE = """\
+  fieldcal batch sessions/2026-03
+  fieldcal batch archive --diagnose --resume
+  fieldcal batch archive --jobs 8 -o march.parquet
+  fieldcal batch /net/archive --scheduler tcp://10.0.0.5:8786
+"""
+
+TABLE = "batch.parquet"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add("folders", type=Path, nargs="+", metavar="FOLDER", help="trees of sessions")
+    add("--jobs", type=int, metavar="N", help="processes (default: one a core)")
+    add(
+        "--resume",
+        action="store_true",
+        help="leave out sessions that are done and have not changed since",
+    )
+    add("--diagnose", action="store_true", help="name the effects of each as well")
+    add(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path(TABLE),
+        metavar="FILE",
+        help=f"table of the results (default: {TABLE})",
+    )
+    add("--json", action="store_true", help="print one JSON object")
+    add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO of each")
+    add(
+        "--scheduler",
+        metavar="tcp://HOST:PORT",
+        help="Dask's, whose workers see the same folders (fieldcal[fleet])",
+    )
+    add("--history", metavar="FILE", help="instead of the usual store")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command: 0 all good, 1 some are not, or have no result."""
+    from fieldcal.fleet.batch import Batch
+    from fieldcal.fleet.outcome import Task
+    from fieldcal.fleet.tree import sessions_in
+    from fieldcal.history.database import Database
+    from fieldcal.history.place import default_place
+
+    if args.jobs is not None and args.jobs < 1:
+        raise InputError(f"--jobs {args.jobs}: there must be one process at least")
+    limits = str(args.limits.resolve()) if args.limits else None
+    batch = Batch(
+        sessions_in(args.folders),
+        Task(args.diagnose, limits),
+        Database(args.history or default_place()),
+    )
+    every = [str(folder) for folder in batch.folders]
+    left = batch.left() if args.resume else every
+    if left:
+        with _pool(args) as pool:
+            _carried_out(batch, left, pool)
+    batch.write(args.output)
+    return _said(args, batch, len(left))
+
+
+@contextlib.contextmanager
+def _pool(args: argparse.Namespace) -> Iterator[Pool]:
+    from fieldcal.fleet.workers import processes, scheduled
+
+    if args.scheduler:
+        with scheduled(args.scheduler) as pool:
+            yield pool
+    else:
+        yield processes(args.jobs or os.cpu_count() or 1, ["fieldcal.fleet.outcome"])
+
+
+def _carried_out(batch: Batch, left: list[str], pool: Pool) -> None:
+    """Do what is left, with a bar that says how quick and how long still."""
+    from rich import progress
+
+    from fieldcal.commands.console import ShownConsole
+
+    bar = progress.Progress(
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TextColumn("{task.fields[rate]}"),
+        progress.TimeRemainingColumn(),
+        console=ShownConsole(stderr=True),
+        transient=True,
+    )
+    with bar, contextlib.closing(batch.carried_out(left, pool)) as done:
+        task = bar.add_task("", total=len(left), rate="")
+        for one in done:
+            bar.update(task, advance=1)
+            speed = bar.tasks[0].speed
+            if speed:
+                bar.update(task, rate=f"{60 * speed:.3g} a minute")
+            if one.error:
+                bar.console.print(one_line(one.error), soft_wrap=True)
+
+
+def _said(args: argparse.Namespace, batch: Batch, done: int) -> int:
+    rows = [one for some in batch.stored() for one in some]
+    failed = [one for one in rows if one.error]
+    solved = [one for one in rows if not one.error]
+    bad = [one for one in solved if not one.good or one.go is False]
+    go = sum(one.go is True for one in solved)
+    judged = sum(one.go is not None for one in solved)
+    if args.json:
+        _print_json(args, rows, done)
+    else:
+        say = sys.stdout.write
+        say(f"{len(rows)} sessions, {done} of them done now: {len(solved)} solved")
+        say(f", {go} of {judged} GO" if judged else ", none to be judged")
+        say(f", {len(bad)} not good, {len(failed)} without a result\n")
+        say(f"written: {args.output}\nstore: {batch.database.shown}\n")
+    return 1 if bad or failed else 0
+
+
+def _print_json(args: argparse.Namespace, rows: list[StoredSession], done: int) -> None:
+    listed = [
+        {"folder": r.folder, "go": r.go, "good": r.good, "error": r.error} for r in rows
+    ]
+    document = {"sessions": listed, "done": done, "table": str(args.output)}
+    sys.stdout.write(json.dumps(document) + "\n")

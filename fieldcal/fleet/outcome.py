@@ -1,0 +1,101 @@
+"""One session from its folder to what the store keeps; nothing is written here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fieldcal.acceptance.assessment import assess, limits_path, start_time, unassessed
+from fieldcal.calibration import Calibration, limits
+from fieldcal.core.errors import FieldcalError
+from fieldcal.diagnosis.verdict import concluded
+from fieldcal.evaluation.not_carried import mended
+from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.solution import Laid, solved_as
+from fieldcal.fleet.reduced import reduced
+from fieldcal.fleet.tree import fingerprint
+from fieldcal.history.sessions import StoredSession, of_calibration
+from fieldcal.session.folder import Session
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What is to be done with each session.
+
+    Attributes
+    ----------
+    diagnose : whether effects are named as well
+    limits : file of limits, by which every session is judged
+
+    """
+
+    diagnose: bool = False
+    limits: str | None = None
+
+    @property
+    def options(self) -> str:
+        """What counts for whether a session has to be done again."""
+        bounds = Path(self.limits).read_text("utf-8") if self.limits else ""
+        return f"diagnose={self.diagnose}\n{bounds}"
+
+    def __call__(self, folder: str) -> StoredSession:
+        """Carry it out; what is wrong with the session is in its row."""
+        mark = None
+        try:
+            mark = fingerprint(Path(folder), self.options)
+            return replace(self._carried_out(Path(folder)), fingerprint=mark)
+        except FieldcalError as error:
+            said = str(error)
+            said = said if folder in said else f"{folder}: {said}"
+        except Exception as error:  # one session costs no other, whatever it is
+            said = (
+                f"{folder}: {type(error).__name__}: {error}; see fieldcal verify, or"
+                " report this with the session"
+            )
+        return StoredSession(folder, fingerprint=mark, error=said)
+
+    def _carried_out(self, folder: Path) -> StoredSession:
+        session, repaired = mended(Session.open(folder))
+        still = rests(session)
+        laid = Laid(session, still)
+        found = solved_as(laid)
+        found = replace(found, warnings=(*repaired, *found.warnings))
+        given = Path(self.limits) if self.limits else None
+        bounds = limits.read(session.grade, limits_path(session, given))
+        if given is None and "run" not in session.about.raw:
+            found = unassessed(found, session, still, bounds)
+        else:
+            found = assess(found, session, still, bounds, None)
+        explanation = laid.explanation
+        diagnosis = None
+        if explanation is not None and self.diagnose:
+            diagnosis = concluded(session.block, explanation).to_json()
+        return replace(
+            of_calibration(folder, found, _taken_at(session, found)),
+            serial=str(session.about.device.get("serial", "")),
+            levels=levels_of(session),
+            diagnosis=diagnosis,
+            reduced=None if explanation is None else reduced(explanation).to_bytes(),
+        )
+
+
+def _taken_at(session: Session, found: Calibration) -> str | None:
+    """When, if the session says so."""
+    marks = list(session.marks())
+    known = any(isinstance(m.get("host_s"), int | float) for m in marks)
+    return start_time(marks) if known else None
+
+
+def levels_of(session: Session) -> dict[str, str]:
+    """What session.toml says that a session has in common with others."""
+    raw: Mapping[str, Any] = session.about.raw
+    device, site = raw.get("device", {}), raw.get("site", {})
+    said = {
+        "model": device.get("model"),
+        "lot": device.get("lot"),
+        "station": site.get("station"),
+        "operator": site.get("operator"),
+    }
+    return {name: str(value) for name, value in said.items() if value not in (None, "")}

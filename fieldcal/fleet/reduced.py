@@ -1,0 +1,150 @@
+"""What a session says of effects that it may share with others.
+
+Everything of its own (bias, scale factors, orientations, instability, what walks) is
+eliminated with the sizes that it has there, and what is left is added up:
+
+    M = T (G_kk - G_ka C G_ak) T,  q = T (b_k - G_ka C b_a),  C = (G_aa + S^-2)^-1  (1)
+
+with T typical sizes. M and q of several sessions that share an effect are added; for
+the notation see `model.evidence.gram`. An effect with a time constant has columns at
+powers of two of a second, so that they are the same in every session; one with an
+instant is a session's own.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.evidence.gram import Eliminated
+
+CLOSE = 0.1
+"""How far the grid of a session may be off a power of two, ln."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A parameter of an effect.
+
+    Attributes
+    ----------
+    effect, part : id, and triad where it has one
+    shape : value of the time constant, empty where there is none
+    name, unit, typical : of the parameter
+    chance : that a session has the effect
+
+    """
+
+    effect: str
+    part: str
+    shape: str
+    name: str
+    unit: str
+    typical: float
+    chance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reduced:
+    """One session.
+
+    Attributes
+    ----------
+    columns : (k,)
+    matrix, pull : M (k, k) and q (k,) of (1), in typical sizes
+
+    """
+
+    columns: tuple[Column, ...]
+    matrix: Array
+    pull: Array
+
+    def to_bytes(self) -> bytes:
+        """As the store keeps it: a compressed file of numpy's."""
+        out = io.BytesIO()
+        names = json.dumps([asdict(c) for c in self.columns]).encode()
+        upper = self.matrix[np.triu_indices(len(self.columns))]
+        np.savez_compressed(
+            out, columns=np.frombuffer(names, np.uint8), matrix=upper, pull=self.pull
+        )
+        return out.getvalue()
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Reduced:
+        """The same from what the store keeps."""
+        with np.load(io.BytesIO(data), allow_pickle=False) as kept:
+            columns = tuple(Column(**c) for c in json.loads(kept["columns"].tobytes()))
+            size = len(columns)
+            matrix = np.zeros((size, size))
+            matrix[np.triu_indices(size)] = kept["matrix"]
+            matrix += np.triu(matrix, 1).T
+            return cls(columns, matrix, kept["pull"])
+
+
+def reduced(explanation: Explanation) -> Reduced:
+    """Reduce a session that was explained, (1)."""
+    search, best = explanation.posterior.search, explanation.inferred.best
+    wide, _ = search.opened(best)
+    own = np.ones(len(wide), dtype=bool)
+    first = len(wide) - sum(len(g.columns) for _, g in best.members)
+    for cause, group in best.members:
+        own[first : first + len(group.columns)] = not _shareable(cause)
+        first += len(group.columns)
+    state = best.state
+    less = Eliminated.of(state.rows, state.columns[own], wide[own])
+    groups = [
+        found
+        for cause in search.dictionary.causes
+        if _shareable(cause)
+        for found in _groups(cause)
+    ]
+    none = np.empty(0, dtype=np.intp)
+    columns = np.concatenate([none, *(g.columns for _, _, g in groups)])
+    typical = np.concatenate([np.empty(0), *(g.typical for _, _, g in groups)])
+    matrix, pull = less.rest(columns, typical)
+    named = [c for cause, shape, g in groups for c in _named(cause, shape, g)]
+    return Reduced(tuple(named), 0.5 * (matrix + matrix.T), pull)
+
+
+def _shareable(cause: Cause) -> bool:
+    """Whether other sessions may have a cause alike: it is physics, and has no date."""
+    effect = cause.variants[0].effect
+    if cause.kind != "effect" or effect is None:
+        return False
+    return all(s.kind in ("session", "turn") for s in effect.shapes)
+
+
+def _groups(cause: Cause) -> Iterator[tuple[Cause, str, Group]]:
+    """A cause with all its parameters, at the time constants that all have."""
+    first = cause.variants[0]
+    if not first.shape:
+        yield cause, "", first
+        return
+    near: dict[int, tuple[float, Group]] = {}
+    for group in cause.variants:
+        if group.params != first.params or group.origin:
+            continue
+        (tau,) = group.shape.values()
+        power = round(np.log2(tau))
+        off = abs(np.log(tau) - power * np.log(2))
+        if off < near.get(power, (CLOSE,))[0]:
+            near[power] = (off, group)
+    for power, (_, group) in sorted(near.items()):
+        yield cause, f"{2.0**power:g} s", group
+
+
+def _named(cause: Cause, shape: str, group: Group) -> Iterator[Column]:
+    if group.effect is None:
+        return
+    for index in group.params:
+        p = group.effect.params[index]
+        yield Column(
+            cause.name, cause.part, shape, p.name, p.unit, p.typical, cause.chance
+        )

@@ -1,0 +1,58 @@
+"""Sessions in trees of folders, and of what each was made when it was solved."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.version import __version__
+from fieldcal.session.folder import DESCRIPTION, MARKS
+
+
+def sessions_in(folders: Iterable[Path]) -> list[Path]:
+    """Session folders in trees, each once, in order.
+
+    Raises
+    ------
+    InputError
+        If a folder is not there, or there is no session in any.
+
+    """
+    found: dict[Path, None] = {}
+    asked = list(folders)
+    for folder in asked:
+        if not folder.is_dir():
+            raise InputError(f"{folder}: is no folder; name one that holds sessions")
+        found |= dict.fromkeys(sorted(_below(folder)))
+    if not found:
+        named = ", ".join(map(str, asked))
+        raise InputError(
+            f"{named}: no session there, for no folder has a {DESCRIPTION}; make some"
+            " with fieldcal import"
+        )
+    return list(found)
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    for place, inner, files in os.walk(folder):
+        inner[:] = [name for name in inner if not name.startswith(".")]
+        if DESCRIPTION in files:
+            yield Path(place).resolve()
+
+
+def fingerprint(folder: Path, options: str = "") -> str:
+    """Of what a session is made, the program and what was asked of it included.
+
+    Samples count by name, size and time of change; they may be many.
+    """
+    made = hashlib.sha256(f"{__version__}\n{options}\n".encode())
+    for path in sorted(folder.iterdir()):
+        if path.name in (DESCRIPTION, MARKS):
+            made.update(path.read_bytes())
+        elif path.name.startswith("samples"):
+            at = path.stat()
+            made.update(f"{path.name} {at.st_size} {at.st_mtime_ns}\n".encode())
+    return made.hexdigest()

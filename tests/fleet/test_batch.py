@@ -1,0 +1,131 @@
+"""Trees of sessions: everything that can be solved is, and what cannot says why."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from session_folders import places, recorded, write_session
+
+from fieldcal.calibration import Calibration
+from fieldcal.cli import main
+from fieldcal.commands import batch as command
+from fieldcal.fleet.batch import Batch
+from fieldcal.fleet.outcome import Task
+from fieldcal.fleet.reduced import Reduced
+from fieldcal.fleet.tree import fingerprint, sessions_in
+from fieldcal.fleet.workers import Pool
+from fieldcal.history import sessions
+from fieldcal.history.database import Database
+from fieldcal.session.folder import RESULT
+from fieldcal.sim_device.profile import Profile
+
+TWO = [(0.0, 0.0), (45.0, 5.0)]
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two sessions, and one with a word where a number belongs."""
+    root = tmp_path_factory.mktemp("tree")
+    held = places(TWO, seconds=6.0, gap=6.0)
+    for number in (1, 2):
+        block = recorded(Profile(), held, seed=number)
+        device = {"serial": f"A{number}", "lot": "L7"}
+        folder = root / f"station {number}" / "session"
+        site = {"latitude_deg": 50.45, "height_m": 170.0, "station": str(number)}
+        write_session(folder, block, held, device=device, site=site)
+    broken = root / "x" / "broken"
+    shutil.copytree(root / "station 1" / "session", broken)
+    (broken / "session.toml").write_text("[site]\nlatitude_deg = 'north'\n")
+    return root
+
+
+@pytest.fixture
+def inside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Threads in the place of processes, which would import everything again."""
+    pool = Pool(lambda: ThreadPoolExecutor(1), 1)
+    monkeypatch.setattr("fieldcal.fleet.workers.processes", lambda *_: pool)
+
+
+@pytest.mark.usefixtures("inside")
+def test_a_tree_is_solved_and_what_is_broken_has_a_row(
+    tree: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store, table = str(tmp_path / "h.sqlite"), tmp_path / "t.parquet"
+    call = ["batch", str(tree), "--history", store, "-o", str(table), "--json"]
+    assert main([*call, "--diagnose"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said["done"] == 3
+    broken = [one for one in said["sessions"] if one["error"]]
+    assert len(broken) == 1 and "latitude_deg" in broken[0]["error"]
+    assert "x/broken/session.toml" in broken[0]["error"]
+    rows = pq.read_table(table).to_pylist()
+    good = {r["serial"]: r for r in rows if r["serial"]}
+    assert set(good) == {"A1", "A2"} and len(rows) == 3
+    assert good["A2"]["lot"] == "L7" and good["A2"]["station"] == "2"
+    assert good["A1"]["verdict"] and good["A1"]["go"] is None
+
+    alone = tree / "station 1" / "session"
+    assert main(["solve", str(alone), "--json"]) in (0, 1)
+    solved = Calibration.from_json(json.loads(capsys.readouterr().out))
+    (alone / RESULT).unlink()
+    for name in solved.names:
+        assert good["A1"][name] == solved.value(name), "as solve has it"
+        assert good["A1"][f"{name}.sigma"] == pytest.approx(solved.uncertainty(name))
+
+    assert main([*call, "--diagnose", "--resume"]) == 1
+    assert json.loads(capsys.readouterr().out)["done"] == 0
+    kept = Database(store).done(
+        lambda db: sessions.found(db, {"lot": "L7"}, None, True)
+    )
+    small = Reduced.from_bytes(kept[0].reduced or b"")
+    assert {c.effect for c in small.columns} >= {"cross_coupling", "g_sensitivity"}
+    assert np.linalg.eigvalsh(small.matrix)[0] > -1e-6 * np.trace(small.matrix)
+    np.testing.assert_array_equal(Reduced.from_bytes(small.to_bytes()).pull, small.pull)
+
+
+def quick(folder: str) -> sessions.StoredSession:
+    """Stands for work that takes long."""
+    return sessions.StoredSession(folder, fingerprint=fingerprint(Path(folder)))
+
+
+class Quick(Task):
+    """A task that only looks."""
+
+    @property
+    def options(self) -> str:
+        return ""
+
+    def __call__(self, folder: str) -> sessions.StoredSession:
+        return quick(folder)
+
+
+def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
+    tree: Path, tmp_path: Path
+) -> None:
+    copy = tmp_path / "tree"
+    shutil.copytree(tree, copy)
+    found = sessions_in([copy, copy / "x"])
+    assert len(found) == 3, "each once"
+    batch = Batch(found, Quick(), Database(tmp_path / "h"))
+    done = batch.carried_out(batch.left(), Pool(lambda: ThreadPoolExecutor(1), 1))
+    first = next(done).folder
+    done.close()
+    left = batch.left()
+    assert first not in left and len(left) == 2
+    list(batch.carried_out(left, Pool(lambda: ThreadPoolExecutor(1), 1)))
+    assert batch.left() == []
+    with (found[0] / "session.toml").open("a") as file:
+        file.write("# mended\n")
+    assert batch.left() == [str(found[0])]
+
+
+def test_wrong_calls_are_refused(tmp_path: Path) -> None:
+    for wrong in ([str(tmp_path / "none")], [str(tmp_path)], [".", "--jobs", "0"]):
+        assert main(["batch", *wrong]) == 2
+    assert command.TABLE.endswith(".parquet")

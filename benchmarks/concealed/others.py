@@ -56,7 +56,7 @@ def several(rng: np.random.Generator, sigmas: float, count: int = 2) -> Session:
 
 def chance(name: str, rng: np.random.Generator) -> Session:
     """Something random, well beyond the noise of the windows."""
-    session = _calm(plain(rng, ("ladder", "twelve", "wide")))
+    session = calm(plain(rng, ("ladder", "twelve", "wide")))
     one, length = session.profile, session.windows[0].end - session.windows[0].start
     of_window = one.noise.acc[0] / np.sqrt(one.sampling.rate_hz * length)
     times = float(rng.uniform(6, 30))
@@ -78,7 +78,7 @@ def special(name: str, rng: np.random.Generator) -> Session:
         session = replace(session, off=session.off * 0)
         return replace(session.having({name: concealed}), label=name)
     if name == "earth_rate":
-        session = _calm(plain(rng))
+        session = calm(plain(rng))
         rate = session.profile.sampling.rate_hz
         length = session.windows[0].end - session.windows[0].start
         gyr = 7.292e-5 / float(rng.uniform(30, 100)) * np.sqrt(rate * length)
@@ -105,7 +105,7 @@ def special(name: str, rng: np.random.Generator) -> Session:
 
 def chain(name: str, rng: np.random.Generator) -> Session:
     """A fault of the signal chain."""
-    session = _calm(plain(rng))
+    session = calm(plain(rng))
     one = session.profile
     w = session.windows[int(rng.integers(len(session.windows)))]
     channel = str(rng.choice(["ax", "ay", "az", "gx", "gy", "gz"]))
@@ -149,7 +149,7 @@ def example(name: str, rng: np.random.Generator) -> Session:
             replace(w, vibration=v) for w, v in zip(windows, levels, strict=True)
         )
     session = replace(
-        _calm(session),
+        calm(session),
         label=name,
         windows=windows,
         thermometer=True,
@@ -164,7 +164,7 @@ def example(name: str, rng: np.random.Generator) -> Session:
     return session.having({name: given})
 
 
-def _calm(session: Session) -> Session:
+def calm(session: Session) -> Session:
     """Without bias instability."""
     still = (0.0, 0.0, 0.0)
     noise = replace(session.profile.noise, acc_instability=still, gyr_instability=still)
@@ -174,7 +174,7 @@ def _calm(session: Session) -> Session:
 def outside(name: str, rng: np.random.Generator, sigmas: float) -> Session:
     """Something that no effect in the catalogue makes, on one accelerometer axis."""
     while True:
-        session = _calm(plain(rng))
+        session = calm(plain(rng))
         channel = int(rng.integers(3))
         which = int(rng.integers(1, len(session.windows)))
         if name == "fading scale":

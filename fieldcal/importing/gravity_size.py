@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.importing.recording import LARGEST
 from fieldcal.importing.scales import FEW, FEWEST
 
 FEWEST_MEANS, MOST_MEANS = 3, 200
@@ -56,12 +57,18 @@ class Gravity(NamedTuple):
     round: bool
 
 
+def _readings(acc: Array) -> Array:
+    """Rows (m, 3) that a sensor may have said."""
+    rows: Array = acc[(np.abs(acc) < LARGEST).all(axis=1)]
+    return rows
+
+
 def are_means(acc: Array) -> bool:
     """Whether successive rows (n, 3) point so differently that they are no samples.
 
     Samples that follow each other point nearly the same way; means of positions do not.
     """
-    acc = acc[np.isfinite(acc).all(axis=1)]
+    acc = _readings(acc)
     length = np.linalg.norm(acc, axis=1)
     if not FEWEST_MEANS <= len(acc) <= MOST_MEANS or not length.all():
         return False
@@ -75,7 +82,7 @@ def are_means(acc: Array) -> bool:
 
 def gravity_in(acc: Array) -> Gravity | None:
     """Size of gravity in numbers (n, 3) of a file, by (1); None of too few."""
-    acc = acc[np.isfinite(acc).all(axis=1)]
+    acc = _readings(acc)
     if are_means(acc):
         return _gravity_of(acc)
     if len(acc) < FEW:
@@ -106,7 +113,7 @@ def with_length(acc: Array, size: float) -> Gravity | None:
 
     Rests in few directions lie on many spheres, but on one of a known radius.
     """
-    acc = acc[np.isfinite(acc).all(axis=1)]
+    acc = _readings(acc)
     if len(acc) < FEWEST:
         return None
     x = _quiet_means(acc)

@@ -93,11 +93,10 @@ class _Gunzip(io.RawIOBase):
         if self._part.eof:
             # zeros between parts and at the end are padding
             packed = packed.lstrip(b"\0")
-            if packed:
-                self._part = zlib.decompressobj(16 + zlib.MAX_WBITS)
-            elif not self._file.peek(1):
-                self._over = True
+            if not packed:
+                self._packed, self._over = b"", not self._file.peek(1)
                 return b""
+            self._part = zlib.decompressobj(16 + zlib.MAX_WBITS)
         try:
             data = self._part.decompress(packed, size)
         except zlib.error as error:

@@ -64,6 +64,7 @@ class StreamFacts:
     pauses, paused_s : those of them that last `PAUSE`, and the duration of all these
     coldest, warmest : deg C, None where there is no temperature
     left_out : rows that were left out, where that was asked for
+    measured : whether any accelerometer or gyroscope has a number
 
     """
 
@@ -77,6 +78,7 @@ class StreamFacts:
     coldest: float | None = None
     warmest: float | None = None
     left_out: int = 0
+    measured: bool = False
     _period: float = float("nan")
 
     def add(self, block: Block) -> None:
@@ -95,6 +97,7 @@ class StreamFacts:
             if len(long):
                 self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
         self.rows += len(block)
+        self.measured = self.measured or bool(np.isfinite(block.six).any())
         self.end_s = float(block.t[-1])
         known = block.temperature[np.isfinite(block.temperature)]
         if len(known):
@@ -111,19 +114,22 @@ class StreamFacts:
 
     def sentence(self) -> str:
         """Say it in a line."""
-        says = [f"{self.rows} samples over {self.end_s - self.start_s:.1f} s"]
+        many = "1 sample" if self.rows == 1 else f"{self.rows} samples"
+        says = [f"{many} over {self.end_s - self.start_s:.1f} s"]
         if np.isfinite(self.rate_hz):
             says.append(f"{self.rate_hz:.4g} Hz")
         if self.coldest is not None:
             says.append(f"{self.coldest:.1f} to {self.warmest:.1f} °C")
         if self.gaps:
-            many = f"{self.gaps} gaps of up to" if self.gaps > 1 else "a gap of"
-            says.append(f"{many} {self.longest_gap_s:.3g} s")
+            gaps = f"{self.gaps} gaps of up to" if self.gaps > 1 else "a gap of"
+            says.append(f"{gaps} {self.longest_gap_s:.3g} s")
         return ", ".join(says)
 
     def table(self) -> dict[str, Any]:
         """What a mark keeps of it."""
-        kept = {k: v for k, v in asdict(self).items() if not k.startswith("_")}
+        kept = {
+            k: v for k, v in asdict(self).items() if k[0] != "_" and k != "measured"
+        }
         rate = self.rate_hz
         return kept | {"rate_hz": round(rate, 6) if np.isfinite(rate) else None}
 
@@ -245,6 +251,11 @@ def _fill(
                 written.add(good)
         if not facts.rows:
             raise InputError(f"{recording.path}: has no row that can be used")
+        if not facts.measured:
+            raise InputError(
+                f"{recording.path}: has no number of an accelerometer or gyroscope in"
+                f" {facts.rows} rows; name its columns with --columns"
+            )
         if said := too_quick(facts.rate_hz):
             raise InputError(f"{recording.path}: {said}")
         facts.left_out = judge.left_out
@@ -276,11 +287,12 @@ def _fill(
 
 
 def _mean_of(blocks: Iterable[Block]) -> Array:
-    """Mean of the accelerometers over some blocks, (3,) m/s^2."""
-    total, many = np.zeros(3), 0
+    """Mean of the accelerometers over some blocks, (3,) m/s^2; nan of those without."""
+    total, many = np.zeros(3), np.zeros(3)
     for block in blocks:
-        total, many = total + block.acc.sum(axis=0), many + len(block)
-    mean: Array = total / max(many, 1)
+        total += np.nansum(block.acc, axis=0)
+        many += np.isfinite(block.acc).sum(axis=0)
+    mean: Array = np.divide(total, many, out=np.full(3, np.nan), where=many > 0)
     return mean
 
 

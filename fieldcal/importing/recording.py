@@ -28,6 +28,9 @@ ROWS = 1 << 15
 MOST = 12
 """Faults of a file that are listed one by one."""
 
+LARGEST = 1e12
+"""Beyond every reading in SI units, and every count of 32 bits."""
+
 TEMP_UNITS = {
     "degC": (1.0, 0.0),
     "cdegC": (0.01, 0.0),

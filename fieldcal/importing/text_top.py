@@ -8,6 +8,7 @@ second the axis. A line such as ``Fs,100`` or ``# Sample rate: 100 Hz`` says the
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -27,6 +28,9 @@ ABOVE = 4
 
 LATEST = 50
 """Lines below the first of numbers among which their names are looked for."""
+
+AXES = 3
+"""Fewest columns by which the width of a table is told."""
 
 FULL = 50
 """Lines at the top by which the width of a row is judged."""
@@ -74,14 +78,20 @@ def first_numbers(lines: Sequence[str], separator: str | None) -> int:
     """Which of the lines is the first of numbers; how many there are if none is."""
     parted = [separator or separator_of(line) for line in lines]
     rows = [cells(line, s) for line, s in zip(lines, parted, strict=True)]
-    width = max((len(row) for row in rows), default=0)
+    many = Counter(len(row) for row in rows if len(row) >= AXES)
+    # a line into which another broke is wider than all others
+    width = (
+        max(many, key=lambda n: (many[n], n))
+        if many
+        else max(map(len, rows), default=0)
+    )
     for i, (row, s) in enumerate(zip(rows, parted, strict=True)):
         said = [cell for cell in row if cell]
-        if len(row) < min(3, width) or not said:
+        if len(row) < min(AXES, width) or not said:
             continue
-        many = sum(is_number(cell, s != ",") for cell in said)
+        numbers = sum(is_number(cell, s != ",") for cell in said)
         wide = s is None or len(row) >= width - 1
-        if many > NUMBERS * len(said) and many >= min(3, width) and wide:
+        if numbers > NUMBERS * len(said) and numbers >= min(AXES, width) and wide:
             return i
     return len(lines)
 

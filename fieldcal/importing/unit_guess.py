@@ -18,7 +18,12 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing.gravity_size import Gravity, are_means, gravity_in, with_length
 from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.recording import TIME_UNITS, ReadOptions, Recording
+from fieldcal.importing.recording import (
+    LARGEST,
+    TIME_UNITS,
+    ReadOptions,
+    Recording,
+)
 from fieldcal.importing.scales import (
     ACC_OUT,
     ACC_SCALES,
@@ -90,7 +95,11 @@ def _beginning(recording: Recording, stream: str) -> Block:
         rows += len(block)
         if rows >= ROWS:
             break
-    return concat(blocks)[:ROWS]
+    whole = concat(blocks)[:ROWS]
+    # such values tell no unit; whoever takes the rows says where they stand
+    acc, gyr = (np.where(np.abs(three) > LARGEST, np.nan, three)
+                for three in (whole.acc, whole.gyr))  # fmt: skip
+    return replace(whole, acc=acc, gyr=gyr)
 
 
 def _said(parts: Sequence[Recording]) -> ReadOptions:

@@ -1,13 +1,14 @@
 """Validation of imported samples: bad rows are left out, good ones written.
 
 A row is refused whose time is not later than that of the row before, whose numbers are
-infinite, or which holds nothing but zeros (a buffer that was never filled): a missing
-value is no zero. Rows are written a group at a time, and found again by their time.
+infinite or larger than any sensor's, or which holds nothing but zeros (a buffer that
+was never filled): a missing value is no zero. Rows are written a group at a time, and
+found again by their time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block, concat
-from fieldcal.importing.recording import MOST
+from fieldcal.importing.recording import LARGEST, MOST
 
 FEWEST, GROUP = 1 << 13, 1 << 15
 """Fewest and most rows of a row group."""
@@ -94,10 +95,15 @@ class RowValidator:
         if timeless.any():
             yield "t", "is no time", timeless
         for names, triad in ((CHANNELS[:3], block.acc), (CHANNELS[3:], block.gyr)):
-            infinite = np.isinf(triad)
-            if infinite.any():
-                for i in np.flatnonzero(infinite.any(axis=0)):
-                    yield names[i], "is infinite", infinite[:, i]
+            wild = np.abs(triad) > LARGEST
+            if wild.any():
+                infinite = np.isinf(triad)
+                for what, rows in (
+                    ("is infinite", infinite),
+                    ("is larger than any sensor's", wild & ~infinite),
+                ):
+                    for i in np.flatnonzero(rows.any(axis=0)):
+                        yield names[i], what, rows[:, i]
 
     def _backwards(self, t: Array, bad: Rows) -> Rows:
         """Rows that are not later than all good ones before them."""
@@ -188,7 +194,6 @@ class SampleWriter:
         self._groups: list[tuple[float, float]] = []
         self._file: Any = None
         self._read = (-1, concat([]))
-        self.rows = 0
 
     def add(self, block: Block) -> None:
         """Take in the block that follows."""
@@ -208,18 +213,12 @@ class SampleWriter:
             part = whole[first : first + GROUP]
             self._writer.write_batch(to_batch(part, nulls=True), row_group_size=GROUP)
             self._groups.append((float(part.t[0]), float(part.t[-1])))
-            self.rows += len(part)
 
     def close(self) -> None:
         """Write what waits, and end the file."""
         if self._many:
             self._put()
         self._writer.close()
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """First and last time, s."""
-        return self._groups[0][0], self._groups[-1][1]
 
     def between(self, start: float, end: float) -> Iterator[Block]:
         """Times and channels with start <= t < end, of a file that was closed."""
@@ -259,11 +258,3 @@ def digest(path: Path) -> dict[str, Any]:
     return {
         "name": path.name, "sha256": hashed.hexdigest(), "bytes": path.stat().st_size
     }  # fmt: skip
-
-
-def rate(blocks: Iterable[Block]) -> float:
-    """Rate of the first samples, Hz; nan of less than two."""
-    for block in blocks:
-        if len(block) > 1:
-            return float(1 / np.median(np.diff(block.t)))
-    return float("nan")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,47 @@ def test_toml_without_end(
     assert says in refused("solve", str(tmp_path), capsys=capsys)
     plan = ["run", "two_position", "--virtual", "--limits", str(limits)]
     assert says in refused(*plan, "-o", str(tmp_path / "s"), capsys=capsys)
+
+
+def table(cells: Mapping[tuple[int, int], str]) -> str:
+    """Rows of a device at rest at 100 Hz, with other texts in some cells."""
+    rng = np.random.default_rng(3)
+    rows = []
+    for i in range(400):
+        values = [
+            0.01 * i,
+            *(np.array([0, 0, 9.81, 0, 0, 0]) + 0.01 * rng.standard_normal(6)),
+        ]
+        row = [f"{v:.5f}" for v in values]
+        for j in range(7):
+            row[j] = cells.get((i, j), row[j])
+        rows.append(",".join(row))
+    units = [*(f"{c} [m/s^2]" for c in ("ax", "ay", "az")),
+             *(f"{c} [rad/s]" for c in ("gx", "gy", "gz"))]  # fmt: skip
+    return "\n".join([",".join(["t [s]", *units]), *rows]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("cells", "says"),
+    [
+        ({(5, 3): "1e300"}, "line 7, column az: is larger than any sensor's"),
+        ({(5, 3): "inf"}, "line 7, column az: is infinite"),
+        ({(5, 6): "1,9,9"}, "line 7: has 9 columns, not 7"),
+        ({(i, j): "nan" for i in range(400) for j in range(1, 7)}, "has no number of"),
+    ],
+    ids=["huge", "infinite", "two lines in one", "nothing"],
+)
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_tables_of_what_no_sensor_says(
+    tmp_path: Path,
+    cells: Mapping[tuple[int, int], str],
+    says: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "log.csv").write_text(table(cells))
+    arguments = ("import", str(tmp_path / "log.csv"), "-o", str(tmp_path / "s"))
+    assert says in refused(*arguments, capsys=capsys)
+    assert not (tmp_path / "s").exists()
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"format": ' + "9" * 5000 + "}"])

@@ -31,7 +31,11 @@ def test_turns_are_not_followed_with_a_scale_factor_by_the_earth_alone(
 @pytest.mark.parametrize(
     ("mistake", "why"),
     [
-        ("outputs exchanged", "the gyroscopes lead to another attitude"),
+        pytest.param(
+            "outputs exchanged",
+            "the gyroscopes lead to another attitude",
+            marks=pytest.mark.thorough,
+        ),
         ("rad/s labelled deg/s", "unit = rad/s read as deg/s"),
     ],
 )

@@ -54,13 +54,13 @@ def peak(folder: Path, hours: float) -> tuple[int, int]:
         tracemalloc.stop()
 
 
-def test_eight_hours_take_no_more_memory_than_two(tmp_path: Path) -> None:
+def test_four_hours_take_no_more_memory_than_one(tmp_path: Path) -> None:
     peak(tmp_path, 0.5)
-    short, few = peak(tmp_path, 2.0)
-    long, many = peak(tmp_path, 8.0)
-    assert (few, many) == (24, 96)
-    # what eight hours of cells would take by themselves
-    assert 35 * 8 * 8 * 36_000 > 10 * IN_MEMORY
+    short, few = peak(tmp_path, 1.0)
+    long, many = peak(tmp_path, 4.0)
+    assert (few, many) == (12, 48)
+    # what four hours of cells would take by themselves
+    assert 35 * 8 * 4 * 36_000 > 10 * IN_MEMORY
     assert long < 1.1 * short
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._real import REAL
+from benchmarks.injected.recorded import REAL
 from benchmarks.joint import OFFSET, SIGMA, G, bound, observed
 from fieldcal.core.positions import FIVE, TWO
 from fieldcal.core.samples import Array

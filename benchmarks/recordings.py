@@ -20,7 +20,7 @@ from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
-from benchmarks._real import REAL
+from benchmarks.injected.recorded import REAL
 from fieldcal.cli import main as command
 
 JOINED = "set-2__full-sphere__"

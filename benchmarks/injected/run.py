@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks._real import REAL, Made, real, recordings
 from benchmarks.injected import judging
 from benchmarks.injected.judging import CONTROL, Outcome
 from benchmarks.injected.physics import (
@@ -20,6 +19,7 @@ from benchmarks.injected.physics import (
     physical,
     thermometer,
 )
+from benchmarks.injected.recorded import REAL, Made, real, recordings
 from benchmarks.injected.samples import CHAIN
 from benchmarks.injected.scene import Scene
 from benchmarks.injected.tables import fault, printed

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks._real import Real
 from benchmarks.injected.oracle import Oracle
 from benchmarks.injected.parts import windows_of
 from benchmarks.injected.readout import grid
+from benchmarks.injected.recorded import Real
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.diagnosis import Diagnosis
 

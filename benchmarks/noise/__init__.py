@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._real import REAL
+from benchmarks.injected.recorded import REAL
 from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.noise import estimate, reduced

@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from time import time
 from typing import Any
@@ -19,6 +19,7 @@ from fieldcal.core.samples import Array, Block, too_quick
 from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.spool import SpooledRows
+from fieldcal.importing.stream_facts import StreamFacts
 from fieldcal.importing.validation import RowValidator, SampleWriter, digest
 from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
@@ -27,111 +28,6 @@ from fieldcal.windows.cells import Cells
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.stretch_ends import reasons
 from fieldcal.windows.stretches import still_stretches_of_file, summary, why_none
-
-LONG = 5.0
-"""Mean periods without a sample that are a gap."""
-
-PAUSE = 1.0
-"""Shortest gap that is a pause of the recording, s: in others samples came late."""
-
-
-def mean_period(t: Array) -> float:
-    """Mean distance of times (n,) between pauses, s; nan of one.
-
-    What a pause is depends on the period, so the longest are left out until none is.
-
-    >>> round(mean_period(np.r_[np.arange(20), 9000 + np.arange(20)] / 50), 9)
-    0.02
-    """
-    steps = np.diff(t)
-    while len(steps):
-        period = float(steps.mean())
-        if not (long := steps > max(LONG * period, PAUSE)).any():
-            return period
-        steps = steps[~long]
-    return float("nan")
-
-
-@dataclass(slots=True)
-class StreamFacts:
-    """What was found in a stream.
-
-    Attributes
-    ----------
-    rows : samples that were taken
-    start_s, end_s : first and last time
-    gaps, longest_gap_s : times that no sample came for `LONG` mean periods
-    pauses, paused_s : those of them that last `PAUSE`, and the duration of all these
-    coldest, warmest : deg C, None where there is no temperature
-    left_out : rows that were left out, where that was asked for
-    measured : whether any accelerometer or gyroscope has a number
-
-    """
-
-    rows: int = 0
-    start_s: float = float("nan")
-    end_s: float = float("nan")
-    gaps: int = 0
-    longest_gap_s: float = 0.0
-    pauses: int = 0
-    paused_s: float = 0.0
-    coldest: float | None = None
-    warmest: float | None = None
-    left_out: int = 0
-    measured: bool = False
-    _period: float = float("nan")
-
-    def add(self, block: Block) -> None:
-        """Take in the block that follows."""
-        if not self.rows:
-            self.start_s = float(block.t[0])
-            self._period = mean_period(block.t)
-        pause = float(block.t[0]) - self.end_s if self.rows else 0.0
-        steps = block.t[1:] - block.t[:-1]
-        for gaps in (np.array([pause]), steps):
-            long = gaps[gaps > LONG * self._period]
-            self.gaps += len(long)
-            paused = long[long >= PAUSE]
-            self.pauses += len(paused)
-            self.paused_s += float(paused.sum())
-            if len(long):
-                self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
-        self.rows += len(block)
-        self.measured = self.measured or bool(np.isfinite(block.six).any())
-        self.end_s = float(block.t[-1])
-        known = block.temperature[np.isfinite(block.temperature)]
-        if len(known):
-            low, high = float(known.min()), float(known.max())
-            self.coldest = low if self.coldest is None else min(low, self.coldest)
-            self.warmest = high if self.warmest is None else max(high, self.warmest)
-
-    @property
-    def rate_hz(self) -> float:
-        """Mean rate between the pauses, Hz; nan where no sample follows another."""
-        steps = self.rows - 1 - self.pauses
-        span = self.end_s - self.start_s - self.paused_s
-        return steps / span if steps > 0 and span > 0 else float("nan")
-
-    def sentence(self) -> str:
-        """Say it in a line."""
-        many = "1 sample" if self.rows == 1 else f"{self.rows} samples"
-        says = [f"{many} over {self.end_s - self.start_s:.1f} s"]
-        if np.isfinite(self.rate_hz):
-            says.append(f"{self.rate_hz:.4g} Hz")
-        if self.coldest is not None:
-            says.append(f"{self.coldest:.1f} to {self.warmest:.1f} °C")
-        if self.gaps:
-            gaps = f"{self.gaps} gaps of up to" if self.gaps > 1 else "a gap of"
-            says.append(f"{gaps} {self.longest_gap_s:.3g} s")
-        return ", ".join(says)
-
-    def table(self) -> dict[str, Any]:
-        """What a mark keeps of it."""
-        kept = {
-            k: v for k, v in asdict(self).items() if k[0] != "_" and k != "measured"
-        }
-        rate = self.rate_hz
-        return kept | {"rate_hz": round(rate, 6) if np.isfinite(rate) else None}
 
 
 @dataclass(frozen=True, slots=True)

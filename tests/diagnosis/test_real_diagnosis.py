@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import gzip
 import json
 import tomllib
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
-from functools import cache
+from functools import cache, partial
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -19,8 +18,14 @@ from recordings import hand_held
 from scipy.optimize import least_squares
 from session_folders import recorded, write_session
 
+from benchmarks.injected.recorded import (
+    TEN_MINUTES,
+    Held,
+    at_rest_for,
+    faces_by_rows,
+    labelled_faces,
+)
 from fieldcal.cli import main
-from fieldcal.core.frames import angles_of
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.effects import catalogue
@@ -28,13 +33,6 @@ from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
 from fieldcal.sim_device.profile import NoiseFigures, Profile, Truth
 from fieldcal.sim_device.vocabulary import parse
-
-FACES = {
-    f"{axis}_{sense}": tuple(sign * (axis == a) for a in "xyz")
-    for axis in "xyz"
-    for sense, sign in (("p", 1.0), ("a", -1.0))
-}
-"""The specific force in six faces, by the names that their recordings use."""
 
 
 def diagnosed(folder: Path) -> dict[str, Any]:
@@ -54,70 +52,24 @@ def named(said: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {effect["id"]: effect for effect in said["effects"]}
 
 
-def text_rows(path: Path) -> list[list[str]]:
-    if not path.is_file():
-        pytest.skip(f"the recording is not here: {path}")
-    with gzip.open(path, "rt") as file:
-        return list(csv.reader(file))
-
-
-def face(name: str, start: float, end: float) -> dict[str, Any]:
-    alpha, beta = np.rad2deg(angles_of(FACES[name]))
-    return {
-        "name": name,
-        "alpha_deg": float(alpha),
-        "beta_deg": float(beta),
-        "start_s": start,
-        "end_s": end,
-    }
-
-
-def labelled_faces(shared: Path, folder: Path) -> Path:
-    """Six faces in counts, labelled row by row, samples between them left out."""
-    path = shared / "real" / "imucal_ferraris" / "annotated_session.csv.gz"
-    rows = text_rows(path)[1:]
-    rows.sort(key=lambda row: float(row[1]))
-    part = np.array([row[0] for row in rows])
-    number = np.array([row[1:] for row in rows], dtype=float)
-    t = number[:, 0] / 204.8
-    places = []
-    for name in dict.fromkeys(part):
-        if name in FACES:
-            inside = t[part == name]
-            places.append(face(name, float(inside[0]), float(inside[-1]) + 0.002))
-    gyr = np.deg2rad(number[:, 4:] / 16.4)
-    return write_session(folder, Block.of(t, number[:, 1:4] / 2048 * G0, gyr), places)
-
-
-def faces_by_rows(shared: Path, folder: Path) -> Path:
-    """Six faces in m/s^2, with the rows of each beside them."""
-    origin = shared / "real" / "imucal_ferraris"
-    rows = text_rows(origin / "example_ferraris_session.csv.gz")[1:]
-    number = np.array(rows, dtype=float)
-    t = number[:, 0] / 204.8
-    spans = json.loads((origin / "example_ferraris_session_list.json").read_text())
-    ordered = sorted(spans.items(), key=lambda item: int(item[1]["start"]))
-    places = [
-        face(name, float(t[s["start"]]), float(t[s["end"]]))
-        for name, s in ordered
-        if name in FACES
-    ]
-    gyr = np.deg2rad(number[:, 1:4])
-    return write_session(folder, Block.of(t, number[:, 4:], gyr), places)
-
-
-Write = Callable[[Path, Path], Path]
+def written(make: Callable[[], Held], folder: Path) -> Path:
+    """A session of a recording that lies beside the project."""
+    try:
+        block, places = make()
+    except FileNotFoundError as error:
+        pytest.skip(f"the recording is not here: {error.filename}")
+    return write_session(folder, block, places)
 
 
 @pytest.fixture(scope="module")
 def faces(
-    shared: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[Write], dict[str, Any]]:
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[[Callable[[], Held]], dict[str, Any]]:
     """Diagnose a session of six faces; each once, however often it is asked for."""
 
     @cache
-    def said_of(session: Write) -> dict[str, Any]:
-        return diagnosed(session(shared, tmp_path_factory.mktemp("faces") / "s"))
+    def said_of(session: Callable[[], Held]) -> dict[str, Any]:
+        return diagnosed(written(session, tmp_path_factory.mktemp("faces") / "s"))
 
     return said_of
 
@@ -130,10 +82,10 @@ def faces(
     ],
 )
 def test_six_faces_are_not_square(
-    session: Write,
+    session: Callable[[], Held],
     before: float,
     after: float,
-    faces: Callable[[Write], dict[str, Any]],
+    faces: Callable[[Callable[[], Held]], dict[str, Any]],
 ) -> None:
     """The published residuals with known axes, without and with cross-coupling.
 
@@ -154,7 +106,7 @@ def test_six_faces_are_not_square(
 
 
 def test_the_bias_of_six_faces_is_the_peer_s(
-    shared: Path, faces: Callable[[Write], dict[str, Any]]
+    shared: Path, faces: Callable[[Callable[[], Held]], dict[str, Any]]
 ) -> None:
     said = faces(labelled_faces)
     path = shared / "real" / "imucal_ferraris" / "peer_example_cal.json"
@@ -227,32 +179,9 @@ def test_an_autopilot_on_the_bench_warms_up(shared: Path, tmp_path: Path) -> Non
     )
 
 
-def at_rest_for(shared: Path, folder: Path, name: str) -> Path:
-    """Accelerometers, gyroscopes and die temperature of three files."""
-    h5py = pytest.importorskip("h5py", reason="h5py reads these recordings")
-    columns = []
-    for part in ("accelerometer", "gyroscope", "temperature"):
-        path = shared / "real" / "sunsided_mpu6050_temp" / f"{name}__{part}.mat"
-        if not path.is_file():
-            pytest.skip(f"the recording is not here: {path}")
-        with h5py.File(path) as file:
-            table = np.array(next(v for k, v in file.items() if k[0] != "#"))
-        columns.append(table if table.shape[0] > table.shape[1] else table.T)
-    acc, gyr, degrees = columns
-    latest = np.maximum.accumulate(acc[:, 0])
-    kept = np.concatenate([[True], np.diff(latest) > 0]) & (acc[:, 0] > 0)
-    block = Block.of(
-        acc[kept, 0], acc[kept, 1:] * G0, np.deg2rad(gyr[kept, 1:]), degrees[kept, 1]
-    )
-    window = {"start_s": float(block.t[0]), "end_s": float(block.t[-1])}
-    return write_session(folder, block, [window])
-
-
-def test_ten_minutes_on_a_table_follow_a_quarter_of_a_kelvin(
-    shared: Path, tmp_path: Path
-) -> None:
-    name = "set-2__unmoved-with-x-pointing-forward-10min"
-    said = diagnosed(at_rest_for(shared, tmp_path / "s", name))
+def test_ten_minutes_on_a_table_follow_a_quarter_of_a_kelvin(tmp_path: Path) -> None:
+    pytest.importorskip("h5py", reason="h5py reads these recordings")
+    said = diagnosed(written(partial(at_rest_for, TEN_MINUTES), tmp_path / "s"))
     found = named(said)
     assert "temperature_bias" in found
     assert found["temperature_bias"]["evidence"]["held_out_gain"] > 0.5
@@ -266,11 +195,10 @@ def test_ten_minutes_on_a_table_follow_a_quarter_of_a_kelvin(
     )
 
 
-def test_a_minute_with_broken_stamps_shows_nothing_more(
-    shared: Path, tmp_path: Path
-) -> None:
+def test_a_minute_with_broken_stamps_shows_nothing_more(tmp_path: Path) -> None:
+    pytest.importorskip("h5py", reason="h5py reads these recordings")
     name = "set-1__unmoved-z-pointing-left"
-    said = diagnosed(at_rest_for(shared, tmp_path / "s", name))
+    said = diagnosed(written(partial(at_rest_for, name), tmp_path / "s"))
     assert said["verdict"] == "consistent"
     assert "degrees of freedom" in " ".join(said["warnings"])
 

@@ -28,7 +28,7 @@ from fieldcal.session import description
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 
-REAL = Path(__file__).resolve().parents[2] / "shared" / "real"
+REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
 
 SIX = ("ax", "ay", "az", "gx", "gy", "gz")
 SITE = {"latitude_deg": 50.45, "height_m": 170.0}
@@ -43,6 +43,8 @@ FERRARIS_HZ = 204.8
 MPU6050 = {"acc_unit": "g", "acc_lsb": 16384.0, "gyr_unit": "deg/s", "gyr_lsb": 131.0}
 LONG_GAP_S = 1.0
 """Time without a sample that parts two bursts."""
+
+TEN_MINUTES = "set-2__unmoved-with-x-pointing-forward-10min"
 
 MOVED_S = 9.0
 """Time for which the device of the PX4 log was still being moved about."""
@@ -65,6 +67,8 @@ class Real(NamedTuple):
 
 
 Made = tuple[Block, Description]
+Held = tuple[Block, list[dict[str, Any]]]
+"""Samples, and the tables of the positions in which they were taken."""
 
 
 def recordings() -> dict[str, Callable[[], Made]]:
@@ -76,15 +80,15 @@ def recordings() -> dict[str, Callable[[], Made]]:
         path = REAL / "mikoff_mpu9150_x5" / f"imu{i}.log.gz"
         wanted = ReadOptions(SIX, 100.0)
         out[f"mikoff {i}"] = partial(_imported, path, wanted, 2.0)
-    out["ferraris counts"] = _ferraris_counts
-    out["ferraris"] = _ferraris
+    out["ferraris counts"] = lambda: _told(labelled_faces())
+    out["ferraris"] = lambda: _told(faces_by_rows())
     for repeat in (2, 6):
         for unit in range(1, 9):
             path = REAL / "mpu9150_array" / f"exp{repeat}_imu{unit}.csv.gz"
             wanted = ReadOptions(("t", *SIX), acc_unit="g", gyr_unit="deg/s")
             out[f"array {repeat}.{unit}"] = partial(_imported, path, wanted, 5.0)
     out["pyulog"] = _autopilot_on_the_bench
-    out["sunsided"] = _ten_minutes
+    out["sunsided"] = lambda: _told(at_rest_for(TEN_MINUTES))
     for name, file in (("static", "tinit_calc"), ("positions", "calibration")):
         path = REAL / "tomisuarez_mpu6050" / f"example_data_{file}.csv.gz"
         counts = ReadOptions(SIX, 100.0, **MPU6050)  # type: ignore[arg-type]
@@ -110,6 +114,10 @@ def _imported(path: Path, wanted: ReadOptions, still: float, stream: str = "") -
         return session.block, session.about
 
 
+def _told(held: Held) -> Made:
+    return held[0], _said(held[1])
+
+
 def _said(positions: Sequence[Mapping[str, Any]]) -> Description:
     tables = [dict(p) for p in positions]
     return description.parse({"format": 1, "site": SITE, "position": tables})
@@ -131,7 +139,7 @@ def _rows(path: Path) -> list[list[str]]:
         return list(csv.reader(file))[1:]
 
 
-def _ferraris_counts() -> Made:
+def labelled_faces() -> Held:
     """Six faces in counts, labelled row by row; samples between them are left out."""
     rows = _rows(REAL / "imucal_ferraris" / "annotated_session.csv.gz")
     rows.sort(key=lambda row: float(row[1]))
@@ -144,10 +152,10 @@ def _ferraris_counts() -> Made:
             inside = t[part == name]
             places.append(_face(name, float(inside[0]), float(inside[-1]) + 0.002))
     acc, gyr = number[:, 1:4] / 2048 * G0, np.deg2rad(number[:, 4:] / 16.4)
-    return Block.of(t, acc, gyr), _said(places)
+    return Block.of(t, acc, gyr), places
 
 
-def _ferraris() -> Made:
+def faces_by_rows() -> Held:
     """Six faces in m/s^2, with the rows of each in a file beside them."""
     folder = REAL / "imucal_ferraris"
     number = np.array(_rows(folder / "example_ferraris_session.csv.gz"), dtype=float)
@@ -158,7 +166,7 @@ def _ferraris() -> Made:
         for name, s in sorted(spans.items(), key=lambda item: int(item[1]["start"]))
         if name in FACES
     ]
-    return Block.of(t, number[:, 4:], np.deg2rad(number[:, 1:4])), _said(places)
+    return Block.of(t, number[:, 4:], np.deg2rad(number[:, 1:4])), places
 
 
 def _autopilot_on_the_bench() -> Made:
@@ -169,12 +177,11 @@ def _autopilot_on_the_bench() -> Made:
     return block, _said([{"start_s": start, "end_s": float(block.t[-1])}])
 
 
-def _ten_minutes() -> Made:
-    """Ten minutes on a table with the temperature of the die, one window."""
+def at_rest_for(name: str) -> Held:
+    """Some time on a table with the temperature of the die, one window."""
     import h5py
 
     folder = REAL / "sunsided_mpu6050_temp"
-    name = "set-2__unmoved-with-x-pointing-forward-10min"
     columns: list[Array] = []
     for part in ("accelerometer", "gyroscope", "temperature"):
         with h5py.File(folder / f"{name}__{part}.mat") as file:
@@ -185,7 +192,7 @@ def _ten_minutes() -> Made:
     kept = np.concatenate([[True], np.diff(latest) > 0]) & (acc[:, 0] > 0)
     t, rate = acc[kept, 0], np.deg2rad(gyr[kept, 1:])
     block = Block.of(t, acc[kept, 1:] * G0, rate, degrees[kept, 1])
-    return block, _said([{"start_s": float(t[0]), "end_s": float(t[-1])}])
+    return block, [{"start_s": float(t[0]), "end_s": float(t[-1])}]
 
 
 def _bursts() -> Made:

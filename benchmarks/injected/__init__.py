@@ -2,10 +2,10 @@
 
     python -m benchmarks injected [--quick] [--all] [--only=NAME] [--untouched]
 
-Every recording in `benchmarks/injected/recorded` is diagnosed as it is. Then one known effect is
-added to its samples and it is diagnosed again: nothing may be lost of what was said
-before, the effect must be named (or be an alias of what is), and nothing else may be
-invented. Effects are 10 and 20 standard deviations, as an oracle sees them that knows
+Every recording of `recorded` is diagnosed as it is. Then one known effect is added to
+its samples and it is diagnosed again: nothing may be lost of what was said before, the
+effect must be named (or be an alias of what is), and nothing else may be invented.
+Effects are 10 and 20 standard deviations, as an oracle sees them that knows
 everything but the size (`oracle`), against the scatter that the recording itself shows;
 `samples` says what the two sizes are of faults that have none.
 

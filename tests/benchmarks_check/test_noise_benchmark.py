@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.noise import allan_variance, scored
+from benchmarks.noise import scored
+from benchmarks.noise.peers import allan_variance
 from benchmarks.noise.processes import bound, covariance, noise
 
 
@@ -41,5 +42,5 @@ def test_simulated_processes_have_their_covariance(process: str) -> None:
 def test_the_peer_is_asked_for_the_same_sizes() -> None:
     pytest.importorskip("allan_variance")
     values = noise(np.random.default_rng(2), 20_000, 0.1, 3, N=2.0, K=0.1)
-    found = allan_variance(values, {"N": 2.0, "K": 0.1})
+    found = allan_variance(values, 0.1, {"N": 2.0, "K": 0.1})
     assert found[:, 0] == pytest.approx(2.0, rel=0.1)

@@ -68,8 +68,6 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.history.database import Database
     from fieldcal.history.place import default_place
 
-    if args.jobs is not None and args.jobs < 1:
-        raise InputError(f"--jobs {args.jobs}: there must be one process at least")
     limits = str(args.limits.resolve()) if args.limits else None
     batch = Batch(
         sessions_in(args.folders),
@@ -79,24 +77,34 @@ def run(args: argparse.Namespace) -> int:
     every = [str(folder) for folder in batch.folders]
     left = batch.left() if args.resume else every
     if left:
-        with _pool(args) as pool:
-            _carried_out(batch, left, pool)
+        with pool_of(args) as pool:
+            carried_out(batch, left, pool)
     batch.write(args.output)
     return _said(args, batch, len(left))
 
 
 @contextlib.contextmanager
-def _pool(args: argparse.Namespace) -> Iterator[Pool]:
+def pool_of(args: argparse.Namespace) -> Iterator[Pool]:
+    """Processes as --jobs has them, or the workers of --scheduler.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+
+    """
     from fieldcal.fleet.workers import processes, scheduled
 
-    if args.scheduler:
+    if args.jobs is not None and args.jobs < 1:
+        raise InputError(f"--jobs {args.jobs}: there must be one process at least")
+    if getattr(args, "scheduler", None):
         with scheduled(args.scheduler) as pool:
             yield pool
     else:
         yield processes(args.jobs or os.cpu_count() or 1, ["fieldcal.fleet.outcome"])
 
 
-def _carried_out(batch: Batch, left: list[str], pool: Pool) -> None:
+def carried_out(batch: Batch, left: list[str], pool: Pool) -> None:
     """Do what is left, with a bar that says how quick and how long still."""
     from rich import progress
 

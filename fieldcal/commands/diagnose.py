@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 HELP = "say what physics the simulation leaves out of a recording"
 
-RARE = ("rounds", "limit", "junit")
+RARE = ("rounds", "limit", "junit", "jobs", "history")
 
 EXAMPLE = """\
   fieldcal diagnose bench-7/2026-03-01
@@ -28,6 +28,7 @@ EXAMPLE = """\
   fieldcal diagnose bench-7/2026-03-01 --twin bench-7.toml
   fieldcal sim --profile bench-7.toml
   fieldcal diagnose bench-7/2026-03-01 --against sitl.bin --patch sitl
+  fieldcal diagnose bench-7/2026-* --shared
   fieldcal diagnose bench-7/2026-03-01 --against "./simulate {patch} {out}"
 """
 
@@ -37,7 +38,15 @@ DIAGNOSIS = "diagnosis.json"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
-    add("session", type=Path, metavar="SESSION", help="session folder")
+    add("sessions", type=Path, nargs="+", metavar="SESSION", help="session folder")
+    add(
+        "--shared",
+        action="store_true",
+        help="say which effects several sessions share, and whether device, lot,"
+        " station or session has them",
+    )
+    add("--jobs", type=int, metavar="N", help="with --shared: processes")
+    add("--history", metavar="FILE", help="with --shared: instead of the usual store")
     add("--json", action="store_true", help="print diagnosis.json instead of the view")
     add("--details", action="store_true", help="all numbers behind the view as well")
     add("--report", action="store_true", help="write report.html as well")
@@ -85,6 +94,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command: 0 consistent, 1 something is left out or unexplained."""
+    if args.shared:
+        from fieldcal.commands import shared
+
+        return shared.run(args)
+    if len(args.sessions) > 1:
+        raise InputError("several sessions need --shared; or diagnose one at a time")
+    (args.session,) = args.sessions
     if args.against:
         from fieldcal.commands import against
 

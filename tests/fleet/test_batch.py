@@ -125,7 +125,11 @@ def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
     assert batch.left() == [str(found[0])]
 
 
-def test_wrong_calls_are_refused(tmp_path: Path) -> None:
-    for wrong in ([str(tmp_path / "none")], [str(tmp_path)], [".", "--jobs", "0"]):
+def test_wrong_calls_are_refused(tree: Path, tmp_path: Path) -> None:
+    for wrong in (
+        [str(tmp_path / "none")],
+        [str(tmp_path)],
+        [str(tree), "--jobs", "0"],
+    ):
         assert main(["batch", *wrong]) == 2
     assert command.TABLE.endswith(".parquet")

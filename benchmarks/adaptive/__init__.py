@@ -1,0 +1,93 @@
+"""Devices with something concealed, recalibrated by `adaptive` and by a fixed plan.
+
+    python -m benchmarks adaptive [DEVICES] [--seed=N] [--each]
+
+Every device is drawn with its place, noise, tilted base and fixture; a third of them
+conceals nothing, the others one effect or two. Each is led twice through the engine, on
+device time: as `adaptive` asks, and through all nine positions of the same ladder.
+Afterwards it is put into positions that neither took, where what the calibration says
+of the force is held against a perfect device's.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from benchmarks.adaptive.bench import Bench, drawn
+from benchmarks.adaptive.led import Run, led
+from fieldcal.core.errors import FieldcalError
+
+USUAL, SEED = 60, 71_000_000
+
+NINE = [(float(a), float(b)) for a, b in product((0, -45, 45), (0, -5, 5))]
+"""The fixed plan: all positions of the ladder."""
+
+WRONG = 5.0
+"""Standard uncertainties from which a parameter is wrong."""
+
+
+def main() -> None:
+    """Print what became of each plan."""
+    words = sys.argv[2:]
+    count = next((int(w) for w in words if w.isdigit()), USUAL)
+    seed = next((int(w[7:]) for w in words if w.startswith("--seed=")), SEED)
+    plans = {
+        "adaptive": ({"procedure": "adaptive"}, None),
+        "nine fixed": ({"procedure": "positions"}, NINE),
+    }
+    rows: dict[str, list[tuple[Bench, Run]]] = {name: [] for name in plans}
+    for number in range(seed, seed + count):
+        bench = drawn(number, np.random.default_rng(number))
+        told = f"{number} {', '.join(bench.session.concealed) or 'nothing'}:"
+        try:
+            found = {n: led(bench, *plan, number) for n, plan in plans.items()}
+        except FieldcalError as error:
+            print(f"{told} {error}", flush=True)
+            continue
+        for name, one in found.items():
+            rows[name].append((bench, one))
+        if "--each" in words:
+            parts = [
+                f"{n} {r.held} {'GO' if r.go else 'NO-GO'}{' named' * r.named}"
+                f" {1e3 * r.error:.2f} mm/s^2 {r.off:.1f} sigma"
+                for n, r in found.items()
+            ]
+            print(f"{told} {'; '.join(parts)}", flush=True)
+    _print(rows)
+
+
+def _print(rows: Mapping[str, Sequence[tuple[Bench, Run]]]) -> None:
+    for concealed in (False, True):
+        print("with something concealed" if concealed else "nothing concealed")
+        print(
+            "| plan | devices | positions | GO | GO or named | error, rms | > 5 sigma |"
+        )
+        print("|---|---|---|---|---|---|---|")
+        for name, some in rows.items():
+            runs = [r for b, r in some if bool(b.session.concealed) == concealed]
+            if not runs:
+                continue
+            held = np.array([r.held for r in runs])
+            error = 1e3 * np.median([r.error for r in runs])
+            good = sum(r.go or (r.named and concealed) for r in runs)
+            wrong = sum(r.go and r.off > WRONG for r in runs)
+            print(
+                f"| {name} | {len(runs)} | {held.mean():.1f} (median"
+                f" {np.median(held):.0f}) | {sum(r.go for r in runs)} | {good} |"
+                f" {error:.2f} mm/s^2 | {wrong} |"
+            )
+    took = np.array([s for _, r in rows["adaptive"] for s in r.choices])
+    ratio = [
+        a.error / b.error
+        for (_, a), (_, b) in zip(*rows.values(), strict=True)
+        if np.isfinite(a.error + b.error)
+    ]
+    print(f"error of adaptive over that of nine: median {np.median(ratio):.2f}")
+    print(
+        f"choice: median {np.median(took):.2f} s, 95 % {np.quantile(took, 0.95):.2f} s"
+        " of processor time"
+    )

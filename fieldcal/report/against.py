@@ -37,7 +37,7 @@ def against(material: Material) -> Section | None:
     blocks: list[Block] = [verdict_box(found, VERDICTS)]
     blocks.append(Text(f"Compared with {found.get('against', 'a simulator')}."))
     if said := str(found.get("says", "")):
-        blocks.append(Text(said))
+        blocks.append(Text(pretty(said)))
     rows = [row for one in objects_at(found, "differences") for row in _rows(one)]
     if rows:
         blocks.append(table("What differs", COLUMNS, rows))

@@ -75,7 +75,7 @@ def diagnosis(material: Material) -> Section | None:
     if effects:
         blocks += _fit(table_at(found, "fit"))
     if said := str(found.get("says", "")):
-        blocks.append(Text(said))
+        blocks.append(Text(pretty(said)))
     blocks += [WarningBox(str(w)) for w in list_at(found, "warnings")]
     mismatch = objects_at(found, "mismatch")
     if mismatch:

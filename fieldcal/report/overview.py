@@ -13,6 +13,8 @@ from fieldcal.calibration.names import ParameterName
 from fieldcal.calibration.wording import number, pretty, title
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.samples import Array
+from fieldcal.core.samples import Block as SampleBlock
+from fieldcal.importing.stream_facts import StreamFacts
 from fieldcal.model import thresholds
 from fieldcal.report.blocks import (
     Block,
@@ -31,13 +33,6 @@ from fieldcal.report.loose import list_at, objects_at, table_at
 
 WIDEST = 30.0
 """Change in standard uncertainties that fills its bar."""
-
-
-UNSTEADY = 0.2
-"""Part by which two ways to tell the rate differ if the times come in bursts."""
-
-GAP = 5.0
-"""Periods without a sample that are a gap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +108,7 @@ def _facts(material: Material) -> NameValues:
     span = float(block.t[-1] - block.t[0])
     facts = [
         ("recorded", f"{_duration(span)}, {len(block):,} samples"),
-        ("rate", _rate(block.t)),
+        ("rate", _rate(block)),
     ]
     if material.still is not None:
         taken, of = len(material.still.rows), len(material.session.positions)
@@ -141,26 +136,13 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min {rest} s" if minutes else f"{seconds:.1f} s"
 
 
-def _rate(t: Array) -> str:
-    if len(t) < 2:
+def _rate(block: SampleBlock) -> str:
+    found = StreamFacts()
+    found.add(block)
+    if not np.isfinite(found.rate_hz):
         return "a single sample"
-    steps = np.diff(t)
-    rate = 1 / float(np.median(steps))
-    usual = _in_a_second(t)
-    if abs(rate / usual - 1) > UNSTEADY:
-        # the times come in bursts: most steps are short, and tell nothing of the rate
-        rate = (len(t) - 1) / float(t[-1] - t[0])
-    gaps = int((steps > GAP / rate).sum())
-    holes = f", {gaps} gap{'s' * (gaps > 1)}" if gaps else ", no gap"
-    return f"{rate:.4g} Hz{holes}"
-
-
-def _in_a_second(t: Array) -> float:
-    """Samples in a usual second, Hz; of a slow device, in the time of some samples."""
-    width = max(1.0, 20 * float(np.median(np.diff(t))))
-    # seconds of a pause, of which there may be years, hold none and are not counted
-    _, counts = np.unique(((t - t[0]) // width), return_counts=True)
-    return float(np.median(counts[:-1] if len(counts) > 1 else counts)) / width
+    many = f"{found.gaps} gap{'s' * (found.gaps > 1)}" if found.gaps else "no gap"
+    return f"{found.rate_hz:.4g} Hz, {many}"
 
 
 def calibration(material: Material) -> Section | None:

@@ -126,6 +126,7 @@ def test_the_end_is_what_is_shown_last() -> None:
     now = board.content()
     assert (now["words"], now["colour"], now["ended"]) == ("NO-GO", "red", True)
     assert now["told"] == ["take position 3 again"] and "phase" not in now
+    assert now["now"] is None and not any(row["state"] for row in now["positions"])
     assert board.version > before
 
 

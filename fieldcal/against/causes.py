@@ -139,23 +139,10 @@ def _pairs(one: Member | None, two: Member | None, found: Decided) -> dict[str, 
     real = quantities(found.real, one) if one else {}
     sim = quantities(found.sim, two) if two else {}
     return {
-        name: _pair(real.get(name), sim.get(name))
+        name: Pair.of(real.get(name), sim.get(name))
         for name in dict.fromkeys([*real, *sim])
         if (one is None or name in real) and (two is None or name in sim)
     }
-
-
-def _pair(one: Quantity | None, two: Quantity | None) -> Pair:
-    """Two quantities with their difference; what is not there is 0 for certain."""
-    known = one or two
-    if known is None:
-        raise ValueError("neither is known")
-    values = [float(q.value) if q else 0.0 for q in (one, two)]
-    sigmas = [(q.sigma or 0.0) if q else 0.0 for q in (one, two)]
-    off = Quantity(
-        values[0] - values[1], float(np.hypot(sigmas[0], sigmas[1])), known.unit
-    )
-    return Pair(one, two, off)
 
 
 def quantities(there: Widened, member: Member) -> dict[str, Quantity]:

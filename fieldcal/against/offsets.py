@@ -51,13 +51,20 @@ def earth(found: Decided) -> Iterator[Difference]:
     if probability < thresholds.NAMED or felt[0] == felt[1]:
         return
     direction: Direction = "left_out" if felt[0] else "added"
-    unit, parameters = "rad/s", dict[str, Pair]()
-    for i, axis in enumerate("xyz"):
-        had = [Quantity(float(r[i]), float(np.sqrt(c[i, i])), unit)
-               for r, c in ((one, cov), (two, more))]  # fmt: skip
-        off = Quantity(float(one[i] - two[i]), float(np.sqrt(total[i, i])), unit)
-        parameters[axis] = Pair(had[0], had[1], off)
+    parameters = _pairs(np.arange(3), (one, cov), (two, more), "rad/s")
     yield Difference("earth_rate", direction, probability, parameters)
+
+
+def _pairs(
+    axes: Index, real: tuple[Array, Array], sim: tuple[Array, Array], unit: str
+) -> dict[str, Pair]:
+    """Values with covariance of both by axis, of some channels."""
+    out: dict[str, Pair] = {}
+    for i, c in enumerate(axes.tolist()):
+        one, two = (Quantity(float(value[i]), float(np.sqrt(cov[i, i])), unit)
+                    for value, cov in (real, sim))  # fmt: skip
+        out["xyz"[c % 3]] = Pair.of(one, two)
+    return out
 
 
 def _felt(rate: Array, covariance: Array) -> bool:
@@ -141,13 +148,9 @@ def _difference(found: Decided, name: str, axes: Index) -> Iterator[Difference]:
     probability = differs((one - two)[known], (cov + more)[inner], typical[known])
     if probability < thresholds.NAMED:
         return
-    unit, parameters = GROUPS[name], dict[str, Pair]()
-    for i in known.tolist():
-        parameters["xyz"[axes[i] % 3]] = Pair(
-            Quantity(float(one[i]), float(np.sqrt(cov[i, i])), unit),
-            Quantity(float(two[i]), float(np.sqrt(more[i, i])), unit),
-            Quantity(float(one[i] - two[i]), float(sigma[i]), unit),
-        )
+    parameters = _pairs(
+        axes[known], (one[known], cov[inner]), (two[known], more[inner]), GROUPS[name]
+    )
     where = tuple(
         _everywhere(
             found,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
@@ -23,6 +24,24 @@ class Pair:
     real: Quantity | None
     simulator: Quantity | None
     difference: Quantity
+
+    @classmethod
+    def of(cls, real: Quantity | None, simulator: Quantity | None) -> Pair:
+        """Numbers with their difference; what is not there is 0 for certain.
+
+        Raises
+        ------
+        ValueError
+            If neither is there.
+
+        """
+        there = [q for q in (real, simulator) if q is not None]
+        if not there:
+            raise ValueError("neither is known")
+        one, two = (0.0 if q is None else float(q.value) for q in (real, simulator))
+        sigmas = [q.sigma for q in there if q.sigma is not None]
+        sigma = math.hypot(*sigmas) if len(sigmas) == len(there) else None
+        return cls(real, simulator, Quantity(one - two, sigma, there[0].unit))
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of against.json."""

@@ -69,12 +69,7 @@ def _noise(real: Side, sim: Side, at: Sequence[int]) -> Iterator[Difference]:
     probability = differs(off, np.diag(sigma**2), np.full(len(at), LOUDER))
     if probability < thresholds.NAMED:
         return
-    pairs = dict[str, Pair]()
-    for c in at:
-        had = [level(s, c) for s in (real, sim)]
-        spread = math.hypot(*(s.noise[c] * s.unsure[c] for s in (real, sim)))
-        more = Quantity(float(real.noise[c] - sim.noise[c]), spread, UNITS[c // 3])
-        pairs[CHANNELS[c]] = Pair(had[0], had[1], more)
+    pairs = {CHANNELS[c]: Pair.of(level(real, c), level(sim, c)) for c in at}
     silent = bool((sim.noise[at] <= NONE * one).all())
     louder = [
         c
@@ -180,14 +175,8 @@ def _difference(
     pairs = {}
     for name, q in one.parameters.items():
         other = two.parameters.get(name) if two is not None else None
-        if isinstance(q.value, str):
-            pairs[name] = Pair(q, other, q)
-            continue
-        before = float(other.value) if other is not None else 0.0
-        sigma = q.sigma
-        if other is not None and sigma is not None:
-            sigma = float(np.hypot(sigma, other.sigma or 0.0))
-        pairs[name] = Pair(q, other, replace(q, value=q.value - before, sigma=sigma))
+        word = isinstance(q.value, str)
+        pairs[name] = Pair(q, other, q) if word else Pair.of(q, other)
     if two is not None and not any(_apart(n, p) for n, p in pairs.items()):
         return
     yield Difference(

@@ -8,7 +8,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.wording import title
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.report.blocks import Block, Figure, Matrix, Section, Text
-from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.charts import SENSORS, Axis, Chart, Series
 from fieldcal.report.gather import Material
 from fieldcal.report.residuals import Residuals, residuals
 
@@ -27,10 +27,7 @@ def agreement(material: Material) -> Section | None:
     blocks: list[Block] = []
     warm = found.temperature
     span = np.ptp(warm[np.isfinite(warm)]) if np.isfinite(warm).any() else 0.0
-    for first, what, unit in (
-        (0, "accelerometers", "m/s²"),
-        (3, "gyroscopes", "rad/s"),
-    ):
+    for first, what, unit in SENSORS:
         values = _values(found, first)
         if not values:
             continue

@@ -16,6 +16,9 @@ from fieldcal.core.samples import Array
 DIGITS = 7
 """Significant digits of a number in the page: more than a screen can show."""
 
+SENSORS = ((0, "accelerometers", "m/s²"), (3, "gyroscopes", "rad/s"))
+"""First channel of each triad, what it is called, and its unit."""
+
 Draw = Literal["points", "line", "both"]
 
 

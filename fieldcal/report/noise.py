@@ -13,7 +13,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS
 from fieldcal.report.blocks import Block as Part
 from fieldcal.report.blocks import Figure, Section, Table, Text, table
-from fieldcal.report.charts import Axis, Chart, Series
+from fieldcal.report.charts import SENSORS, Axis, Chart, Series
 from fieldcal.report.gather import Material
 from fieldcal.session.noise_file import read_noise
 from fieldcal.windows.allan import SHORTEST, AllanDeviation, allan_deviation
@@ -86,7 +86,7 @@ def _longest(material: Material) -> tuple[float, float]:
     best = max(spans, key=_length, default=(0.0, 0.0))
     whole = float(material.block.t[-1] - material.block.t[0])
     if _length(best) < SHORTEST <= whole:
-        return max(still_stretches(material.block), key=_length, default=best)
+        return max([best, *still_stretches(material.block)], key=_length)
     return best
 
 
@@ -96,10 +96,7 @@ def _length(span: tuple[float, float]) -> float:
 
 def _figures(found: AllanDeviation, where: str) -> list[Part]:
     out: list[Part] = []
-    for first, what, unit in (
-        (0, "accelerometers", "m/s²"),
-        (3, "gyroscopes", "rad/s"),
-    ):
+    for first, what, unit in SENSORS:
         series = tuple(
             Series(
                 CHANNELS[i],
@@ -114,18 +111,19 @@ def _figures(found: AllanDeviation, where: str) -> list[Part]:
             if np.isfinite(found.deviation[:, i]).any()
         )
         if series:
-            out.append(Figure(_chart(series, what, unit, found), where))
+            least = [f"{s.name} {np.nanmin(s.y):.2g} {unit}" for s in series]
+            over = f"Over {found.tau[0]:.2g} to {found.tau[-1]:.3g} s"
+            alt = f"{over}; least: {', '.join(least)}."
+            out.append(Figure(allan_chart(what, unit, alt, series), where))
     return out
 
 
-def _chart(
-    series: tuple[Series, ...], what: str, unit: str, found: AllanDeviation
-) -> Chart:
-    least = [f"{s.name} {np.nanmin(s.y):.2g} {unit}" for s in series]
+def allan_chart(what: str, unit: str, alt: str, series: tuple[Series, ...]) -> Chart:
+    """Allan deviations of a triad over the averaging time."""
     return Chart(
         f"allan-{what}",
         f"Allan deviation, {what}",
-        f"Over {found.tau[0]:.2g} to {found.tau[-1]:.3g} s; least: {', '.join(least)}.",
+        alt,
         Axis("averaging time τ", "s", log=True),
         Axis("Allan deviation", unit, log=True),
         series,

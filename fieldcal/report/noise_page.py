@@ -12,8 +12,8 @@ from fieldcal.noise.estimate import ChannelEstimate
 from fieldcal.noise.wording import PROCESSES, TRIADS, follows, value_or_bound
 from fieldcal.report.blocks import Block as Part
 from fieldcal.report.blocks import Figure, NameValues, Section, Table, Text, table
-from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.noise import averaging
+from fieldcal.report.charts import Chart, Series
+from fieldcal.report.noise import allan_chart, averaging
 from fieldcal.report.overview import Head
 from fieldcal.report.page import rendered
 
@@ -67,14 +67,7 @@ def _chart(what: str, some: list[ChannelEstimate], length: float) -> Chart:
         ]  # fmt: skip
     unit = pretty(some[0].unit)
     least = [f"{c.name} {np.min(c.averaging.sigma):.2g} {unit}" for c in some]
-    return Chart(
-        f"allan-{what}",
-        f"Allan deviation, {what}",
-        f"Least: {', '.join(least)}.",
-        Axis("averaging time τ", "s", log=True),
-        Axis("Allan deviation", unit, log=True),
-        tuple(series),
-    )
+    return allan_chart(what, unit, f"Least: {', '.join(least)}.", tuple(series))
 
 
 def _processes(found: NoiseResult) -> Table:

@@ -10,7 +10,7 @@ from fieldcal.calibration.wording import number
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.evaluation.observations import Rests
 from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
-from fieldcal.report.charts import LabelledSpan, Mark, Record
+from fieldcal.report.charts import SENSORS, LabelledSpan, Mark, Record
 from fieldcal.report.gather import Material
 from fieldcal.report.loose import Json, objects_at, real
 from fieldcal.report.packing import Columns, pack, stretches_around
@@ -132,10 +132,7 @@ def _alt(
 def averages(material: Material, still: Rests) -> list[Table]:
     """The mean of each window with its standard error, a table a sensor."""
     out = []
-    for first, sensor, unit in (
-        (0, "accelerometers", "m/s²"),
-        (3, "gyroscopes", "rad/s"),
-    ):
+    for first, sensor, unit in SENSORS:
         channels = [
             i
             for i in range(first, first + 3)

@@ -62,6 +62,7 @@ class Body:
         self._strength = stream(seed, "vibration level")
         self.levels = [self._level()]
         self.ways: list[Manoeuvre] = []
+        self._rest: tuple[bytes, Felt] | None = None
         self._start_temperature = float(course(profile.temperature, np.zeros(1))[0][0])
 
     def disturb(self, effect: SimulatedEffect) -> None:
@@ -108,11 +109,20 @@ class Body:
     def life(self, t: Array, vibration: Array) -> Life:
         """What the sensors live through at ascending instants, (n,) s."""
         swing = self.joints.at(t)
-        felt = self._felt(t[:1] if self._still(t, swing) else t)
+        felt = self._resting(t, swing) if self._still(t, swing) else self._felt(t)
         f, w = (np.broadcast_to(v, (3, len(t))) for v in (felt.f, felt.w))
         degrees, warming = course(self.profile.temperature, t)
         warmth = degrees - self._start_temperature
         return Life(t, f, w, warmth, warming, swing.since, swing.progress, vibration)
+
+    def _resting(self, t: Array, swing: Swing) -> Felt:
+        """What is felt at rest; on a base that nothing moves, as long as it rests."""
+        if self.moves or self.ways:
+            return self._felt(t[:1])
+        key = swing.angle[:, 0].tobytes() + swing.axis[:, 0].tobytes()
+        if self._rest is None or self._rest[0] != key:
+            self._rest = key, self._felt(t[:1])
+        return self._rest[1]
 
     def _felt(self, t: Array) -> Felt:
         push = np.zeros((3, len(t)))

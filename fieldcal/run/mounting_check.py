@@ -8,6 +8,8 @@ declared.
 
 from __future__ import annotations
 
+from contextlib import suppress
+from functools import cache
 from itertools import permutations, product
 
 import numpy as np
@@ -35,17 +37,23 @@ def other_mounting(
     """
     length = float(np.linalg.norm(device) * np.linalg.norm(wanted))
     near: list[tuple[int, tuple[str, ...]]] = []
+    for axes, matrix in _mountings():
+        if matrix @ device @ wanted >= np.cos(FIRST) * length:
+            changed = sum(a != b for a, b in zip(axes, declared, strict=True))
+            near.append((changed, axes))
+    return min(near)[1] if near else None
+
+
+@cache
+def _mountings() -> list[tuple[tuple[str, ...], Array]]:
+    """Every right-handed mounting with its matrix, 24."""
+    found = []
     for names in permutations("xyz"):
         for signs in product("+-", repeat=3):
             axes = tuple(s + n for s, n in zip(signs, names, strict=True))
-            try:
-                turned = mounting_matrix(axes) @ device
-            except InputError:
-                continue  # left-handed
-            if turned @ wanted >= np.cos(FIRST) * length:
-                changed = sum(a != b for a, b in zip(axes, declared, strict=True))
-                near.append((changed, axes))
-    return min(near)[1] if near else None
+            with suppress(InputError):  # left-handed
+                found.append((axes, mounting_matrix(axes)))
+    return found
 
 
 def mounted_otherwise(device: Array, wanted: Array, declared: tuple[str, ...]) -> str:

@@ -32,6 +32,10 @@ class GradeLimits:
     acc_scale_repeat: float
     gyr_bias_repeat: float
     gyr_scale_repeat: float
+    acc_bias_tolerance: float
+    acc_scale_tolerance: float
+    gyr_bias_tolerance: float
+    gyr_scale_tolerance: float
     family_chance: float
     fit_chance: float
     verification_residual: float
@@ -51,6 +55,10 @@ class GradeLimits:
     def repeat(self, group: str) -> float | None:
         """Spread of a group from run to run while no history tells; None unknown."""
         return getattr(self, f"{group}_repeat", None)
+
+    def tolerance(self, group: str) -> float | None:
+        """How far a group's parameters may be from nominal; None where none is set."""
+        return getattr(self, f"{group}_tolerance", None)
 
 
 NAMES = tuple(f.name for f in fields(GradeLimits))

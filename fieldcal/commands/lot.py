@@ -1,0 +1,136 @@
+"""`fieldcal lot`: say what the units of a lot have in common, and which are odd."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fieldcal.core.shown import one_line
+
+if TYPE_CHECKING:
+    from fieldcal.fleet.lot import Lot
+
+RARE = ("limits", "history")
+
+SHOWN = 12
+"""Odd units that are listed; --json has all."""
+
+EXAMPLE = """\
+  fieldcal lot
+  fieldcal lot lot=2026-11 station=B
+  fieldcal lot model=MK2 since=2026-03-01 --report mk2.html
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add(
+        "query",
+        nargs="*",
+        metavar="NAME=VALUE",
+        help="model, lot, station, operator or serial, since or until a date (default:"
+        " everything in the store)",
+    )
+    add("--report", type=Path, metavar="FILE", help="write a page as well")
+    add("--json", action="store_true", help="print one JSON object")
+    add(
+        "--fdr",
+        type=float,
+        default=0.05,
+        metavar="Q",
+        help="share of false ones among the odd units (default: 0.05)",
+    )
+    add("--grade", choices=("tactical", "navigation"), default="tactical",
+        help="whose tolerances count (default: tactical)")  # fmt: skip
+    add("--limits", type=Path, metavar="FILE", help="tolerances of your own")
+    add("--history", metavar="FILE", help="instead of the usual store")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command: 0 in control, 1 something is odd or has shifted."""
+    from fieldcal.calibration import limits
+    from fieldcal.core.errors import InputError
+    from fieldcal.fleet.lot import lot
+    from fieldcal.history import sessions
+    from fieldcal.history.database import Database
+    from fieldcal.history.place import default_place
+
+    if not 0 < args.fdr < 1:
+        raise InputError(f"--fdr {args.fdr:g}: give a share between 0 and 1")
+    wanted = sessions.parsed(args.query)
+    database = Database(args.history or default_place())
+    some = database.done(lambda db: sessions.found(db, wanted))
+    found = lot(some, limits.read(args.grade, args.limits), args.fdr)
+    if args.report:
+        from fieldcal.report.lot_page import page
+        from fieldcal.session.folder import write_whole
+
+        write_whole(args.report, page(found, " ".join(args.query) or "everything"))
+    if args.json:
+        sys.stdout.write(json.dumps(found.to_json(), allow_nan=False) + "\n")
+    else:
+        _show(found)
+        if args.report:
+            sys.stdout.write(f"written: {args.report}\n")
+    return 0 if found.in_control else 1
+
+
+def _show(found: Lot) -> None:
+    from fieldcal.calibration.wording import number, pretty
+
+    say = sys.stdout.write
+    share, low, high = (100 * part for part in found.share)
+    say(
+        f"{len(found.units)} units with a good result, of {found.sessions} sessions;"
+        f" {found.failed} without a result\n"
+        f"yield {found.good} of {found.judged}: {share:.1f} % (95 %: {low:.1f} to"
+        f" {high:.1f} %)\n\n"
+    )
+    say(f"{'parameter':24}{'mean ± of it':>24}{'spread (95 %)':>32}{'Cpk':>14}\n")
+    for one in found.parameters.values():
+        mean = " ± ".join(number(one.about.mean, one.about.mean_sigma))
+        wide = f"{one.about.spread:.2g} ({one.about.low:.2g} to {one.about.high:.2g})"
+        unit = pretty(one.unit)
+        cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
+        say(f"{one.name:24}{mean:>24}{f'{wide} {unit}':>32}{cpk:>14}\n")
+    for line in statements(found):
+        say(line + "\n")
+
+
+def statements(found: Lot) -> list[str]:
+    """What is odd, what has shifted, and which chart is beyond its limits."""
+    from fieldcal.calibration.wording import number, pretty
+
+    out = []
+    for odd in found.odd[:SHOWN]:
+        unit = pretty(found.parameters[odd.parameter].unit)
+        out.append(
+            f"odd: {one_line(odd.serial or odd.folder)}, {odd.parameter} is off by"
+            f" {' ± '.join(number(odd.off, odd.sigma))} {unit}".rstrip()
+        )
+    if len(found.odd) > SHOWN:
+        out.append(f"odd: and {len(found.odd) - SHOWN} more (--json)")
+    for shift in found.shifts:
+        unit = pretty(found.parameters[shift.parameter].unit)
+        groups = zip(shift.labels, shift.values, shift.sigmas, strict=True)
+        told = "; ".join(
+            f"{one_line(label)} {' ± '.join(number(float(v), float(s)))} {unit}"
+            for label, v, s in groups
+        )
+        out.append(
+            f"shifted by {shift.level}, P = {shift.probability:.2f}: {shift.parameter}:"
+            f" {told}"
+        )
+    for alarm in found.alarms:
+        since = "" if alarm.since is None else f", since about {one_line(alarm.since)}"
+        out.append(
+            f"drift: {alarm.parameter} leaves the {alarm.chart} chart at"
+            f" {one_line(alarm.at)}{since}"
+        )
+    if found.in_control:
+        out.append("in control: no odd unit, no shift, no drift")
+    return out

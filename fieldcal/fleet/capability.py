@@ -1,0 +1,111 @@
+"""A parameter over the units of a lot: spread, process capability, control charts.
+
+With tolerance +-T about the nominal value, m and t the mean and spread of the units
+(`spread`),
+
+    Cp = T / (3 t),   Cpk = (T - |m - nominal|) / (3 t)                             (1)
+    var Cpk = 1 / (9 n) + Cpk^2 / (2 (n - 1))                                       (2)
+
+Source: (2) Bissell, Applied Statistics 39 (1990) 331.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import ParameterName
+from fieldcal.core.samples import Array, Index
+from fieldcal.fleet.control import ControlChart, cusum, ewma
+from fieldcal.fleet.spread import Spread, spread
+
+FALSE_ALARM = 0.05
+"""Chance of a false alarm of any control chart over the whole lot."""
+
+CHARTS = 2
+"""Of each parameter."""
+
+
+@dataclass(frozen=True, slots=True)
+class LotParameter:
+    """A parameter over the units of a lot.
+
+    Attributes
+    ----------
+    name, unit : of the parameter
+    units : (n,) number of each unit that has it
+    x, sigma : (n,) value and uncertainty
+    about : their spread
+    cp, cpk, cpk_sigma : (1), (2); None where there is no tolerance
+    tolerance : from nominal
+    charts : in the order of time
+
+    """
+
+    name: str
+    unit: str
+    units: Index
+    x: Array
+    sigma: Array
+    about: Spread
+    tolerance: float | None
+    cp: float | None
+    cpk: float | None
+    cpk_sigma: float | None
+    charts: tuple[ControlChart, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as an object; null where not known."""
+        return {
+            "unit": self.unit,
+            "units": len(self.x),
+            "mean": self.about.mean,
+            "mean_sigma": self.about.mean_sigma,
+            "spread": self.about.spread,
+            "spread_95": [self.about.low, self.about.high],
+            "median_sigma": float(np.median(self.sigma)),
+            "tolerance": self.tolerance,
+            "cp": self.cp,
+            "cpk": self.cpk,
+            "cpk_sigma": self.cpk_sigma,
+        }
+
+
+def capability(
+    name: str,
+    unit: str,
+    units: Index,
+    x: Array,
+    sigma: Array,
+    limits: GradeLimits,
+    together: int,
+) -> LotParameter:
+    """A parameter of a lot.
+
+    Parameters
+    ----------
+    name, unit : of the parameter
+    units : (n,) number of each unit
+    x, sigma : (n,) value and uncertainty, in the order of time
+    limits : for the tolerance
+    together : parameters of the lot, which share the chance of a false alarm
+
+    """
+    about = spread(x, sigma)
+    parsed = ParameterName.of(name)
+    tolerance = limits.tolerance(parsed.group)
+    cp = cpk = wide = None
+    if tolerance is not None and about.spread > 0:
+        off = abs(about.mean - (1.0 if parsed.is_scale else 0.0))
+        cp = tolerance / (3 * about.spread)  # (1)
+        cpk = (tolerance - off) / (3 * about.spread)
+        wide = float(np.sqrt(1 / (9 * len(x)) + cpk**2 / (2 * (len(x) - 1))))  # (2)
+    quiet = len(x) * together * CHARTS / FALSE_ALARM
+    z = (x - about.mean) / about.sigma
+    charts = (ewma(z, quiet), cusum(z, quiet))
+    return LotParameter(
+        name, unit, units, x, sigma, about, tolerance, cp, cpk, wide, charts
+    )

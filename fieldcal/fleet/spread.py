@@ -1,0 +1,104 @@
+"""How units of a lot differ, with the uncertainty of each taken off.
+
+Most units are of the lot, a few may be odd:
+
+    x_i ~ (1 - p) N(m, t^2 + s_i^2) + p N(m, K^2 (t^2 + s_i^2))                     (1)
+
+with s_i the uncertainty of the unit's own value. At each spread t the mean and p are
+found by expectation and maximisation, with w_i the probability that a unit is none of
+the odd ones; then
+
+    ln L(t) = sum_i ln density(x_i) - ln(sum_i w_i / (t^2 + s_i^2)) / 2             (2)
+
+is largest at the spread (restricted maximum likelihood, which counts the mean), and its
+interval is where (2) is less by up to 1.92. Source: Harville, J. Am. Stat. Assoc. 72
+(1977) 320; mixtures for outliers: Tukey's contaminated normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from fieldcal.core.samples import Array
+
+WIDER = 6.0
+"""K: an odd unit is so many times as far off as others."""
+
+ODD = 0.01
+"""p before the units are seen, which counts as `COUNTS` units."""
+
+COUNTS = 20.0
+
+STEPS = 25
+"""Of expectation and maximisation: the weights are settled long before."""
+
+GRID = 160
+"""Spreads that are tried."""
+
+WITHIN = 1.92
+"""ln of the likelihood by which the ends of a 95 % interval are less."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """What most units are.
+
+    Attributes
+    ----------
+    mean, mean_sigma : m with its standard uncertainty
+    spread : t; what units differ by
+    low, high : its 95 % interval
+    typical : (n,) w_i, probability that each unit is none of the odd ones
+    sigma : (n,) what each unit is off by, its own uncertainty and that of the mean
+        included
+
+    """
+
+    mean: float
+    mean_sigma: float
+    spread: float
+    low: float
+    high: float
+    typical: Array
+    sigma: Array
+
+    def chances(self, x: Array) -> Array:
+        """Probability of values as far off as these, (n,); the spread is uncertain."""
+        dof = max(float(self.typical.sum()) - 1.0, 1.0)
+        out: Array = 2 * student.sf(np.abs(x - self.mean) / self.sigma, dof)
+        return out
+
+
+def spread(x: Array, sigma: Array) -> Spread:
+    """The spread of values (n,) whose uncertainties are (n,); n is two or more."""
+    scale = 1.4826 * float(np.median(np.abs(x - np.median(x))))
+    scale = scale or float(np.std(x)) or float(np.median(sigma))
+    tried = np.concatenate([[0.0], np.geomspace(1e-2, 10.0, GRID) * scale])
+    variance = tried[:, None] ** 2 + sigma**2
+    middle, share = np.full(len(tried), np.median(x)), np.full(len(tried), ODD)
+    for _ in range(STEPS):
+        square = (x - middle[:, None]) ** 2 / variance
+        core = np.log1p(-share)[:, None] - 0.5 * square
+        odd = np.log(share / WIDER)[:, None] - 0.5 * square / WIDER**2
+        typical = np.exp(core - np.logaddexp(core, odd))
+        weight = (typical + (1 - typical) / WIDER**2) / variance
+        middle = (weight * x).sum(axis=1) / weight.sum(axis=1)
+        share = ((1 - typical).sum(axis=1) + COUNTS * ODD) / (len(x) + COUNTS)
+    density = np.logaddexp(core, odd) - 0.5 * np.log(variance)
+    told = (typical / variance).sum(axis=1)
+    likely = density.sum(axis=1) - 0.5 * np.log(told)  # (2)
+    best = int(np.argmax(likely))
+    inside = tried[likely > likely[best] - WITHIN]
+    off = np.sqrt(variance[best] + 1 / told[best])
+    return Spread(
+        float(middle[best]),
+        float(told[best] ** -0.5),
+        float(tried[best]),
+        float(inside.min()),
+        float(inside.max()),
+        typical[best],
+        off,
+    )

@@ -1,0 +1,166 @@
+"""A page of a lot: how units differ, which are odd, what has shifted, drifts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.calibration.wording import number, pretty
+from fieldcal.fleet.capability import LotParameter
+from fieldcal.fleet.control import ControlChart
+from fieldcal.fleet.lot import Lot
+from fieldcal.report.blocks import (
+    Block,
+    Cell,
+    Figure,
+    NameValues,
+    Section,
+    Table,
+    Text,
+    Tone,
+    table,
+)
+from fieldcal.report.charts import Axis, Chart, Mark, Series
+from fieldcal.report.overview import Head
+from fieldcal.report.page import rendered
+
+
+def page(found: Lot, query: str) -> str:
+    """The page as HTML; `query` says which lot it is."""
+    share, low, high = (100 * part for part in found.share)
+    facts = NameValues(
+        (
+            ("units", f"{len(found.units)}"),
+            ("sessions", f"{found.sessions}"),
+            ("without a result", f"{found.failed}"),
+            ("yield", f"{share:.1f} % (95 %: {low:.1f} to {high:.1f} %)"),
+        )
+    )
+    says = (
+        "Spreads are those of the units, with the uncertainty of each taken off; of a"
+        f" unit the last good session counts. Among odd units {100 * found.rate:.3g} %"
+        " are expected to be false."
+    )
+    verdict = "in control" if found.in_control else "look here"
+    top = Head(
+        "lot", query, verdict, "good" if found.in_control else "warn", says, facts
+    )
+    return rendered(
+        top,
+        [
+            Section("odd", "Odd units", (_odd(found),)),
+            Section("shifts", "What has shifted", tuple(_shifts(found))),
+            Section("spread", "Spread and capability", (_spreads(found),)),
+            Section("values", "Units", tuple(map(_values, found.parameters.values()))),
+            Section("control", "Control charts", tuple(_control(found))),
+        ],
+    )
+
+
+def _odd(found: Lot) -> Table | Text:
+    if not found.odd:
+        return Text("No unit is out of family.")
+    rows = []
+    for one in found.odd:
+        off = " ± ".join(number(one.off, one.sigma))
+        unit = pretty(found.parameters[one.parameter].unit)
+        rows.append(
+            [one.serial, one.parameter, off, unit, f"{one.chance:.1g}", one.folder]
+        )
+    columns = ("unit", "parameter", ">off by", "", ">chance", "session")
+    return table("Out of family, by the oddest parameter", columns, rows)
+
+
+def _shifts(found: Lot) -> list[Block]:
+    rows: list[list[str | Cell]] = []
+    for one in found.shifts:
+        unit = pretty(found.parameters[one.parameter].unit)
+        for label, value, sigma in zip(one.labels, one.values, one.sigmas, strict=True):
+            shown = " ± ".join(number(float(value), float(sigma)))
+            tone: Tone = "warn" if abs(value) > 3 * sigma else ""
+            rows.append(
+                [one.parameter, one.level, label, Cell(shown, tone), unit,
+                 f"{one.probability:.2f}"]
+            )  # fmt: skip
+    for alarm in found.alarms:
+        rows.append([alarm.parameter, f"time, {alarm.chart}", alarm.at, "", "", ""])
+    if not rows:
+        return [Text("Nothing differs by lot, station or operator, or drifts.")]
+    columns = ("parameter", "by", "group", ">shift", "", ">probability")
+    return [table("Against the mean of all", columns, rows)]
+
+
+def _spreads(found: Lot) -> Table:
+    rows = []
+    for one in found.parameters.values():
+        about = one.about
+        cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
+        rows.append(
+            [
+                one.name,
+                f"{len(one.x)}",
+                " ± ".join(number(about.mean, about.mean_sigma)),
+                f"{about.spread:.2g}",
+                f"{about.low:.2g} to {about.high:.2g}",
+                f"{np.median(one.sigma):.2g}",
+                pretty(one.unit),
+                "" if one.tolerance is None else f"{one.tolerance:.3g}",
+                "" if one.cp is None else f"{one.cp:.2f}",
+                cpk,
+            ]
+        )
+    columns = (
+        *("parameter", ">units", ">mean", ">spread", ">95 %", ">± of a unit", "unit"),
+        *(">tolerance", ">Cp", ">Cpk"),
+    )
+    return table("Process capability", columns, rows)
+
+
+def _values(one: LotParameter) -> Figure:
+    """Units in the order of time, with their own ±."""
+    about, unit = one.about, pretty(one.unit)
+    at = np.arange(1, len(one.x) + 1, dtype=float)
+    seen = Series(
+        one.name, at, one.x, 1, "points", one.x - one.sigma, one.x + one.sigma
+    )
+    levels = [Mark(about.mean, "mean")]
+    levels += [Mark(about.mean + s * about.spread, f"{s:+d} spreads") for s in (-3, 3)]
+    alt = (
+        f"{len(one.x)} units; mean {about.mean:.4g}, spread {about.spread:.2g} {unit}."
+    )
+    chart = Chart(
+        f"values-{one.name}", one.name, alt, Axis("unit, in order of time"),
+        Axis("value", unit), (seen,), tuple(levels),
+    )  # fmt: skip
+    return Figure(chart, "Bars are each unit's own ± 1σ.")
+
+
+def _control(found: Lot) -> list[Block]:
+    out: list[Block] = [
+        Text(
+            "Of standardised values; the limits are such that 5 of 100 lots in control"
+            " have an alarm on any chart."
+        )
+    ]
+    for one in found.parameters.values():
+        for chart in one.charts:
+            out.append(Figure(_chart(one, chart), ""))
+    return out
+
+
+def _chart(one: LotParameter, chart: ControlChart) -> Chart:
+    at = np.arange(1, len(chart.values) + 1, dtype=float)
+    limits = [
+        Series(f"limit {sign:+d}", at, sign * chart.limit, 2, "line")
+        for sign in (1, -1)
+    ]
+    seen = Series(chart.name, at, chart.values, 1, "both")
+    said = (
+        "in control"
+        if chart.alarm is None
+        else f"beyond its limits from unit {chart.alarm + 1}"
+    )
+    name = f"{chart.name}, {one.name}"
+    return Chart(
+        f"{chart.name}-{one.name}", name, f"{name}: {said}.",
+        Axis("unit, in order of time"), Axis(chart.name, "σ"), (seen, *limits),
+    )  # fmt: skip

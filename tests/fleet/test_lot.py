@@ -1,0 +1,214 @@
+"""A lot against what it was drawn from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from fieldcal.calibration import limits
+from fieldcal.cli import main
+from fieldcal.core.errors import InputError
+from fieldcal.fleet.control import cusum, cusum_limit, ewma, ewma_limit
+from fieldcal.fleet.lot import Lot, lot
+from fieldcal.fleet.odd import discovered
+from fieldcal.fleet.spread import spread
+from fieldcal.history import sessions
+from fieldcal.history.database import Database
+from fieldcal.history.sessions import StoredSession
+
+BOUNDS = limits.read("tactical")
+
+
+def test_the_spread_is_that_of_units_without_their_errors() -> None:
+    rng = np.random.default_rng(1)
+    inside, ratio = 0, []
+    for _ in range(60):
+        sigma = rng.uniform(0.5, 2.0, 40)
+        found = spread(
+            3 + rng.standard_normal(40) + sigma * rng.standard_normal(40), sigma
+        )
+        inside += found.low <= 1.0 <= found.high
+        ratio.append((found.mean - 3) / found.mean_sigma)
+    assert inside >= 52, "of 60 intervals of 95 %"
+    assert 0.8 < np.std(ratio) < 1.25
+
+
+def test_units_that_differ_by_their_errors_only_have_no_spread() -> None:
+    rng = np.random.default_rng(2)
+    found = spread(0.1 * rng.standard_normal(300), np.full(300, 0.1))
+    assert found.low == 0.0 and found.spread < 0.04
+
+
+def test_odd_units_widen_nothing() -> None:
+    rng = np.random.default_rng(3)
+    x, sigma = rng.standard_normal(200), np.full(200, 0.3)
+    x += sigma * rng.standard_normal(200)
+    clean = spread(x, sigma)
+    x[:6] += np.array([15, -20, 30, 12, -14, 18])
+    found = spread(x, sigma)
+    assert found.spread == pytest.approx(clean.spread, rel=0.1)
+    assert (found.typical[:6] < 0.01).all()
+
+
+@pytest.mark.parametrize(
+    ("weight", "bound"), [(0.4, 3.054), (0.25, 2.998), (0.2, 2.962), (0.1, 2.814)]
+)
+def test_limits_are_those_of_published_tables(weight: float, bound: float) -> None:
+    # Lucas and Saccucci, Technometrics 32 (1990), an average of 500 units
+    assert ewma_limit(500.0, weight) == pytest.approx(bound, abs=0.01)
+
+
+def test_limits_of_sums_are_those_of_published_tables() -> None:
+    # Montgomery, Introduction to Statistical Quality Control, k = 1/2
+    assert cusum_limit(168.0, 0.5) == pytest.approx(4.0, abs=0.03)
+    assert cusum_limit(465.0, 0.5) == pytest.approx(5.0, abs=0.03)
+
+
+@pytest.mark.statistical
+def test_charts_alarm_as_seldom_as_they_are_meant_to() -> None:
+    rng = np.random.default_rng(4)
+    for chart in (ewma, cusum):
+        alarms = sum(
+            chart(rng.standard_normal(500), 5000.0).alarm is not None
+            for _ in range(200)
+        )
+        assert alarms < 0.17 * 200, "one in ten is expected"
+
+
+def test_a_sum_says_since_when() -> None:
+    z = np.concatenate([np.tile([0.2, -0.2], 50), np.full(60, 0.8)])
+    found = cusum(z, 1e4)
+    assert found.alarm is not None and found.alarm < 130
+    assert found.onset is not None and abs(found.onset - 100) < 5
+    assert np.argmax(np.abs(found.values) > found.limit) == found.alarm
+
+
+def test_false_discoveries_are_as_many_as_stated() -> None:
+    rng = np.random.default_rng(5)
+    wrong = right = 0
+    for _ in range(200):
+        z = rng.standard_normal(300)
+        z[:15] += 5
+        found = discovered(2 * norm.sf(np.abs(z)), 0.05)
+        wrong, right = wrong + int(found[15:].sum()), right + int(found[:15].sum())
+    assert wrong / (wrong + right) < 0.06 and right > 0.85 * 15 * 200
+
+
+def units(
+    count: int = 150, seed: int = 6, station: float = 0.0, drift: float = 0.0
+) -> list[StoredSession]:
+    """Units with a spread of 0.02 m/s^2 and errors of their own; two of them odd.
+
+    `station` is what Q adds to gyr_bias.y, in spreads; `drift` what acc_bias.z changes
+    by after unit 80.
+    """
+    rng = np.random.default_rng(seed)
+    out = []
+    for i in range(count):
+        own: Mapping[str, tuple[float, float, str]] = {
+            f"{group}.{axis}": (wide * float(rng.standard_normal()), wide / 2, unit)
+            for group, wide, unit in (
+                ("acc_bias", 0.02, "m/s^2"), ("gyr_bias", 1e-3, "rad/s"),
+            )
+            for axis in "xyz"
+        }  # fmt: skip
+        seen = {
+            name: (x + sigma * float(rng.standard_normal()), sigma, unit)
+            for name, (x, sigma, unit) in own.items()
+        }
+        place = "PQR"[i % 3]
+        change = {"acc_bias.x": 0.3 * (i in (10, 90)),
+                  "gyr_bias.y": 1e-3 * station * (place == "Q"),
+                  "acc_bias.z": 0.02 * drift * (i > 80)}  # fmt: skip
+        for name, more in change.items():
+            x, sigma, unit = seen[name]
+            seen[name] = (x + more, sigma, unit)
+        out.append(
+            StoredSession(
+                f"/s/{i}", f"A{i}", {"station": place, "lot": "7"},
+                f"2026-03-{1 + i // 24:02d}T{i % 24:02d}:00:00+00:00",
+                go=i % 50 != 0, good=True, result={}, parameters=seen,
+            )
+        )  # fmt: skip
+    return out
+
+
+def of(some: list[StoredSession]) -> Lot:
+    return lot(some, BOUNDS)
+
+
+def test_a_lot_says_what_it_was_drawn_from() -> None:
+    found = of(units(station=2.0))
+    first = found.odd[:2]
+    assert {(o.serial, o.parameter) for o in first} == {
+        ("A10", "acc_bias.x"), ("A90", "acc_bias.x"),
+    }  # fmt: skip
+    assert len(found.odd) <= 4
+    assert {(s.parameter, s.level) for s in found.shifts} == {("gyr_bias.y", "station")}
+    (shift,) = found.shifts
+    at = shift.labels.index("Q")
+    difference = shift.values[at] - np.delete(shift.values, at).mean()
+    assert difference == pytest.approx(2e-3, abs=4 * shift.sigmas[at])
+    assert not found.alarms
+    assert (found.good, found.judged) == (147, 150)
+    assert 0.94 < found.share[1] < 0.98 < found.share[2] < 1.0
+    about = found.parameters["acc_bias.y"].about
+    assert about.low < 0.02 < about.high
+    capable = found.parameters["acc_bias.y"].cpk or 0.0
+    assert capable == pytest.approx(0.3 / 0.06, rel=0.25)
+
+
+def test_a_lot_that_drifts_says_since_when() -> None:
+    found = of(units(drift=1.5))
+    assert {a.parameter for a in found.alarms} == {"acc_bias.z"}
+    (since,) = {a.since for a in found.alarms if a.since}
+    assert 70 <= int(since[1:]) <= 95
+
+
+@pytest.mark.statistical
+def test_a_lot_in_control_is_said_to_be() -> None:
+    calm = []
+    for seed in range(10, 22):
+        some = [s for s in units(seed=seed) if s.serial not in ("A10", "A90")]
+        calm.append(of(some).in_control)
+    assert sum(calm) >= 9, "odd units and charts have five in a hundred each"
+
+
+def test_the_last_good_session_of_a_unit_counts() -> None:
+    some = units(8)
+    again = StoredSession("/s/again", "A0", {}, "2026-05-01", error="is broken")
+    later = units(8, seed=9)[1]
+    found = of([*some, again, later])
+    assert found.sessions == 10 and found.failed == 1 and len(found.units) == 8
+    assert found.units[0].folder == "/s/0"
+    with pytest.raises(InputError, match="a lot needs 5"):
+        of(some[:4])
+
+
+def test_the_command_reads_the_store_and_writes_a_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = Database(tmp_path / "h")
+
+    def put(db: object) -> None:
+        for one in units(station=2.0):
+            sessions.keep(db, one)  # type: ignore[arg-type]
+
+    data.done(put, write=True)
+    own, page = ["--history", str(tmp_path / "h")], tmp_path / "lot.html"
+    assert main(["lot", "lot=7", *own, "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said["units"] == 150 and said["yield"]["good"] == 147
+    assert [s["level"] for s in said["shifts"]] == ["station"]
+    assert main(["lot", *own, "--report", str(page)]) == 1
+    text = capsys.readouterr().out
+    assert "odd: A10, acc_bias.x is off by" in text and "shifted by station" in text
+    html = page.read_text()
+    assert "A90" in html and "Process capability" in html and "EWMA" in html
+    for wrong in (["lot=8"], ["colour=red"], ["--fdr", "2"]):
+        assert main(["lot", *wrong, *own]) == 2

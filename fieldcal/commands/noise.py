@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import io
 import json
+import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -96,9 +97,14 @@ def _opened(path: Path, place: Path) -> Session:
         return Session.open(path)
     parser = argparse.ArgumentParser()
     import_recording.add_arguments(parser)
+    said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(io.StringIO()):
+        with (
+            contextlib.redirect_stdout(io.StringIO()),
+            contextlib.redirect_stderr(said),
+        ):
             import_recording.run(parser.parse_args([str(path), "-o", str(place)]))
+        sys.stderr.write(said.getvalue().replace(str(place), str(path)))
     except InputError as error:
         raise InputError(
             f"{error}; fieldcal import takes that, and fieldcal noise its folder"
@@ -200,9 +206,13 @@ def _recalibrate(
         steps = _steps(runs, f"{group}.{name[1]}")
         limit = float(getattr(allowed, f"{group}_sigma"))
         variance = channel.averaging.at(30.0)[0] ** 2
-        out[name] = recalibration(channel.drawn, channel.ramp, limit, variance, steps)
-    since = runs[-1].taken_at if runs else datetime.now(UTC).isoformat()
-    return out, str(since)
+        pair = channel.pair
+        unseen = pair.walk / pair.left_out if math.isnan(pair.walk_sigma) else 0.0
+        out[name] = recalibration(
+            channel.drawn, channel.ramp, limit, variance, steps, unseen
+        )
+    dates = [str(run.taken_at) for run in runs if run.taken_at]
+    return out, dates[-1] if dates else datetime.now(UTC).isoformat()
 
 
 def _steps(runs: Sequence[Any], name: str) -> list[HistoryStep]:

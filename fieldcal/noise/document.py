@@ -148,6 +148,7 @@ def _times(found: Recalibration) -> dict[str, Any]:
         "chance": list(CHANCES),
         "after_s": [_known(s) for s in found.seconds],
         "from_history": found.from_history,
+        "unseen_walk": found.unseen,
     }
 
 

@@ -10,8 +10,10 @@ limit of the grade the chance to be beyond it is
 
     P(t) = 1 - Phi((L - R t)/sqrt v) + Phi((-L - R t)/sqrt v)                      (2)
 
-averaged over the sizes as they may be. Where the device's history has calibrations
-enough, their steps d over the time h between them say what months do:
+averaged over the sizes as they may be. A recording that shows no walk leaves room for
+one: where the sizes have none, K is the largest that would not have been seen. Where
+the device's history has calibrations enough, their steps d over the time h between them
+say what months do:
 
     d^2 - V_1 - V_2 = K_h^2 h                                                      (3)
 
@@ -66,12 +68,14 @@ class Recalibration:
     seconds : after which it is beyond it with each of `CHANCES`; inf where later than
         `LONGEST`
     from_history : whether the device's own calibrations say so
+    unseen : whether a walk does that was not seen, and would not have been
 
     """
 
     limit: float
     seconds: tuple[float, ...]
     from_history: bool
+    unseen: bool
 
 
 def recalibration(
@@ -80,6 +84,7 @@ def recalibration(
     limit: float,
     variance: float,
     steps: Sequence[HistoryStep] = (),
+    unseen: float = 0.0,
 ) -> Recalibration:
     """When a bias leaves its limit, (1), (2).
 
@@ -90,20 +95,22 @@ def recalibration(
     limit : change that is too much
     variance : V, of the calibration
     steps : of the device's history
+    unseen : the largest K that the recording would not show; 0 where it shows one
 
     """
     seconds = np.geomspace(60.0, LONGEST, 120)
     known = walk_of(steps) if len(steps) >= STEPS else None
     chance = np.zeros(len(seconds))
     for one in drawn:
-        v = variance + _structure(one, seconds, known)
+        v = variance + _structure(one, seconds, known, unseen)
         root, mean = np.sqrt(v), (0.0 if known is not None else ramp * seconds)
         chance += _beyond(limit, mean, root) / len(drawn)
     times = []
     for level in CHANCES:
         over = np.flatnonzero(chance > level)
         times.append(float(seconds[over[0]]) if len(over) else np.inf)
-    return Recalibration(limit, tuple(times), known is not None)
+    guessed = known is None and unseen > 0 and any("K" not in d.terms for d in drawn)
+    return Recalibration(limit, tuple(times), known is not None, guessed)
 
 
 def walk_of(steps: Sequence[HistoryStep]) -> float:
@@ -121,7 +128,7 @@ def walk_of(steps: Sequence[HistoryStep]) -> float:
     return float(np.exp(found.x))
 
 
-def _structure(one: Draw, seconds: Array, known: float | None) -> Array:
+def _structure(one: Draw, seconds: Array, known: float | None, unseen: float) -> Array:
     """Variance of the change, (1), without the calibration's own."""
     total = np.zeros(len(seconds))
     times = iter(range(len(one.terms), len(one.x)))
@@ -135,7 +142,9 @@ def _structure(one: Draw, seconds: Array, known: float | None) -> Array:
         elif term in ("B", "BT"):
             # of each e-fold of correlation times up to T, those below t have moved
             total += 2 * size / np.pi * np.log1p(np.minimum(seconds, time))
-    return total if known is None else total + known * seconds
+    if known is None:
+        return total if "K" in one.terms else total + unseen**2 * seconds
+    return total + known * seconds
 
 
 def _beyond(limit: float, mean: Array | float, root: Array) -> Array:

@@ -31,23 +31,37 @@ def follows(found: NoiseResult) -> list[str]:
     The date is of the first bias that leaves its limit.
     """
     left = max(c.pair.left_out for c in found.model.channels.values())
-    first = min(found.recalibrate, key=lambda n: found.recalibrate[n].seconds[0])
-    when = found.recalibrate[first]
-    by = "".join(
-        f" {100 * chance:.0f} % by {_date(found.since, seconds)},"
-        for chance, seconds in zip(CHANCES, when.seconds, strict=True)
-    )
-    whose = "history" if when.from_history else "this recording"
     out = [
         f"white noise and walk that filters are told are {left:.2f} times the fitted"
         " ones at most: what the two leave out",
-        f"recalibrate: {first} is beyond its limit with{by} says {whose}",
+        f"recalibrate: {_due(found)}",
     ]
     if found.alignment is not None:
         seconds, sigma, spread = found.alignment.best
         angle = " ± ".join(number(math.degrees(sigma), math.degrees(spread)))
         out.append(f"north by gyrocompassing: {angle}° after {seconds:.0f} s")
     return out
+
+
+def _due(found: NoiseResult) -> str:
+    """When the first bias leaves its limit, and who says so."""
+    first = min(found.recalibrate, key=lambda n: found.recalibrate[n].seconds[0])
+    when = found.recalibrate[first]
+    sure = f"{100 * CHANCES[0]:.0f} %"
+    if when.unseen and math.isfinite(when.seconds[0]):
+        return (
+            f"by {_date(found.since, when.seconds[0])} {first} may be beyond its limit"
+            f" ({sure}), by a walk that this recording would not show: a longer one"
+            " tells more"
+        )
+    whose = "history" if when.from_history else "this recording"
+    if not any(map(math.isfinite, when.seconds)):
+        return f"no bias leaves its limit within 20 years ({sure}), says {whose}"
+    by = "".join(
+        f" {100 * chance:.0f} % by {_date(found.since, seconds)},"
+        for chance, seconds in zip(CHANCES, when.seconds, strict=True)
+    )
+    return f"{first} is beyond its limit with{by} says {whose}"
 
 
 def _date(since: str, seconds: float) -> str:

@@ -202,7 +202,9 @@ def test_a_file_is_imported_on_the_way(
     file = tmp_path / "log.csv"
     file.write_text("\n".join([",".join(["t [s]", *names]), *rows]) + "\n")
     assert main(["noise", str(file), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    said = capsys.readouterr()
+    told = json.loads(said.out)
+    assert str(file) in said.err and "fieldcal-noise-" not in said.err
     assert told["sessions"] == [str(file)] and os.listdir(tmp_path) == ["log.csv"]
     assert told["channels"]["gy"]["processes"]["N"]["value"] == pytest.approx(
         N, rel=0.1

@@ -110,6 +110,14 @@ def test_a_ramp_leaves_its_limit_on_a_day() -> None:
     assert recalibration(drawn(N=1e-9), 0.0, 1.0, 1e-14).seconds == (math.inf,) * 2
 
 
+def test_a_walk_that_would_not_be_seen_counts_where_none_is() -> None:
+    seen = recalibration(drawn(N=1e-9, K=1e-6), 0.0, 5e-4, 0.0, unseen=1e-5)
+    none = recalibration(drawn(N=1e-9), 0.0, 5e-4, 0.0, unseen=1e-6)
+    assert none.seconds == seen.seconds and none.unseen and not seen.unseen
+    # 1.96 K sqrt(t) = limit
+    assert none.seconds[0] == pytest.approx((5e-4 / 1.96e-6) ** 2, rel=0.15)
+
+
 def test_what_history_shows_counts_more_than_an_hour() -> None:
     rng = np.random.default_rng(33)
     k = 1e-7

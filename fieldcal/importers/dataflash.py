@@ -131,7 +131,8 @@ class DataflashLog(Recording):
         batches, scales = FifoBatches(), dict[int, float]()
         for found in self._log.tables({HEAD, BODY}):
             for row in found.get(HEAD, ()):
-                if row["instance"] == number and row["mul"] and row["smp_rate"] > 0:
+                told = row["mul"] and row["smp_rate"] > 0 and row["smp_cnt"]
+                if row["instance"] == number and told:
                     scales[int(row["N"])] = 1 / float(row["mul"])
                     batches.begin(int(row["N"]), _batch(row))
             for row in found.get(BODY, ()):
@@ -142,9 +143,8 @@ class DataflashLog(Recording):
             batches.forget()
         yield from batches.rest()
         if batches.lost:
-            self.says.append(
-                f"{batches.lost} batches of which a part is missing are left out"
-            )
+            many = "a batch" if batches.lost == 1 else f"{batches.lost} batches"
+            self.says.append(f"{many} of which a part is missing: left out")
 
     _scanned = False
 

@@ -258,11 +258,12 @@ def test_a_batch_that_lacks_a_part_is_left_out_and_said(
     f = true(1, 128, 9.0)
     whole = batch(0, False, 3.0, f[:64], 200, 1000.0)
     broken = batch(1, False, 4.0, f[64:], 200, 1000.0)
-    content = dataflash(whole + broken[:2], option=None)
-    out = import_log(tmp_path / "b", content, tmp_path)
+    # a damaged head, of a batch of nothing, and a part that seems to be its own
+    empty = batch(2, True, 5.0, f[:0], 200, 1000.0)
+    alien = batch(2, True, 5.0, f[:32], 200, 1000.0)[1:]
+    rows = [*empty, *alien, *whole, *empty, *alien, *broken[:2]]
+    out = import_log(tmp_path / "b", dataflash(rows, option=None), tmp_path)
     assert len(Session.open(out).block) == 64
-    assert (
-        "1 batches of which a part is missing are left out" in capsys.readouterr().err
-    )
+    assert "a batch of which a part is missing: left out" in capsys.readouterr().err
     assert main(["import", str(tmp_path / "b"), "--list"]) == 0
     assert "lacks INS_LOG_BAT_OPT" in capsys.readouterr().out

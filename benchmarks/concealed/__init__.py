@@ -62,6 +62,7 @@ def kinds() -> Mapping[str, tuple[Draw, int]]:
     for name in catalogue():
         if name not in out:
             out[name] = (lambda rng, n=name: others.example(n, rng), 3)  # type: ignore[misc]
+    out["pier"] = (others.pier, 3)
     return out
 
 

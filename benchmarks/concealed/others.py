@@ -14,6 +14,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import effects
 from fieldcal.sim_device.profile import FullScale
 from fieldcal.sim_device.profile_file import from_tables
+from fieldcal.sim_device.vocabulary import effect
 
 CHANCE = ("angle_setting", "random_walk")
 CHAIN = (
@@ -101,6 +102,26 @@ def special(name: str, rng: np.random.Generator) -> Session:
     factor = rng.uniform(10, 30) * shaken / np.sqrt(length * some.sum()) / there
     values = {n: v * factor for n, v in values.items()}
     return session.having({name: values | {"level": 0.0}})
+
+
+def pier(rng: np.random.Generator) -> Session:
+    """A base that sways irregularly about both level axes, as a ship at the pier."""
+    session = calm(plain(rng))
+    hz, azimuth = float(rng.uniform(0.1, 0.5)), float(rng.uniform(0, 180))
+    both = []
+    for turned in (0.0, 90.0):
+        values = {
+            "amplitude_deg": float(rng.uniform(0.4, 1.0)),
+            "hz": hz * float(rng.uniform(0.8, 1.2)),
+            "spread_hz": float(rng.choice([0.0, 0.1])) * hz,
+            "azimuth_deg": azimuth + turned,
+            "phase_deg": float(rng.uniform(0, 360)),
+        }
+        both.append(values)
+    one = session.profile
+    swaying = tuple(effect("sway", values) for values in both)
+    profile = replace(one, effects=(*one.effects, *swaying))
+    return replace(session, profile=profile, concealed={"sway": {}}, label="pier")
 
 
 def chain(name: str, rng: np.random.Generator) -> Session:

@@ -132,6 +132,12 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
         metavar="TEXT",
         help="who vouches for the angles: the certificate of the fixture",
     )
+    add(
+        "--sways",
+        action="store_true",
+        default=None,
+        help="the base sways: do not wait until it comes to rest",
+    )
     add("--verify", action="store_true", help="one more position, which is not fitted")
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
     add("--history", metavar="FILE", help="instead of the usual history")

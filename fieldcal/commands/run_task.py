@@ -90,7 +90,7 @@ def _tables_of_file(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _site(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
-    """How level the base is and how well angles are set, as far as options say it.
+    """How level and steady the base is, how well angles are set, as options say it.
 
     A virtual fixture stands where it is told, unless it is to be off.
     """
@@ -101,6 +101,7 @@ def _site(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
         "level_deg": args.level,
         "angle_setting_deg": angles,
         "angles_from": args.angles_from,
+        "sways": args.sways,
     }
     site = {key: value for key, value in said.items() if value is not None}
     return {"site": site} if site else {}

@@ -142,6 +142,8 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
     )  # fmt: skip
     grain = grain_of(source.block, spans(source.block, about))
     rough = bool((grain[:3] > thresholds.ROUGH * rows.noise[:3]).any())
+    # what sways is taken out of windows and closures; on the way it shakes
+    rough |= "sway" in prepared.checked.ids
     turning = Turning(source, rows, dictionary.since)
     turns = Turns(turning, dictionary, not rough) if turned else None
     return Inference(System(rows, dictionary), nominal, turns)

@@ -9,18 +9,20 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import ACC, GYR, Block
+from fieldcal.core.samples import ACC, CHANNELS, GYR, Block
 from fieldcal.diagnosis.signal.chain import Checked, check, checked_again
 from fieldcal.diagnosis.signal.line import Remains, Tone
 from fieldcal.diagnosis.signal.spectrum import tones, without
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.hand_tremor import rows_of
 from fieldcal.model.rows.means import median_sigma, rows_of_means
-from fieldcal.model.rows.reduce import Rows, RowSource, spans
+from fieldcal.model.rows.reduce import Rows, RowSource, masked, spans
 from fieldcal.model.rows.rest_onset import arrivals
+from fieldcal.model.rows.swaying import Swaying, swaying
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import Term
 from fieldcal.physics.effect import Chain, Line, Scatter
+from fieldcal.physics.recording import Fault
 from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
 
@@ -76,9 +78,15 @@ def prepare(block: Block, about: Description) -> Prepared:
     about.refuse_overlap()
     known = known_terms(about.model)
     checked = check(block, about)
+    sways = swaying(masked(checked.block, checked.usable), about)
+    if sways is not None:
+        checked = _hung_at_rest(checked, sways, about)
     rest = arrivals(checked.block, about, checked.noise)
     warmth = Thermometer.of(checked.block)
-    source = RowSource(checked.block, about, checked.usable, rest, warmth, checked.pace)
+    source = RowSource(
+        checked.block, about, checked.usable, rest, warmth, checked.pace,
+        None if sways is None else sways.left,
+    )  # fmt: skip
     rows = rows_of(source)
     _refuse_turning(rows, about)
     lines = tones(source, rows)
@@ -94,6 +102,36 @@ def prepare(block: Block, about: Description) -> Prepared:
             " clipped there; record them again"
         )
     return Prepared(checked, source, _warming(rows, warmth), known, found, left)
+
+
+def _hung_at_rest(checked: Checked, sways: Swaying, about: Description) -> Checked:
+    """The samples as on a base at rest, and that it sways."""
+    size, spread = np.rad2deg(sways.amplitude), np.rad2deg(sways.spread[0])
+    fault = Fault(
+        channel="gx",
+        values={
+            "amplitude_deg": float(size),
+            "hz": sways.hz,
+            "needed_s": sways.seconds,
+        },
+        sigmas={"amplitude_deg": float(spread), "hz": sways.spread[1]},
+        from_s=float(checked.block.t[0]),
+        to_s=float(checked.block.t[-1]),
+        size=sways.amplitude * 2 * np.pi * sways.hz,
+        sigma=float(size / max(spread, 1e-3 * size)),
+        channels=CHANNELS,
+    )
+    block = _where(checked.block, sways.block)
+    checked = replace(checked, block=block, faults=(*checked.faults, ("sway", fault)))
+    return checked_again(checked, block, about)
+
+
+def _where(block: Block, mended: Block) -> Block:
+    """Samples as mended, and as they were where those may not be used."""
+    acc = np.where(np.isfinite(mended.acc), mended.acc, block.acc)
+    return replace(
+        block, acc=acc, gyr=np.where(np.isfinite(mended.gyr), mended.gyr, block.gyr)
+    )
 
 
 def _of_means(block: Block, about: Description) -> Prepared:

@@ -32,8 +32,8 @@ class Sway(Line):
     covariate = "line in horizontal force, rate in quadrature"
     decided_by = "the same window on firm ground"
     cure = (
-        "Put the device on firm ground, wait for the wind to drop, or average "
-        "over whole periods."
+        "Put the device on firm ground, or let each position last for many periods: "
+        "what sways by more than 0.2 deg is taken out, and needed_s says how long."
     )
     source = "kinematics of a small rotation; 0.001 to 0.2 deg, 0.1 to 2 Hz"
     band = (0.08, 2.5)

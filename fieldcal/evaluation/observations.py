@@ -18,6 +18,7 @@ from fieldcal.core.errors import FieldcalError, SessionError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Grain
 from fieldcal.core.version import __version__
 from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
+from fieldcal.model.rows.swaying import swaying
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
@@ -134,6 +135,10 @@ def rests(session: Session) -> Rests:
     refuse_copies(block)
     taken: dict[int, Average] = {}
     warnings = [*session.warnings, *_beyond(session)]
+    sways = swaying(block, session.about)
+    if sways is not None:
+        block = sways.block
+        warnings.append(sways.sentence)
     noise: LearnedNoise | None = None
     grain = _grain_shown(session)
     # each tells the noise for the next
@@ -148,6 +153,9 @@ def rests(session: Session) -> Rests:
         except FieldcalError as error:
             warnings.append(f"{_named(session, i)} is left out: {error}")
             continue
+        if sways is not None:
+            more = np.diag(sways.left[i])
+            found = replace(found, covariance=found.covariance + more)
         taken[i] = found
         if remark:
             warnings.append(f"{_named(session, i)}: {remark}")

@@ -282,7 +282,9 @@ class Engine:
             return
         if waiting.waited_enough(self._give_up):
             what = (
-                waiting.problem or f"it has not come to rest in {waiting.waited:.0f} s"
+                waiting.problem
+                or f"it has not come to rest in {waiting.waited:.0f} s"
+                "; if it is the base that sways, say so with --sways"
             )
             raise WrongPosition(f"{hold.position.name}: {what}")
 

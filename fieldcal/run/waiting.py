@@ -86,7 +86,7 @@ class PositionWait:
         self.waited = self.waited_host = 0.0
 
     def _start(self) -> None:
-        self._stillness = Stillness()
+        self._stillness = Stillness(self._about.sways)
         self._resting = _Resting()
         self._told = -np.inf
         self.arrival: PositionCheck | None = None

@@ -110,6 +110,11 @@ class Description:
         return bool({"latitude_deg", "gravity"} & set(self.raw.get("site", {})))
 
     @property
+    def sways(self) -> bool:
+        """Whether somebody said that the base sways."""
+        return bool(self.raw.get("site", {}).get("sways", False))
+
+    @property
     def angles_from(self) -> str:
         """Who vouches for the angles; empty where nobody does."""
         return str(self.raw.get("site", {}).get("angles_from", ""))

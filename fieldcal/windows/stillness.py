@@ -10,6 +10,9 @@ Every 0.1 s the means y of the last 0.8 s of cells are looked at:
 Rest is d, e and w of every channel within what its noise explains. The noise is the
 smallest tenth of a of the last 20 s, so it is known from the first second on, a turn
 does not spoil it, and a device that became noisier is at rest again after a while.
+
+On a base that sways nothing comes to rest so. Where somebody says that it does, rest is
+that what goes to and fro, and on, stays within the limits of sanity.
 """
 
 from __future__ import annotations
@@ -54,6 +57,10 @@ class Stillness:
 
     What it says does not depend on how the samples were cut into blocks.
 
+    Parameters
+    ----------
+    sways : whether the base is said to sway
+
     Attributes
     ----------
     meter : present motion as part of what is allowed; below 1 is rest
@@ -61,8 +68,8 @@ class Stillness:
 
     """
 
-    def __init__(self) -> None:
-        self._limits = StillnessLimits()
+    def __init__(self, sways: bool = False) -> None:
+        self._limits, self._sways = StillnessLimits(), sways
         self._cells = Cells()
         self._recent: deque[tuple[Array, Array]] = deque(maxlen=SPAN)
         self._finest = np.full(6, np.inf)
@@ -97,7 +104,10 @@ class Stillness:
         y, short = (np.array(rows) for rows in zip(*self._recent, strict=True))
         self._noises.append(np.sqrt((np.diff(y, axis=0) ** 2).mean(axis=0) / 2))  # (1)
         noise = self._noise(np.sqrt(short.mean(axis=0)))
-        self.meter = max(self._unrest(y, noise), self._turning(y[:, 3:], noise[3:]))
+        if self._sways:
+            self.meter = self._swinging(y)
+        else:
+            self.meter = max(self._unrest(y, noise), self._turning(y[:, 3:], noise[3:]))
         if self.meter > 1:
             self.since = None
         elif self.since is None:
@@ -124,6 +134,10 @@ class Stillness:
             np.abs(slope) / _or_inf(np.minimum(SLOPE * noise, bound)),
         )
         return float(ratio.max())
+
+    def _swinging(self, y: Array) -> float:
+        """How far a base that sways goes to and fro, over what it may."""
+        return float(np.max(y.std(axis=0) / self._limits.noise))
 
     def _turning(self, rates: Array, noise: Array) -> float:
         """(4) over what a bias may change by; an even rate that lasts is a bias."""

@@ -282,4 +282,6 @@ def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[FoundEffect]:
 def _unit(name: str, fault: Fault, units: dict[str, str]) -> str:
     if name == "limit":
         return "m/s^2" if fault.channel in CHANNELS[:3] else "rad/s"
+    if name == "needed_s":  # of a window
+        return "s"
     return units.get(name, "1")

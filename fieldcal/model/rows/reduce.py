@@ -130,6 +130,7 @@ class RowSource:
     arrived : (p,) instant from which the device was at rest in each position, s
     warmth : the temperature
     pace : seconds of the device's clock in a true second
+    left : (p, 6) variance that a swaying base leaves of each window's mean, SI squared
 
     """
 
@@ -139,6 +140,7 @@ class RowSource:
     arrived: Array
     warmth: Thermometer
     pace: float = 1.0
+    left: Array | None = None
 
 
 def masked(block: Block, usable: NDArray[np.bool_]) -> Block:
@@ -171,6 +173,8 @@ def reduce(source: RowSource) -> Rows:
         np.repeat(shaken.variance, rows, axis=0),
     )
     off = np.repeat(rounding(block, windows[held]), rows, axis=0)
+    if source.left is not None:
+        off = np.hypot(off, np.sqrt(source.left[out.x.position]))
     # the Earth turns a device of unknown orientation about any of its axes; one that
     # was never turned has it in its bias
     free = ~out.x.oriented & (len(held) > 1)

@@ -46,9 +46,9 @@ def moving(
     total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])
     level = np.abs(total[m:] - total[:-m]) / m
     limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
-    if not level.max() > CLEARLY * limit.min():
-        return (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
     at = np.flatnonzero((level > limit).any(axis=1))
+    if not (len(at) and level.max() > CLEARLY * limit.min()):
+        return (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
     noise, each = rows.noise[3:], round(TOUCH_S * rate)
     before = block.gyr[gap][max(at[0] - each, 0) : at[0]] - rest[0]
     after = block.gyr[gap][at[-1] + m : at[-1] + m + each] - rest[1]

@@ -1,0 +1,133 @@
+"""A base that sways: its windows, and the ways between them, as if it hung at rest.
+
+In a window that the base sways in, what it adds is taken out (`windows.sway`). At its
+ends the device is turned by phi from where it would be at rest, and the gyroscopes on
+the way to the next window begin and end there. So the device
+is turned by phi(end) and -phi(start) there, in a tenth of a second: the closure of the
+way is then that between two attitudes at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.positions import rates
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.reduce import rate_of, spans
+from fieldcal.session.description import Description
+from fieldcal.windows.sway import Waves, needed, waves_of
+
+WIDE = float(np.deg2rad(0.2))
+"""Turning from which it is taken out so, rad. What is less moves gravity by less than
+3e-5 m/s^2 in the mean, and is a line as any other where it is regular."""
+
+SHARE = 0.5
+"""Part of the windows that must sway: a base does not sway in one of them alone."""
+
+TURN_S, NEAR_S = 0.1, 0.03
+"""In which a rotation is added to the way, s, and before a window in which the way may
+end already: its steps are as long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Swaying:
+    """What a swaying base does in a recording.
+
+    Attributes
+    ----------
+    block : the samples without it
+    left : (p, 6) variance that it leaves of each window's mean
+    amplitude, hz : rad, Hz, of one wave with all its power
+    spread : (2,) standard deviations of both over the windows
+    seconds : that a window needs, s
+
+    """
+
+    block: Block
+    left: Array
+    amplitude: float
+    hz: float
+    spread: tuple[float, float]
+    seconds: float
+
+    @property
+    def sentence(self) -> str:
+        """Say it to the operator."""
+        return (
+            f"the base sways by {np.rad2deg(self.amplitude):.2g}° at {self.hz:.2g} Hz:"
+            " this is taken out of the windows, and what it leaves open is in the ±;"
+            f" each position needs {self.seconds:.0f} s on such a base"
+        )
+
+
+def swaying(block: Block, about: Description) -> Swaying | None:
+    """Look whether the base sways; None where it does not, or nobody can tell.
+
+    Gyroscopes tell turning from what pushes; positions must be known, as the device
+    turns in a hand as well, and there about nothing.
+    """
+    if not _fixed(about) or not np.isfinite(block.gyr).any(axis=0).all():
+        return None
+    scale, windows = about.nominal["gyr_scale"], spans(block, about)
+    found = {
+        p: some
+        for p, (a, b) in enumerate(windows)
+        if b > a and (some := waves_of(block.t[a:b], block.six[a:b], scale))
+    }
+    if len(found) < SHARE * len(windows):
+        return None
+    sizes = np.array(
+        [np.mean([w.size for w in some], axis=0) for some in found.values()]
+    )
+    amplitude = np.sqrt(2 * sizes[:, 0])
+    if np.sqrt((amplitude**2).mean()) < WIDE:
+        return None
+    hz = np.sqrt(sizes[:, 1] / sizes[:, 0]) / (2 * np.pi)
+    left = np.zeros((len(windows), 6))
+    for p, some in found.items():
+        left[p] = sum(w.left for w in some) / len(some) ** 2
+    root = np.sqrt(max(len(found) - 1, 1))
+    return Swaying(
+        _at_rest(block, windows, found, scale),
+        left,
+        float(np.sqrt((amplitude**2).mean())),
+        float(hz.mean()),
+        (float(amplitude.std() / root), float(hz.std() / root)),
+        max(needed(w) for some in found.values() for w in some),
+    )
+
+
+def _fixed(about: Description) -> bool:
+    """Whether the device is held in positions that are known, and on no rate table."""
+    positions = about.positions
+    known = all(p.oriented for p in positions)
+    return bool(positions) and known and not rates(positions).any()
+
+
+def _at_rest(
+    block: Block, windows: NDArray[np.intp], found: dict[int, list[Waves]], scale: Array
+) -> Block:
+    """Samples as they would be on a base at rest."""
+    six, rate = block.six, rate_of(block)
+    for p, some in found.items():
+        a, b = (int(i) for i in windows[p])
+        for part, waves in zip(np.array_split(np.arange(a, b), len(some)), some,
+                               strict=True):  # fmt: skip
+            six[part] -= waves.of(block.t[part])
+    few = max(1, round(TURN_S * rate))
+    ordered = sorted((int(a), int(b), p) for p, (a, b) in enumerate(windows) if b > a)
+    for (_, end, p), (start, _, q) in zip(ordered, ordered[1:], strict=False):
+        if start - end < 4 * few:
+            continue
+        if p in found:
+            turned = found[p][-1].turn(block.t[end : end + 1])[0]
+            six[end + few : end + 2 * few, 3:] += turned * scale * rate / few
+        if q in found:
+            waves, last = found[q][0], start - 1 - round(NEAR_S * rate)
+            turned = waves.turn(block.t[last : last + 1])[0]
+            six[last + 1 : start, 3:] -= waves.of(block.t[last + 1 : start])[:, 3:]
+            six[start - 2 * few : start - few, 3:] -= turned * scale * rate / few
+    return replace(block, acc=six[:, :3], gyr=six[:, 3:])

@@ -1,0 +1,116 @@
+"""Sessions of the virtual device on a base that sways."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from session_folders import recorded, write_session
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.diagnosis import diagnose
+from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.solution import solved
+from fieldcal.session import description
+from fieldcal.session.folder import Session
+from fieldcal.sim_device import profile as device
+from fieldcal.sim_device.profile import Profile
+from fieldcal.sim_device.vocabulary import parse
+
+FACES = ((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
+SECONDS, RATE = 30.0, 50.0
+NOISE = np.repeat([5e-3, 1e-3], 3)
+WHITE = NOISE / np.sqrt(SECONDS * RATE)
+TRUTH = device.Truth(
+    acc_bias=(0.05, -0.08, 0.03), acc_scale=(1.002, 0.998, 1.001),
+    gyr_bias=(2e-3, -1e-3, 3e-3), gyr_scale=device.ONE,
+)  # fmt: skip
+IRREGULAR = "sway:amplitude_deg=1,hz=0.3,spread_hz=0.04,phase_deg={},azimuth_deg={}"
+LEVEL = {"level_deg": 0.01, "angle_setting_deg": 0.01}
+
+
+def positions(angles: bool = True) -> list[dict[str, Any]]:
+    out: list[dict[str, Any]] = []
+    for i, (alpha, beta) in enumerate(FACES):
+        start = 4.0 + i * (SECONDS + 8.0)
+        out.append({"start_s": start, "end_s": start + SECONDS})
+        if angles:
+            out[-1] |= {"alpha_deg": float(alpha), "beta_deg": float(beta)}
+    return out
+
+
+def played(seed: int, *effects: str) -> Block:
+    profile = Profile(
+        sampling=device.Sampling(RATE),
+        truth=TRUTH,
+        noise=device.NoiseFigures(
+            acc=(5e-3,) * 3, gyr=(1e-3,) * 3,
+            acc_instability=device.ZERO, gyr_instability=device.ZERO,
+        ),
+        effects=tuple(parse(e) for e in effects),
+    )  # fmt: skip
+    return recorded(profile, positions(), seed)
+
+
+def session(folder: Path, block: Block, **site: Any) -> Session:
+    write_session(folder, block, positions(), site=LEVEL | site)
+    return Session.open(folder)
+
+
+def off(found: Any) -> Array:
+    """Biases less the truth, over their standard deviations."""
+    truth = {f"acc_bias.{x}": v for x, v in zip("xyz", TRUTH.acc_bias, strict=True)}
+    truth |= {f"gyr_bias.{x}": v for x, v in zip("xyz", TRUTH.gyr_bias, strict=True)}
+    at = [found.names.index(n) for n in truth]
+    sigma = np.sqrt(np.diag(found.covariance))[at]
+    pulls: Array = (found.values[at] - list(truth.values())) / sigma
+    return np.column_stack([pulls, sigma]).T
+
+
+def test_it_calibrates_through_sway(tmp_path: Path) -> None:
+    """Biases as on firm ground; scale factors by turns that begin and end aslant."""
+    block = played(3, IRREGULAR.format(40, 30), IRREGULAR.format(200, 120))
+    one = session(tmp_path / "pier", block)
+    swaying = solved(one, rests(one))
+    firm = session(tmp_path / "firm", played(3))
+    there, here = off(swaying), off(solved(firm, rests(firm)))
+    assert np.abs(there[0]).max() < 3.5
+    assert (there[1] < 1.5 * here[1]).all()
+    assert np.abs(there[0] * there[1] - here[0] * here[1]).max() < 1.5 * there[1].max()
+    scale = swaying.names.index("gyr_scale.z")
+    sigma = float(np.sqrt(swaying.covariance[scale, scale]))
+    assert sigma < 5e-4 and abs(swaying.values[scale] - 1) < 4 * sigma
+    said = " ".join(swaying.warnings)
+    assert "sways by 1" in said and "each position needs" in said
+    told = {e.id: e.parameters for e in diagnose(one.block, one.about).effects}
+    assert set(told) == {"sway"}
+    assert told["sway"]["amplitude_deg"].value == pytest.approx(1.4, abs=0.25)
+    assert told["sway"]["hz"].value == pytest.approx(0.3, abs=0.02)
+    needed = told["sway"]["needed_s"]
+    assert needed.unit == "s" and 5 < float(needed.value) < 100
+
+
+def test_means_of_windows_pull_right(tmp_path: Path) -> None:
+    pulls = []
+    for seed in range(2):
+        effects = [IRREGULAR.format(70 * seed, a) for a in (20, 100)]
+        quiet = rests(session(tmp_path / f"q{seed}", played(seed))).averages
+        found = rests(session(tmp_path / f"s{seed}", played(seed, *effects))).averages
+        for one, other in zip(found, quiet, strict=True):
+            assert (one.sigma < 1.5 * WHITE).all()
+            pulls.append((one.mean - other.mean) / one.sigma)
+    # the same noise is in both, so what is left is what swaying adds
+    assert np.sqrt((np.array(pulls) ** 2).mean()) < 0.9
+
+
+def test_a_device_in_a_hand_is_on_no_base(tmp_path: Path) -> None:
+    block = played(1, IRREGULAR.format(40, 30))
+    held = write_session(tmp_path / "s", block, positions(angles=False))
+    assert not any("sways" in w for w in rests(Session.open(held)).warnings)
+
+
+def test_who_says_that_it_sways() -> None:
+    assert description.parse({"site": {"sways": True}, "format": 1}).sways
+    assert not description.parse({"format": 1}).sways

@@ -1,0 +1,132 @@
+"""Windows on a base that sways, against attitudes made another way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.windows import Stillness
+from fieldcal.windows.sway import Waves, needed, waves_of
+
+G, RATE = 9.81, 50.0
+NOISE = np.repeat([5e-3, 1e-3], 3)
+REST = np.array([0.05, -G - 0.03, 0.02, 2e-3, -1e-3, 3e-3])
+PLAIN = np.ones(3)
+
+
+def swayed(
+    rng: np.random.Generator,
+    hz: tuple[float, ...],
+    degrees: float = 1.0,
+    seconds: float = 30.0,
+    arm: Array | None = None,
+) -> tuple[Array, Array]:
+    """Times and outputs of a base that turns about both level axes.
+
+    Force and rate follow from the attitude by differences, and no formula.
+    """
+    fine = 8
+    step = 1 / RATE / fine
+    t = np.arange(-2 * fine, round(seconds * RATE) * fine + 2 * fine) * step
+    level = np.zeros((len(t), 3))
+    for one in hz:
+        for axis in (0, 2):
+            phase = rng.uniform(0, 2 * np.pi)
+            size = np.deg2rad(degrees) / np.sqrt(2 * len(hz))
+            level[:, axis] += size * np.sin(2 * np.pi * one * t + phase)
+    held = Rotation.from_rotvec(level)
+    body = held.inv()
+    place = np.zeros_like(level) if arm is None else held.apply(arm)
+    pushed = np.gradient(np.gradient(place, t, axis=0), t, axis=0)
+    acc = body.apply(pushed + [0.0, -G, 0.0])
+    gyr = (held[:-2].inv() * held[2:]).as_rotvec() / (2 * step)
+    inside = slice(2 * fine, -2 * fine, fine)
+    six = np.column_stack([acc[inside], gyr[2 * fine - 1 : -2 * fine + 1 : fine]])
+    six += [*REST[:3] + [0.0, G, 0.0], *REST[3:]]
+    return t[inside], six + NOISE * rng.standard_normal(six.shape)
+
+
+def at_rest(t: Array, six: Array) -> tuple[Array, Array]:
+    """Mean without the swaying, and its standard deviation."""
+    found = waves_of(t, six, PLAIN)
+    assert found
+    parts = np.array_split(np.arange(len(t)), len(found))
+    rest = np.vstack([six[p] - w.of(t[p]) for p, w in zip(parts, found, strict=True)])
+    left = sum(w.left for w in found) / len(found) ** 2
+    return rest.mean(axis=0), np.sqrt(NOISE**2 / len(t) + left)
+
+
+@pytest.mark.parametrize("hz", [(0.1,), (0.137,), (0.5,), (0.2, 0.26, 0.31, 0.33)])
+def test_means_are_those_of_a_base_at_rest(hz: tuple[float, ...]) -> None:
+    """Within 1.5 of what they are uncertain by on firm ground, and as stated."""
+    rng = np.random.default_rng(7)
+    white = NOISE / np.sqrt(30 * RATE)
+    off, sigma = [], []
+    for _ in range(8):
+        mean, sd = at_rest(*swayed(rng, hz))
+        off.append(mean - REST)
+        sigma.append(sd)
+    pulls = np.array(off) / sigma
+    assert 0.85 < np.sqrt((pulls**2).mean()) < 1.15
+    assert (np.sqrt((np.array(off) ** 2).mean(axis=0)) < 1.5 * white).all()
+
+
+def test_an_arm_pulls_outward() -> None:
+    """Three metres from the turning centre the mean of w x (w x r) is 5e-3 m/s^2."""
+    rng, arm = np.random.default_rng(3), np.array([0.0, 3.0, 0.0])
+    t, six = swayed(rng, (0.5,), arm=arm)
+    found = waves_of(t, six, PLAIN)
+    assert found[0].arm[1] == pytest.approx(3.0, abs=0.1)
+    assert np.abs(at_rest(t, six)[0] - REST)[:3].max() < 4e-4
+
+
+def test_a_minute_is_cut_and_a_base_at_rest_is_none() -> None:
+    rng = np.random.default_rng(5)
+    assert len(waves_of(*swayed(rng, (0.2,), seconds=70.0), PLAIN)) == 2
+    assert waves_of(*swayed(rng, (0.2,), degrees=0.0), PLAIN) == []
+
+
+def test_what_pushes_and_does_not_turn_is_no_sway() -> None:
+    """Gyroscopes that show a turning which accelerometers deny."""
+    t, six = swayed(np.random.default_rng(5), (0.2,), degrees=0.0)
+    six[:, 3] += 0.02 * np.sin(2 * np.pi * 0.08 * t)
+    assert waves_of(t, six, PLAIN) == []
+
+
+def test_missing_samples_and_short_windows() -> None:
+    t, six = swayed(np.random.default_rng(9), (0.3,))
+    six[100:130, 2] = np.nan
+    found = waves_of(t, six, PLAIN)
+    rest = np.nanmean(six - found[0].of(t), axis=0)
+    assert np.abs((rest - REST) / NOISE * np.sqrt(len(t))).max() < 4
+    assert waves_of(t[:20], six[:20], PLAIN) == []
+
+
+def test_slow_and_irregular_swaying_needs_longer_windows() -> None:
+    def seconds(*hz: float) -> float:
+        wide = np.full((len(hz), 6), 0.1)
+        return needed(
+            Waves(
+                np.array(hz), 0.0, wide, wide, REST[:3], np.zeros(3), np.zeros(6),
+                NOISE**2 / 5, 0.1, (0.0, 30.0), PLAIN,
+            )
+        )  # fmt: skip
+
+    assert seconds(0.5) < seconds(0.06) < seconds(0.03, 0.04, 0.05, 0.06)
+
+
+def test_who_says_that_it_sways_need_not_wait() -> None:
+    t, six = swayed(np.random.default_rng(2), (0.5,))
+    waiting, told = Stillness(), Stillness(sways=True)
+    for one in (waiting, told):
+        one.add(Block.of(t, six[:, :3], six[:, 3:]))
+    assert not waiting.still and told.still
+    turning = np.linspace(0.0, 3.0, len(t))
+    acc = six[:, :3] + 5 * np.sin(turning)[:, None] ** 3
+    for quick in (1.0, 3.0):
+        told.add(
+            Block.of(t + 30 * quick, acc, six[:, 3:] + 0.3 * np.sin(5 * t)[:, None])
+        )
+        assert not told.still

@@ -231,7 +231,7 @@ def test_settling_fades_from_the_end_of_the_turn() -> None:
     more = blocks[0] - blocks[1]
     np.testing.assert_allclose(more[0], 0, atol=1e-12)
     np.testing.assert_allclose(more[200], [-0.03, 0, 0, 0, 1e-3, 0], atol=1e-12)
-    np.testing.assert_allclose(more[600, 0], -0.03 / np.e)
+    np.testing.assert_allclose(more[600, 0], -0.03 * np.exp(-1))
     assert np.abs(np.diff(more, axis=0)).max() < 2e-4
 
 

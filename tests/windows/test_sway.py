@@ -8,7 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Stillness
-from fieldcal.windows.sway import Waves, needed, waves_of
+from fieldcal.windows.sway import waves_of
+from fieldcal.windows.sway_process import needed
+from fieldcal.windows.sway_waves import Waves
 
 G, RATE = 9.81, 50.0
 NOISE = np.repeat([5e-3, 1e-3], 3)

@@ -18,7 +18,9 @@ from fieldcal.core.positions import rates
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import rate_of, spans
 from fieldcal.session.description import Description
-from fieldcal.windows.sway import Waves, needed, waves_of
+from fieldcal.windows.sway import waves_of
+from fieldcal.windows.sway_process import needed
+from fieldcal.windows.sway_waves import Waves
 
 WIDE = float(np.deg2rad(0.2))
 """Turning from which it is taken out so, rad. What is less moves gravity by less than

@@ -1,0 +1,191 @@
+"""Fits of waves to a stretch of a window: a spectrum that all outputs share.
+
+    y_c = m_c + q_c t + sum_k s_ck (a_ck cos w_k t + b_ck sin w_k t) + noise,
+    a, b ~ N(0, v_k),   s = |f0| of accelerometers, w_k of gyroscopes            (1)
+
+on frequencies half a cycle a window apart, and on those of the strongest lines. v_k and
+the noise are those of greatest evidence: a swell is one line, gusts are many. What the
+stretch leaves open of m_c is its variance beyond that of white noise.
+
+Source: MacKay 1992, Tipping 2001.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.windows.sway_waves import Waves
+
+ROUNDS, KEPT = 20, 1.0
+"""Steps towards the greatest evidence, and the power that a line must have in some
+output, in that of its noise, to be looked at any longer."""
+
+LINES, FINER = 4, 16
+"""Lines whose frequencies are sought, and points of the first grid in 1 / T."""
+
+STEP_S, TINY = 0.25, 1e-15
+"""Step of a window that is only thought of, s, and the least size of a wave in it."""
+
+WORSE = 1.5
+"""How many times as uncertain as on firm ground a window may be on a swaying base."""
+
+LADDER = (10, 15, 20, 30, 45, 60, 90, 120, 180, 300, 600)
+"""Seconds that a window may be given."""
+
+
+def fitted(t: Array, y: Array, hz: Array, known: Waves) -> Waves | None:
+    """Waves of greatest evidence in cells (m, 6); None where there are none.
+
+    Parameters
+    ----------
+    t : (m,) s, middles of the cells
+    hz : (k,) frequencies
+    known : what is known of the stretch, its waves not among it
+
+    """
+    return _Fitted(t, y, hz, known).waves()
+
+
+def frequencies(t: Array, y: Array, hz: Array, near: float) -> Array:
+    """Frequencies, and those of the strongest lines for any so `near` to them, Hz."""
+    return _beside(hz, _lines(t, y, hz), near)
+
+
+class _Fitted:
+    """The process (1) of the outputs of one stretch, by its evidence.
+
+    Parameters
+    ----------
+    t, y : (m,), (m, 6) cells
+    hz : (k,) frequencies
+    known : what is known of the stretch
+
+    """
+
+    def __init__(self, t: Array, y: Array, hz: Array, known: Waves) -> None:
+        self.hz, self.count, self.known = hz, len(t), known
+        t = t - known.middle
+        wave = np.multiply.outer(t, 2 * np.pi * hz)
+        mean = np.sinc(hz * known.length)  # of a wave over a cell
+        self.table = np.hstack([np.cos(wave) * mean, np.sin(wave) * mean])
+        flat = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
+        self.free = self.table - flat @ (flat.T @ self.table)
+        self.off = y - flat @ (flat.T @ y)
+        rate = np.multiply.outer(2 * np.pi * hz, np.abs(known.scale))
+        size = np.full((len(hz), 3), np.linalg.norm(known.force))
+        self.size = np.tile(np.hstack([size, rate]), (2, 1))
+
+    def waves(self) -> Waves | None:
+        """Waves of greatest evidence; None where there is none beyond noise."""
+        gram, pull = self.free.T @ self.free, self.free.T @ self.off
+        bent = np.diff(self.off, n=2, axis=0)
+        noise = np.maximum((bent**2).mean(axis=0) / 6, 1e-30)
+        at = np.arange(len(self.hz))
+        power = (2 / self.count * pull / self.size) ** 2
+        v = (power[at] + power[at + len(at)]).mean(axis=1) / 2
+        for _ in range(ROUNDS):
+            both = np.concatenate([at, at + len(self.hz)])
+            wide = np.sqrt(np.tile(v[at], 2))[:, None] * self.size[both]
+            mean, cov = _posterior(gram[np.ix_(both, both)], pull[both], wide, noise)
+            known = np.clip(1 - np.einsum("ckk->kc", cov) / wide**2, 1e-12, 1.0)
+            share = [
+                (x[: len(at)] + x[len(at) :]).sum(axis=1)
+                for x in ((mean / self.size[both]) ** 2, known)
+            ]
+            v[at] = share[0] / share[1]
+            rest = self.off - self.free[:, both] @ mean
+            spare = np.maximum(self.count - 2 - known.sum(axis=0), 1.0)
+            noise = np.maximum((rest**2).sum(axis=0) / spare, 1e-30)
+            loud = v[at, None] * self.size[at] ** 2 * self.count / 2 > KEPT * noise
+            if not loud.any():
+                return None
+            kept = loud.any(axis=1)
+            mean, cov = mean[np.tile(kept, 2)], cov[:, np.tile(kept, 2)]
+            cov, at = cov[:, :, np.tile(kept, 2)], at[kept]
+        off = self.table[:, np.concatenate([at, at + len(self.hz)])].mean(axis=0)
+        left = np.einsum("i,cij,j->c", off, cov, off)
+        half = len(at)
+        return replace(
+            self.known, hz=self.hz[at], cos=mean[:half], sin=mean[half:], left=left,
+            noise=noise,
+        )  # fmt: skip
+
+
+def _posterior(
+    gram: Array, pull: Array, wide: Array, noise: Array
+) -> tuple[Array, Array]:
+    """Amplitudes (k, 6) of columns as wide as `wide` (k, 6), covariances (6, k, k)."""
+    sizes = wide.T
+    scaled = sizes[:, :, None] * gram * sizes[:, None, :] / noise[:, None, None]
+    inverse = np.linalg.inv(scaled + np.eye(len(gram)))
+    cov = sizes[:, :, None] * inverse * sizes[:, None, :]
+    mean: Array = np.einsum("cij,jc->ic", cov, pull) / noise
+    return mean, cov
+
+
+def needed(waves: Waves) -> float:
+    """Seconds that a window needs to be nearly as good as on firm ground.
+
+    With waves of these sizes and unknown phases, none of its means is `WORSE` times as
+    uncertain as by its noise.
+    """
+    power = (waves.cos**2 + waves.sin**2) / 2
+    for seconds in LADDER:
+        t = np.arange(0.0, seconds, STEP_S) - seconds / 2
+        noise = waves.noise * waves.length / STEP_S
+        wave = np.multiply.outer(t, 2 * np.pi * waves.hz)
+        table = np.hstack([np.cos(wave), np.sin(wave)])
+        flat = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
+        free = table - flat @ (flat.T @ table)
+        wide = np.sqrt(np.tile(power, (2, 1))) + TINY
+        _, cov = _posterior(free.T @ free, np.zeros_like(wide), wide, noise)
+        off = table.mean(axis=0)
+        left = np.einsum("i,cij,j->c", off, cov, off)
+        if (noise / len(t) + left <= WORSE**2 * noise / len(t)).all():
+            return float(seconds)
+    return float(LADDER[-1])
+
+
+def _beside(hz: Array, lines: Array, near: float) -> Array:
+    """Frequencies with lines among them, but for those that are nearly the same."""
+    kept: list[float] = []
+    for line in lines.tolist():
+        if all(abs(line - other) > near for other in kept):
+            kept.append(line)
+    apart = np.abs(np.subtract.outer(hz, np.array(kept))).min(axis=1) > near
+    return np.sort(np.concatenate([hz[apart], kept]))
+
+
+def _lines(t: Array, y: Array, hz: Array) -> Array:
+    """Frequencies of the strongest lines, (l,) Hz, one found in what others leave."""
+    noise = np.maximum(np.diff(y, n=2, axis=0).std(axis=0) / np.sqrt(6), 1e-12)
+    white = y / noise
+    step = float(hz[1] - hz[0]) / 2 if len(hz) > 1 else float(hz[0]) / 2
+    grid = np.arange(hz[0], hz[-1], 2 * step / (FINER / 4))
+    found: list[float] = []
+    for _ in range(LINES):
+        rest = flattened(t, white, found)
+        power = np.abs(np.exp(-2j * np.pi * np.outer(grid, t)) @ rest) ** 2
+        at = float(grid[int(np.argmax(power.sum(axis=1)))])
+        found.append(at)
+        for width in step / 2.0 ** np.arange(1, 9):
+            for i in range(len(found)):
+                near = found[i] + width * np.array([-1.0, 0.0, 1.0])
+                others = [*found[:i], *found[i + 1 :]]
+                left = [(flattened(t, white, [*others, f]) ** 2).sum() for f in near]
+                found[i] = float(near[int(np.argmin(left))])
+    return np.array(found)
+
+
+def flattened(t: Array, y: Array, hz: Sequence[float]) -> Array:
+    """What a constant, a drift and some waves leave of outputs, (m, c)."""
+    wave = np.multiply.outer(t - t.mean(), 2 * np.pi * np.array(hz))
+    s = (t - t.mean()) / np.ptp(t)
+    design = np.column_stack([np.ones_like(s), s, np.cos(wave), np.sin(wave)])
+    base = np.linalg.qr(design)[0]
+    rest: Array = y - base @ (base.T @ y)
+    return rest

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.samples import Block, concat
+from fieldcal.core.samples import Array, Block, Index, concat
 
 PATIENCE = 10.0
 """Longest time that a sample waits for its partner, s: either sensor may end."""
@@ -60,13 +60,18 @@ class AlignedPair:
             self._period = float(np.median(np.diff(acc.t)))
         out = np.full((len(acc), 3), np.nan)
         if len(gyr):
-            right = np.searchsorted(gyr.t, acc.t).clip(0, len(gyr) - 1)
-            left = (right - 1).clip(0)
-            nearer = np.abs(gyr.t[left] - acc.t) <= np.abs(gyr.t[right] - acc.t)
-            nearest = np.where(nearer, left, right)
-            apart = np.abs(gyr.t[nearest] - acc.t)
+            partner, apart = nearest(acc.t, gyr.t)
             close = ~(apart > self._period / 2)
-            out[close] = gyr.gyr[nearest[close]]
+            out[close] = gyr.gyr[partner[close]]
             if close.any():
                 self.worst = max(self.worst, float(apart[close].max()))
         return Block.of(acc.t, acc.acc, out, acc.temperature)
+
+
+def nearest(t: Array, others: Array) -> tuple[Index, Array]:
+    """Which of other times (m,), in order, is nearest to each (n,), and how far."""
+    right = np.searchsorted(others, t).clip(0, len(others) - 1)
+    left = (right - 1).clip(0)
+    nearer = np.abs(others[left] - t) <= np.abs(others[right] - t)
+    found = np.where(nearer, left, right)
+    return found, np.abs(others[found] - t)

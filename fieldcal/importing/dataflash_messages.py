@@ -116,7 +116,7 @@ class DataflashMessages:
             kind = data[at + 2]
             length = FMT_SIZE if kind == FMT else sizes.get(kind, 0)
             if data[at] != 0xA3 or data[at + 1] != 0x95 or not length:
-                if data.count(0xFF, at) == size - at or not data[at:].strip(b"\0"):
+                if data[at] in (0, 0xFF) and data.count(data[at], at) == size - at:
                     # blocks of flash that were never written
                     return found, size
                 if scan:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, concat
+from fieldcal.importing.alignment import nearest
 
 GAP = 1.5
 """Times the length of a batch that lie between two, if something is missing."""
@@ -153,9 +154,7 @@ def in_time_order(acc: Block, gyr: Block) -> Block:
     Each of the accelerometer goes with the gyroscope's nearest within half a period of
     either; all others stay alone, with the other sensor's values unknown.
     """
-    nearest = np.abs(acc.t[:, None] - gyr.t[_around(acc.t, gyr.t)]).argmin(axis=1)
-    partner = _around(acc.t, gyr.t)[np.arange(len(acc)), nearest]
-    apart = np.abs(acc.t - gyr.t[partner])
+    partner, apart = nearest(acc.t, gyr.t)
     period = min(_period(acc.t), _period(gyr.t))
     first = np.concatenate([[True], np.diff(partner) != 0])
     paired = first & ~(apart > period / 2)
@@ -166,12 +165,6 @@ def in_time_order(acc: Block, gyr: Block) -> Block:
     both = concat([Block.of(acc.t, acc.acc, rates), _rows(gyr, alone)])
     order = np.argsort(both.t, kind="stable")
     return Block.of(both.t[order], both.acc[order], both.gyr[order])
-
-
-def _around(t: Array, others: Array) -> NDArray[np.int64]:
-    """Neighbours of each time among others, (n, 2)."""
-    right = np.searchsorted(others, t).clip(0, len(others) - 1)
-    return np.column_stack([(right - 1).clip(0), right])
 
 
 def _period(t: Array) -> float:

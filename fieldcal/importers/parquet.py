@@ -100,7 +100,7 @@ class ParquetFile(ColumnRecording):
                 else:
                     stream = pa.ipc.open_stream(file)
                     yield stream.schema, iter(stream)
-            except (pa.ArrowException, OSError) as error:
+            except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
                 raise InputError(
                     f"{self.path}: is not whole: {error}; copy it again from where it"
                     " came"

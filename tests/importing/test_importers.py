@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -412,6 +413,16 @@ def test_a_log_whose_format_calls_a_number_a_text_is_refused(tmp_path: Path) -> 
     small.path.write_bytes(content)
     with pytest.raises(InputError, match="fit"):
         whole(small.path, small.wanted, small.name, repair=False)
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    rows = pa.table({name: np.arange(9.0) for name in ("t", "ax", "ay", "az", "qqqq")})
+    with pa.ipc.new_stream(path, rows.schema) as stream:
+        stream.write_table(rows)
+    path.write_bytes(path.read_bytes().replace(b"qqqq", b"q\xa2qq"))
+    with pytest.raises(InputError, match="is not whole"):
+        open_recording(path, ReadOptions()).streams()
 
 
 def test_a_nan_that_signals_is_a_missing_number(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -93,10 +94,19 @@ def test_other_archives_are_refused(
     assert says in said and said.count("\n") == 1
 
 
-def test_an_archive_that_was_cut_off_is_one_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def newer(content: bytes) -> bytes:
+    """An archive whose list says that it takes version 8.3 to read it."""
+    at = content.index(b"PK\x01\x02")
+    return content[: at + 6] + bytes([83]) + content[at + 7 :]
+
+
+@pytest.mark.parametrize("spoil", [lambda content: content[:-200], newer])
+def test_an_archive_that_is_spoilt_is_one_sentence(
+    spoil: Callable[[bytes], bytes],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     path = packed(tmp_path, phyphox(turned(2, RATE)))
-    path.write_bytes(path.read_bytes()[:-200])
+    path.write_bytes(spoil(path.read_bytes()))
     assert main(["import", str(path)]) == 2
     assert "cannot be read" in capsys.readouterr().err

@@ -104,6 +104,29 @@ def test_a_walk_leaves_its_limit_when_it_is_said_to() -> None:
     assert not found.from_history
 
 
+def test_what_returns_leaves_its_limit_by_as_much_as_it_has() -> None:
+    """A Gauss-Markov process changes by a variance of 2 s^2 (1 - exp(-t/T))."""
+    s, time, limit = 1e-4, 5e4, 2e-4
+    known = (Draw(("N", "G"), np.log([1e-18, s**2, time])),)
+    found = recalibration(known, 0.0, limit, 0.0).seconds[0]
+    assert found == pytest.approx(
+        -time * math.log(1 - (limit / 1.96 / s) ** 2 / 2), rel=0.15
+    )
+    assert recalibration(known, 0.0, 1.96 * 1.5 * s, 0.0).seconds[0] == math.inf
+
+
+def test_flicker_up_to_a_time_changes_no_more_behind_it() -> None:
+    """Each e-fold of its correlation times, from 1 s on, has B^2 / pi."""
+    time = 1e4
+    known = (Draw(("N", "BT"), np.log([1e-18, 1.0, time])),)
+    most = math.sqrt(2 / math.pi * math.log(time))
+    inside, beyond = (
+        recalibration(known, 0.0, 1.96 * part * most, 0.0).seconds[0]
+        for part in (0.95, 1.05)
+    )
+    assert 0.2 * time < inside < 2 * time and beyond == math.inf
+
+
 def test_a_ramp_leaves_its_limit_on_a_day() -> None:
     found = recalibration(drawn(N=1e-9), 1e-9, 1e-4, 1e-14)
     assert found.seconds == pytest.approx((1e5, 1e5), rel=0.2)

@@ -35,7 +35,7 @@ from fieldcal.core.frames import turn, way
 from fieldcal.core.positions import Position, angles
 from fieldcal.core.samples import GYR, Array, Index
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import CLOSURE, Basis, Cause
+from fieldcal.model.causes.cause import CLOSURE, Cause
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.planned import late
@@ -301,7 +301,7 @@ def _table(d: Dictionary, view: RowView, used: Array) -> Array:
     """The columns that are used in some rows, (n, 6, k); zero elsewhere."""
     n = len(view.x)
     out = np.zeros((n, 6, d.width))
-    for first, end, basis in _bases(d):
+    for first, end, basis in d.spans():
         if not used[first:end].any():
             continue
         row = basis.of(view)
@@ -312,10 +312,3 @@ def _table(d: Dictionary, view: RowView, used: Array) -> Array:
         else:
             out[:, :, first:end] = row
     return np.where(used, out, 0.0)
-
-
-def _bases(d: Dictionary) -> Iterator[tuple[int, int, Basis]]:
-    """Every basis with its first column, and the first of the next one."""
-    ends = [*(first for first, _ in d.bases[1:]), d.width]
-    for (first, basis), end in zip(d.bases, ends, strict=True):
-        yield first, end, basis

@@ -237,7 +237,7 @@ class Given(Dictionary):
                     return one.columns[[names.index(parameter.component)]]
         return np.empty(0, dtype=np.intp)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Full names of all parameters, in the order of results."""
         sensors = [("acc", (0, 1, 2), "cross_coupling"),

@@ -224,8 +224,7 @@ def _outputs(d: Dictionary, there: Array, felt: Array) -> Array:
     nowhere = State(np.zeros(6), np.ones(6), np.zeros((d.places, 2)), np.zeros(3))
     view = RowView(x, x, np.full((len(d.since), 1), np.inf), nowhere)
     out = np.zeros((6, d.width))
-    ends = [*(first for first, _ in d.bases[1:]), d.width]
-    for (first, basis), end in zip(d.bases, ends, strict=True):
+    for first, end, basis in d.spans():
         if not there[first:end].any():
             continue
         row = basis.of(view)[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,12 @@ class ColumnTable:
         self.bases.append((start, basis))
         self.width += width
         return start
+
+    def spans(self) -> Iterator[tuple[int, int, Basis]]:
+        """Every basis with its first column, and the first of the next one."""
+        ends = [*(first for first, _ in self.bases[1:]), self.width]
+        for (first, basis), end in zip(self.bases, ends, strict=True):
+            yield first, end, basis
 
     def course(
         self, name: str, of: Callable[[Experience], Array], width: int, timed: bool

@@ -12,7 +12,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.offers import Less, Offer, Offers, OfferTable
-from fieldcal.model.search.pairs import pairs
+from fieldcal.model.search.pairs import Pair, pairs
 
 SETTLED = 0.02
 """Rise of ln Z that is none."""
@@ -108,11 +108,11 @@ class Search(Offers):
         for table in self.tables(there):
             if table.less == there.sizes.instability:
                 continue
-            for one, two, gain in _pairs(table):
+            for one, two, gain, (u, v) in _pairs(table):
                 key = (one.member[0].key, two.member[0].key)
                 total = table.score + gain + self._more(there, one, two)
                 if key not in tried or total > tried[key][0]:
-                    tried[key] = (total, one, two)
+                    tried[key] = total, replace(one, size=u), replace(two, size=v)
         near = sorted(tried.values(), key=lambda t: -t[0])[:FOLLOWED]
         near = [t for t in near if t[0] > level - 2 * SLACK]
         found = [self.taken(there, one, two) for _, one, two in near]
@@ -124,8 +124,8 @@ class Search(Offers):
         return self.chance(both) - self.chance(there.members)
 
 
-def _pairs(table: OfferTable) -> Iterator[tuple[Offer, Offer, float]]:
-    """Every two offers of a table with their gain.
+def _pairs(table: OfferTable) -> Iterator[tuple[Offer, Offer, float, Pair]]:
+    """Every two offers of a table with their gain, and the sizes that it is at.
 
     Each with all its parameters as well: beside the other it may need them.
     """
@@ -138,8 +138,8 @@ def _pairs(table: OfferTable) -> Iterator[tuple[Offer, Offer, float]]:
         if new[i] or new[j]:
             wanted.append((i + new[i] * len(known), j + new[j] * len(known)))
     groups, sizes = [o.member[1] for o in every], [o.size for o in every]
-    for gain, (i, j), (u, v) in pairs(table.state, groups, sizes, wanted):
-        yield replace(every[i], size=u), replace(every[j], size=v), gain
+    for gain, (i, j), at in pairs(table.state, groups, sizes, wanted):
+        yield every[i], every[j], gain, at
 
 
 def _widened(offer: Offer) -> Offer:

@@ -56,14 +56,14 @@ class System:
         view = RowView.of(rows.x, self.dictionary.since, state)
         off = rows.y - state.output(view.x, self.dictionary.since)
         parts: list[list[tuple[Index, Array]]] = [[] for _ in range(6)]
-        for first, basis in self.dictionary.bases:
-            if isinstance(basis, Course):
-                self._course(parts, first, basis, view, wanted)
-                continue
-            table = basis.of(view)
-            at = first + np.arange(table.shape[2])
+        for first, end, basis in self.dictionary.spans():
+            at = np.arange(first, end)
             kept = np.ones(len(at), bool) if wanted is None else wanted[at]
             if not kept.any():
+                continue
+            table = basis.of(view)
+            if isinstance(basis, Course):
+                self._course(parts, at, table, kept)
                 continue
             for c in self.dictionary.observed:
                 there = kept & np.any(table[used[:, c], c] != 0.0, axis=0)
@@ -94,22 +94,16 @@ class System:
     def _course(
         self,
         parts: list[list[tuple[Index, Array]]],
-        first: int,
-        basis: Course,
-        view: RowView,
-        wanted: NDArray[np.bool_] | None,
+        at: Index,
+        table: Array,
+        kept: NDArray[np.bool_],
     ) -> None:
-        """Columns of a function that is the same on every channel."""
-        whole = first + np.arange(6 * basis.width)
-        if wanted is not None and not wanted[whole].any():
-            return
-        table = basis.of(view)
+        """Columns `at` of a function that is the same on every channel, those kept."""
+        width = table.shape[1]
         for c in self.dictionary.observed:
-            at = first + c * basis.width + np.arange(basis.width)
-            if wanted is None:
-                parts[c].append((at, table))
-            elif wanted[at].any():
-                parts[c].append((at[wanted[at]], table[:, wanted[at]]))
+            own = slice(c * width, (c + 1) * width)
+            if kept[own].any():
+                parts[c].append((at[own][kept[own]], table[:, kept[own]]))
 
 
 def gram(

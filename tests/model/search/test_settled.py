@@ -213,8 +213,8 @@ def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
     assert len(found.members) == 2
     scores = []
     for table in search.tables(empty):
-        for one, two, gain in selection._pairs(table):
-            assert one.size is not None and two.size is not None
+        for one, two, gain, (u, v) in selection._pairs(table):
+            one, two = replace(one, size=u), replace(two, size=v)
             foretold = table.score + gain + search._more(empty, one, two)
             scores.append(foretold)
             both = search.taken(empty, one, two)

@@ -72,7 +72,7 @@ def test_turns_that_led_elsewhere_are_named_three_by_three() -> None:
 
 def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
     none = estimated(names=(), missing=("acc_bias.x", "acc_scale.x"), found=None)
-    none.given.names = ("acc_bias.x", "acc_scale.x")  # type: ignore[misc]
+    none.given.names = ("acc_bias.x", "acc_scale.x")
     carried = {"sure": 0.0, "causes": {}, "moved": np.zeros(0), "ended_s": None}
     vars(none).update(carried | {"values": np.zeros(0), "covariance": np.zeros((0, 0))})
     with pytest.raises(NotObservable) as error:

@@ -89,6 +89,7 @@ def test_three_devices_on_three_links_have_a_session_and_a_result_each(
     assert kept.calibration.to_json() == result["further"]["device-2"]
 
 
+@pytest.mark.thorough
 def test_all_devices_are_gone_on_with_after_a_kill(tmp_path: Path) -> None:
     with ExitStack() as stack:
         devices, urls = started(stack, tmp_path, once=False)

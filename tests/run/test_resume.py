@@ -154,7 +154,9 @@ def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
     assert description.read(tmp_path / "s" / "session.toml").positions
 
 
-@pytest.mark.parametrize("kind", ["killed", "pulled"])
+@pytest.mark.parametrize(
+    "kind", ["killed", pytest.param("pulled", marks=pytest.mark.thorough)]
+)
 @pytest.mark.parametrize("runs", [1, pytest.param(6, marks=pytest.mark.thorough)])
 def test_runs_that_are_broken_end_with_right_numbers(kind: str, runs: int) -> None:
     """A few of what benchmarks/kills.py does by the hundred."""

@@ -52,7 +52,7 @@ def plain(coupled: Block) -> Diagnosis:
 @pytest.mark.parametrize(
     ("later", "axes", "turned", "signs"),
     [
-        (1.7e9, AXES, [0, 1, 2], (1, 1, 1)),
+        pytest.param(1.7e9, AXES, [0, 1, 2], (1, 1, 1), marks=pytest.mark.thorough),
         (-500.0, ("+z", "+x", "+y"), [1, 2, 0], (1, 1, 1)),
         (0.0, ("-x", "-y", "+z"), [0, 1, 2], (-1, -1, 1)),
     ],

@@ -114,9 +114,22 @@ def _squares(
     weighed = rows.weighed(tau)
     inner, pull = weighed.matrix(columns, columns), weighed.pull(columns)
     left = weighed.square - 2 * values @ pull + values @ inner @ values
+    return unsure_squares(float(left), pull - inner @ values, inner, covariance)
+
+
+def unsure_squares(left: float, b: Array, inner: Array, covariance: Array) -> float:
+    """Chi squared where what predicts has an uncertainty of its own, (1).
+
+    Parameters
+    ----------
+    left : r^T R^-1 r
+    b : (k,) Phi^T R^-1 r
+    inner, covariance : (k, k) G and C
+
+    """
     sigma = np.sqrt(np.diag(covariance))
     power, axes = np.linalg.eigh(covariance / sigma / sigma[:, None])
     root = sigma[:, None] * axes * np.sqrt(np.maximum(power, 0.0))  # L of (1)
-    rest = root.T @ (pull - inner @ values)
+    rest = root.T @ b
     taken = np.linalg.solve(np.eye(len(rest)) + root.T @ inner @ root, rest)
     return float(left - rest @ taken)

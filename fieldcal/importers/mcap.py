@@ -7,6 +7,7 @@ sensor_msgs/msg/Temperature that has the same frame, where there is one.
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,7 +65,7 @@ class McapLog(Recording):
         with path.open("rb") as file:
             try:
                 summary = make_reader(file).get_summary()
-            except (McapError, ValueError, EOFError, OSError):
+            except (McapError, ValueError, EOFError, OSError, struct.error):
                 summary = None
         if summary is None:
             raise InputError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,12 +40,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_same_schedule_on_another_clock(tmp_path: Path, folder: Path) -> None:
     session = Session.open(folder)
-    table = strapdown.outputs(NOISE)
-    table[:, 0] += 7.0
-    path = write_csv(tmp_path / "simulated.csv", table)
-    block, about, _ = opened(path, (session.block, session.about))
-    starts = [w[0] - block.t[0] for w in about.windows if w]
-    assert starts[0] == pytest.approx(3.0) and len(starts) == len(strapdown.ANGLES)
+    ours = np.array([w for w in session.windows if w])
+    real = (
+        replace(session.block, t=session.block.t + 700.0),
+        replace(session.about, windows=tuple(map(tuple, ours + 700.0))),
+    )
+    path = write_csv(tmp_path / "simulated.csv", strapdown.outputs(NOISE))
+    block, about, _ = opened(path, real)
+    assert block.t[0] == session.block.t[0] and len(ours) == len(strapdown.ANGLES)
+    theirs = [w for w in about.windows if w]
+    np.testing.assert_allclose(np.array(theirs), ours, atol=1e-9)
 
 
 def test_other_times_of_the_same_positions_in_their_order(

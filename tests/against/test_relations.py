@@ -12,8 +12,11 @@ from fieldcal.against.joint import (
     likeliest,
     weighed,
 )
-from fieldcal.core.samples import Array
+from fieldcal.against.prediction import unsure_squares
+from fieldcal.against.side import noise_of
+from fieldcal.core.samples import Array, Block
 from fieldcal.model import priors
+from fieldcal.session import description
 
 SIGMA = 0.01
 SHARE = priors.density()
@@ -74,6 +77,33 @@ def test_who_has_it(
     found = weighed(one, two, 0.01, None)
     assert sum(found.values()) == pytest.approx(1.0)
     assert apart(found) > 0.99 and likeliest(found) == expected
+
+
+def test_what_a_simulator_does_not_know_is_no_misfit() -> None:
+    """Beside the dense covariance of what it predicts."""
+    rng = np.random.default_rng(8)
+    design, r = rng.normal(size=(30, 4)), rng.normal(size=30)
+    root = rng.normal(size=(4, 4)) * [1.0, 1e-3, 10.0, 0.1]
+    covariance = root.T @ root
+    white = np.exp(rng.normal(size=30))
+    expected = r @ np.linalg.solve(np.diag(white) + design @ covariance @ design.T, r)
+    scaled = design.T / white
+    found = unsure_squares(float(r @ (r / white)), scaled @ r, scaled @ design,
+                           covariance)  # fmt: skip
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_noise_of_a_window_is_known_as_well_as_is_said() -> None:
+    about = description.parse(
+        {"format": 1, "position": [{"start_s": 0.0, "end_s": 2.0}]}
+    )
+    rng, seen = np.random.default_rng(9), []
+    for _ in range(60):
+        six = rng.standard_normal((201, 6))
+        level, unsure = noise_of(Block.of(np.arange(201) / 100, *np.split(six, 2, 1)),
+                                 about)  # fmt: skip
+        seen.append(np.log(level) / unsure)
+    assert np.std(seen) == pytest.approx(1.0, abs=0.15)
 
 
 @pytest.mark.parametrize("size", [0.0, 0.05])

@@ -425,6 +425,21 @@ def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
         open_recording(path, ReadOptions()).streams()
 
 
+def test_a_summary_that_is_damaged_is_none(tmp_path: Path) -> None:
+    """Whatever byte of it: what reads it raises what it likes."""
+    small, refused = Small("mcap", tmp_path / "file"), 0
+    for at in range(len(small.content) - 400, len(small.content)):
+        content = bytearray(small.content)
+        content[at] = 255
+        small.path.write_bytes(content)
+        try:
+            open_recording(small.path, small.wanted).streams()
+        except InputError as error:
+            assert small.path.name in str(error)
+            refused += 1
+    assert refused
+
+
 def test_a_nan_that_signals_is_a_missing_number(tmp_path: Path) -> None:
     """A damaged byte makes one; where it is cast, numpy warns."""
     small = Small("dataflash", tmp_path / "file")

@@ -142,6 +142,37 @@ def test_what_follows_the_temperature_is_taken_out() -> None:
             assert channel.temperature is None
 
 
+def test_a_noisy_thermometer_does_not_make_a_coefficient_smaller() -> None:
+    """Its own noise is in what it is divided by, where it shows nothing else."""
+    rng = np.random.default_rng(26)
+    t = np.arange(30_000) * DT
+    course = 4 * np.sin(t / 300)
+    values = noise(rng, len(t), DT, 6, N=1.0) + 0.2 * course[:, None]
+    warmth = 25 + course + 6 * rng.standard_normal(len(t))
+    found = estimate([reduced([recording(values, DT, warmth)])]).channels
+    seen = [c.temperature for c in found.values() if c.temperature is not None]
+    assert len(seen) == 6
+    assert np.mean([value for value, _ in seen]) == pytest.approx(0.2, rel=0.05)
+
+
+def test_what_scatters_more_than_its_processes_is_known_less_well() -> None:
+    """Noise that swells and ebbs: neighbouring coefficients are not independent."""
+    rng = np.random.default_rng(27)
+    swell = 1 + 0.9 * np.sin(2 * np.pi * np.arange(16_000) * DT / 200)
+    values = swell[:, None] * noise(rng, 16_000, DT, 6, N=1.0)
+    found = estimate([reduced([recording(values, DT)])]).channels.values()
+    # 1.86 is the mean of the fourth power over the squared one of the second
+    assert 1.3 < np.mean([c.dispersion for c in found]) < 2.4
+
+
+def test_noise_that_a_device_makes_quickly_is_white_to_a_second() -> None:
+    """N^2 + 2 s^2 T of a Gauss-Markov process of a twentieth of a second."""
+    values = noise(np.random.default_rng(28), 60_000, 0.01, 6, N=0.3, s=3.0, T=0.05)
+    for channel in estimate([reduced([recording(values, 0.01)])]).channels.values():
+        whole = np.sqrt(0.3**2 + 2 * 3.0**2 * 0.05)
+        assert channel.processes["N"].value == pytest.approx(whole, rel=0.06)
+
+
 def test_a_ramp_is_no_walk() -> None:
     values = noise(np.random.default_rng(11), 30_000, DT, 6, N=1.0, R=1e-3)
     for channel in estimate([reduced([recording(values, DT)])]).channels.values():

@@ -91,6 +91,18 @@ def test_bands_hold_what_they_say() -> None:
     assert 0.5 < np.mean(held) < 0.87
 
 
+def test_sizes_are_drawn_from_their_likelihood() -> None:
+    """The log of a variance from n samples of white noise scatters by sqrt(2/n)."""
+    values = noise(np.random.default_rng(19), 400, 0.1, 6, N=1.0)
+    spread = []
+    for channel in estimate([reduced([recording(values, 0.1)])]).channels.values():
+        alone = [d.x[0] for d in channel.drawn if d.terms == ("N",)]
+        if channel.dispersion == 1 and len(alone) > 50:
+            spread.append(np.std(alone) / np.sqrt(2 / 400))
+    assert len(spread) >= 3
+    assert np.mean(spread) == pytest.approx(1.0, abs=0.12)
+
+
 def test_the_score_is_a_density() -> None:
     values = noise(np.random.default_rng(18), 6000, 0.1, 6, N=1.0)
     model = estimate([reduced([recording(values, 0.1)])]).channels["ax"]

@@ -20,14 +20,16 @@ from hypothesis.extra import numpy as hnp
 
 from fieldcal.cli import main
 from fieldcal.core.positions import FIVE
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Block
 from fieldcal.report import EarlierCalibration, Material, gather, packing, render
 from fieldcal.report.agreement import correlations
 from fieldcal.report.blocks import Figure
 from fieldcal.report.gravity_norm import norm_errors
 from fieldcal.report.packing import MISSING, PIECE, Columns, pack, quantised
 from fieldcal.report.residuals import reached, residuals
+from fieldcal.report.stillness import motion_by_second
 from fieldcal.sim_device.profile import Profile
+from fieldcal.windows.cells import Cells
 
 HOSTILE = "</script><script>hacked=1</script><img src=x onerror=hacked=1>\"'&{{7*7}}"
 
@@ -289,7 +291,22 @@ def test_the_norm_misses_gravity_by_bias_and_scale_before(material: Material) ->
     expected = np.linalg.norm(output, axis=1) - g
     np.testing.assert_allclose(errors.before, expected, atol=3e-3)
     assert np.abs(errors.after).max() < 5 * errors.sigma.max() < 0.01
+    assert material.still is not None
+    means = [a.sigma[:3].mean() for a in material.still.averages]
+    np.testing.assert_allclose(errors.sigma, means, rtol=0.4)
     assert "Gravity, before and after" in Tags(render(material)).text
+
+
+def test_restlessness_is_told_by_the_quietest_tenth() -> None:
+    """Noise that is twenty times as strong in a third of the time."""
+    t = np.arange(6000) / 100
+    loud = np.where((t > 20) & (t < 40), 20.0, 1.0)
+    six = loud[:, None] * np.random.default_rng(4).standard_normal((6000, 6))
+    cells = Cells()
+    cells.add(Block.of(t, six[:, :3], six[:, 3:]))
+    at, r = motion_by_second(cells.table)
+    assert 1 < np.median(r[(at < 19) | (at > 41)]) < 3
+    assert 15 < np.median(r[(at > 21) & (at < 39)]) < 60
 
 
 def _earlier(session: Path) -> tuple[EarlierCalibration, ...]:

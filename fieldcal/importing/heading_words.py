@@ -19,42 +19,15 @@ AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
 
 _SENSORS = {
     "a": (
-        "a",
-        "f",
-        "acc",
-        "accel",
-        "accelerometer",
-        "acceleration",
-        "accs",
-        "accl",
-        "acce",
-        "ac",
-        "beschleunigung",
-        "aceleracion",
-        "aceleracao",
-        "accelerazione",
-        "versnelling",
-        "加速度",
-    ),
+        "a f acc accel accelerometer acceleration accs accl acce ac "
+        "beschleunigung aceleracion aceleracao accelerazione versnelling 加速度"
+    ).split(),
     "g": (
-        "g",
-        "w",
-        "gyr",
-        "gyro",
-        "gyroscope",
-        "gyros",
-        "omega",
-        "rate",
-        "gy",
-        "gyroskop",
-        "giroscopio",
-        "drehrate",
-        "winkelgeschwindigkeit",
-        "角速度",
-        "陀螺仪",
-    ),
-    "m": ("m", "mag", "magnetometer", "magnetic", "compass", "磁场"),
-    "v": ("gravity", "grav"),
+        "g w gyr gyro gyroscope gyros omega rate gy gyroskop giroscopio "
+        "drehrate winkelgeschwindigkeit 角速度 陀螺仪"
+    ).split(),
+    "m": "m mag magnetometer magnetic compass 磁场".split(),
+    "v": "gravity grav".split(),
 }
 _PHRASES = (
     (("angular", "velocity"), "g"),

@@ -22,20 +22,8 @@ SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "n
 
 MEAN = ("mean", "avg", "average")
 
-NOT_SAMPLES = (
-    *SCATTER,
-    "min",
-    "max",
-    "median",
-    "bias",
-    "offset",
-    "cov",
-    "filtered",
-    "magnitude",
-    "norm",
-    "drift",
-    "delta",
-)
+NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
+               "magnitude", "norm", "drift", "delta")  # fmt: skip
 """Words of columns that are no samples of a sensor."""
 
 FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air",

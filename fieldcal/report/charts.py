@@ -6,7 +6,7 @@ Every chart has a text alternative that says what it shows in words.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -30,15 +30,6 @@ class Axis:
     unit: str = ""
     log: bool = False
     names: tuple[str, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the object the page reads."""
-        return {
-            "label": self.label,
-            "unit": self.unit,
-            "log": self.log,
-            "names": list(self.names),
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +78,6 @@ class Mark:
     at: float
     label: str
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the object the page reads."""
-        return {"at": self.at, "label": self.label}
-
 
 @dataclass(frozen=True, slots=True)
 class Chart:
@@ -110,10 +97,10 @@ class Chart:
         return {
             "kind": "chart",
             "id": self.id,
-            "x": self.x.to_json(),
-            "y": self.y.to_json(),
+            "x": asdict(self.x),
+            "y": asdict(self.y),
             "series": [s.to_json() for s in self.series],
-            "levels": [m.to_json() for m in self.levels],
+            "levels": [asdict(m) for m in self.levels],
             "spans": [s.to_json() for s in self.spans],
             "marks": [],
         }
@@ -145,11 +132,11 @@ class Record:
                 {"label": label, "unit": unit, "tone": tone}
                 for label, unit, tone in self.panels
             ],
-            "x": Axis(self.clock, "s").to_json(),
+            "x": asdict(Axis(self.clock, "s")),
             "store": self.store,
             "means": [numbers(row) for row in self.means],
             "spans": [s.to_json() for s in self.spans],
-            "marks": [m.to_json() for m in self.marks],
+            "marks": [asdict(m) for m in self.marks],
         }
 
 

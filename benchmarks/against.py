@@ -11,13 +11,13 @@ something is said that is not so, and how the recording is predicted before and 
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks._words import how_many, option
 from benchmarks.concealed import Draw, draws, kinds
 from benchmarks.concealed.sessions import Session
 from fieldcal.against import Match, compare
@@ -153,7 +153,4 @@ def printed(found: Sequence[Outcome]) -> None:
 
 def main() -> None:
     """Print the table."""
-    words = sys.argv[2:]
-    numbers = [int(w) for w in words if w.isdigit()]
-    seeds = [int(w.removeprefix("--seed=")) for w in words if w.startswith("--seed=")]
-    printed(outcomes(numbers[0] if numbers else USUAL, seeds[0] if seeds else SEED))
+    printed(outcomes(how_many(USUAL), int(option("seed", str(SEED)))))

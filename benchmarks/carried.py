@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks._words import how_many, option
 from benchmarks.concealed.draws import single
 from benchmarks.concealed.sessions import Session as Played
 from benchmarks.concealed.sessions import plain
@@ -96,16 +97,14 @@ def pulls(played: Played, seed: int) -> tuple[dict[str, float], Calibration]:
 
 def main() -> None:
     """Print coverage and pulls for each kind of course."""
-    words = sys.argv[2:]
-    count = next((int(w) for w in words if w.isdigit()), USUAL)
-    seeds = [int(w.removeprefix("--seed=")) for w in words if w.startswith("--seed=")]
-    rows: dict[str, list[Array]] = {name: [] for name in KINDS}
+    count, first = how_many(USUAL), int(option("seed", str(SEED)))
+    rows: dict[str, list[Array]] = {}
     for k in range(count):
-        name, seed = list(KINDS)[k % len(KINDS)], (seeds or [SEED])[0] + k
+        name, seed = list(KINDS)[k % len(KINDS)], first + k
         played = KINDS[name](np.random.default_rng(seed))
         off, found = pulls(played, seed)
-        rows[name].append(np.array(list(off.values())))
-        if "--each" in words:
+        rows.setdefault(name, []).append(np.array(list(off.values())))
+        if "--each" in sys.argv:
             worst = max(off, key=lambda n: abs(off[n]))
             causes = found.info.get("carried", {}).get("causes", {})
             print(name, seed, played.place, f"{played.sigmas:.1f}", worst,

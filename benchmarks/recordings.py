@@ -10,8 +10,6 @@ or that nothing is.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import sys
 import tempfile
@@ -20,8 +18,8 @@ from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
+from benchmarks._words import ran
 from benchmarks.injected.recorded import REAL
-from fieldcal.cli import main as command
 
 JOINED = "set-2__full-sphere__"
 
@@ -125,17 +123,17 @@ def of(one: Published) -> Verdict:
     with tempfile.TemporaryDirectory() as name:
         out = Path(name) / "session"
         given: list[str] = []
-        code, _ = _run([*call, "-o", str(out)])
+        code = ran([*call, "-o", str(out)]).code
         for answer in one.options:
             if code == 0:
                 break
             given += answer.split()
             asked += 1
-            code, _ = _run([*call, *given, "-o", str(out)])
+            code = ran([*call, *given, "-o", str(out)]).code
         if code:
             return Verdict(asked, 0, "not imported", (), process_time() - began)
         folder = out / one.stream if one.stream and (out / one.stream).exists() else out
-        code, text = _run(["diagnose", str(folder), "--json"])
+        code, text, _ = ran(["diagnose", str(folder), "--json"])
         seconds = process_time() - began
         marks = (folder / "session.toml").read_text().count("[[position]]")
         if code not in (0, 1):
@@ -143,11 +141,3 @@ def of(one: Published) -> Verdict:
         said = json.loads(text)
         effects = tuple(effect["id"] for effect in said["effects"])
         return Verdict(asked, marks, said["verdict"], effects, seconds)
-
-
-def _run(words: list[str]) -> tuple[int, str]:
-    """Exit code of a command, and what it printed."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
-        code = command(words)
-    return code, out.getvalue()

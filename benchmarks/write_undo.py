@@ -13,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,6 +21,7 @@ from unittest import mock
 
 import numpy as np
 
+from benchmarks._words import how_many
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main as fieldcal
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
@@ -260,7 +260,7 @@ def trial(seed: int, place: Path) -> tuple[str, str, str, str]:
 
 def main() -> None:
     """Print what was tried and what was survived."""
-    trials = next((int(word) for word in sys.argv[2:] if word.isdigit()), TRIALS)
+    trials = how_many(TRIALS)
     table: Counter[tuple[str, str]] = Counter()
     bad = []
     for seed in range(trials):

@@ -10,13 +10,13 @@ not say consistent, nor `solve` good.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._words import how_many, option
 from benchmarks.concealed.sessions import MOUNTINGS, plain
 from benchmarks.concealed.sessions import Session as Played
 from fieldcal.calibration import Calibration
@@ -151,12 +151,10 @@ def of_diagnose(told: Told, played: Played) -> tuple[bool, float]:
 
 def main() -> None:
     """Print what became of each kind of wrong fact."""
-    words = sys.argv[2:]
-    count = next((int(w) for w in words if w.isdigit()), USUAL)
-    seeds = [int(w.removeprefix("--seed=")) for w in words if w.startswith("--seed=")]
+    count, first = how_many(USUAL), int(option("seed", str(SEED)))
     rows: dict[str, list[Array]] = {name: [] for name in FACTS}
     for k in range(count):
-        name, seed = list(FACTS)[k % len(FACTS)], (seeds or [SEED])[0] + k
+        name, seed = list(FACTS)[k % len(FACTS)], first + k
         rng = np.random.default_rng(seed)
         played = plain(rng)
         told = FACTS[name](played, seed, rng)

@@ -17,6 +17,7 @@ from itertools import product
 
 import numpy as np
 
+from benchmarks._words import how_many, option
 from benchmarks.adaptive.bench import Bench, drawn
 from benchmarks.adaptive.led import Run, led
 from fieldcal.core.errors import FieldcalError
@@ -32,9 +33,7 @@ WRONG = 5.0
 
 def main() -> None:
     """Print what became of each plan."""
-    words = sys.argv[2:]
-    count = next((int(w) for w in words if w.isdigit()), USUAL)
-    seed = next((int(w[7:]) for w in words if w.startswith("--seed=")), SEED)
+    count, seed = how_many(USUAL), int(option("seed", str(SEED)))
     plans = {
         "adaptive": ({"procedure": "adaptive"}, None),
         "nine fixed": ({"procedure": "positions"}, NINE),
@@ -50,7 +49,7 @@ def main() -> None:
             continue
         for name, one in found.items():
             rows[name].append((bench, one))
-        if "--each" in words:
+        if "--each" in sys.argv:
             parts = [
                 f"{n} {r.held} {'GO' if r.go else 'NO-GO'}{' named' * r.named}"
                 f" {1e3 * r.error:.2f} mm/s^2 {r.off:.1f} sigma"

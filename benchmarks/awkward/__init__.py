@@ -10,8 +10,6 @@ and memory beyond four times the rows.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
 import pickle
 import resource
@@ -24,10 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks._words import how_many, option, ran
 from benchmarks.awkward.drawn import Log, draw
 from benchmarks.awkward.motion import Floats as Floats
 from benchmarks.awkward.motion import G
-from fieldcal.cli import main as command
 from fieldcal.core.samples import Array
 from fieldcal.session.folder import Session
 
@@ -71,10 +69,8 @@ class Outcome(NamedTuple):
 
 def main() -> None:
     """Print what became of the logs, and those that went wrong."""
-    words = sys.argv[2:]
-    count = next((int(w) for w in words if w.isdigit()), USUAL)
-    seeds = [int(w.removeprefix("--seed=")) for w in words if w.startswith("--seed=")]
-    first, totals = (seeds or [SEED])[0], Counter[str]()
+    count, first = how_many(USUAL), int(option("seed", str(SEED)))
+    totals = Counter[str]()
     asked = Counter[int]()
     _warm()
     for k in range(count):
@@ -85,7 +81,7 @@ def main() -> None:
         judged = judge(log, got)
         totals[judged] += 1
         asked[got.asked] += judged == "right"
-        if judged not in ("right",) or "--show" in words:
+        if judged not in ("right",) or "--show" in sys.argv:
             last = got.text.strip().split("\n")[-1][:230]
             print(
                 f"{seed} {judged}: {log.said} {got.wrong} {got.after} | {last}",
@@ -150,7 +146,7 @@ def _imported(log: Log, folder: Path, after: bool) -> Outcome:
     out = folder / "out"
     code, text, asked = 2, "", 0
     while asked <= MOST:
-        code, text = _run(["import", str(log.path), "-o", str(out), *options])
+        code, _, text = ran(["import", str(log.path), "-o", str(out), *options])
         if code != 2 or not (answer := _answer(log, text, options)):
             break
         options, asked = options + answer, asked + 1
@@ -164,7 +160,7 @@ def _imported(log: Log, folder: Path, after: bool) -> Outcome:
         wrong += off(log, session, i)
     codes = []
     for name in ("solve", "diagnose", "report") if after else ():
-        codes.append(_run([name, str(folders[0])])[0])
+        codes.append(ran([name, str(folders[0])]).code)
     shutil.rmtree(out)
     return Outcome(code, asked, text, wrong, guessed, 0, codes)
 
@@ -175,13 +171,6 @@ def _answer(log: Log, text: str, given: list[str]) -> list[str]:
         if word in text and answer[0] not in given:
             return answer
     return []
-
-
-def _run(words: list[str]) -> tuple[int, str]:
-    said = io.StringIO()
-    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-        code = command(words)
-    return code, said.getvalue()
 
 
 def off(log: Log, session: Session, i: int) -> list[str]:

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
+from benchmarks._words import how_many, option
 from benchmarks.concealed import draws, others
 from benchmarks.concealed.judging import Outcome, judged
 from benchmarks.concealed.sessions import Session, plain
@@ -87,19 +88,11 @@ def outcome(seed: int, session: Session) -> Outcome:
     return judged(session, seed, told, time.perf_counter() - start)
 
 
-def _option(words: Sequence[str], name: str) -> str:
-    """What is said after --name=, nothing if it is not there."""
-    return "".join(w.removeprefix(name) for w in words if w.startswith(name))
-
-
 def main() -> None:
     """Print the tables."""
-    words = sys.argv[2:]
-    only, first = (_option(words, name) for name in ("--only=", "--seed="))
-    numbers = [int(w) for w in words if w.isdigit()]
-    count = numbers[0] if numbers else QUICK if "--quick" in words else USUAL
+    count = how_many(QUICK if "--quick" in sys.argv else USUAL)
     found = []
-    for seed, session in drawn(count, only, int(first or SEED)):
+    for seed, session in drawn(count, option("only"), int(option("seed", str(SEED)))):
         one = outcome(seed, session)
         found.append(one)
         if not one.right:

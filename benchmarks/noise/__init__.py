@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._words import how_many
 from benchmarks.injected.recorded import REAL
 from benchmarks.noise.peers import THEIRS, allan_variance, white_freedom
 from benchmarks.noise.processes import bound, covariance, noise, recording
@@ -250,7 +251,6 @@ def cost() -> None:
 def main() -> None:
     """Print all tables."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
     beside_the_bound()
-    prediction(numbers[0] if numbers else 4)
+    prediction(how_many(4))
     cost()

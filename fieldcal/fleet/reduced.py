@@ -9,6 +9,9 @@ with T typical sizes. M and q of several sessions that share an effect are added
 the notation see `model.evidence.gram`. An effect with a time constant has columns at
 powers of two of a second, so that they are the same in every session; one with an
 instant is a session's own.
+
+A function that no physics makes, by which a session explains itself alone, keeps its
+columns: beside others it may turn out to be an effect that they share.
 """
 
 from __future__ import annotations
@@ -39,6 +42,9 @@ class Column:
     shape : value of the time constant, empty where there is none
     name, unit, typical : of the parameter
     chance : that a session has the effect
+    variants : numbers of the parts of the effect that it is in, of which each may be
+        there alone: some of its axes, or all
+    own : whether it is of a function without physics, which no other session shares
 
     """
 
@@ -49,6 +55,8 @@ class Column:
     unit: str
     typical: float
     chance: float
+    variants: tuple[int, ...] = (0,)
+    own: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +88,8 @@ class Reduced:
     def from_bytes(cls, data: bytes) -> Reduced:
         """The same from what the store keeps."""
         with np.load(io.BytesIO(data), allow_pickle=False) as kept:
-            columns = tuple(Column(**c) for c in json.loads(kept["columns"].tobytes()))
+            told = json.loads(kept["columns"].tobytes())
+            columns = tuple(Column(**c | {"variants": (*c["variants"],)}) for c in told)
             size = len(columns)
             matrix = np.zeros((size, size))
             matrix[np.triu_indices(size)] = kept["matrix"]
@@ -95,7 +104,8 @@ def reduced(explanation: Explanation) -> Reduced:
     own = np.ones(len(wide), dtype=bool)
     first = len(wide) - sum(len(g.columns) for _, g in best.members)
     for cause, group in best.members:
-        own[first : first + len(group.columns)] = not _shareable(cause)
+        left = _shareable(cause) or cause.kind == "unknown"
+        own[first : first + len(group.columns)] = not left
         first += len(group.columns)
     state = best.state
     less = Eliminated.of(state.rows, state.columns[own], wide[own])
@@ -105,6 +115,7 @@ def reduced(explanation: Explanation) -> Reduced:
         if _shareable(cause)
         for found in _groups(cause)
     ]
+    groups += [(c, "", g) for c, g in best.members if c.kind == "unknown"]
     none = np.empty(0, dtype=np.intp)
     columns = np.concatenate([none, *(g.columns for _, _, g in groups)])
     typical = np.concatenate([np.empty(0), *(g.typical for _, _, g in groups)])
@@ -142,9 +153,16 @@ def _groups(cause: Cause) -> Iterator[tuple[Cause, str, Group]]:
 
 def _named(cause: Cause, shape: str, group: Group) -> Iterator[Column]:
     if group.effect is None:
+        for i in range(len(group.columns)):
+            yield Column(
+                cause.name, cause.part, "", str(i), "", 1.0, cause.chance, own=True
+            )
         return
+    parts = list(dict.fromkeys(g.params for g in cause.variants))
     for index in group.params:
         p = group.effect.params[index]
+        having = tuple(i for i, part in enumerate(parts) if index in part)
         yield Column(
-            cause.name, cause.part, shape, p.name, p.unit, p.typical, cause.chance
-        )
+            cause.name, cause.part, shape, p.name, p.unit, p.typical, cause.chance,
+            having,
+        )  # fmt: skip

@@ -7,13 +7,14 @@ at a time. Probabilities are the weights of all sets that were looked at.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 from fieldcal.fleet.levels import Grouping, Member, Sessions, Weighed, groupings
 from fieldcal.fleet.reduced import Column, Reduced
 from fieldcal.history.sessions import LEVELS, StoredSession
@@ -70,8 +71,8 @@ class SharedFinding:
     probability: float
     level_probability: float
     other: tuple[str, ...]
-    values: np.ndarray[Any, Any]
-    sigmas: np.ndarray[Any, Any]
+    values: Array
+    sigmas: Array
 
     @property
     def level(self) -> str:
@@ -124,12 +125,15 @@ class SharedSearch:
         columns, matrix, pull = together(some)
         self.sessions = Sessions(matrix, pull)
         self.candidates = list(self._candidates(columns))
+        self.candidates += _unexplained(columns, matrix, self.groupings)
         self.visited: dict[frozenset[int], tuple[float, Weighed]] = {}
 
     def _candidates(self, columns: Sequence[Column]) -> list[SharedEffect]:
-        shapes: dict[Key, dict[str, list[int]]] = {}
+        parts: dict[Key, dict[tuple[str, int], list[int]]] = {}
         for i, c in enumerate(columns):
-            shapes.setdefault((c.effect, c.part), {}).setdefault(c.shape, []).append(i)
+            for variant in () if c.own else c.variants:
+                every = parts.setdefault((c.effect, c.part), {})
+                every.setdefault((c.shape, variant), []).append(i)
         return [
             SharedEffect(
                 key,
@@ -139,8 +143,8 @@ class SharedSearch:
                 float(np.log(columns[at[0]].chance)),
                 -float(np.log(len(every) * len(self.groupings))),
             )
-            for key, every in shapes.items()
-            for shape, at in every.items()
+            for key, every in parts.items()
+            for (shape, _), at in every.items()
             for level in self.groupings
         ]
 
@@ -158,7 +162,7 @@ class SharedSearch:
         names: set[str] = set()
         total = 0.0
         for one in effects:
-            again = one.key[0] in names
+            again = one.key[0] in names and not one.columns[0].own
             total += float(np.log(priors.AGAIN)) if again else one.chance
             total += one.among
             names.add(one.key[0])
@@ -177,7 +181,11 @@ class SharedSearch:
             for other in self._offers(best - {i})[:FOLLOWED]:
                 self.weighed(best - {i} | {other})
         found = [self._finding(best, i) for i in best]
-        found = [one for one in found if one.level_probability > thresholds.NAMED]
+        found = [
+            one for one in found
+            if one.level_probability > thresholds.NAMED
+            and not one.effect.columns[0].own
+        ]  # fmt: skip
         return sorted(found, key=lambda one: -one.level_probability)
 
     def _near(self, best: frozenset[int]) -> list[frozenset[int]]:
@@ -185,9 +193,9 @@ class SharedSearch:
         found = [best | {i} for i in self._offers(best)[:FOLLOWED]]
         for i in best:
             found.append(best - {i})
-            key, shape = self.candidates[i].key, self.candidates[i].shape
+            one = self.candidates[i]
             for j, other in enumerate(self.candidates):
-                if j not in best and (other.key, other.shape) == (key, shape):
+                if j not in best and other.columns == one.columns:
                     found.append(best - {i} | {j})
         return found
 
@@ -243,7 +251,26 @@ class SharedSearch:
         return list(found)
 
 
-def together(some: Sequence[Reduced]) -> tuple[list[Column], Any, Any]:
+def _unexplained(
+    columns: Sequence[Column], matrix: Array, levels: Sequence[Grouping]
+) -> Iterator[SharedEffect]:
+    """Functions without physics, each of those sessions that had it alone."""
+    sessions = next(level for level in levels if "session" in level.names)
+    parts: dict[Key, list[int]] = {}
+    for i, c in enumerate(columns):
+        if c.own:
+            parts.setdefault((c.effect, c.part), []).append(i)
+    for key, at in parts.items():
+        having = int((matrix[:, at, at] > 0).any(axis=1).sum())
+        first = columns[at[0]]
+        yield SharedEffect(
+            key, "", tuple(columns[i] for i in at),
+            Member(np.array(at, dtype=np.intp), sessions),
+            having * float(np.log(first.chance)), 0.0,
+        )  # fmt: skip
+
+
+def together(some: Sequence[Reduced]) -> tuple[list[Column], Array, Array]:
     """Columns of all sessions, M (s, k, k) and q (s, k); nothing where one has none.
 
     Of an effect with a time constant only those count that all sessions have that

@@ -203,3 +203,49 @@ def test_time_constants_count_that_all_sessions_have() -> None:
         ("warm_up", "16 s"), *(("cross_coupling", "") for _ in range(2)),
     ]  # fmt: skip
     assert matrix[2, 0, 0] == 0.0 and pull[1, 0] == 1.0
+
+
+def strange(rng: np.random.Generator, only: str, tilts: bool) -> list[StoredSession]:
+    """Sessions that explain themselves by a function without physics at one station.
+
+    Where it `tilts`, that function stands in for base_tilt; else for no effect.
+    """
+    own = Column("beta", "ax", "", "0", "", 1.0, 5e-4, own=True)
+    out = []
+    for i in range(16):
+        station = "PQRS"[i % 4]
+        rows = 2 * rng.standard_normal((20, 6))
+        function = rows[:, 4] if tilts else 2 * rng.standard_normal(20)
+        seen = rng.standard_normal(20) + 5 * function * (station == only)
+        alone = station == only
+        design = np.column_stack([rows, function]) if alone else rows
+        columns = (*COLUMNS, own) if alone else COLUMNS
+        small = Reduced(columns, design.T @ design, design.T @ seen)
+        out.append(
+            StoredSession(
+                f"/s/{i}", f"A{i}", {"station": station}, reduced=small.to_bytes()
+            )
+        )
+    return out
+
+
+def test_what_a_session_alone_cannot_name_others_may() -> None:
+    found = SharedSearch(strange(np.random.default_rng(1), "R", tilts=True)).run()
+    assert named(found) == [("base_tilt", "station")]
+
+
+def test_what_no_effect_makes_is_named_by_nobody() -> None:
+    found = SharedSearch(strange(np.random.default_rng(2), "R", tilts=False)).run()
+    assert named(found) == []
+
+
+def test_some_axes_of_an_effect_may_be_there_alone() -> None:
+    columns = tuple(replace(c, variants=(0, 1) if c.name == "x" else (0,))
+                    for c in COLUMNS)  # fmt: skip
+    rng = np.random.default_rng(3)
+    some = []
+    for one in fleet(rng, 20, np.array([0, 0, 2.0, 0, 0, 0])):
+        small = Reduced.from_bytes(one.reduced or b"")
+        some.append(replace(one, reduced=replace(small, columns=columns).to_bytes()))
+    (found,) = SharedSearch(some).run()
+    assert [c.name for c in found.effect.columns] == ["x"] and found.level == "all"

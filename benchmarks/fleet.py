@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 import pyarrow as pa
@@ -87,38 +87,40 @@ def batch(place: Path, count: int) -> list[StoredSession]:
     folders = sessions_in([place / "tree"])
     own = Batch(folders, Killing(), Database(place / "store.sqlite"))
     jobs = os.cpu_count() or 1
-    begun, cpu = perf_counter(), _children()
+    begun = perf_counter()
     for _ in own.carried_out(own.left(), processes(jobs)):
         pass
-    wall, cpu = perf_counter() - begun, _children() - cpu
+    wall = perf_counter() - begun
+    seconds, peaks = np.loadtxt(place / "used", ndmin=2).T
     rows = own.database.done(lambda db: sessions.found(db, documents=True))
-    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
     solved = sum(one.good is True for one in rows)
+    data = sum(len(r.reduced or b"") for r in rows) / count / 1024
     print(
-        f"{count} sessions on {jobs} processes: {cpu / count:.2f} s of processor time"
-        f" and {wall / count:.2f} s each, {peak:.0f} MB a process at most; a worker"
-        f" killed: {len(rows)} rows, {len(set(r.folder for r in rows))} folders,"
-        f" {solved} good; {sum(len(r.reduced or b'') for r in rows) / count / 1024:.0f}"
-        " KiB of reduced rows each"
+        f"{count} sessions on {jobs} processes: {seconds.mean():.2f} s of processor"
+        f" time and {wall / count:.2f} s each, {peaks.max():.0f} MB a process at most"
+    )
+    print(
+        f"a worker killed: {len(rows)} rows of {len({r.folder for r in rows})} folders,"
+        f" {solved} good; {data:.0f} KiB of reduced rows each"
     )
     return rows
 
 
-def _children() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
 class Killing(Task):
-    """A task whose process is killed once, in the middle of one session."""
+    """A task whose process is killed once, amid a session; notes what each takes."""
 
     def __call__(self, folder: str) -> StoredSession:
         """Carry it out, if the process lives."""
-        mark = Path(folder).parent.parent.parent / "killed"
-        if folder.endswith("/1") and not mark.exists():
-            mark.touch()
+        root = Path(folder).parents[2]
+        if folder.endswith("/1") and not (root / "killed").exists():
+            (root / "killed").touch()
             os.kill(os.getpid(), 9)
-        return super().__call__(folder)
+        begun = process_time()
+        made = super().__call__(folder)
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        with (root / "used").open("a") as file:
+            file.write(f"{process_time() - begun} {peak}\n")
+        return made
 
 
 def tilted(place: Path, count: int = 12) -> None:

@@ -57,17 +57,18 @@ def test_a_tree_is_solved_and_what_is_broken_has_a_row(
     tree: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     store, table = str(tmp_path / "h.sqlite"), tmp_path / "t.parquet"
-    call = ["batch", str(tree), "--history", store, "-o", str(table), "--json"]
+    some = [str(tree / name) for name in ("station 1", "x")]
+    call = ["batch", *some, "--history", store, "-o", str(table), "--json"]
     assert main([*call, "--diagnose"]) == 1
     said = json.loads(capsys.readouterr().out)
-    assert said["done"] == 3
+    assert said["done"] == 2
     broken = [one for one in said["sessions"] if one["error"]]
     assert len(broken) == 1 and "latitude_deg" in broken[0]["error"]
     assert "x/broken/session.toml" in broken[0]["error"]
     rows = pq.read_table(table).to_pylist()
     good = {r["serial"]: r for r in rows if r["serial"]}
-    assert set(good) == {"A1", "A2"} and len(rows) == 3
-    assert good["A2"]["lot"] == "L7" and good["A2"]["station"] == "2"
+    assert set(good) == {"A1"} and len(rows) == 2
+    assert good["A1"]["lot"] == "L7" and good["A1"]["station"] == "1"
     assert good["A1"]["verdict"] and good["A1"]["go"] is None
 
     alone = tree / "station 1" / "session"

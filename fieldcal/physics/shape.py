@@ -18,6 +18,10 @@ next."""
 PIECES = 4
 """Instants to try within a window; the best is refined by the samples."""
 
+INSTANTS = 36
+"""And in all at least: of one long window no piece may be so long that what changes
+amid it looks like a walk."""
+
 WITHIN = (0.25, 0.08, 0.025, 0.008)
 """Parts of a row by which an instant is moved in it, closer and closer."""
 
@@ -86,11 +90,19 @@ class Shape:
 
 
 def instants(x: Experience) -> Array:
-    """Instants at which something may change: between rows, some for each window, s."""
+    """Instants at which something may change: between rows, some for each window, s.
+
+    Those of a window part it into pieces of about the same length.
+    """
     middle = (x.t[1:] + x.t[:-1]) / 2
-    turned = np.diff(x.position) != 0
-    each = np.bincount(np.unique(x.position, return_inverse=True)[1])
-    number = np.concatenate([np.arange(n) for n in each])[1:]
-    step = np.repeat(np.maximum(each // PIECES, 1), each)[1:]
-    kept: Array = middle[turned | (number % step == 0)]
-    return kept
+    turned = np.flatnonzero(np.diff(x.position))
+    kept = [turned]
+    for rows in np.split(np.arange(len(x.t)), turned + 1):
+        pieces = max(PIECES, INSTANTS // (len(turned) + 1))
+        cuts = np.linspace(x.t[rows[0]], x.t[rows[-1]], pieces + 1)[1:-1]
+        inside = middle[rows[:-1]]
+        if len(inside):
+            near = np.abs(np.subtract.outer(cuts, inside)).argmin(axis=1)
+            kept.append(rows[near])
+    out: Array = middle[np.unique(np.concatenate(kept))]
+    return out

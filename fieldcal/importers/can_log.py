@@ -16,6 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO, cast
 
+import numpy as np
+
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.options import Options
@@ -124,6 +126,10 @@ class CanLog(Recording):
         options.finish()
         for packed in self._packed(buses):
             frames = buses.frames(packed)
+            timed = np.isfinite(frames["t"])
+            if not timed.all():
+                self.damaged(f"{(~timed).sum()} of its frames", "without a time")
+                frames = frames[timed]
             block = samples.feed(frames, frames["t"])
             if block is not None:
                 yield block

@@ -119,7 +119,7 @@ class PhoneArchive(Recording):
         try:
             with zipfile.ZipFile(self.path) as archive:
                 names = [n for n in archive.namelist() if n.lower().endswith(".csv")]
-        except (zipfile.BadZipFile, OSError, RuntimeError) as error:
+        except (zipfile.BadZipFile, OSError, RuntimeError, ValueError) as error:
             raise InputError(
                 f"{self.path}: cannot be read: {error}; copy it again from where it"
                 " came"

@@ -425,6 +425,17 @@ def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
         open_recording(path, ReadOptions()).streams()
 
 
+def test_a_frame_of_which_nobody_can_tell_the_time_is_named(tmp_path: Path) -> None:
+    small = Small("can_log", tmp_path / "file")
+    lines = small.content.splitlines(keepends=True)
+    spoilt = lines[60].replace(b"(", b"(" + b"9" * 400, 1)
+    small.path.write_bytes(b"".join([*lines[:60], spoilt, *lines[61:]]))
+    with pytest.raises(InputError, match="1 of its frames: without a time"):
+        whole(small.path, small.wanted, small.name, repair=False)
+    found = whole(small.path, small.wanted, small.name, repair=True)
+    assert len(small.expected) - 2 < len(found) < len(small.expected)
+
+
 def test_a_summary_that_is_damaged_is_none(tmp_path: Path) -> None:
     """Whatever byte of it: what reads it raises what it likes."""
     small, refused = Small("mcap", tmp_path / "file"), 0

@@ -168,9 +168,15 @@ def stand(profile: Profile) -> Stand:
     latitude = np.deg2rad(profile.site.latitude_deg)
     rate = earth.RATE if profile.feels_earth else 0.0
     index, signs = mounting_axes(profile.frame.mounting, right_handed=True)
+    site = profile.site
+    turning, pull = earth.carried(
+        float(latitude), site.height_m, site.north_m_s, site.east_m_s
+    )
+    still = np.array([[0.0], [-np.sin(latitude)], [np.cos(latitude)]])
     held = Stand(
         gravity=profile.gravity,
-        earth=rate * np.array([[0.0], [-np.sin(latitude)], [np.cos(latitude)]]),
+        earth=rate * still + turning,
+        pull=pull,
         base=STILL,
         axes=index,
         signs=np.array(signs)[:, None],

@@ -19,13 +19,19 @@ from __future__ import annotations
 
 from math import atan, atan2, cos, hypot, radians, sin, sqrt
 
+import numpy as np
+
 from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
 
 RATE = 7.292115e-5
 """Angular rate of the Earth, rad/s."""
 
 STANDARD_GRAVITY = 9.80665
 """What a device means by one g, m/s^2."""
+
+STEP_S = 2.0
+"""Step of differences along a path over the Earth, s."""
 
 _SEMI_MAJOR = 6_378_137.0
 _SEMI_MINOR = _SEMI_MAJOR * (1 - 1 / 298.257223563)
@@ -59,6 +65,63 @@ def gravity(latitude_deg: float, height_m: float) -> float:
     g_u = (-(_GM + flattening) / square + RATE**2 * u * cos(b) ** 2) / w  # (e1)
     g_b = (centrifugal * _q(u) / q0 / sqrt(square) - RATE**2 * sqrt(square)) / w
     return hypot(g_u, g_b * sin(b) * cos(b))  # (e2)
+
+
+def carried(
+    latitude: float, height_m: float, north: float, east: float
+) -> tuple[Array, Array]:
+    """What a base that moves over the Earth adds, by the path of a point in space.
+
+    Parameters
+    ----------
+    latitude : rad
+    height_m : m
+    north, east : m/s
+
+    Returns
+    -------
+    rate : (3, 1) rad/s of the local level (East, down, north), beside the Earth's
+    pull : (3, 1) m/s^2, acceleration of the point less that of one that stands
+
+    """
+    (moved, turned), (stood, spun) = (
+        _along(latitude, height_m, *v) for v in ((north, east), (0.0, 0.0))
+    )
+    return (turned - spun)[:, None], (moved - stood)[:, None]
+
+
+def _along(
+    latitude: float, height: float, north: float, east: float
+) -> tuple[Array, Array]:
+    """Acceleration and rate of the local level, by differences, level axes, (3,)."""
+    places, axes = [], []
+    for way in (-STEP_S, 0.0, STEP_S):
+        half = latitude + north * way / 2 / (_radii(latitude)[1] + height)
+        phi = latitude + north * way / (_radii(half)[1] + height)
+        circle = (_radii(half)[0] + height) * cos(half)
+        turned = RATE * way + east * way / circle
+        out = _radii(phi)[0]
+        ratio = (_SEMI_MINOR / _SEMI_MAJOR) ** 2
+        level, up = (out + height) * cos(phi), (out * ratio + height) * sin(phi)
+        places.append([level * cos(turned), level * sin(turned), up])
+        axes.append(
+            [
+                [-sin(turned), cos(turned), 0.0],
+                [-cos(phi) * cos(turned), -cos(phi) * sin(turned), -sin(phi)],
+                [-sin(phi) * cos(turned), -sin(phi) * sin(turned), cos(phi)],
+            ]
+        )
+    before, now, after = (np.array(p) for p in places)
+    first, middle, last = (np.array(a) for a in axes)
+    change = (last - first) / (2 * STEP_S) @ middle.T  # of axes: -[w]x
+    rate = np.array([change[1, 2], change[2, 0], change[0, 1]])
+    return middle @ (after - 2 * now + before) / STEP_S**2, rate
+
+
+def _radii(latitude: float) -> tuple[float, float]:
+    """Radii of curvature of the prime vertical and of the meridian, m."""
+    root = hypot(_SEMI_MAJOR * cos(latitude), _SEMI_MINOR * sin(latitude))
+    return _SEMI_MAJOR**2 / root, (_SEMI_MAJOR * _SEMI_MINOR) ** 2 / root**3
 
 
 def _ellipsoidal(latitude: float, height: float) -> tuple[float, float]:

@@ -116,7 +116,9 @@ class Stand:
     Attributes
     ----------
     gravity : m/s^2
-    earth : the Earth's rate in (East, down, north), (3, 1) rad/s; zero if not felt
+    earth : rate of (East, down, north) by the Earth, zero if not felt, and by a motion
+        over it, (3, 1) rad/s
+    pull : acceleration by that motion, (3, 1) m/s^2
     base : attitude of the base against the local level, (4, 1)
     axes : (3,) index and (3, 1) sign: procedure axis i is device axis index[i]
     signs : see `axes`
@@ -126,6 +128,7 @@ class Stand:
 
     gravity: float
     earth: Array
+    pull: Array
     base: Array
     axes: tuple[int, int, int]
     signs: Array
@@ -174,7 +177,7 @@ def carried(
 
 def feel(stand: Stand, frame: MovingFrame, acceleration: Array) -> Felt:
     """What the sensors feel, with the base accelerated by (3, n) m/s^2, level axes."""
-    f = into(frame.q, acceleration - stand.gravity * Y)
+    f = into(frame.q, acceleration + stand.pull - stand.gravity * Y)
     if np.any(stand.lever):
         arm = stand.from_device(stand.lever)
         arm = arm + np.zeros_like(f)

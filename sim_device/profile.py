@@ -42,11 +42,16 @@ class Sampling:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """[site]: where the device stands; `gravity` in m/s^2 overrides the ellipsoid's."""
+    """[site]: where the device stands; `gravity` in m/s^2 overrides the ellipsoid's.
+
+    A base may move over the Earth at a constant velocity, m/s.
+    """
 
     latitude_deg: float = 50.45
     height_m: float = 170.0
     gravity: float | None = None
+    north_m_s: float = 0.0
+    east_m_s: float = 0.0
 
     @property
     def local_gravity(self) -> float:

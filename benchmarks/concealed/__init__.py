@@ -64,6 +64,7 @@ def kinds() -> Mapping[str, tuple[Draw, int]]:
         if name not in out:
             out[name] = (lambda rng, n=name: others.example(n, rng), 3)  # type: ignore[misc]
     out["pier"] = (others.pier, 3)
+    out["under way"] = (others.under_way, 3)
     return out
 
 

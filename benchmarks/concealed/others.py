@@ -12,7 +12,7 @@ from benchmarks.concealed.draws import EQUATIONS, HOT, drawn, size, sized, suite
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import effects
-from fieldcal.sim_device.profile import FullScale
+from fieldcal.sim_device.profile import FullScale, Identity
 from fieldcal.sim_device.profile_file import from_tables
 from fieldcal.sim_device.vocabulary import effect
 
@@ -122,6 +122,24 @@ def pier(rng: np.random.Generator) -> Session:
     swaying = tuple(effect("sway", values) for values in both)
     profile = replace(one, effects=(*one.effects, *swaying))
     return replace(session, profile=profile, concealed={"sway": {}}, label="pier")
+
+
+def under_way(rng: np.random.Generator) -> Session:
+    """Nothing concealed, on a base whose velocity over the Earth is said.
+
+    Of navigation grade: tactical grade knows no north, and finds Coriolis as a tilt.
+    """
+    session = calm(plain(rng))
+    one = session.profile
+    north, east = (float(v) for v in rng.uniform(-100, 100, 2))
+    profile = replace(
+        one,
+        site=replace(one.site, north_m_s=north, east_m_s=east),
+        noise=replace(one.noise, gyr=(10 ** rng.uniform(-4.5, -4),) * 3),
+        device=Identity(grade="navigation"),
+        effects=(),
+    )
+    return replace(session, profile=profile, label="nothing")
 
 
 def chain(name: str, rng: np.random.Generator) -> Session:

@@ -126,7 +126,12 @@ class Session:
                 "format": 1,
                 "device": {"name": "concealed", "grade": self.profile.device.grade},
                 "sampling": {"rate_hz": self.profile.sampling.rate_hz},
-                "site": {"latitude_deg": site.latitude_deg, "height_m": site.height_m},
+                "site": {
+                    "latitude_deg": site.latitude_deg,
+                    "height_m": site.height_m,
+                    "north_m_s": site.north_m_s,
+                    "east_m_s": site.east_m_s,
+                },
                 "frame": {"mounting": list(self.profile.frame.mounting)},
                 "nominal": {
                     "acc_bias": (np.array(truth.acc_bias) + off).tolist(),

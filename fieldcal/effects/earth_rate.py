@@ -2,8 +2,9 @@
 
     w = A(alpha, beta) Omega (0, -sin phi, cos phi)                              (39)
 
-w angular rate, rad/s, procedure axes; phi the latitude; no parameter. Left out of the
-simulation of tactical grade. Source: Avrutov and Pozniak 2023, (38), (39), with y down.
+w angular rate, rad/s, procedure axes; phi the latitude; no parameter. A base that moves
+over the Earth adds what it turns by, (37). Left out of the simulation of tactical
+grade. Source: Avrutov and Pozniak 2023, (37) to (39), with y down.
 
 >>> import numpy as np
 >>> pole = {"latitude": np.pi / 2, "position": np.zeros(1, int)}
@@ -33,4 +34,5 @@ class EarthRate(Motion):
 
     def change(self, x: Experience, values: Values) -> Experience:
         """Add the Earth's rate to what turns with the device."""
-        return x.turned(base_rate=earth_rate_home(x.latitude))  # (39)
+        rate = earth_rate_home(x.latitude) + x.transport
+        return x.turned(base_rate=rate)  # (39)

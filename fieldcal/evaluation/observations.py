@@ -48,6 +48,7 @@ def observations(
         averages,
         about.gravity,
         latitude=about.latitude,
+        under_way=about.under_way,
         mounting=about.mounting,
         grade="navigation" if about.grade == "navigation" else "tactical",
         nominal=Nominal(**{k: tuple(v.tolist()) for k, v in about.nominal.items()}),

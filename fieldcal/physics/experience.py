@@ -46,6 +46,7 @@ class Experience:
     rate : (n, 3) rad/s about the procedure axes, what a rate table adds
     base_force : (3,) m/s^2, specific force in base axes
     base_rate : (3,) rad/s, the Earth's rate in base axes; zero where it is left out
+    transport : (3,) rad/s, what a base that moves over the Earth adds to it
     mounting : (3, 3) P, procedure = P device
     latitude : rad; nan where unknown
     gravity_sigma : m/s^2, what is not known of gravity, 1 sigma
@@ -75,6 +76,7 @@ class Experience:
     gravity_sigma: float
     gamma: Array
     attitude_sigma: Array
+    transport: Array
 
     @classmethod
     def at_rest(cls, alpha: Array, beta: Array, gravity: float, **known: Any) -> Self:
@@ -111,6 +113,7 @@ class Experience:
             "gravity_sigma": 0.0,
             "gamma": np.zeros(n),
             "attitude_sigma": np.full(n, np.nan),
+            "transport": np.zeros(3),
         }
         return cls(alpha, beta, **(unknown | known)).turned()
 

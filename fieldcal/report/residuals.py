@@ -19,6 +19,7 @@ from fieldcal.core.frames import (
     EARTH_RATE,
     angles_of,
     earth_rate_home,
+    force_home,
     mean_rotation,
     turn,
 )
@@ -72,12 +73,14 @@ def predicted(found: Calibration, seen: Observations) -> Array:
     x = Experience.at_rest(
         *seen.angles,
         seen.gravity,
+        base_force=force_home(seen.gravity) + seen.under_way.force * [1.0, 0.0, 1.0],
         mounting=seen.mounting,
         rate=rates(seen.positions),
         gamma=third_angles(seen.positions),
     )
     if seen.grade == "navigation" and seen.latitude is not None:
-        x = x.turned(base_rate=earth_rate_home(seen.latitude))
+        rate = earth_rate_home(seen.latitude) + seen.under_way.rate
+        x = x.turned(base_rate=rate)
     nominal = seen.nominal
     state = state_of(
         found.names,
@@ -101,7 +104,8 @@ def _earth(seen: Observations, left: Array) -> Array:
     away[known] = mean_rotation(seen.rates[known]) @ (
         seen.mounting.T @ turn(*(angle[known] for angle in turns))
     )
-    down = away[..., 1] * earth_rate_home(seen.latitude)[1]
+    home = earth_rate_home(seen.latitude) + seen.under_way.rate
+    down = away[..., 1] * home[1]
     level = away[known][..., [0, 2]].reshape(-1, 2)
     # a prior of the size it can have keeps few windows from explaining anything with it
     size = EARTH_RATE * np.cos(seen.latitude)

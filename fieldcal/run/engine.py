@@ -43,7 +43,7 @@ from fieldcal.run.waiting import PositionWait, force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import Description
 from fieldcal.session.folder import ADDED
-from fieldcal.windows import Average, LearnedNoise, PiecedWindow
+from fieldcal.windows import Average, LearnedNoise, PiecedWindow, StillnessLimits
 
 R = TypeVar("R")
 
@@ -206,7 +206,8 @@ class Engine:
                 self._operator.place(hold)
 
     def _new_window(self) -> PiecedWindow:
-        return PiecedWindow(self._noise, self._driver.grain)
+        limits = StillnessLimits.swaying() if self._about.sways else None
+        return PiecedWindow(self._noise, self._driver.grain, limits)
 
     def _heard(self, block: Block) -> None:
         """Look at samples that have just been recorded."""
@@ -332,7 +333,8 @@ class Engine:
                 self._recorder.mark("repeated", position=hold.index)
                 return False
             self._display.averaging(hold, pieces)
-            if pieces.full(hold.seconds) or pieces.done(hold.sigma):
+            early = not self._about.sways and pieces.done(hold.sigma)
+            if pieces.full(hold.seconds) or early:
                 break
         self._confirm(watch)
         return True

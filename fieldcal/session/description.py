@@ -20,11 +20,12 @@ from fieldcal.calibration import Gauge
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, SessionError
-from fieldcal.core.frames import mounting_matrix
+from fieldcal.core.frames import earth_rate_home, force_home, mounting_matrix
 from fieldcal.core.gravity import G0, gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.core.shown import one_line
+from fieldcal.core.under_way import UnderWay
 from fieldcal.session.attitude import held
 from fieldcal.session.schemas import refusal, validator
 
@@ -61,7 +62,10 @@ class Description:
     rate_hz : nominal sampling rate, None where unknown
     units : of "acceleration" and "angular_rate" in the samples
     limits : full scale of the same two, in SI; absent where unknown
-    latitude_deg, height_m, gravity : the site; gravity in m/s^2
+    latitude_deg, height_m, gravity : the site; gravity in m/s^2, less what makes a base
+        under way lighter
+    under_way : what the motion of the base adds; of tactical grade, whose z points
+        anywhere, about and along the vertical only
     level_deg : how level the base was made, one sigma about each level axis; None where
         not stated
     angle_setting_deg : how well each position's angles are set, likewise
@@ -83,6 +87,7 @@ class Description:
     latitude_deg: float
     height_m: float
     gravity: float
+    under_way: UnderWay
     level_deg: float | None
     angle_setting_deg: float | None
     axes: tuple[str, ...]
@@ -103,6 +108,22 @@ class Description:
     def latitude(self) -> float:
         """Latitude in rad."""
         return float(np.deg2rad(self.latitude_deg))
+
+    @property
+    def velocity(self) -> tuple[float, float]:
+        """Of the base towards north and East, m/s."""
+        return _velocity(self.raw.get("site", {}))
+
+    @property
+    def base_force(self) -> Array:
+        """Specific force of a device at rest on the base, base axes, (3,) m/s^2."""
+        return force_home(self.gravity) + self.under_way.force * [1.0, 0.0, 1.0]
+
+    @property
+    def base_rate(self) -> Array:
+        """Rate of the base as navigation grade sees it, (3,) rad/s; 0 for tactical."""
+        rate: Array = earth_rate_home(self.latitude) + self.under_way.rate
+        return rate * (self.grade == "navigation")
 
     @property
     def gravity_said(self) -> bool:
@@ -226,16 +247,23 @@ def parse(raw: Mapping[str, Any]) -> Description:
     mounting_matrix(axes)
     nominal = _nominal(raw.get("nominal", {}))
     gauge = _gauge(units, nominal)
+    grade = device.get("grade", "tactical")
+    moving = UnderWay.at(*_velocity(site), float(np.deg2rad(latitude)), height)
+    level = _known(site.get("level_deg"))
+    if grade == "tactical" and level is not None:
+        level = float(np.hypot(level, np.rad2deg(moving.lean)))
     return Description(
         device=device,
-        grade=device.get("grade", "tactical"),
+        grade=grade,
         rate_hz=_known(raw.get("sampling", {}).get("rate_hz")),
         units=units,
         limits=_limits(raw.get("range", {}), units, gauge),
         latitude_deg=latitude,
         height_m=height,
-        gravity=float(site.get("gravity") or gravity(latitude, height)),
-        level_deg=_known(site.get("level_deg")),
+        gravity=float(site.get("gravity") or gravity(latitude, height))
+        - float(moving.force[1]),
+        under_way=moving.level if grade == "tactical" else moving,
+        level_deg=level,
         angle_setting_deg=_known(site.get("angle_setting_deg")),
         axes=tuple(axes),
         nominal={n: v / gauge.size[n.startswith("gyr")] for n, v in nominal.items()},
@@ -257,6 +285,11 @@ def with_more(about: Description, positions: Iterable[Position]) -> Description:
     if not more:
         return about
     return parse({**about.raw, "position": [*about.raw.get("position", ()), *more]})
+
+
+def _velocity(site: Mapping[str, Any]) -> tuple[float, float]:
+    """Towards north and East, m/s."""
+    return float(site.get("north_m_s", 0.0)), float(site.get("east_m_s", 0.0))
 
 
 def _known(value: float | None) -> float | None:

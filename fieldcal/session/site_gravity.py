@@ -35,4 +35,5 @@ def gravity_sigma(about: Description) -> float:
         fall = gravity(about.latitude_deg) - gravity(about.latitude_deg, LIVES)
         return float(np.hypot(fall, ANOMALY))
     normal = gravity(about.latitude_deg, about.height_m)
-    return abs(about.gravity - normal) if site.get("gravity") else ANOMALY
+    at_rest = about.gravity + float(about.under_way.force[1])
+    return abs(at_rest - normal) if site.get("gravity") else ANOMALY

@@ -128,7 +128,7 @@ class _Session:
         self.observations, self.asked, self.method = observations, asked, method
         navigation = observations.grade == "navigation"
         base, self.unknown = earth_known(
-            observations.latitude, navigation, asked.heading
+            observations.latitude, navigation, asked.heading, observations.under_way
         )
         if not earth:
             base, self.unknown = np.zeros(3), (0.0, 0.0, 0.0)

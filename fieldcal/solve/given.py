@@ -20,6 +20,7 @@ import numpy as np
 from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home
 from fieldcal.core.samples import CHANNELS, Array, Index
+from fieldcal.core.under_way import UnderWay
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
@@ -297,7 +298,10 @@ def repeated(x: Experience, oriented: Sequence[int]) -> Array:
 
 
 def earth_known(
-    latitude: float | None, navigation: bool, heading: float | None
+    latitude: float | None,
+    navigation: bool,
+    heading: float | None,
+    under_way: UnderWay | None = None,
 ) -> tuple[Array, tuple[float, float, float]]:
     """What is known of the Earth's rate in base axes, and how uncertain it is, rad/s.
 
@@ -308,12 +312,13 @@ def earth_known(
     if latitude is None:
         free = EARTH_RATE / float(np.sqrt(3.0))
         return np.zeros(3), (free, free, free)
-    level = EARTH_RATE * float(np.cos(latitude))
-    home = earth_rate_home(latitude)
+    moving = under_way or UnderWay()
+    home = earth_rate_home(latitude) + moving.rate
+    level = float(np.hypot(home[0], home[2]))
     if navigation and heading is None:
         heading = 0.0
     if heading is not None:
-        return home, (level * heading, 0.0, 0.0)
+        return home, (abs(home[2]) * heading, 0.0, abs(home[0]) * heading)
     anywhere = level / float(np.sqrt(2.0))
     return home * [0.0, 1.0, 0.0], (anywhere, 0.0, anywhere)
 

@@ -18,6 +18,7 @@ from fieldcal.calibration import Nominal
 from fieldcal.core.errors import InputError
 from fieldcal.core.positions import Position, angles, forces, rates
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array
+from fieldcal.core.under_way import UnderWay
 from fieldcal.windows import Average
 
 Grade = Literal["tactical", "navigation"]
@@ -62,6 +63,7 @@ class Observations:
     mounting: Array = field(default_factory=lambda: np.eye(3))
     grade: Grade = "tactical"
     nominal: Nominal = field(default_factory=Nominal)
+    under_way: UnderWay = field(default_factory=UnderWay)
 
     def __post_init__(self) -> None:
         n = len(self.positions)
@@ -88,6 +90,7 @@ class Observations:
         mounting: Array | None = None,
         grade: Grade = "tactical",
         nominal: Nominal | None = None,
+        under_way: UnderWay | None = None,
     ) -> Observations:
         """Gather the averages of windows; units and frames as in the attributes."""
         if not averages:
@@ -103,6 +106,7 @@ class Observations:
             np.eye(3) if mounting is None else mounting,
             grade,
             nominal or Nominal(),
+            under_way or UnderWay(),
         )
 
     def __len__(self) -> int:

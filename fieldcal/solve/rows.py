@@ -35,7 +35,9 @@ def of_means(observations: Observations) -> Recorded:
         gamma=third_angles(observations.positions),
         attitude_sigma=attitude_sigmas(observations.positions),
         rate=rates(observations.positions),
-        base_force=force_home(observations.gravity),
+        base_force=force_home(observations.gravity)
+        + observations.under_way.force * [1.0, 0.0, 1.0],
+        transport=observations.under_way.rate,
         mounting=observations.mounting,
         latitude=np.nan if observations.latitude is None else observations.latitude,
     )

@@ -22,8 +22,9 @@ POINTS = 24
 """Variants of a certain explanation that stand for all of them; of one less likely so
 many fewer."""
 
-PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
-"""Their square roots spread points evenly over the causes beyond the first."""
+PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
+"""Their square roots spread points evenly over the causes beyond the first; where there
+are more causes, over several of them alike."""
 
 
 def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Shown]:
@@ -54,7 +55,7 @@ def spread(count: int, points: int = POINTS) -> Array:
     """Points spread evenly over a cube, (points, count); in the middle of one line."""
     if not count:
         return np.full((1, 0), 0.5)
-    step = np.array([1 / points, *np.sqrt(PRIMES[: count - 1])])
+    step = np.array([1 / points, *np.resize(np.sqrt(PRIMES), count - 1)])
     out: Array = (np.arange(points)[:, None] * step + 0.5 / points) % 1.0
     return out
 

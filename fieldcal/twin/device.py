@@ -93,7 +93,12 @@ def device(
             "navigation" if about.grade == "navigation" else "tactical",
         ),
         sampling=Sampling(float(f"{rate_of(source.block):.9g}")),
-        site=Site(about.latitude_deg, about.height_m, about.gravity),
+        site=Site(
+            about.latitude_deg,
+            about.height_m,
+            about.gravity + float(about.under_way.force[1]),
+            *about.velocity,
+        ),
         frame=MountingAxes((about.axes[0], about.axes[1], about.axes[2])),
         range=FullScale(
             about.limits.get("acceleration"), about.limits.get("angular_rate")

@@ -116,7 +116,7 @@ def _heading(fitted: Fitted) -> float:
 
 def _turned(x: Experience, headings: Array) -> Array:
     """The Earth's rate in base axes by heading, (n, 3) rad/s."""
-    east, down, north = earth_rate_home(x.latitude)
+    east, down, north = earth_rate_home(x.latitude) + x.transport
     c, s = np.cos(headings), np.sin(headings)
     return np.column_stack(
         [c * east + s * north, np.full(len(c), down), c * north - s * east]

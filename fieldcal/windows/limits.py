@@ -8,6 +8,9 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
+SWINGS = 16.0
+"""Longest period of swaying, s."""
+
 
 @dataclass(frozen=True, slots=True)
 class StillnessLimits:
@@ -19,6 +22,7 @@ class StillnessLimits:
         device on a running vehicle or in a hand stays below
     acc_drift, gyr_drift : m/s^2, rad/s: largest steady change over a window, which a
         device that warms up stays below
+    settled : s of a window that are not judged yet, for want of what is usual in it
 
     """
 
@@ -26,6 +30,13 @@ class StillnessLimits:
     gyr: float = 0.1
     acc_drift: float = 0.1
     gyr_drift: float = 0.01
+    settled: float = 3.0
+
+    @classmethod
+    def swaying(cls) -> StillnessLimits:
+        """On a base that sways: what goes to and fro in many seconds goes on in few."""
+        still = cls()
+        return cls(acc_drift=2 * still.acc, gyr_drift=2 * still.gyr, settled=SWINGS)
 
     @property
     def noise(self) -> Array:

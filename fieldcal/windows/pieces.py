@@ -16,6 +16,7 @@ import numpy as np
 
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
+from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.mean import Average
 from fieldcal.windows.window import LearnedNoise, Window
 
@@ -36,6 +37,7 @@ class PiecedWindow:
     ----------
     noise : learned in windows before
     grain : what the device rounds to
+    limits : bounds of rest, the usual ones if not given
 
     Attributes
     ----------
@@ -43,11 +45,16 @@ class PiecedWindow:
 
     """
 
-    def __init__(self, noise: LearnedNoise | None, grain: Grain) -> None:
-        self._noise, self._grain = noise, grain
+    def __init__(
+        self,
+        noise: LearnedNoise | None,
+        grain: Grain,
+        limits: StillnessLimits | None = None,
+    ) -> None:
+        self._noise, self._grain, self._limits = noise, grain, limits
         self._kept: Window | None = None
         self._gaps: list[tuple[float, float]] = []
-        self._now = Window(noise=noise, grain=grain)
+        self._now = Window(limits, noise, grain)
         self.dropped = 0.0
 
     def add(self, block: Block) -> None:
@@ -113,7 +120,7 @@ class PiecedWindow:
         learned = piece.noise if piece.seconds >= SHORTEST else self._noise
         if piece.seconds >= SHORTEST:
             self._join(piece)
-        self._now = Window(noise=learned, grain=self._grain)
+        self._now = Window(self._limits, learned, self._grain)
         return self._kept.seconds if self._kept else 0.0
 
     def full(self, seconds: float) -> bool:
@@ -159,7 +166,7 @@ class PiecedWindow:
         return whole if self._agree(before, after) and whole.moved is None else None
 
     def _whole(self, before: Window, after: Window) -> Window:
-        return Window(noise=self._noise, grain=self._grain, pieces=(before, after))
+        return Window(self._limits, self._noise, self._grain, (before, after))
 
     @staticmethod
     def _agree(before: Window, after: Window) -> bool:

@@ -64,6 +64,8 @@ def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
     One for each stretch of up to a minute; none where nothing sways.
 
     """
+    known = np.isfinite(six).all(axis=1)
+    t, six = t[known], six[known]
     parts = max(1, int(np.ceil((t[-1] - t[0]) / WIDEST))) if len(t) > 1 else 1
     found = [
         _stretch(t[some], six[some], scale)
@@ -103,17 +105,15 @@ def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
     """Middles and means (m, 6) of cells in which nothing is missing, and how long."""
     if len(t) < LEAST:
         return None
-    step = float(t[-1] - t[0]) / (len(t) - 1)
+    step = float(np.median(np.diff(t)))
     each = max(1, round(CELL / step))
     count = len(t) // each
     if count < LEAST:
         return None
     y = six[: count * each].reshape(count, each, 6).mean(axis=1)
-    at = t[: count * each].reshape(count, each).mean(axis=1)
-    whole = np.isfinite(y).all(axis=1)
-    if whole.sum() < max(LEAST, 0.7 * count):
-        return None
-    return at[whole], y[whole], each * step
+    own = t[: count * each].reshape(count, each)
+    whole = np.ptp(own, axis=1) < (each + 0.5) * step  # none across a gap
+    return own.mean(axis=1)[whole], y[whole], each * step
 
 
 def _swings(rate: Array, length: float) -> bool:

@@ -22,9 +22,6 @@ THRESHOLD = 5.8
 EARLY = 8.0
 """The threshold is twice as high in a window this long, s, for lack of data."""
 
-FEWEST = 30
-"""Cells whose own noise is known well enough to judge them."""
-
 ROUNDED = 1e-6
 """Relative error of a mean of equal values, of which a jump of one step consists."""
 
@@ -105,7 +102,7 @@ def judge(
     `shows` (6,) are jumps that come of rounding alone, where the device tells them.
     """
     m = cells.whole
-    if m < FEWEST:
+    if m < limits.settled / CELL:
         scatter = np.nan_to_num(cells.means[:m]).std(axis=0) if m else np.zeros(6)
         return Verdict(_beyond_noise(cells, scatter, limits), 0.0, before)
     means = cells.steady[:m]

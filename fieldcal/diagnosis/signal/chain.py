@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.frames import earth_rate_home, force_home
 from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.effects import catalogue
@@ -189,8 +188,8 @@ def recording(
         about.gravity,
         gamma=gamma,
         rate=table_rate(about, np.arange(len(alpha))),
-        base_force=force_home(about.gravity),
-        base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
+        base_force=about.base_force,
+        base_rate=about.base_rate,
         mounting=about.mounting,
         latitude=about.latitude,
     )

@@ -82,7 +82,7 @@ def late(x: Experience, alpha: Array, beta: Array) -> Experience:
         heating=x.heating[last], variance=x.variance[last],
         position=np.full(len(alpha), -1), base_force=x.base_force,
         base_rate=x.base_rate, mounting=x.mounting, latitude=x.latitude,
-        gravity_sigma=x.gravity_sigma,
+        gravity_sigma=x.gravity_sigma, transport=x.transport,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.frames import EARTH_RATE, earth_rate_home, force_home
+from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.positions import angles, attitude_sigmas, rates, third_angles
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.noise import rounding
@@ -224,8 +224,9 @@ def averaged(
         variance=np.nan_to_num(variance),
         position=position,
         rate=table_rate(about, position),
-        base_force=force_home(about.gravity),
-        base_rate=earth_rate_home(about.latitude) * (about.grade == "navigation"),
+        base_force=about.base_force,
+        base_rate=about.base_rate,
+        transport=about.under_way.rate,
         mounting=about.mounting,
         latitude=about.latitude,
         gravity_sigma=gravity_sigma(about),

@@ -10,6 +10,7 @@ way is then that between two attitudes at rest.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,9 +89,11 @@ def swaying(block: Block, about: Description) -> Swaying | None:
     if np.sqrt((amplitude**2).mean()) < WIDE:
         return None
     hz = np.sqrt(sizes[:, 1] / sizes[:, 0]) / (2 * np.pi)
-    left = np.zeros((len(windows), 6))
-    for p, some in found.items():
-        left[p] = sum(w.left for w in some) / len(some) ** 2
+    left = np.array([
+        sum(w.left for w in found[p]) / len(found[p]) ** 2 if p in found
+        else _at_ends(sizes.mean(axis=0), block.t[a:b], about.gravity)
+        for p, (a, b) in enumerate(windows)
+    ])  # fmt: skip
     root = np.sqrt(max(len(found) - 1, 1))
     return Swaying(
         _at_rest(block, windows, found, scale),
@@ -100,6 +103,16 @@ def swaying(block: Block, about: Description) -> Swaying | None:
         (float(amplitude.std() / root), float(hz.std() / root)),
         max(needed(w) for some in found.values() for w in some),
     )
+
+
+def _at_ends(size: Array, t: Array, gravity: float) -> Array:
+    """Variance (6,) of means of a window that does not show the swaying by itself.
+
+    The mean of a wave is what its ends leave of it, sqrt(2) of its size over w T.
+    """
+    length = float(np.ptp(t)) if len(t) > 1 else np.inf
+    turned = 2 * size[0] / max(size[1] / size[0], 1e-12) / length**2
+    return np.repeat([gravity**2 * turned, 2 * size[0] / length**2], 3)
 
 
 def _fixed(about: Description) -> bool:
@@ -116,12 +129,13 @@ def _at_rest(
     six, rate = block.six, rate_of(block)
     for p, some in found.items():
         a, b = (int(i) for i in windows[p])
-        for part, waves in zip(np.array_split(np.arange(a, b), len(some)), some,
-                               strict=True):  # fmt: skip
-            six[part] -= waves.of(block.t[part])
+        middles = [(u.span[1] + v.span[0]) / 2 for u, v in pairwise(some)]
+        edges = [a, *np.searchsorted(block.t, middles).tolist(), b]
+        for waves, (first, last) in zip(some, pairwise(edges), strict=True):
+            six[first:last] -= waves.of(block.t[first:last])
     few = max(1, round(TURN_S * rate))
     ordered = sorted((int(a), int(b), p) for p, (a, b) in enumerate(windows) if b > a)
-    for (_, end, p), (start, _, q) in zip(ordered, ordered[1:], strict=False):
+    for (_, end, p), (start, _, q) in pairwise(ordered):
         if start - end < 4 * few:
             continue
         if p in found:

@@ -13,6 +13,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
 from fieldcal.evaluation.observations import rests
 from fieldcal.evaluation.solution import solved
+from fieldcal.model.rows.swaying import swaying
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import profile as device
@@ -103,6 +104,29 @@ def test_means_of_windows_pull_right(tmp_path: Path) -> None:
             pulls.append((one.mean - other.mean) / one.sigma)
     # the same noise is in both, so what is left is what swaying adds
     assert np.sqrt((np.array(pulls) ** 2).mean()) < 0.9
+
+
+def test_a_window_too_short_to_show_it_is_as_uncertain_as_its_ends(
+    tmp_path: Path,
+) -> None:
+    """Ten seconds of a swell of ten; the other windows show that the base sways."""
+    block = played(2, "sway:amplitude_deg=1,hz=0.1,azimuth_deg=30")
+    places = positions()
+    places[2]["end_s"] = places[2]["start_s"] + 8.0
+    short = Session.open(write_session(tmp_path / "s", block, places))
+    found = swaying(block, short.about)
+    assert found is not None and found.left[2, 0] > 100 * found.left[1, 0]
+    still = rests(short)  # eight seconds of it creep, and are no rest
+    assert 2 not in still.rows and any("position 3" in w for w in still.warnings)
+
+
+def test_samples_that_are_left_out_part_a_window(tmp_path: Path) -> None:
+    block = played(2, IRREGULAR.format(40, 30))
+    gap = (block.t > 15.0) & (block.t < 19.0)
+    block.acc[gap] = block.gyr[gap] = np.nan
+    plain = rests(session(tmp_path / "plain", played(2))).averages[0]
+    found = rests(session(tmp_path / "gap", block)).averages[0]
+    assert (np.abs(found.mean - plain.mean) < 3 * found.sigma).all()
 
 
 def test_a_device_in_a_hand_is_on_no_base(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import Prepared, prepare
 from fieldcal.diagnosis.verdict import concluded
 from fieldcal.model.rows.reduce import rate_of, spans
-from fieldcal.physics.recording import lsb_of
+from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 from fieldcal.windows.noise import short_lag
 
@@ -85,7 +85,7 @@ def side(
         prepared = _from_one_temperature(prepared, beside.explanation.prepared)
     explanation = explain(prepared)
     found = concluded(heard, explanation)
-    steps = np.array([lsb_of(column) for column in block.six.T])
+    steps = grids_of(block)
     return Side(
         name, block, explanation, found, noise, unsure, steps, rate_of(block), quieted
     )

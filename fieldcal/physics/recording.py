@@ -136,10 +136,8 @@ def lsb_of(values: Array) -> float:
     >>> round(lsb_of(np.array([0.5, 1.25, -0.25, 1.0])), 12)
     0.25
     """
-    some = values[:ENOUGH]
-    some = some[np.isfinite(some)]
-    if len(some) < min(ENOUGH, len(values)):
-        some = values[np.isfinite(values)][:ENOUGH]
+    some = values[np.isfinite(values)]
+    some = some[:: max(1, len(some) // ENOUGH)]  # one rest may show two values alone
     distinct = np.unique(some[some != 0.0])
     gaps = np.diff(distinct)
     gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]

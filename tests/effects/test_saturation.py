@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.effects.saturation import rails
+from fieldcal.physics.recording import lsb_of
 
 STEP = 1e-3
 
@@ -41,3 +42,14 @@ def test_the_declared_range_needs_no_more_than_a_few() -> None:
     values = np.concatenate([np.linspace(-1.0, 8.0, 500), np.full(5, 9.8)])
     assert [len(at) for at in rails(values, 9.8)] == [5]
     assert not rails(values, 19.6)
+
+
+def test_a_coarse_step_is_known_though_the_first_rest_shows_two_values() -> None:
+    """A device on one face for minutes: its other positions show the grid."""
+    rng = np.random.default_rng(3)
+    held = np.repeat([9.79, 0.0, -9.79, 6.92, -6.92], 22_000)
+    step = 0.037
+    values = np.round((held + rng.normal(0, 0.2 * step, len(held))) / step) * step
+    assert len(np.unique(values[:20_000])) == 2
+    assert lsb_of(values) == pytest.approx(step, rel=1e-9)
+    assert rails(values, np.nan) and not rails(values, np.nan, coarse=True)

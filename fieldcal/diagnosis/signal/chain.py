@@ -19,7 +19,7 @@ from fieldcal.model.rows.reduce import masked, rate_of, spans, table_rate
 from fieldcal.model.rows.vibration import usual_noise
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.recording import CheckedSamples, Fault, lsb_of
+from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
 from fieldcal.session.description import Description
 from fieldcal.windows.noise import ChannelNoise
 
@@ -202,7 +202,7 @@ def recording(
         bias=np.concatenate([about.nominal["acc_bias"], about.nominal["gyr_bias"]]),
         noise=noise.white,
         quick=noise.quick,
-        steps=np.array([lsb_of(c) for c in (*block.acc.T, *block.gyr.T)]),
+        steps=grids_of(block),
         limits=np.array(limits),
         rate_hz=about.rate_hz or np.nan,
     )

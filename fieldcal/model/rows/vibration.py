@@ -69,7 +69,9 @@ def shaking(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Shaking:
     six = block.six if loud.any() else np.empty((0, 6))
     for i in np.flatnonzero(loud).tolist():
         a, b = windows[i]
-        variance[i] = np.nan_to_num(np.nanvar(block.acc[a:b], axis=0))
+        seen = np.isfinite(block.acc[a:b]).any(axis=0)
+        variance[i] = 0.0
+        variance[i, seen] = np.nanvar(block.acc[a:b, seen], axis=0)
         six[a:b] = without_lines(six[a:b], rate_hz)
     if loud.any():
         block = replace(block, acc=six[:, :3], gyr=six[:, 3:])

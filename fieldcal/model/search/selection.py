@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
@@ -44,7 +45,22 @@ class Search(Offers):
             if better.score <= best.score + SETTLED:
                 break
             best = better
-        return best
+        return self._of_effects(best)
+
+    def _of_effects(self, best: Set) -> Set:
+        """The best set of effects alone, where that it is no effect is unlikely.
+
+        Alone it may be the likeliest, and still several effects that do the same,
+        each a little less likely, are likelier together: those are to be told.
+        """
+        if not _strange(best):
+            return best
+        every = list(self.visited.values())
+        score = np.array([one.score for one in every])
+        share = np.exp(score - np.logaddexp.reduce(score))
+        if share[[_strange(one) for one in every]].sum() >= thresholds.NAMED:
+            return best
+        return max((one for one in every if not _strange(one)), key=_score)
 
     def _step(self, there: Set) -> Set:
         """The best of the set with one or two more, with one less, or with one else."""
@@ -154,6 +170,11 @@ def _whole(cause: Cause, group: Group) -> Group:
     whole = cause.variants[0]
     part = not group.shape and set(group.params) < set(whole.params)
     return whole if part else group
+
+
+def _strange(one: Set) -> bool:
+    """Whether a set has a cause that is no effect."""
+    return any(cause.kind == "unknown" for cause, _ in one.members)
 
 
 def _score(one: Set) -> float:

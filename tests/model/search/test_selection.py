@@ -246,3 +246,21 @@ def test_an_offer_foretells_the_set_with_it() -> None:
         predicted = offer.score
         assert search.taken(empty, offer).score == pytest.approx(predicted, rel=1e-9)
         assert offer.size == search.taken(empty, offer).sizes.members[0]
+
+
+@pytest.mark.parametrize(
+    ("worth", "told"), [((-0.1, -0.6), "angle_offset"), ((-2.0, -3.0), "alpha:ay")]
+)
+def test_several_effects_are_likelier_than_a_function_that_none_makes(
+    worth: tuple[float, float], told: str
+) -> None:
+    """Together, though each alone is a little less likely than it."""
+    search = SESSION.search(np.zeros((len(SESSION.dictionary.x), 6)))
+    empty = search.evaluated(())
+    scores = {"alpha:ay": 0.0, "angle_offset": worth[0], "settling:acc": worth[1]}
+    sets = {k: replace(empty, members=(there(k),), score=v) for k, v in scores.items()}
+    assert CAUSES["alpha:ay"].kind == "unknown"
+    search.visited = {search.key(s.members): s for s in sets.values()}
+    search.visited[()] = replace(empty, score=-9.0)
+    assert search._of_effects(sets["alpha:ay"]) is sets[told]
+    assert search._of_effects(sets["settling:acc"]) is sets["settling:acc"]

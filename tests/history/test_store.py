@@ -10,6 +10,7 @@ import socket
 import sqlite3
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -228,8 +229,10 @@ class Server:
     def _call(self, name: str, *words: str) -> None:
         as_user = []
         if os.geteuid() == 0:
-            for part in (self.folder, *list(self.folder.parents)[:3]):
-                part.chmod(0o755)
+            ours = Path(tempfile.gettempdir()).resolve()
+            for part in self.folder.resolve().parents:
+                if ours in part.parents:  # the way there, however deep
+                    part.chmod(0o755)
             shutil.chown(self.folder, "nobody")
             self.folder.chmod(0o700)
             as_user = ["runuser", "-u", "nobody", "--"]
@@ -237,7 +240,9 @@ class Server:
         subprocess.run(call, check=True, stdout=subprocess.DEVNULL, cwd="/")
 
     def start(self) -> None:
-        options = f"-p {self.port} -k {self.folder} -c listen_addresses=127.0.0.1"
+        # no socket in the folder: its name may be longer than a socket's can be
+        options = f"-p {self.port} -c unix_socket_directories= "
+        options += "-c listen_addresses=127.0.0.1"
         self._call("pg_ctl", "-w", "-s", "-l", str(self.folder / "log"),
                    "-o", options, "start")  # fmt: skip
 

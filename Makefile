@@ -16,11 +16,11 @@ demo: $(READY)
 
 # two processes that wait for devices, and two that calculate meanwhile
 test: $(DEV)
-	$(BIN)/python -m pytest -q -n 6
+	$(BIN)/python -m pytest -q -n 4
 
 # the whole catalogue and every seed, before a release or where diagnosis was changed
 test-all: $(DEV)
-	$(BIN)/python -m pytest -q -n 6 --all
+	$(BIN)/python -m pytest -q -n 4 --all
 
 # faults put into the formulas one by one, and whether the tests of the same room notice;
 # `make mutants-core` does one room; hours for all, so not in CI. DRAW=150 draws so many of

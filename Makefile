@@ -14,13 +14,13 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 demo: $(READY)
 	@$(BIN)/fieldcal run five_position --virtual="--base-tilt=1,-1" --speed 20
 
-# two processes that wait for devices, and two that calculate meanwhile
+# a process that waits for devices, and two that calculate meanwhile
 test: $(DEV)
-	$(BIN)/python -m pytest -q -n 4
+	$(BIN)/python -m pytest -q -n 3
 
 # the whole catalogue and every seed, before a release or where diagnosis was changed
 test-all: $(DEV)
-	$(BIN)/python -m pytest -q -n 4 --all
+	$(BIN)/python -m pytest -q -n 3 --all
 
 # faults put into the formulas one by one, and whether the tests of the same room notice;
 # `make mutants-core` does one room; hours for all, so not in CI. DRAW=150 draws so many of

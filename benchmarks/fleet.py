@@ -25,10 +25,10 @@ import tomlkit
 
 from fieldcal.calibration import limits
 from fieldcal.core.samples import Array
-from fieldcal.fleet.batch import Batch
+from fieldcal.fleet.batch import SessionBatch
 from fieldcal.fleet.lot import lot
-from fieldcal.fleet.outcome import Task
-from fieldcal.fleet.reduced import Reduced
+from fieldcal.fleet.outcome import SessionTask
+from fieldcal.fleet.reduced import ReducedSession
 from fieldcal.fleet.shared import SharedFinding, SharedSearch
 from fieldcal.fleet.tree import sessions_in
 from fieldcal.fleet.workers import processes
@@ -85,7 +85,7 @@ def batch(place: Path, count: int) -> list[StoredSession]:
     for i in range(count):
         recorded(place / "tree" / f"{i // 100}" / f"{i}", seed=i)
     folders = sessions_in([place / "tree"])
-    own = Batch(folders, Killing(), Database(place / "store.sqlite"))
+    own = SessionBatch(folders, Killing(), Database(place / "store.sqlite"))
     jobs = os.cpu_count() or 1
     begun = perf_counter()
     for _ in own.carried_out(own.left(), processes(jobs)):
@@ -106,7 +106,7 @@ def batch(place: Path, count: int) -> list[StoredSession]:
     return rows
 
 
-class Killing(Task):
+class Killing(SessionTask):
     """A task whose process is killed once, amid a session; notes what each takes."""
 
     def __call__(self, folder: str) -> StoredSession:
@@ -132,7 +132,7 @@ def tilted(place: Path, count: int = 12) -> None:
         effects = (common, *((effect("base_tilt", tilt),) if tilt else ()))
         recorded(place / f"{i}", i, station, effects)
     database = Database(place / "store.sqlite")
-    own = Batch(sessions_in([place]), Task(), database)
+    own = SessionBatch(sessions_in([place]), SessionTask(), database)
     alone: Counter[str] = Counter()
     for _ in own.carried_out(own.left(), processes(os.cpu_count() or 1)):
         pass
@@ -226,7 +226,7 @@ def lots() -> None:
 
 
 def drawn(
-    rng: np.random.Generator, known: list[Reduced], u: Array, stations: int
+    rng: np.random.Generator, known: list[ReducedSession], u: Array, stations: int
 ) -> Iterator[StoredSession]:
     """Sessions of one device, ten a station, with the information of recorded ones.
 
@@ -247,7 +247,7 @@ def drawn(
 def shared(rows: list[StoredSession]) -> None:
     """How often an effect is named with its level."""
     rng = np.random.default_rng(2)
-    known = [Reduced.from_bytes(r.reduced) for r in rows[:8] if r.reduced]
+    known = [ReducedSession.from_bytes(r.reduced) for r in rows[:8] if r.reduced]
     columns = known[0].columns
     known = [one for one in known if one.columns == columns]
     number = {(c.effect, c.name): i for i, c in enumerate(columns) if not c.shape}

@@ -15,7 +15,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.shown import one_line
 
 if TYPE_CHECKING:
-    from fieldcal.fleet.batch import Batch
+    from fieldcal.fleet.batch import SessionBatch
     from fieldcal.fleet.workers import Pool
     from fieldcal.history.sessions import StoredSession
 
@@ -62,16 +62,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command: 0 all good, 1 some are not, or have no result."""
-    from fieldcal.fleet.batch import Batch
-    from fieldcal.fleet.outcome import Task
+    from fieldcal.fleet.batch import SessionBatch
+    from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
     from fieldcal.history.place import default_place
 
     limits = str(args.limits.resolve()) if args.limits else None
-    batch = Batch(
+    batch = SessionBatch(
         sessions_in(args.folders),
-        Task(args.diagnose, limits),
+        SessionTask(args.diagnose, limits),
         Database(args.history or default_place()),
     )
     every = [str(folder) for folder in batch.folders]
@@ -104,7 +104,7 @@ def pool_of(args: argparse.Namespace) -> Iterator[Pool]:
         yield processes(args.jobs or os.cpu_count() or 1, ["fieldcal.fleet.outcome"])
 
 
-def carried_out(batch: Batch, left: list[str], pool: Pool) -> None:
+def carried_out(batch: SessionBatch, left: list[str], pool: Pool) -> None:
     """Do what is left, with a bar that says how quick and how long still."""
     from rich import progress
 
@@ -129,7 +129,7 @@ def carried_out(batch: Batch, left: list[str], pool: Pool) -> None:
                 bar.console.print(one_line(one.error), soft_wrap=True)
 
 
-def _said(args: argparse.Namespace, batch: Batch, done: int) -> int:
+def _said(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:
     rows = [one for some in batch.stored() for one in some]
     failed = [one for one in rows if one.error]
     solved = [one for one in rows if not one.error]

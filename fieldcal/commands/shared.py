@@ -62,15 +62,17 @@ def _reduced(args: argparse.Namespace) -> list[StoredSession]:
 
     """
     from fieldcal.commands.batch import carried_out, pool_of
-    from fieldcal.fleet.batch import Batch
-    from fieldcal.fleet.outcome import Task
+    from fieldcal.fleet.batch import SessionBatch
+    from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
     from fieldcal.history.place import default_place
 
     folders = sessions_in(args.sessions)
     database = Database(args.history or default_place())
-    plain, diagnosed = (Batch(folders, Task(d), database) for d in (False, True))
+    plain, diagnosed = (
+        SessionBatch(folders, SessionTask(d), database) for d in (False, True)
+    )
     known = set(diagnosed.left())
     left = [folder for folder in plain.left() if folder in known]
     if left:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fieldcal.fleet.outcome import Task
+from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.fleet.workers import Pool, results
 from fieldcal.history import sessions
@@ -21,7 +21,7 @@ CHUNK = 500
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class SessionBatch:
     """What is to be done.
 
     Attributes
@@ -33,7 +33,7 @@ class Batch:
     """
 
     folders: Sequence[Path]
-    task: Task
+    task: SessionTask
     database: Database
 
     def left(self) -> list[str]:

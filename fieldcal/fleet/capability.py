@@ -20,7 +20,7 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import ParameterName
 from fieldcal.core.samples import Array, Index
 from fieldcal.fleet.control import ControlChart, cusum, ewma
-from fieldcal.fleet.spread import Spread, spread
+from fieldcal.fleet.spread import UnitSpread, spread
 
 FALSE_ALARM = 0.05
 """Chance of a false alarm of any control chart over the whole lot."""
@@ -50,7 +50,7 @@ class LotParameter:
     units: Index
     x: Array
     sigma: Array
-    about: Spread
+    about: UnitSpread
     tolerance: float | None
     cp: float | None
     cpk: float | None

@@ -112,7 +112,7 @@ class Member:
 
 
 @dataclass(frozen=True, slots=True)
-class Weighed:
+class WeighedMembers:
     """Members with their sizes at the likeliest.
 
     Attributes
@@ -151,7 +151,7 @@ class Sessions:
     def __init__(self, matrix: Array, pull: Array) -> None:
         self.matrix, self.pull = matrix, pull
 
-    def weighed(self, members: Sequence[Member]) -> Weighed:
+    def weighed(self, members: Sequence[Member]) -> WeighedMembers:
         """A set with its sizes sought one beside the others."""
         inner, pull, places = self._together(members)
         sizes = [EVEN] * len(members)
@@ -168,9 +168,9 @@ class Sessions:
         score, mean, covariance = _solved(inner, pull, self._spread(wide, places))
         score += sum(float(DENSITY[i]) for i in sizes)
         score += sum(float(np.logaddexp.reduce(p - p.max())) for p in profiles)
-        return Weighed(tuple(members), tuple(wide), score, mean, covariance)
+        return WeighedMembers(tuple(members), tuple(wide), score, mean, covariance)
 
-    def offered(self, base: Weighed, member: Member) -> float:
+    def offered(self, base: WeighedMembers, member: Member) -> float:
         """What a further member adds to a set's score with its sizes as they are."""
         if not base.members:
             blocks = self._blocks(member)

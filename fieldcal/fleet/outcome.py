@@ -21,7 +21,7 @@ from fieldcal.session.folder import Session
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class SessionTask:
     """What is to be done with each session.
 
     Attributes

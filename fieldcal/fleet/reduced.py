@@ -33,7 +33,7 @@ CLOSE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class SharedColumn:
     """A parameter of an effect.
 
     Attributes
@@ -60,7 +60,7 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True)
-class Reduced:
+class ReducedSession:
     """One session.
 
     Attributes
@@ -70,7 +70,7 @@ class Reduced:
 
     """
 
-    columns: tuple[Column, ...]
+    columns: tuple[SharedColumn, ...]
     matrix: Array
     pull: Array
 
@@ -85,11 +85,13 @@ class Reduced:
         return out.getvalue()
 
     @classmethod
-    def from_bytes(cls, data: bytes) -> Reduced:
+    def from_bytes(cls, data: bytes) -> ReducedSession:
         """The same from what the store keeps."""
         with np.load(io.BytesIO(data), allow_pickle=False) as kept:
             told = json.loads(kept["columns"].tobytes())
-            columns = tuple(Column(**c | {"variants": (*c["variants"],)}) for c in told)
+            columns = tuple(
+                SharedColumn(**c | {"variants": (*c["variants"],)}) for c in told
+            )
             size = len(columns)
             matrix = np.zeros((size, size))
             matrix[np.triu_indices(size)] = kept["matrix"]
@@ -97,7 +99,7 @@ class Reduced:
             return cls(columns, matrix, kept["pull"])
 
 
-def reduced(explanation: Explanation) -> Reduced:
+def reduced(explanation: Explanation) -> ReducedSession:
     """Reduce a session that was explained, (1)."""
     search, best = explanation.posterior.search, explanation.inferred.best
     wide, _ = search.opened(best)
@@ -121,7 +123,7 @@ def reduced(explanation: Explanation) -> Reduced:
     typical = np.concatenate([np.empty(0), *(g.typical for _, _, g in groups)])
     matrix, pull = less.rest(columns, typical)
     named = [c for cause, shape, g in groups for c in _named(cause, shape, g)]
-    return Reduced(tuple(named), 0.5 * (matrix + matrix.T), pull)
+    return ReducedSession(tuple(named), 0.5 * (matrix + matrix.T), pull)
 
 
 def _shareable(cause: Cause) -> bool:
@@ -151,10 +153,10 @@ def _groups(cause: Cause) -> Iterator[tuple[Cause, str, Group]]:
         yield cause, f"{2.0**power:g} s", group
 
 
-def _named(cause: Cause, shape: str, group: Group) -> Iterator[Column]:
+def _named(cause: Cause, shape: str, group: Group) -> Iterator[SharedColumn]:
     if group.effect is None:
         for i in range(len(group.columns)):
-            yield Column(
+            yield SharedColumn(
                 cause.name, cause.part, "", str(i), "", 1.0, cause.chance, own=True
             )
         return
@@ -162,7 +164,7 @@ def _named(cause: Cause, shape: str, group: Group) -> Iterator[Column]:
     for index in group.params:
         p = group.effect.params[index]
         having = tuple(i for i, part in enumerate(parts) if index in part)
-        yield Column(
+        yield SharedColumn(
             cause.name, cause.part, shape, p.name, p.unit, p.typical, cause.chance,
             having,
         )  # fmt: skip

@@ -15,8 +15,8 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.fleet.levels import Grouping, Member, Sessions, Weighed, groupings
-from fieldcal.fleet.reduced import Column, Reduced
+from fieldcal.fleet.levels import Grouping, Member, Sessions, WeighedMembers, groupings
+from fieldcal.fleet.reduced import ReducedSession, SharedColumn
 from fieldcal.history.sessions import LEVELS, StoredSession
 from fieldcal.model import priors, thresholds
 
@@ -47,7 +47,7 @@ class SharedEffect:
 
     key: Key
     shape: str
-    columns: tuple[Column, ...]
+    columns: tuple[SharedColumn, ...]
     member: Member
     chance: float
     among: float
@@ -113,7 +113,9 @@ class SharedSearch:
     """
 
     def __init__(self, sessions: Sequence[StoredSession]) -> None:
-        some = [Reduced.from_bytes(one.reduced) for one in sessions if one.reduced]
+        some = [
+            ReducedSession.from_bytes(one.reduced) for one in sessions if one.reduced
+        ]
         if len(some) < len(sessions):
             bad = next(one.folder for one in sessions if not one.reduced)
             raise InputError(
@@ -126,9 +128,9 @@ class SharedSearch:
         self.sessions = Sessions(matrix, pull)
         self.candidates = list(self._candidates(columns))
         self.candidates += _unexplained(columns, matrix, self.groupings)
-        self.visited: dict[frozenset[int], tuple[float, Weighed]] = {}
+        self.visited: dict[frozenset[int], tuple[float, WeighedMembers]] = {}
 
-    def _candidates(self, columns: Sequence[Column]) -> list[SharedEffect]:
+    def _candidates(self, columns: Sequence[SharedColumn]) -> list[SharedEffect]:
         parts: dict[Key, dict[tuple[str, int], list[int]]] = {}
         for i, c in enumerate(columns):
             for variant in () if c.own else c.variants:
@@ -252,7 +254,7 @@ class SharedSearch:
 
 
 def _unexplained(
-    columns: Sequence[Column], matrix: Array, levels: Sequence[Grouping]
+    columns: Sequence[SharedColumn], matrix: Array, levels: Sequence[Grouping]
 ) -> Iterator[SharedEffect]:
     """Functions without physics, each of those sessions that had it alone."""
     sessions = next(level for level in levels if "session" in level.names)
@@ -270,13 +272,13 @@ def _unexplained(
         )  # fmt: skip
 
 
-def together(some: Sequence[Reduced]) -> tuple[list[Column], Array, Array]:
+def together(some: Sequence[ReducedSession]) -> tuple[list[SharedColumn], Array, Array]:
     """Columns of all sessions, M (s, k, k) and q (s, k); nothing where one has none.
 
     Of an effect with a time constant only those count that all sessions have that
     have the effect: it may be there at another.
     """
-    every: dict[tuple[str, str, str, str], Column] = {}
+    every: dict[tuple[str, str, str, str], SharedColumn] = {}
     having: dict[tuple[str, str], int] = {}
     count: dict[tuple[str, str, str, str], int] = {}
     for one in some:
@@ -300,7 +302,7 @@ def together(some: Sequence[Reduced]) -> tuple[list[Column], Array, Array]:
     return [every[key] for key in names], matrix, pull
 
 
-def _key(c: Column) -> tuple[str, str, str, str]:
+def _key(c: SharedColumn) -> tuple[str, str, str, str]:
     return (c.effect, c.part, c.shape, c.name)
 
 

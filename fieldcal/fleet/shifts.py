@@ -18,8 +18,8 @@ from itertools import combinations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.fleet.levels import Grouping, Member, Sessions, Weighed
-from fieldcal.fleet.spread import Spread
+from fieldcal.fleet.levels import Grouping, Member, Sessions, WeighedMembers
+from fieldcal.fleet.spread import UnitSpread
 from fieldcal.model import thresholds
 
 CHANCE = 0.03
@@ -60,7 +60,7 @@ def shifts(
     parameter: str,
     x: Array,
     sigma: Array,
-    about: Spread,
+    about: UnitSpread,
     levels: Sequence[Grouping],
 ) -> list[Shift]:
     """Levels that shift a parameter more likely than not, the likeliest first.
@@ -76,7 +76,7 @@ def shifts(
     size = about.spread or float(np.median(sigma))
     everyone = Grouping.of("all", ["all"] * len(x))
     sets = [c for k in range(TOGETHER + 1) for c in combinations(range(len(levels)), k)]
-    scores, found = np.zeros(len(sets)), dict[tuple[int, ...], Weighed]()
+    scores, found = np.zeros(len(sets)), dict[tuple[int, ...], WeighedMembers]()
     for number, some in enumerate(sets):
         members = [Member(COLUMN, g) for g in (everyone, *(levels[i] for i in some))]
         each = [_at(x, sigma, about, size, ratio, members) for ratio in SPREADS]
@@ -107,11 +107,11 @@ def shifts(
 def _at(
     x: Array,
     sigma: Array,
-    about: Spread,
+    about: UnitSpread,
     size: float,
     ratio: float,
     members: Sequence[Member],
-) -> tuple[float, Weighed]:
+) -> tuple[float, WeighedMembers]:
     """Evidence of a set where units differ by some part of the spread besides."""
     variance = (ratio * about.spread) ** 2 + sigma**2
     weight = about.typical / variance

@@ -43,7 +43,7 @@ WITHIN = 1.92
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class UnitSpread:
     """What most units are.
 
     Attributes
@@ -72,7 +72,7 @@ class Spread:
         return out
 
 
-def spread(x: Array, sigma: Array) -> Spread:
+def spread(x: Array, sigma: Array) -> UnitSpread:
     """The spread of values (n,) whose uncertainties are (n,); n is two or more."""
     scale = 1.4826 * float(np.median(np.abs(x - np.median(x))))
     scale = scale or float(np.std(x)) or float(np.median(sigma))
@@ -93,7 +93,7 @@ def spread(x: Array, sigma: Array) -> Spread:
     best = int(np.argmax(likely))
     inside = tried[likely > likely[best] - WITHIN]
     off = np.sqrt(variance[best] + 1 / told[best])
-    return Spread(
+    return UnitSpread(
         float(middle[best]),
         float(told[best] ** -0.5),
         float(tried[best]),

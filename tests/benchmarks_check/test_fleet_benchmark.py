@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.fleet import drawn, units
-from fieldcal.fleet.reduced import Column, Reduced
+from fieldcal.fleet.reduced import ReducedSession, SharedColumn
 from fieldcal.history import sessions
 
 
@@ -24,13 +24,13 @@ def test_units_are_odd_and_shifted_as_often_as_said() -> None:
 
 def test_sessions_are_drawn_with_the_information_of_recorded_ones() -> None:
     rng = np.random.default_rng(2)
-    columns = tuple(Column("cubic", "", "", n, "1", 1.0, 0.01) for n in "xy")
+    columns = tuple(SharedColumn("cubic", "", "", n, "1", 1.0, 0.01) for n in "xy")
     matrix = np.array([[4.0, 1.0], [1.0, 3.0]])
     there = np.tile([2.0, -1.0], (800, 1))
-    known = [Reduced(columns, matrix, np.zeros(2))]
+    known = [ReducedSession(columns, matrix, np.zeros(2))]
     pulls = np.array(
         [
-            Reduced.from_bytes(one.reduced or b"").pull
+            ReducedSession.from_bytes(one.reduced or b"").pull
             for one in drawn(rng, known, there, 5)
         ]
     )

@@ -15,9 +15,9 @@ from session_folders import places, recorded, write_session
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.commands import batch as command
-from fieldcal.fleet.batch import Batch
-from fieldcal.fleet.outcome import Task
-from fieldcal.fleet.reduced import Reduced
+from fieldcal.fleet.batch import SessionBatch
+from fieldcal.fleet.outcome import SessionTask
+from fieldcal.fleet.reduced import ReducedSession
 from fieldcal.fleet.tree import fingerprint, sessions_in
 from fieldcal.fleet.workers import Pool
 from fieldcal.history import sessions
@@ -84,10 +84,12 @@ def test_a_tree_is_solved_and_what_is_broken_has_a_row(
     kept = Database(store).done(
         lambda db: sessions.found(db, {"lot": "L7"}, None, True)
     )
-    small = Reduced.from_bytes(kept[0].reduced or b"")
+    small = ReducedSession.from_bytes(kept[0].reduced or b"")
     assert {c.effect for c in small.columns} >= {"cross_coupling", "g_sensitivity"}
     assert np.linalg.eigvalsh(small.matrix)[0] > -1e-6 * np.trace(small.matrix)
-    np.testing.assert_array_equal(Reduced.from_bytes(small.to_bytes()).pull, small.pull)
+    np.testing.assert_array_equal(
+        ReducedSession.from_bytes(small.to_bytes()).pull, small.pull
+    )
 
 
 def quick(folder: str) -> sessions.StoredSession:
@@ -95,7 +97,7 @@ def quick(folder: str) -> sessions.StoredSession:
     return sessions.StoredSession(folder, fingerprint=fingerprint(Path(folder)))
 
 
-class Quick(Task):
+class Quick(SessionTask):
     """A task that only looks."""
 
     @property
@@ -113,7 +115,7 @@ def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
     shutil.copytree(tree, copy)
     found = sessions_in([copy, copy / "x"])
     assert len(found) == 3, "each once"
-    batch = Batch(found, Quick(), Database(tmp_path / "h"))
+    batch = SessionBatch(found, Quick(), Database(tmp_path / "h"))
     done = batch.carried_out(batch.left(), Pool(lambda: ThreadPoolExecutor(1), 1))
     first = next(done).folder
     done.close()

@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from fieldcal.fleet.levels import Grouping, Member, Sessions, groupings
-from fieldcal.fleet.reduced import Column, Reduced
+from fieldcal.fleet.reduced import ReducedSession, SharedColumn
 from fieldcal.fleet.shared import SharedFinding, SharedSearch, together
 from fieldcal.history.sessions import StoredSession
 from fieldcal.model import priors
@@ -114,8 +114,8 @@ def test_what_a_further_effect_adds_is_exact_beside_the_others() -> None:
 NAMES = ("cross_coupling", "g_sensitivity", "base_tilt")
 
 
-def column(effect: str, name: str) -> Column:
-    return Column(effect, "", "", name, "1", 1e-3, 0.01)
+def column(effect: str, name: str) -> SharedColumn:
+    return SharedColumn(effect, "", "", name, "1", 1e-3, 0.01)
 
 
 COLUMNS = tuple(column(effect, name) for effect in NAMES for name in ("x", "y"))
@@ -135,7 +135,7 @@ def fleet(
         station = "PQRS"[rng.integers(4)]
         there = 0.5 * value * (only is None or station == only)
         noise = np.linalg.cholesky(matrix) @ rng.standard_normal(6)
-        small = Reduced(COLUMNS, matrix, matrix @ there + noise)
+        small = ReducedSession(COLUMNS, matrix, matrix @ there + noise)
         out.append(
             StoredSession(
                 f"/s/{i}", f"A{i % 10}", {"station": station}, reduced=small.to_bytes()
@@ -176,7 +176,7 @@ def test_of_what_every_session_has_for_itself_the_level_is_the_session() -> None
         rng = np.random.default_rng(seed)
         sessions = []
         for one in fleet(rng, 16, np.zeros(6)):
-            small = Reduced.from_bytes(one.reduced or b"")
+            small = ReducedSession.from_bytes(one.reduced or b"")
             push = 4 * rng.standard_normal() * np.eye(6)[0]
             more = replace(small, pull=small.pull + small.matrix @ push)
             sessions.append(replace(one, reduced=more.to_bytes()))
@@ -192,12 +192,12 @@ def test_nothing_is_named_where_nothing_is() -> None:
 
 
 def test_time_constants_count_that_all_sessions_have() -> None:
-    def warm(*shapes: str) -> Reduced:
-        columns = tuple(Column("warm_up", "acc", s, "ax", "m/s^2", 1e-2, 0.1)
+    def warm(*shapes: str) -> ReducedSession:
+        columns = tuple(SharedColumn("warm_up", "acc", s, "ax", "m/s^2", 1e-2, 0.1)
                         for s in shapes)  # fmt: skip
-        return Reduced(columns, np.eye(len(shapes)), np.ones(len(shapes)))
+        return ReducedSession(columns, np.eye(len(shapes)), np.ones(len(shapes)))
 
-    other = Reduced(COLUMNS[:2], np.eye(2), np.ones(2))
+    other = ReducedSession(COLUMNS[:2], np.eye(2), np.ones(2))
     columns, matrix, pull = together([warm("8 s", "16 s"), warm("16 s"), other])
     assert [(c.effect, c.shape) for c in columns] == [
         ("warm_up", "16 s"), *(("cross_coupling", "") for _ in range(2)),
@@ -210,7 +210,7 @@ def strange(rng: np.random.Generator, only: str, tilts: bool) -> list[StoredSess
 
     Where it `tilts`, that function stands in for base_tilt; else for no effect.
     """
-    own = Column("beta", "ax", "", "0", "", 1.0, 5e-4, own=True)
+    own = SharedColumn("beta", "ax", "", "0", "", 1.0, 5e-4, own=True)
     out = []
     for i in range(16):
         station = "PQRS"[i % 4]
@@ -220,7 +220,7 @@ def strange(rng: np.random.Generator, only: str, tilts: bool) -> list[StoredSess
         alone = station == only
         design = np.column_stack([rows, function]) if alone else rows
         columns = (*COLUMNS, own) if alone else COLUMNS
-        small = Reduced(columns, design.T @ design, design.T @ seen)
+        small = ReducedSession(columns, design.T @ design, design.T @ seen)
         out.append(
             StoredSession(
                 f"/s/{i}", f"A{i}", {"station": station}, reduced=small.to_bytes()
@@ -245,7 +245,7 @@ def test_some_axes_of_an_effect_may_be_there_alone() -> None:
     rng = np.random.default_rng(3)
     some = []
     for one in fleet(rng, 20, np.array([0, 0, 2.0, 0, 0, 0])):
-        small = Reduced.from_bytes(one.reduced or b"")
+        small = ReducedSession.from_bytes(one.reduced or b"")
         some.append(replace(one, reduced=replace(small, columns=columns).to_bytes()))
     (found,) = SharedSearch(some).run()
     assert [c.name for c in found.effect.columns] == ["x"] and found.level == "all"

@@ -12,7 +12,7 @@ from test_shared import fleet
 
 from fieldcal.cli import main
 from fieldcal.fleet import tree
-from fieldcal.fleet.outcome import Task
+from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.workers import Pool
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
@@ -30,19 +30,19 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         (folder / "session.toml").write_text("format = 1\n")
         made[str(folder)] = one
 
-    def solved(task: Task, folder: str) -> StoredSession:
+    def solved(task: SessionTask, folder: str) -> StoredSession:
         one, mark = made[folder], tree.fingerprint(Path(folder), task.options)
         return StoredSession(
             folder, one.serial, one.levels, result={}, fingerprint=mark,
             reduced=one.reduced,
         )  # fmt: skip
 
-    monkeypatch.setattr(Task, "__call__", solved)
+    monkeypatch.setattr(SessionTask, "__call__", solved)
     pool = Pool(lambda: ThreadPoolExecutor(1), 1)
     monkeypatch.setattr("fieldcal.fleet.workers.processes", lambda *_: pool)
     database = Database(tmp_path / "h")
     for name in list(made)[:-2]:
-        kept = solved(Task(diagnose=True), name)
+        kept = solved(SessionTask(diagnose=True), name)
         database.done(lambda db, kept=kept: sessions.keep(db, kept), write=True)  # type: ignore[misc]
     return ["diagnose", *made, "--shared", "--history", str(tmp_path / "h")]
 

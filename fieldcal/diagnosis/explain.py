@@ -80,6 +80,11 @@ class Explanation:
         """Causes that are likelier there than not."""
         return tuple(self.posterior.standing())
 
+    @property
+    def undecided(self) -> bool:
+        """Whether something is there, likelier than not, and no cause likely enough."""
+        return not self.standing and self.posterior.nothing < thresholds.NAMED
+
     @cached_property
     def earth(self) -> float:
         """By how much the Earth's rate of the model raises ln Z; 0 without it."""

@@ -153,7 +153,9 @@ def _verdict(
         return "unexplained"
     if any(_is_open(explanation, one) for one in explanation.standing):
         return "ambiguous"
-    return "left_out" if effects else "consistent"
+    if effects:
+        return "left_out"
+    return "ambiguous" if explanation.undecided else "consistent"
 
 
 def _odd(explanation: Explanation) -> list[str]:
@@ -177,10 +179,15 @@ def _is_open(explanation: Explanation, one: Standing) -> bool:
 
 
 def _probability(explanation: Explanation, verdict: Verdict) -> float:
-    """Probability that the verdict is right: all reported causes are there, or none."""
+    """Probability that the verdict is right: all reported causes are there, or none.
+
+    Where none can be named, that there is one.
+    """
     posterior = explanation.posterior
     if verdict == "consistent":
-        return sum(w for s, w in posterior.weights if not s.members)
+        return posterior.nothing
+    if verdict == "ambiguous" and explanation.undecided:
+        return 1 - posterior.nothing
     wanted = [{one.name, *one.aliases} for one in explanation.standing]
     return sum(
         w

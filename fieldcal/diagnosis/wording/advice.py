@@ -33,6 +33,11 @@ def advice(
 ) -> Iterator[str]:
     """Sentences, the most urgent first; `mismatch` names positions as listed."""
     yield from _look(unknown)
+    if explanation.undecided:
+        yield (
+            "Record it again with more positions, or longer ones: something is left"
+            " out, too weakly to say what."
+        )
     yield from _deciding(explanation, effects)
     for name in dict.fromkeys(f.id for f in effects):
         yield _cure(name, mismatch)

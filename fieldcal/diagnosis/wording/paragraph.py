@@ -13,6 +13,7 @@ from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
 from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quality, Quantity, Verdict
 from fieldcal.diagnosis.wording.deciding_position import decided_by, deciding_position
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.physics.effect import Scatter
 
 SHOWN = 3.0
@@ -98,7 +99,7 @@ def _opening(
     if verdict == "left_out":
         return f"The simulation leaves out {listed}."
     if verdict == "ambiguous":
-        return f"Something is left out, and it may be {listed}."
+        return f"Something is left out, and it may be {listed}." if effects else ""
     where = _places(mismatch)
     some = f" Besides, it leaves out {listed}." if listed else ""
     return (
@@ -193,9 +194,24 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
     )
 
 
+def _undecided(explanation: Explanation) -> str:
+    """That something is there that has no name, and what comes nearest."""
+    posterior = explanation.posterior
+    likeliest = [
+        f"{name} ({probability:.2f})"
+        for name, probability in posterior.suspects()
+        if probability > thresholds.MENTIONED and name in catalogue()
+    ]
+    said = (
+        "Something is left out that this recording shows too weakly to say what it is"
+        f" (probability {1 - posterior.nothing:.2f})"
+    )
+    return f"{said}; likeliest: {', '.join(likeliest)}." if likeliest else f"{said}."
+
+
 def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
     """What else a person should know."""
-    out = []
+    out = [_undecided(explanation)] if explanation.undecided else []
     if explanation.earth > np.log(1000.0) and not explanation.sees_earth:
         out.append("The gyroscopes show the Earth's rate, which is taken into account.")
     if left:

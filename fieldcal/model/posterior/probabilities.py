@@ -149,6 +149,17 @@ class Posterior:
         share = np.exp(score - np.logaddexp.reduce(score))
         return list(zip(sets, share.tolist(), strict=True))
 
+    @property
+    def nothing(self) -> float:
+        """Probability that no cause is there."""
+        return sum(w for s, w in self.weights if not s.members)
+
+    def suspects(self) -> list[tuple[str, float]]:
+        """Every cause with its probability, the likeliest first."""
+        causes = dict.fromkeys(c.name for s, _ in self.weights for c, _ in s.members)
+        each = [(name, self.probability([name])) for name in causes]
+        return sorted(each, key=lambda one: -one[1])
+
     def probability(self, names: Iterable[str], triads: frozenset[str] = BOTH) -> float:
         """That one of some causes is there, on one of some triads.
 

@@ -124,6 +124,29 @@ def test_what_is_said_is_true_as_often_as_is_said(low: float, high: float) -> No
     assert told.pvalue > 0.01, (so[some].mean(), mean, some.sum())
 
 
+def test_that_nothing_is_there_is_as_unlikely_as_is_said() -> None:
+    """Above one half it is that nothing shows: what is too small may be there."""
+    every = [(Posterior(one.search, one.best), not one.true) for one in draws()]
+    for low, high in ((0.0, 0.01), (0.01, 0.6)):
+        some = [(p.nothing, so) for p, so in every if low <= p.nothing < high]
+        mean = float(np.mean([p for p, _ in some]))
+        true = sum(so for _, so in some)
+        assert len(some) >= 8
+        assert binomtest(true, len(some), min(mean, 1.0)).pvalue > 0.01, (low, mean)
+
+
+def test_suspects_have_their_probability_and_the_likeliest_is_first() -> None:
+    one = draws()[0]
+    posterior = Posterior(one.search, one.best)
+    suspects = posterior.suspects()
+    assert {n for n, _ in suspects} <= {key.split(":")[0] for key in KEYS}
+    for name, probability in suspects:
+        assert probability == pytest.approx(posterior.probability([name]))
+    shares = [p for _, p in suspects]
+    assert shares == sorted(shares, reverse=True)
+    assert max(shares) <= 1 - posterior.nothing + 1e-9
+
+
 def test_what_is_large_is_said() -> None:
     """Of causes that the rows show beyond doubt, nearly all."""
     missed, shown = 0, 0

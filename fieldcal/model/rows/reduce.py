@@ -131,6 +131,8 @@ class RowSource:
     warmth : the temperature
     pace : seconds of the device's clock in a true second
     left : (p, 6) variance that a swaying base leaves of each window's mean, SI squared
+    white : (6,) deviation of one sample on such a base, where what is slow of the noise
+        was taken out with what swayed
 
     """
 
@@ -141,6 +143,7 @@ class RowSource:
     warmth: Thermometer
     pace: float = 1.0
     left: Array | None = None
+    white: Array | None = None
 
 
 def masked(block: Block, usable: NDArray[np.bool_]) -> Block:
@@ -161,14 +164,17 @@ def reduce(source: RowSource) -> Rows:
     windows = spans(block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
     shaken = shaking(block, windows[held], rate)
-    noise, source = shaken.noise, replace(source, block=shaken.block)
+    noise, levels = shaken.noise, shaken.levels
+    if source.white is not None:
+        noise, levels = np.fmax(noise, source.white), np.fmax(levels, source.white)
+    source = replace(source, block=shaken.block)
     bounds = [_cut(block.t, a, b, rate, len(held)) for a, b in windows[held]]
     rows = [len(b) for b in bounds]
     out = averaged(
         source,
         np.concatenate(bounds),
         np.repeat(held, rows),
-        np.repeat(shaken.levels, rows, axis=0),
+        np.repeat(levels, rows, axis=0),
         noise,
         np.repeat(shaken.variance, rows, axis=0),
     )

@@ -43,6 +43,8 @@ class Swaying:
     ----------
     block : the samples without it
     left : (p, 6) variance that it leaves of each window's mean
+    white : (6,) deviation of one sample: below the quickest wave the
+        noise has gone with the waves
     amplitude, hz : rad, Hz, of one wave with all its power
     spread : (2,) standard deviations of both over the windows
     seconds : that a window needs, s
@@ -51,6 +53,7 @@ class Swaying:
 
     block: Block
     left: Array
+    white: Array
     amplitude: float
     hz: float
     spread: tuple[float, float]
@@ -95,9 +98,11 @@ def swaying(block: Block, about: Description) -> Swaying | None:
         for p, (a, b) in enumerate(windows)
     ])  # fmt: skip
     root = np.sqrt(max(len(found) - 1, 1))
+    noise = [w.noise * w.length for some in found.values() for w in some]
     return Swaying(
         _at_rest(block, windows, found, scale),
         left,
+        np.sqrt(np.mean(noise, axis=0) * rate_of(block)),
         float(np.sqrt((amplitude**2).mean())),
         float(hz.mean()),
         (float(amplitude.std() / root), float(hz.std() / root)),

@@ -11,6 +11,7 @@ from session_folders import recorded, write_session
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
+from fieldcal.diagnosis.prepare import prepare
 from fieldcal.evaluation.observations import rests
 from fieldcal.evaluation.solution import solved
 from fieldcal.model.rows.swaying import swaying
@@ -138,3 +139,17 @@ def test_a_device_in_a_hand_is_on_no_base(tmp_path: Path) -> None:
 def test_who_says_that_it_sways() -> None:
     assert description.parse({"site": {"sways": True}, "format": 1}).sways
     assert not description.parse({"format": 1}).sways
+
+
+def test_waves_take_slow_noise_with_them_and_the_rows_know_it(tmp_path: Path) -> None:
+    """In the band of the waves hardly any noise is left: it is in their uncertainty."""
+    block = played(8, IRREGULAR.format(40, 30), IRREGULAR.format(200, 120))
+    one = session(tmp_path / "pier", block)
+    found = swaying(one.block, one.about)
+    assert found is not None
+    assert found.white == pytest.approx(NOISE, rel=0.05)
+    rows = prepare(one.block, one.about).rows
+    assert rows.noise == pytest.approx(NOISE, rel=0.05)
+    assert np.nanmedian(rows.sd * np.sqrt(rows.length * RATE)[:, None], axis=0) == (
+        pytest.approx(NOISE, rel=0.06)
+    )

@@ -74,9 +74,9 @@ class Misbehaving(Autopilot):
         self.parameters[name] = kept
         return answer
 
-    def _set(self, name: str, value: float) -> bytes:
+    def _set(self, name: str, value: float | None) -> bytes:
         answer = super()._set(name, value)
-        if self._happens("keeps_wrong"):
+        if value is not None and self._happens("keeps_wrong"):
             self.parameters[name] = 1.01 * value + 0.01
         return answer
 

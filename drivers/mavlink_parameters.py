@@ -6,7 +6,8 @@ once no answer is on its way any more. Questions are put `TRIES` times, since li
 packets; what is no number is no answer. A link that hangs up is opened again: an
 autopilot may start anew meanwhile.
 
-A parameter travels as a float of 32 bits; whole numbers of PX4 as their bits in one.
+A parameter travels as a float of 32 bits; whole numbers of PX4 as their bits in one,
+so that one has to be read, which tells its type, before it is set.
 """
 
 from __future__ import annotations
@@ -90,6 +91,7 @@ class ParameterLink:
         self._in = dialect.MAVLink(None)
         self._in.robust_parsing = True
         self._heard: dict[str, float] = {}
+        self._whole: set[str] = set()
         self._vehicles: dict[tuple[int, int], Any] = {}
         self._beat = -np.inf
         self.autopilot, self.armed = 0, False
@@ -163,15 +165,23 @@ class ParameterLink:
         def ask() -> None:
             for name, value in values.items():
                 if not same(self._heard.get(name), value):
+                    sent, kind = self._as_sent(name, value)
                     self._send(
                         self._out.param_set_encode(
-                            *self._target, name.encode(), value, REAL32
+                            *self._target, name.encode(), sent, kind
                         )
                     )
 
         self._until(
             lambda: all(same(self._heard.get(n), v) for n, v in values.items()), ask
         )
+
+    def _as_sent(self, name: str, value: float) -> tuple[float, int]:
+        """A value as it travels, and its type: PX4 takes none of another type."""
+        if name not in self._whole:
+            return value, REAL32
+        (bits,) = struct.unpack("<f", struct.pack("<i", round(value)))
+        return bits, INT32
 
     def _settle(self) -> None:
         """Let answers that are late come before anything is asked anew."""
@@ -248,10 +258,13 @@ class ParameterLink:
             value = float(message.param_value)
             if self.autopilot == PX4 and message.param_type == INT32:
                 bits = struct.pack("<f", message.param_value)
-                value = float(struct.unpack("<i", bits)[0])
-            self._answered = self._clock()
-            if np.isfinite(value):  # the shortest number that is this float of 32 bits
+                self._whole.add(message.param_id)
+                self._heard[message.param_id] = float(struct.unpack("<i", bits)[0])
+            elif np.isfinite(
+                value
+            ):  # the shortest number that is this float of 32 bits
                 self._heard[message.param_id] = float(str(np.float32(value)))
+            self._answered = self._clock()
 
     def _send(self, message: Any) -> None:
         packed = message.pack(self._out)

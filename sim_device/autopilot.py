@@ -24,6 +24,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
+from fieldcal.sim_device import autopilot_thermal
 from fieldcal.sim_device.mavlink_packing import (
     ACC_UNITS,
     HIGHRES,
@@ -48,7 +49,7 @@ OWN = (
 )
 DENIED, UNSUPPORTED = 2, 3
 INT32, REAL32 = 6, 9
-WHOLE = ("SENS_BOARD_ROT", "TC_A_ENABLE", "TC_G_ENABLE")
+WHOLE = ("SENS_BOARD_ROT", *autopilot_thermal.WHOLE)
 """Parameters of PX4 that are whole numbers."""
 
 COPTER = 2
@@ -66,7 +67,8 @@ def parameters(kind: str) -> dict[str, float]:
         scale = {f"CAL_ACC{n}_{x}SCALE": 1.0 for n in range(3) for x in "XYZ"}
         gyr = {f"CAL_GYRO{n}_{x}OFF": 0.0 for n in range(3) for x in "XYZ"}
         cutoffs = {"IMU_ACCEL_CUTOFF": 30.0, "IMU_GYRO_CUTOFF": 40.0}
-        return {**acc, **scale, **gyr, **cutoffs, **dict.fromkeys(WHOLE, 0.0)}
+        thermal = autopilot_thermal.parameters(kind)
+        return {**acc, **scale, **gyr, **cutoffs, "SENS_BOARD_ROT": 0.0, **thermal}
     table = {}
     for n in ("", "2", "3"):
         for x in "XYZ":
@@ -74,9 +76,9 @@ def parameters(kind: str) -> dict[str, float]:
             table[f"INS_ACC{n}SCAL_{x}"] = 1.0
             table[f"INS_GYR{n}OFFS_{x}"] = 0.0
     filters = {"INS_ACCEL_FILTER": 20.0, "INS_GYRO_FILTER": 20.0}
-    corrects = {f"INS_TCAL{n}_ENABLE": 0.0 for n in (1, 2, 3)}
+    thermal = autopilot_thermal.parameters(kind)
     board = {"AHRS_ORIENTATION": 0.0, "INS_GYR_CAL": 1.0}
-    return {**table, **filters, **corrects, **board}
+    return {**table, **filters, **thermal, **board}
 
 
 class Autopilot:
@@ -180,12 +182,18 @@ class Autopilot:
         if block.t[-1] - self._booting[0].t[0] >= BOOT_S:
             mean = np.concatenate([some.gyr for some in self._booting]).mean(axis=0)
             self.parameters |= dict(zip(self._names("gyr", "off"), mean, strict=True))
+            warm = np.concatenate([some.temperature for some in self._booting]).mean()
+            self.parameters[f"INS_GYR{self._instance + 1}_CALTEMP"] = float(warm)
             self._boots = False
 
     def _corrected(self, block: Block) -> Block:
         """Apply the calibration that it has."""
-        acc = (block.acc - self._triad("acc", "off")) * self._triad("acc", "scale")
-        gyr = block.gyr - self._triad("gyr", "off")
+        warm = autopilot_thermal.taken_out(
+            self._kind, self._instance, self.parameters, block
+        )
+        acc, gyr = block.acc - warm[0], block.gyr - warm[1]
+        acc = (acc - self._triad("acc", "off")) * self._triad("acc", "scale")
+        gyr = gyr - self._triad("gyr", "off")
         return Block.of(block.t, acc, gyr, block.temperature, block.seq)
 
     def _triad(self, sensor: str, what: str) -> Array:
@@ -212,13 +220,24 @@ class Autopilot:
         elif kind == "PARAM_REQUEST_READ" and self._is_target(message):
             return self._value(message.param_id)
         elif kind == "PARAM_SET" and self._is_target(message):
-            return self._set(message.param_id, float(message.param_value))
+            return self._set(message.param_id, self._told(message))
         return b""
 
-    def _set(self, name: str, value: float) -> bytes:
+    def _told(self, message: Any) -> float | None:
+        """A parameter's value as it was sent; PX4 takes none of another type."""
+        value = float(message.param_value)
+        if self._kind != "px4":
+            return value
+        is_whole = message.param_id in WHOLE
+        if message.param_type != (INT32 if is_whole else REAL32):
+            return None
+        (bits,) = struct.unpack("<i", struct.pack("<f", value))
+        return float(bits) if is_whole else value
+
+    def _set(self, name: str, value: float | None) -> bytes:
         """Set a parameter, or do something else with it, and answer."""
         wrong = self._wrong
-        if name not in self.parameters or name in wrong["drop"]:
+        if value is None or name not in self.parameters or name in wrong["drop"]:
             return self._value(name)
         self.parameters[name] = value
         answer = self._value(name)

@@ -42,6 +42,7 @@ WAITING = (
             "test_terminal_run",
             "test_wires_meet",
             "test_write",
+            "test_write_thermal",
         ]
     ),
     frozenset(

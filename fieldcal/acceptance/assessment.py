@@ -18,13 +18,14 @@ import numpy as np
 from fieldcal.acceptance.centred import biases_taken_out
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
+from fieldcal.acceptance.temperature import since_last
 from fieldcal.acceptance.verification import Verification, planned, verify
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.samples import Block
 from fieldcal.evaluation.observations import Rests
-from fieldcal.history.store import History, family
+from fieldcal.history.store import History, HistoryRun, family
 from fieldcal.session.folder import Session
 from fieldcal.windows import Average, average
 
@@ -50,12 +51,14 @@ def assess(
     marks = list(session.marks())
     warnings = list(found.warnings)
     earlier: Sequence[Calibration] | None = None
+    usual: Sequence[HistoryRun] = ()
     serial = str(session.about.device.get("serial", ""))
     if history is not None and serial:
         try:
             here = str(session.folder.resolve())
             runs = [run for run in history.runs(serial) if run.session != here]
-            earlier = [run.calibration for run in family(runs)]
+            usual = family(runs)
+            earlier = [run.calibration for run in usual]
         except FieldcalError as error:
             warnings.append(str(error))
     taken_out = _taken_out(session, still, limits)
@@ -72,6 +75,8 @@ def assess(
     site = {"latitude_deg": session.about.latitude_deg}
     site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
     info = {**found.info, "site": site, "taken_at": start_time(marks)}
+    if (costs := since_last(found, usual, limits)) is not None:
+        info["temperature_change"] = costs
     return with_decision(replace(found, warnings=tuple(warnings), info=info), made)
 
 

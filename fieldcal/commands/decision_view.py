@@ -30,6 +30,8 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
     console = ShownConsole()
     for growth in found.info.get("expectation", []):
         say(console, "", _growth(growth))
+    for sentence in found.info.get("temperature_change", {}).get("says", []):
+        say(console, "", sentence)
     order = {True: 0, None: 1, False: 2}
     for check in sorted(decision["checks"], key=lambda each: order[each["ok"]]):
         say(console, MARKS[check["ok"]], check["says"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from fieldcal.core.errors import FieldcalError, InputError
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.drivers.mavlink_parameters import ParameterLink
     from fieldcal.install.proposal import Change
     from fieldcal.session.folder import Session
 
@@ -184,6 +185,32 @@ def _to_device(
     wanted: Sequence[Change],
     installed: Installed,
 ) -> None:
+    known = {c.name: c.old for c in wanted}
+    new = {c.name: c.new for c in wanted}
+    with opened(args.device) as link:
+        check_ready(link, installed.autopilot)
+        carried_out(link, args.device, session.folder, known, new, args.yes)
+
+
+def carried_out(
+    link: ParameterLink,
+    device: str,
+    folder: Path,
+    known: Mapping[str, float],
+    new: Mapping[str, float],
+    yes: bool,
+) -> None:
+    """Write parameters, with the old set in a session's folder first.
+
+    Parameters
+    ----------
+    link, device : the autopilot, and its address
+    folder : of the session
+    known : what it should keep now
+    new : what it is to keep
+    yes : whether nobody is asked
+
+    """
     from fieldcal.drivers.mavlink_parameters import same
     from fieldcal.install.transaction import (
         WriteRolledBack,
@@ -195,34 +222,30 @@ def _to_device(
         unfinished,
     )
 
-    known = {c.name: c.old for c in wanted}
-    new = {c.name: c.new for c in wanted}
-    with opened(args.device) as link:
-        check_ready(link, installed.autopilot)
-        earlier = unfinished(session.folder)
-        if earlier:  # whatever it keeps, it comes from there
-            now = link.read(known)
-            old = {name: earlier[1]["old"].get(name, now[name]) for name in now}
-            if said := broken_off(now, old, earlier[1]["new"]):
-                sys.stderr.write(f"{said}\n")
-        else:
-            now = old = check_unchanged(link, known, "while it was recorded", new)
-        if all(same(now[name], value) for name, value in new.items()):
-            if earlier:
-                note_done(earlier[0], done=True)
-            sys.stderr.write(f"all {len(new)} parameters are installed already\n")
-            return
-        ask(f"write these {len(new)} parameters to {args.device}", args.yes)
-        path = save(session.folder, args.device, old, new)
+    earlier = unfinished(folder)
+    if earlier:  # whatever it keeps, it comes from there
+        now = link.read(known)
+        old = {name: earlier[1]["old"].get(name, now[name]) for name in now}
+        if said := broken_off(now, old, earlier[1]["new"]):
+            sys.stderr.write(f"{said}\n")
+    else:
+        now = old = check_unchanged(link, known, "while it was recorded", new)
+    if all(same(now[name], value) for name, value in new.items()):
         if earlier:
-            note_done(earlier[0], undone=True)
-        try:
-            install(link, old, new)
-        except WriteRolledBack:
-            note_done(path, undone=True)
-            raise
-        note_done(path, done=True)
-    undo = f"fieldcal undo {args.session} --device {args.device}"
+            note_done(earlier[0], done=True)
+        sys.stderr.write(f"all {len(new)} parameters are installed already\n")
+        return
+    ask(f"write these {len(new)} parameters to {device}", yes)
+    path = save(folder, device, old, new)
+    if earlier:
+        note_done(earlier[0], undone=True)
+    try:
+        install(link, old, new)
+    except WriteRolledBack:
+        note_done(path, undone=True)
+        raise
+    note_done(path, done=True)
+    undo = f"fieldcal undo {folder} --device {device}"
     sys.stderr.write(
         f"written and read back: {len(new)} parameters; the old ones are in {path}\n"
         f"to take it back: {undo}\n"

@@ -35,7 +35,7 @@ GYR_OFFSETS = {
     for autopilot in (ARDUPILOT, PX4)
     for instance in range(3)
     for name in names(autopilot, instance)["gyr_offset"]
-}
+} | {f"INS_GYR{n}_CALTEMP" for n in (1, 2, 3)}
 """Parameters that an autopilot sets by itself."""
 
 

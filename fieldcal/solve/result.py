@@ -300,6 +300,7 @@ def _info(
             "gravity": observations.gravity,
             "latitude_deg": None if latitude is None else float(np.rad2deg(latitude)),
             "temperature_degc": float(known.mean()) if len(known) else None,
+            "temperature_sd_k": float(known.std()) if len(known) else None,
             "grade": observations.grade,
         },
         "bad_position": [round(float(p), 4) for p in found.bad],

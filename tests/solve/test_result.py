@@ -227,7 +227,8 @@ def test_conditions_are_those_that_were_given() -> None:
     assert found["conditions"] == {
         "positions": 5, "gravity": 9.81,
         "latitude_deg": pytest.approx(40.107, abs=1e-3),
-        "temperature_degc": 23.0, "grade": "tactical",
+        "temperature_degc": 23.0, "temperature_sd_k": pytest.approx(5**0.5),
+        "grade": "tactical",
     }  # fmt: skip
     assert found["angle_sigma_deg"] == 0.2 and "gyroscopes" not in found
     plain = solve(observed(), tilt="none").info

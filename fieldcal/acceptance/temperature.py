@@ -1,0 +1,80 @@
+"""What the temperature of now costs who keeps the calibration of then.
+
+Earlier calibrations of the device tell what its parameters do over temperature; with
+fewer than the model needs it is said that nobody knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.wording import title
+from fieldcal.core.errors import InputError
+from fieldcal.history.store import HistoryRun
+from fieldcal.thermal import ThermalPoint, point, thermal_model
+from fieldcal.thermal.wording import costs, document
+
+NEAR_K = 2.0
+"""Two temperatures are one that are no further apart: a room's from day to day."""
+
+
+def since_last(
+    found: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
+) -> dict[str, Any] | None:
+    """Return what the change of temperature since the last calibration makes.
+
+    Parameters
+    ----------
+    found : the calibration of now
+    earlier : of the device's family, oldest first
+    limits : of its grade
+
+    Returns
+    -------
+    Temperatures, changes with their ± where the history tells them, and sentences; None
+    where nothing changed or no temperature is known.
+
+    """
+    points = [p for run in earlier if (p := _point(run.taken_at, run.calibration))]
+    now = _point("now", found)
+    if now is None or not points:
+        return None
+    then = points[-1]
+    if abs(now.temperature - then.temperature) <= NEAR_K:
+        return None
+    about = (
+        f"{now.temperature:.1f} °C now, {then.temperature:.1f} °C at the calibration of"
+        f" {then.name[:10]}"
+    )
+    out: dict[str, Any] = {
+        "now_degc": now.temperature,
+        "then_degc": then.temperature,
+        "then": then.name,
+    }
+    try:
+        model = thermal_model([*points, now], limits)
+    except InputError:
+        says = (
+            f"{about}: what that costs is known from three calibrations over 10 K on"
+            " (fieldcal temperature)"
+        )
+        return {**out, "parameters": None, "says": [says]}
+    changes = model.change(now.temperature, then.temperature)
+    told, rest = costs(changes)
+    says = f"{about}: who kept that one would be off by {'; '.join(told)}"
+    if not told:
+        says = f"{about}: no parameter shows a change by it"
+    elif rest:
+        says += f"; nothing shown by {', '.join(map(title, rest))}"
+    return {**out, "parameters": document(changes), "says": [says]}
+
+
+def _point(name: str, found: Calibration) -> ThermalPoint | None:
+    """A calibration as a point; None where it has no temperature or is no good."""
+    try:
+        return point(name, found)
+    except InputError:
+        return None

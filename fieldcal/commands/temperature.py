@@ -1,0 +1,296 @@
+"""`fieldcal temperature`: make one model of calibrations at several temperatures."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.shown import one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from fieldcal.install.thermal import ThermalParameter, ThermalParameters
+    from fieldcal.thermal import ThermalModel, ThermalPoint
+
+RARE = ("limits", "instance", "force")
+
+EXAMPLE = """\
+  fieldcal temperature chamber/5C chamber/20C chamber/35C chamber/50C
+  fieldcal temperature chamber/* --at 35 --json
+  fieldcal temperature chamber/* --format ardupilot -o bench-7.param
+  fieldcal temperature chamber/* --device mavlink:/dev/ttyACM0
+"""
+
+FORMATS = {"ardupilot": ".param", "px4": ".params", "json": ".json"}
+"""Formats of the file, and how their names end."""
+
+FLOAT, INT = 9, 6
+"""What QGroundControl's files call a number of 32 bits."""
+
+DISAGREES = 4.0
+"""Standard uncertainties from which a session is not what the others predict."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    what = "solved session folders of one device, or their result.json"
+    add("sessions", type=Path, nargs="+", metavar="SESSION", help=what)
+    add(
+        "--at",
+        type=float,
+        metavar="DEGC",
+        help="the parameters at this temperature, and what it costs to use the last"
+        " session's there",
+    )
+    add("--format", choices=FORMATS, help="of the file (default: json)")
+    add("-o", "--output", type=Path, metavar="FILE", help="write a file")
+    add("--device", metavar="URL", help="write onto an autopilot, and read back")
+    add("--instance", type=int, default=0, metavar="N",
+        help="autopilots: sensor the sessions are of, from 0 (default: 0)")  # fmt: skip
+    add("--yes", action="store_true", help="do not ask")
+    add("--force", action="store_true", help="although a session is NO-GO or disagrees")
+    add("--limits", type=Path, metavar="FILE", help="limits of your own")
+    add("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command: 1 if a session is not what the others predict."""
+    if args.format and not args.output:
+        raise InputError("--format is of a file: name it with -o")
+    points = opened(args.sessions)
+    found = modelled(points, args.limits)
+    document: dict[str, Any] = {**found.to_json(), "disagrees": disagrees(found)}
+    if args.at is not None:
+        document["at"] = _at(found, args.at, points[-1])
+    if args.json:
+        sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
+    else:
+        _show(found, args.at, points[-1])
+    for sentence in (*left_out(points), *disagrees(found)):
+        sys.stderr.write(f"fieldcal temperature: {sentence}\n")
+    if args.output:
+        _write(args, found, document)
+    if args.device:
+        _install(args, found, points)
+    return 1 if disagrees(found) else 0
+
+
+def opened(paths: Sequence[Path]) -> list[ThermalPoint]:
+    """The sessions as points.
+
+    Raises
+    ------
+    InputError
+        If one cannot be used, or they are of several devices.
+
+    """
+    from fieldcal.commands.compare import read
+    from fieldcal.thermal import point
+
+    points = [point(str(path), read(path)) for path in paths]
+    serials = {
+        str(p.calibration.info.get("device", {}).get("serial", "")): p.name
+        for p in points
+    }
+    serials.pop("", None)
+    if len(serials) > 1:
+        listed = ", ".join(f"{name} of {serial}" for serial, name in serials.items())
+        raise InputError(f"{listed}: give sessions of one device")
+    return points
+
+
+def modelled(points: Sequence[ThermalPoint], limits: Path | None) -> ThermalModel:
+    """The model of points, by the limits of their grade.
+
+    Raises
+    ------
+    InputError
+        If they are too few, or too close to each other.
+
+    """
+    from fieldcal.calibration.limits import read
+    from fieldcal.thermal import thermal_model
+
+    grade = points[-1].calibration.info.get("conditions", {}).get("grade", "tactical")
+    return thermal_model(points, read(str(grade), limits))
+
+
+def left_out(points: Sequence[ThermalPoint]) -> list[str]:
+    """Groups that not all sessions have, a sentence each."""
+    from fieldcal.calibration.names import group_of
+    from fieldcal.thermal.fit import common
+
+    used = {name for names in common(points) for name in names}
+    rest = {group_of(n) for p in points for n in p.calibration.names if n not in used}
+    return [f"{group} is not in every session, and left out" for group in sorted(rest)]
+
+
+def disagrees(found: ThermalModel) -> list[str]:
+    """Sessions that the others do not predict, by their worst parameter."""
+    said = []
+    for i, (name, temperature) in enumerate(found.sessions):
+        worst = max(found.curves, key=lambda n: abs(found.curves[n].held_out[i]))
+        z = found.curves[worst].held_out[i]
+        if abs(z) > DISAGREES:
+            said.append(
+                f"{one_line(name)} at {temperature:.1f} °C: {worst} is {abs(z):.1f} of"
+                " its ± from what the other sessions predict: hysteresis, a jump, or"
+                " another temperature than the thermometer's; take it again"
+            )
+    return said
+
+
+def _at(found: ThermalModel, to: float, last: ThermalPoint) -> dict[str, Any]:
+    """Parameters at a temperature, and what using the last session's costs there."""
+    from fieldcal.thermal.wording import document
+
+    values = found.at(to)
+    return {
+        "temperature_degc": to,
+        "parameters": {
+            n: {"value": v, "sigma": s, "unit": found.curves[n].unit}
+            for n, (v, s) in values.items()
+        },
+        "since_degc": last.temperature,
+        "change": document(found.change(to, last.temperature)),
+    }
+
+
+def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
+    from fieldcal.calibration.wording import number, pretty, title
+    from fieldcal.thermal.wording import costs
+
+    say = sys.stdout.write
+    say(
+        f"{len(found.sessions)} sessions at {found.low:.1f} to {found.high:.1f} °C;"
+        " between them, ± 1σ:\n"
+    )
+    shown = [found.low, found.reference, found.high]
+    if at is not None:
+        shown = sorted({*shown, at})
+    head = "".join(f"{f'{t:.1f} °C':>24}" for t in shown)
+    say(f"{'parameter':24}{head}  {'from run to run':>16}  order\n")
+    values = {t: found.at(t) for t in shown}
+    for name, curve in found.curves.items():
+        cells = "".join(f"{' ± '.join(number(*values[t][name])):>24}" for t in shown)
+        order = f"{curve.order} (P = {curve.orders[curve.order]:.2f})"
+        unit = pretty(curve.unit)
+        spread = f"± {curve.spread:.2g} {unit}"
+        say(f"{title(name):24}{cells}  {spread:>16}  {order}\n")
+    if at is not None:
+        told, rest = costs(found.change(at, last.temperature))
+        say(
+            f"\nat {at:.1f} °C with the calibration of {one_line(last.name)}"
+            f" ({last.temperature:.1f} °C), off by:\n"
+        )
+        say("".join(f"  {line}\n" for line in told))
+        if rest:
+            say(f"  less than 2 of its ±: {', '.join(map(title, rest))}\n")
+
+
+def _parameters(
+    autopilot: int,
+    found: ThermalModel,
+    instance: int,
+    ids: Mapping[str, float] | None = None,
+) -> ThermalParameters:
+    from fieldcal.install.thermal import thermal_parameters
+
+    made = thermal_parameters(autopilot, found, instance, ids)
+    for sentence in made.says:
+        sys.stderr.write(f"fieldcal temperature: {sentence}\n")
+    return made
+
+
+def _write(
+    args: argparse.Namespace, found: ThermalModel, document: dict[str, Any]
+) -> None:
+    """Write the file in its format.
+
+    Raises
+    ------
+    InputError
+        If it is there already.
+
+    """
+    from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
+    from fieldcal.session.folder import write_whole
+
+    path: Path = args.output
+    if path.exists():
+        raise InputError(f"{path}: is there already; name another file with -o")
+    if args.format == "ardupilot":
+        made = _parameters(ARDUPILOT, found, args.instance)
+        lines = [f"{n},{p.value:.9g}" for n, p in made.values.items()]
+        text = _commented(made.says, lines)
+    elif args.format == "px4":
+        made = _parameters(PX4, found, args.instance)
+        lines = [_px4_line(n, p) for n, p in made.values.items()]
+        head = "# Vehicle-Id Component-Id Name Value Type"
+        text = _commented(made.says, [head, *lines])
+    else:
+        text = json.dumps(document, indent=2, allow_nan=False) + "\n"
+    write_whole(path, text)
+    sys.stderr.write(f"written: {path}\n")
+
+
+def _commented(says: Sequence[str], lines: Sequence[str]) -> str:
+    head = ["# fieldcal: over temperature, m/s^2, rad/s, sensor axes"]
+    return "\n".join([*head, *(f"# {s}" for s in says), *lines]) + "\n"
+
+
+def _px4_line(name: str, parameter: ThermalParameter) -> str:
+    value = f"{parameter.value:.9g}"
+    return f"1\t1\t{name}\t{value}\t{INT if parameter.whole else FLOAT}"
+
+
+def _install(
+    args: argparse.Namespace, found: ThermalModel, points: Sequence[ThermalPoint]
+) -> None:
+    """Write onto an autopilot; the old set is kept in the last session.
+
+    Raises
+    ------
+    InstallRefused
+        If a session is NO-GO, or disagrees with the others.
+
+    """
+    from fieldcal.commands.write import (
+        InstallRefused,
+        carried_out,
+        check_ready,
+        opened,
+        table,
+    )
+    from fieldcal.drivers.mavlink_installed import PX4
+    from fieldcal.install.proposal import Change
+    from fieldcal.install.thermal import id_names
+
+    folder: Path = args.sessions[-1]
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}: name the session's folder: the old set is kept in it"
+        )
+    decided = [p.calibration.info.get("decision") or {"go": True} for p in points]
+    refused = [p.name for p, d in zip(points, decided, strict=True) if not d["go"]]
+    if (refused or disagrees(found)) and not args.force:
+        which = ", ".join(refused) or "a session that the others do not predict"
+        raise InstallRefused(f"NO-GO, nothing is written: {which}; take it again")
+    with opened(args.device) as link:
+        check_ready(link, link.autopilot)
+        ids = link.read(id_names(args.instance)) if link.autopilot == PX4 else None
+        made = _parameters(link.autopilot, found, args.instance, ids)
+        now = link.read(made.values)
+        wanted = [
+            Change(n, now[n], p.value, p.sigma, p.unit) for n, p in made.values.items()
+        ]
+        (sys.stderr if args.json else sys.stdout).write(table(wanted))
+        new = {change.name: change.new for change in wanted}
+        carried_out(link, args.device, folder, now, new, args.yes)
+    sys.stderr.write("restart the autopilot: it takes them in when it starts\n")

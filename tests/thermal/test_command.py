@@ -1,0 +1,139 @@
+"""`fieldcal temperature`, and what it says at GO."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from session_folders import write_session
+from thermal_devices import Warming, drawn, exact, session
+
+from fieldcal.acceptance.temperature import since_last
+from fieldcal.calibration import Calibration, limits
+from fieldcal.cli import main
+from fieldcal.evaluation.observations import observe
+from fieldcal.history.store import HistoryRun
+from fieldcal.session.folder import RESULT, Session
+from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile, Truth
+from fieldcal.sim_device.replay import simulate
+from fieldcal.solve import solve
+
+BOUNDS = limits.read("tactical")
+WARM = (2.0, 14.0, 27.0, 38.0, 49.0)
+LADDER = ((0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90))
+
+
+def virtual(folder: Path, of: Warming, temperature: float, seed: int) -> str:
+    """A session of a virtual device at a temperature, solved."""
+    true = {n: tuple(v.tolist()) for n, v in of.values(temperature).items()}
+    noise = NoiseFigures(acc_instability=(0.0,) * 3, gyr_instability=(0.0,) * 3)
+    climate = Climate(ambient_c=temperature, self_heating_k=0.0)
+    profile = Profile(truth=Truth(**true), noise=noise, temperature=climate)
+    windows = [
+        (np.deg2rad(a), np.deg2rad(b), 20.0 * i + 6, 20.0 * i + 18)
+        for i, (a, b) in enumerate(LADDER)
+    ]
+    block = simulate(profile, windows, seed=seed)
+    positions = [
+        {"alpha_deg": float(a), "beta_deg": float(b), "start_s": s, "end_s": e}
+        for (a, b), (_, _, s, e) in zip(LADDER, windows, strict=True)
+    ]
+    site = {"latitude_deg": 50.45, "height_m": 170.0}
+    write_session(folder, block, positions, site=site, device={"serial": "SIM-1"})
+    recorded = Session.open(folder)
+    recorded.write_json(RESULT, solve(observe(recorded)[0]).to_json())
+    return str(folder)
+
+
+def test_virtual_sessions_at_several_temperatures_become_one_model(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    of = drawn(np.random.default_rng(21))
+    every = [virtual(tmp_path / f"s{i}", of, t, i) for i, t in enumerate(WARM)]
+    capsys.readouterr()
+    out = tmp_path / "model.json"
+    assert main(["temperature", *every, "--at", "33", "--json", "-o", str(out)]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert json.loads(out.read_text()) == said
+    pulls = []
+    for name, found in said["at"]["parameters"].items():
+        group, axis = name.split(".")
+        if group in of.coefficients:
+            true = of.values(33.0)[group]["xyz".index(axis)]
+            pulls.append((found["value"] - true) / found["sigma"])
+    assert len(pulls) == 9 and np.abs(pulls).max() < 4
+    change = said["at"]["change"]["acc_bias.x"]
+    true = of.values(33.0)["acc_bias"][0] - of.values(49.0)["acc_bias"][0]
+    assert abs(change["change"] - true) < 4 * change["sigma"]
+    assert main(["temperature", *every, "--at", "33"]) == 0
+    shown = capsys.readouterr().out
+    assert "5 sessions at 2.0 to 49.0 °C" in shown and "a level wrong by" in shown
+    assert main(["temperature", *every, "--at", "60"]) == 2
+    assert "beyond the sessions" in capsys.readouterr().err
+
+
+def at(of: Warming, temperature: float, serial: str = "A1") -> Calibration:
+    covariance = exact(of)
+    return session(of, temperature, np.zeros(len(covariance)), covariance, serial)
+
+
+def test_sessions_of_two_devices_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    of = drawn(np.random.default_rng(1))
+    paths = []
+    for i, (t, serial) in enumerate([(5, "A1"), (20, "A1"), (40, "B2")]):
+        paths.append(tmp_path / f"{i}.json")
+        paths[-1].write_text(json.dumps(at(of, t, serial).to_json()))
+    assert main(["temperature", *map(str, paths)]) == 2
+    assert "give sessions of one device" in capsys.readouterr().err
+
+
+def test_a_session_that_disagrees_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    of = drawn(np.random.default_rng(1))
+    paths = []
+    for i, t in enumerate((2.0, 9.0, 16.0, 23.0, 30.0, 37.0, 44.0, 50.0)):
+        found = at(of, t)
+        values = found.values + (0.5 if i == 4 else 0.0) * (found.units[0] == "m/s^2")
+        paths.append(tmp_path / f"{i}.json")
+        paths[-1].write_text(json.dumps(replace(found, values=values).to_json()))
+    assert main(["temperature", *map(str, paths)]) == 1
+    assert "4.json at 30.0 °C" in capsys.readouterr().err
+
+
+def run(number: int, found: Calibration) -> HistoryRun:
+    at_, warm = f"2026-03-0{number}T10:00:00", found.info["conditions"]
+    celsius = warm["temperature_degc"]
+    return HistoryRun(
+        number, "A1", at_, f"/s/{number}", True, False, celsius, 50.0, 0.0, "", found
+    )
+
+
+def test_at_go_the_difference_of_temperature_is_told_by_the_history() -> None:
+    of = drawn(np.random.default_rng(9))
+    earlier = [run(i + 1, at(of, t)) for i, t in enumerate((3.0, 46.0, 25.0, 12.0))]
+    told = since_last(at(of, 36.0), earlier, BOUNDS)
+    assert told is not None and told["then_degc"] == 12.0 and told["now_degc"] == 36.0
+    for name, change in told["parameters"].items():
+        group, axis = name.split(".")
+        now, then = (of.values(t)[group]["xyz".index(axis)] for t in (36.0, 12.0))
+        assert abs(change["change"] - (now - then)) < 4 * change["sigma"]
+    (says,) = told["says"]
+    assert "36.0 °C now, 12.0 °C at the calibration of 2026-03-04" in says
+    assert "acc bias" in says and "a level wrong by" in says and "±" in says
+
+
+def test_without_enough_history_it_is_said_that_nobody_knows() -> None:
+    of = drawn(np.random.default_rng(9))
+    told = since_last(at(of, 36.0), [run(1, at(of, 12.0))], BOUNDS)
+    assert told is not None and told["parameters"] is None
+    assert "from three calibrations over 10 K on" in told["says"][0]
+    assert since_last(at(of, 12.5), [run(1, at(of, 12.0))], BOUNDS) is None
+    assert since_last(at(of, 36.0), [], BOUNDS) is None
+    unknown = replace(at(of, 36.0), info={})
+    assert since_last(unknown, [run(1, at(of, 12.0))], BOUNDS) is None

@@ -105,7 +105,8 @@ class ExpectedGain:
     ----------
     rows : of the windows
     found : what was inferred of them
-    likely : sets that were looked at, with their probabilities
+    likely : sets that were looked at, of the columns of the dictionary, with their
+        probabilities
     allowed : uncertainty that is allowed of each parameter, SI, by its full name
     angles : how well angles are set, rad
 
@@ -163,7 +164,7 @@ class ExpectedGain:
 
     def _explained(self, likely: Iterable[tuple[Set, float]]) -> list[Explained]:
         """Those that were looked at, and causes that nothing shows beside the best."""
-        out = [self._with_common(s) for s, p in likely if p > LEAST]
+        out = [self._with_common(s, p) for s, p in likely if p > LEAST]
         best = max(out, key=lambda pair: pair[1])
         known = set().union(*(one.names for one, _ in out))
         for cause in self.dictionary.causes:
@@ -177,14 +178,15 @@ class ExpectedGain:
             if p > LEAST
         ]
 
-    def _with_common(self, one: Set) -> tuple[Explained, float]:
+    def _with_common(self, one: Set, chance: float) -> tuple[Explained, float]:
         """A set with tilt and angles beside its causes, and its weight, ln."""
         columns, sizes = self._common()
         at = np.concatenate([columns, one.state.columns])
         wide = np.concatenate([sizes, one.state.sizes])
         state = Eliminated.of(self._rows(one), at, wide)
         names = frozenset(c.name for c, _ in one.members) - COMMON.keys()
-        return Explained(names, 0.0, state), one.score - one.state.score + state.score
+        weight = float(np.log(chance)) - one.state.score + state.score
+        return Explained(names, 0.0, state), weight
 
     def _beside(
         self, best: tuple[Explained, float], cause: Cause

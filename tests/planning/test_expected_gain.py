@@ -48,7 +48,7 @@ def explained(
 
 
 def gain_of(found: Explanation) -> ExpectedGain:
-    likely = found.posterior.weights
+    likely = found.posterior.at_points
     return ExpectedGain(found.rows, found.inferred, likely, ALLOWED, ANGLE)
 
 
@@ -151,3 +151,21 @@ def test_a_cause_is_told_where_it_differs_from_what_stands_in_its_place() -> Non
     assert {"quadratic", "scale_asymmetry"} & {worth.asked[i] for i in causes}
     same, other = worth.left[:, causes].sum(axis=1)
     assert other < 0.85 * same and worth.gain[1] > worth.gain[0]
+
+
+def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None:
+    """Columns that a refined shape has are in no dictionary of the search."""
+    settling = {"gx": 3e-3, "gy": -2e-3, "gz": 2e-3, "tau_s": 3.0}
+    found = explained(START[:2], [("settling", settling)])
+    posterior = found.posterior
+    causes = {c.key: c for c in found.dictionary.causes}
+    other = causes["warm_up:gyr"]
+    there = posterior.search.evaluated(((other, other.variants[3]),))
+    nearer = found.inferred.inference.beside(found.inferred, there)
+    likely = replace(nearer, score=found.best.set.score)
+    posterior._nearer.append((there, likely))
+    at_points = dict(posterior.at_points)
+    assert sum(at_points.values()) == pytest.approx(1.0)
+    assert at_points[there] >= dict(posterior.weights)[likely] > 0.3
+    assert likely.state.columns.max() >= len(posterior.search.gram.index)
+    assert np.isfinite(gain_of(found).of(LADDER[:2]).gain).all()

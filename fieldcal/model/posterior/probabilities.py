@@ -67,7 +67,7 @@ class Posterior:
         self, search: Search, best: Set, refined: Callable[[Set], Set] | None = None
     ) -> None:
         self.search, self.best, self._refined = search, best, refined
-        self._nearer: list[Set] = []
+        self._nearer: list[tuple[Set, Set]] = []
         self.instead = {name: self._instead(name) for name in self.names(best)}
 
     @staticmethod
@@ -111,8 +111,9 @@ class Posterior:
             return at_points
         if not any(_fades(m[1]) for m in there.members if m not in self.best.members):
             return at_points
-        self._nearer.append(self._refined(there))
-        return max(at_points, self.evidence(self._nearer[-1]))
+        nearer = self._refined(there)
+        self._nearer.append((there, nearer))
+        return max(at_points, self.evidence(nearer))
 
     def _bare(self, less: Set, offer: Offer) -> float:
         """Foretold evidence of a set with an offer, without the chances, ln."""
@@ -144,10 +145,19 @@ class Posterior:
     @cached_property
     def weights(self) -> list[tuple[Set, float]]:
         """Sets visited, with their probabilities."""
-        sets = [*self.search.visited.values(), *self._nearer]
+        sets = [*self.search.visited.values(), *(s for _, s in self._nearer)]
         score: Array = np.array([s.score for s in sets])
         share = np.exp(score - np.logaddexp.reduce(score))
         return list(zip(sets, share.tolist(), strict=True))
+
+    @cached_property
+    def at_points(self) -> list[tuple[Set, float]]:
+        """The same at the points of the grids, whose columns the dictionary has."""
+        kept = len(self.search.visited)
+        out = dict(self.weights[:kept])
+        for (there, _), (_, p) in zip(self._nearer, self.weights[kept:], strict=True):
+            out[there] += p
+        return list(out.items())
 
     @property
     def nothing(self) -> float:

@@ -13,6 +13,12 @@ W = U_i^T M_ij E^(1/2), B = 1 / (lambda_i + 1 / u^2) and A = I - W^T B W in its 
     |I + u^2 M'| = |I + u^2 M_ii| |A|,
     b'^T (M' + 1 / u^2)^-1 b' = b'^T B b' + (W^T B b')^T A^-1 (W^T B b')           (2)
 
+What a pair explains only grows with its sizes, and no determinant is below one, so
+
+    gain <= q_j^T E q_j / 2 + b'^T (M' + 1 / u^2)^-1 b' / 2    at the largest u, v  (3)
+
+and pairs that this leaves below what is asked for need no sizes.
+
 Source: the determinant lemma and the identity of Woodbury.
 """
 
@@ -20,10 +26,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, groupby, pairwise
+from itertools import combinations
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.cause import Group
@@ -40,6 +47,7 @@ def pairs(
     groups: Sequence[Group],
     sizes: Sequence[int],
     wanted: Sequence[Pair] | None = None,
+    least: Sequence[float] | None = None,
 ) -> Iterator[Gained]:
     """Gain of every two groups beside a set, their numbers, and their sizes.
 
@@ -49,35 +57,55 @@ def pairs(
     groups : that it may be given
     sizes : index in `priors.SIZES` of each one's likeliest size alone
     wanted : numbers of the groups of each pair, all pairs if not given
+    least : gain below which each pair is of no use and may be left out
 
     """
-    every = list(combinations(range(len(groups)), 2)) if wanted is None else wanted
-    if not every:
+    every = np.array(
+        list(combinations(range(len(groups)), 2)) if wanted is None else wanted
+    ).reshape(-1, 2)
+    if not len(every):
         return
+    enough = np.full(len(every), -np.inf) if least is None else np.asarray(least)
     columns = np.concatenate([g.columns for g in groups])
     typical = np.concatenate([g.typical for g in groups])
     inner, pull = state.rest(columns, typical)
-    first = np.cumsum([0, *(len(g.columns) for g in groups)]).tolist()
-    alone = [
-        _Alone.of(inner[a:b, a:b], pull[a:b], np.arange(a, b))
-        for a, b in pairwise(first)
-    ]
+    first = np.cumsum([0, *(len(g.columns) for g in groups)])
+    wide = np.diff(first)
+    alone = {
+        int(w): _Alone.of(inner, pull, first[:-1][wide == w, None] + np.arange(w))
+        for w in np.unique(wide)
+    }
+    number = np.array([np.sum(wide[:i] == w) for i, w in enumerate(wide)])
+    for v, w in np.unique(wide[every], axis=0).tolist():
+        some = np.flatnonzero((wide[every] == (v, w)).all(axis=1))
+        i, j = every[some].T
+        one, two = alone[v].at_numbers(number[i]), alone[w].at_numbers(number[j])
+        shared = inner[one.at[:, :, None], two.at[:, None, :]]
+        kept = _most(one, two, shared) >= enough[some]
+        if kept.any():
+            both = (one.at_numbers(kept), two.at_numbers(kept), shared[kept])
+            start = np.asarray(sizes)[i[kept]]
+            yield from _alike(*both, start, every[some[kept]].tolist())
 
-    def widths(pair: Pair) -> Pair:
-        return len(groups[pair[0]].columns), len(groups[pair[1]].columns)
 
-    for _, some in groupby(sorted(every, key=widths), key=widths):
-        both = list(some)
-        one, two = (_Stack.of([alone[p[k]] for p in both]) for k in (0, 1))
-        start = np.array([sizes[i] for i, _ in both])
-        yield from _alike(inner, one, two, start, both)
+def _most(one: _Alone, two: _Alone, shared: Array) -> Array:
+    """What no pair's gain is above, (n,), by (3)."""
+    if one.at.shape[1] > two.at.shape[1]:
+        one, two, shared = two, one, np.swapaxes(shared, 1, 2)
+    largest = np.full(len(shared), len(SIZES) - 1)
+    inner, pull = _Beside(one, two, shared).rest(largest)
+    inner[:, range(inner.shape[1]), range(inner.shape[1])] += SIZES[-1] ** -2
+    beside = np.linalg.solve(inner, pull[:, :, None])[:, :, 0]
+    own = (two.along**2 / (two.strength + SIZES[-1] ** -2)).sum(axis=1)
+    square = own + (pull * beside).sum(axis=1)
+    most: Array = 0.5 * square + 2 * DENSITY.max()
+    return most
 
 
 def _alike(
-    inner: Array, one: _Stack, two: _Stack, start: Index, both: Sequence[Pair]
+    one: _Alone, two: _Alone, shared: Array, start: Index, both: Sequence[list[int]]
 ) -> Iterator[Gained]:
     """The same of pairs of which the first and the second are alike in width."""
-    shared = inner[one.at[:, :, None], two.at[:, None, :]]
     first, then = _Beside(one, two, shared), _Beside(two, one, shared.swapaxes(1, 2))
     n = np.arange(len(both))
     found = []
@@ -86,19 +114,19 @@ def _alike(
         profile = first.profile(v)
         u = profile.argmax(axis=1)
         found.append((two.profile[n, v] + profile[n, u], u, v))
-    for k, pair in enumerate(both):
+    for k, (i, j) in enumerate(both):
         gain, sizes = max((float(g[k]), (int(u[k]), int(v[k]))) for g, u, v in found)
-        yield gain, pair, sizes
+        yield gain, (i, j), sizes
 
 
 @dataclass(frozen=True, slots=True)
 class _Alone:
-    """One group by itself.
+    """Groups of one width, each by itself, (n, ...).
 
     Attributes
     ----------
-    at : its columns among those of all groups
-    inner, pull : what the rows say of it
+    at : their columns among those of all groups
+    inner, pull : what the rows say of them
     strength, axes, along : eigenvalues, eigenvectors, and the pull along these
     profile : gain and density over the sizes
 
@@ -114,20 +142,19 @@ class _Alone:
 
     @classmethod
     def of(cls, inner: Array, pull: Array, at: Index) -> Self:
-        strength, axes = np.linalg.eigh(inner)
-        seen = strength > ROUNDED * max(np.diag(inner).max(), 1e-300)
-        axes, strength = axes * seen, np.where(seen, strength, 0.0)
-        along = axes.T @ pull
+        """Groups of which all columns' `inner` and `pull` are given."""
+        own, pulled = inner[at[:, :, None], at[:, None, :]], pull[at]
+        strength, axes = np.linalg.eigh(own)
+        top = np.diagonal(own, 0, 1, 2).max(axis=1, keepdims=True)
+        seen = strength > ROUNDED * np.maximum(top, 1e-300)
+        axes, strength = axes * seen[:, None, :], np.where(seen, strength, 0.0)
+        along = (pulled[:, None, :] @ axes)[:, 0]
         profile = gained(strength, along**2) + DENSITY
-        return cls(at, inner, pull, strength, axes, along, profile)
+        return cls(at, own, pulled, strength, axes, along, profile)
 
-
-class _Stack(_Alone):
-    """Several alike in width, (n, ...) each."""
-
-    @classmethod
-    def of(cls, some: Sequence[_Alone]) -> Self:  # type: ignore[override]
-        return cls(*(np.stack([getattr(s, k) for s in some]) for k in _Alone.__slots__))
+    def at_numbers(self, some: Index | NDArray[np.bool_]) -> Self:
+        """Some of the groups; one may be there more than once."""
+        return type(self)(*(getattr(self, name)[some] for name in self.__slots__))
 
 
 class _Beside:
@@ -144,20 +171,27 @@ class _Beside:
         self.one, self.other = one, other
         self.shared = shared @ other.axes  # S^T
         self.wide = one.at.shape[1] > other.at.shape[1]
-        if self.wide:
-            self.shared = np.swapaxes(one.axes, 1, 2) @ self.shared
+
+    def rest(self, size: Index) -> tuple[Array, Array]:
+        """What is left of the one beside the other at some sizes, (1)."""
+        root, taken = self._taken(self.shared, size)
+        return self.one.inner - root @ np.swapaxes(root, 1, 2), self.one.pull - taken
 
     def profile(self, size: Index) -> Array:
         """Gain and density over the sizes of the one, (n, sizes)."""
-        one, other = self.one, self.other
-        kept = 1 / (other.strength + 1 / SIZES[size, None] ** 2)
-        taken = (self.shared @ (kept * other.along)[:, :, None])[:, :, 0]
-        root = self.shared * np.sqrt(kept)[:, None, :]
+        one = self.one
         if self.wide:
+            root, taken = self._taken(np.swapaxes(one.axes, 1, 2) @ self.shared, size)
             return self._in_axes(root, one.along - taken) + DENSITY
-        rest = one.inner - root @ np.swapaxes(root, 1, 2)  # (1)
         own = np.diagonal(one.inner, 0, 1, 2).max(axis=1)
-        return gains(rest, one.pull - taken, own) + DENSITY
+        return gains(*self.rest(size), own) + DENSITY
+
+    def _taken(self, shared: Array, size: Index) -> tuple[Array, Array]:
+        """What the other takes at some sizes: S^T E^(1/2) and S^T E q."""
+        other = self.other
+        kept = 1 / (other.strength + 1 / SIZES[size, None] ** 2)
+        taken = (shared @ (kept * other.along)[:, :, None])[:, :, 0]
+        return shared * np.sqrt(kept)[:, None, :], taken
 
     def _in_axes(self, root: Array, pull: Array) -> Array:
         """The gain by (2), of W (n, k, l) and b' (n, k)."""

@@ -124,9 +124,10 @@ class Search(Offers):
         for table in self.tables(there):
             if table.less == there.sizes.instability:
                 continue
-            for one, two, gain, (u, v) in _pairs(table):
+            least = level - 2 * SLACK - table.score
+            for one, two, worth, (u, v) in self._pairs(there, table, least):
                 key = (one.member[0].key, two.member[0].key)
-                total = table.score + gain + self._more(there, one, two)
+                total = table.score + worth
                 if key not in tried or total > tried[key][0]:
                     tried[key] = total, replace(one, size=u), replace(two, size=v)
         near = sorted(tried.values(), key=lambda t: -t[0])[:FOLLOWED]
@@ -134,28 +135,33 @@ class Search(Offers):
         found = [self.taken(there, one, two) for _, one, two in near]
         return max(found, key=_score, default=there)
 
+    def _pairs(
+        self, there: Set, table: OfferTable, least: float
+    ) -> Iterator[tuple[Offer, Offer, float, Pair]]:
+        """Every two offers of a table with their worth, and the sizes that it is at.
+
+        Each with all its parameters as well: beside the other it may need them. Pairs
+        that are worth less than the least may be left out.
+        """
+        known = [o for o in table.offers if o.member[0].kind != "unknown"][:PROMISING]
+        every = [*known, *(_widened(o) for o in known)]
+        new = [a is not b for a, b in zip(known, every[len(known) :], strict=True)]
+        wanted, more = [], {}
+        for i, j in combinations(range(len(known)), 2):
+            wide = i + new[i] * len(known), j + new[j] * len(known)
+            worth = self._more(there, known[i], known[j])
+            for pair in {(i, j), wide}:
+                wanted.append(pair)
+                more[pair] = worth
+        groups, sizes = [o.member[1] for o in every], [o.size for o in every]
+        enough = [least - more[pair] for pair in wanted]
+        for gain, pair, at in pairs(table.state, groups, sizes, wanted, enough):
+            yield every[pair[0]], every[pair[1]], gain + more[pair], at
+
     def _more(self, there: Set, one: Offer, two: Offer) -> float:
         """Chance of two more causes beside those of a set, ln."""
         both = [*there.members, one.member, two.member]
         return self.chance(both) - self.chance(there.members)
-
-
-def _pairs(table: OfferTable) -> Iterator[tuple[Offer, Offer, float, Pair]]:
-    """Every two offers of a table with their gain, and the sizes that it is at.
-
-    Each with all its parameters as well: beside the other it may need them.
-    """
-    known = [o for o in table.offers if o.member[0].kind != "unknown"][:PROMISING]
-    every = [*known, *(_widened(o) for o in known)]
-    new = [a is not b for a, b in zip(known, every[len(known) :], strict=True)]
-    wanted = []
-    for i, j in combinations(range(len(known)), 2):
-        wanted.append((i, j))
-        if new[i] or new[j]:
-            wanted.append((i + new[i] * len(known), j + new[j] * len(known)))
-    groups, sizes = [o.member[1] for o in every], [o.size for o in every]
-    for gain, (i, j), at in pairs(table.state, groups, sizes, wanted):
-        yield every[i], every[j], gain, at
 
 
 def _widened(offer: Offer) -> Offer:

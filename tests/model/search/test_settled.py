@@ -213,10 +213,9 @@ def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
     assert len(found.members) == 2
     scores = []
     for table in search.tables(empty):
-        for one, two, gain, (u, v) in selection._pairs(table):
+        for one, two, worth, (u, v) in search._pairs(empty, table, -np.inf):
             one, two = replace(one, size=u), replace(two, size=v)
-            foretold = table.score + gain + search._more(empty, one, two)
-            scores.append(foretold)
+            scores.append(table.score + worth)
             both = search.taken(empty, one, two)
             assert both.keys == {one.member[0].key, two.member[0].key}
     every = [s for s in search.visited.values() if len(s.members) == 2]

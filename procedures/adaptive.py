@@ -62,9 +62,13 @@ def plan(
     positions = list(about.positions)
     refused = {p.degrees for i, p in enumerate(positions) if i not in held}
     while True:
-        so_far: SoFar = yield Judge()
+        so_far: SoFar = yield Judge(quick=True)
         worth, places = _worth(so_far, about, positions, refused)
         end = _end(so_far, worth, len(positions), most(about, "adaptive") or MOST)
+        if end and so_far.quick:  # it ends by nothing but a search in full
+            so_far = yield Judge()
+            worth, places = _worth(so_far, about, positions, refused)
+            end = _end(so_far, worth, len(positions), most(about, "adaptive") or MOST)
         if end:
             yield from note(end)
             return _ended(so_far, positions, held)

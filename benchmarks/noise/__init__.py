@@ -12,7 +12,6 @@ for white noise. Last the processor time and memory of ten million samples.
 
 from __future__ import annotations
 
-import os
 import resource
 import subprocess
 import sys
@@ -250,7 +249,6 @@ def cost() -> None:
 
 def main() -> None:
     """Print all tables."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     beside_the_bound()
     prediction(how_many(4))
     cost()

@@ -114,10 +114,10 @@ class Explanation:
         return bool(ratio > thresholds.SEES_EARTH)
 
 
-def explain(prepared: Prepared) -> Explanation:
-    """Find what explains a recording."""
+def explain(prepared: Prepared, before: Explanation | None = None) -> Explanation:
+    """Find what explains a recording, beginning with what explained a part of it."""
     inference = inference_of(prepared.source, prepared.rows, prepared)
-    found = inference.run()
+    found = inference.run(None if before is None else before.best.set.members)
     windows = inference.system.linearised(found.state)
     best = Fitted(
         prepared.rows,

@@ -33,6 +33,11 @@ class SoFar:
     failed: tuple[str, ...] = ()
 
     @property
+    def quick(self) -> bool:
+        """Whether its search began with what was found before."""
+        return self.laid.before is not None
+
+    @property
     def explanation(self) -> Explanation | None:
         """What the recording shows to be there; None where it cannot be examined."""
         return self.laid.explanation

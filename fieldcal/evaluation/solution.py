@@ -55,11 +55,13 @@ class Laid:
     ----------
     session : the recording
     still : windows that can be used
+    before : what explained a part of the recording, which a search may begin with
 
     """
 
     session: Session
     still: Rests
+    before: Explanation | None = None
 
     @cached_property
     def order(self) -> list[int]:
@@ -107,7 +109,9 @@ class Laid:
     @cached_property
     def explanation(self) -> Explanation | None:
         """What the recording shows to be there; None where it cannot be examined."""
-        return None if self.prepared is None else explain(self.prepared)
+        if self.prepared is None:
+            return None
+        return explain(self.prepared, self.before)
 
     @property
     def unexamined(self) -> list[str]:

@@ -72,7 +72,15 @@ class Repeat:
 
 @dataclass(frozen=True, slots=True)
 class Judge:
-    """Say what the windows taken so far are good for; the reply is the judgement."""
+    """Say what the windows taken so far are good for; the reply is the judgement.
+
+    Attributes
+    ----------
+    quick : whether the search may begin with what was found the last time
+
+    """
+
+    quick: bool = False
 
 
 Step = Hold | Note | Add | Repeat | Judge

@@ -65,7 +65,7 @@ class Engine:
     warm_up : judges whether the device is still warming up; None does not ask
     lost_share : share of a window's samples that may be missing; with more it is taken
         again, if that helps
-    judge : says what the windows taken so far are good for
+    judge : says what the windows taken so far are good for, quickly or in full
     added : positions that were taken into the session behind the planned ones; what is
         added is appended
 
@@ -81,7 +81,7 @@ class Engine:
         taken: dict[int, Average] | None = None,
         warm_up: WarmUpWatch | None = None,
         lost_share: float = np.inf,
-        judge: Callable[[], object] = lambda: None,
+        judge: Callable[[bool], object] = lambda quick: None,
         added: list[Position] | None = None,
     ) -> None:
         self._driver = driver
@@ -157,8 +157,8 @@ class Engine:
             case Repeat(index):
                 self._desk.repeat(index)
                 return None
-            case Judge():
-                return self._judge()
+            case Judge(quick):
+                return self._judge(quick)
 
     def _add(self, position: Position) -> int:
         """Take a position into the session; back comes its number."""

@@ -20,8 +20,10 @@ temperature, the link, what the operator insisted on and how the device was at e
 calibrations stay as they are."""
 
 
-def judged(folder: Path, limits: GradeLimits) -> SoFar:
+def judged(folder: Path, limits: GradeLimits, before: SoFar | None = None) -> SoFar:
     """What the windows that a session has are good for.
+
+    Beginning with what was found of some of them `before` takes half the time.
 
     Raises
     ------
@@ -31,7 +33,7 @@ def judged(folder: Path, limits: GradeLimits) -> SoFar:
     """
     session = Session.open(folder)
     still = rests(session)
-    laid = Laid(session, still)
+    laid = Laid(session, still, None if before is None else before.explanation)
     try:
         found = assess(solved_as(laid), session, still, limits, None)
     except FieldcalError as error:

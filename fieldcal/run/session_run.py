@@ -88,6 +88,7 @@ class SessionRun:
         wait = float(task.run.get("warm_up_s", WARM_UP))
         self._limits, self._until_go = limits, until_go
         self._added: list[Position] = []
+        self._so_far: SoFar | None = None
         self._remedies = 0
         self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
 
@@ -130,7 +131,7 @@ class SessionRun:
             self._taken,
             self._warm_up,
             self._limits.lost_share,
-            lambda: judged(self._recorder.folder, self._limits),
+            self._judged,
             self._added,
         )
         while True:
@@ -138,6 +139,12 @@ class SessionRun:
                 return engine.run(self._plan())
             except RepeatPosition as again:
                 self._taken.pop(again.index, None)
+
+    def _judged(self, quick: bool) -> SoFar:
+        """What the windows taken so far are good for."""
+        before = self._so_far if quick else None
+        self._so_far = judged(self._recorder.folder, self._limits, before)
+        return self._so_far
 
     def _plan(self) -> Plan[Calibration]:
         task, about = self._task, with_more(self._task.about, self._added)

@@ -169,3 +169,21 @@ def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None
     assert at_points[there] >= dict(posterior.weights)[likely] > 0.3
     assert likely.state.columns.max() >= len(posterior.search.gram.index)
     assert np.isfinite(gain_of(found).of(LADDER[:2]).gain).all()
+
+
+@pytest.mark.parametrize("name, given", [
+    ("quadratic", {"x": 1e-3}),
+    ("settling", {"gx": 3e-3, "gy": -2e-3, "gz": 2e-3, "tau_s": 3.0}),
+])  # fmt: skip
+def test_a_search_that_begins_with_what_was_found_before_finds_the_same(
+    name: str, given: dict[str, float]
+) -> None:
+    places = [*START, Position.deg(-40, 0)]
+    before, whole = (explained(places[:n], [(name, given)]) for n in (3, 4))
+    quick = explain(whole.prepared, before)
+    assert [c.key for c, _ in quick.best.set.members] == [
+        c.key for c, _ in whole.best.set.members
+    ]
+    assert len(quick.inferred.search.visited) <= len(whole.inferred.search.visited)
+    worth, full = (gain_of(one).of(LADDER) for one in (quick, whole))
+    np.testing.assert_allclose(worth.gain, full.gain, rtol=0.05, atol=0.02)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -88,6 +88,18 @@ class Group:
             return np.arange(len(self.columns))
         order = np.argsort(-self.typical, kind="stable")
         return np.sort(order[:OFFERED])
+
+    def alike(self, others: Iterable[Group]) -> list[Group]:
+        """Those of others that are of the same parameters, whatever their shapes."""
+        own = (self.params, self.origin, self.position, self.shape.keys())
+        return [
+            g for g in others if (g.params, g.origin, g.position, g.shape.keys()) == own
+        ]
+
+    def apart(self, other: Group) -> float:
+        """How far the shape of one alike is from its own."""
+        return max((abs(other.shape[k] - v) / max(abs(v), 1e-9)
+                    for k, v in self.shape.items()), default=0.0)  # fmt: skip
 
     def sizes(self, v: float) -> Array:
         """Standard deviation of each column before the rows are seen, (k,)."""

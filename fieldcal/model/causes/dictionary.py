@@ -114,6 +114,23 @@ class Dictionary(ColumnTable):
         out.bases = list(self.bases)
         return out
 
+    def like(
+        self, members: Iterable[tuple[Cause, Group]]
+    ) -> tuple[tuple[Cause, Group], ...]:
+        """Causes of another dictionary as they are here, each at its nearest variant.
+
+        Those that are not here, or of which nothing tells which variant is meant, are
+        left out.
+        """
+        here = {cause.key: cause for cause in self.causes}
+        found = {}
+        for cause, group in members:
+            same = here.get(cause.key)
+            some = [] if same is None else group.alike(same.variants)
+            if same is not None and some:
+                found[same.key] = (same, min(some, key=group.apart))
+        return tuple(found.values())
+
     @cached_property
     def by_width(self) -> list[AlikeGroups]:
         """Groups of causes, those alike in width together."""

@@ -2,6 +2,7 @@
 
 The search is exact in what is linear. A set that was found moves the state to its
 estimate, where everything is linearised and searched again, beginning with that set.
+What a part of the same recording was explained by may be begun with as well.
 """
 
 from __future__ import annotations
@@ -82,20 +83,24 @@ class Inference:
         self.dictionary: Dictionary = system.dictionary
         self.turned: list[TurnRows] = []
 
-    def run(self) -> Inferred:
-        """Search until set and state stay."""
+    def run(self, begin: Sequence[Member] | None = None) -> Inferred:
+        """Search until set and state stay.
+
+        Parameters
+        ----------
+        begin : of any dictionary, what it is to begin with instead of with nothing;
+            a position far from where it is said to be is then not looked for
+
+        """
         members: tuple[Member, ...] = ()
         start: Array = np.zeros(self.dictionary.width)
         state, values, _ = self.settled(self.nominal, start, ())
         seen: set[tuple[tuple[str, int], ...]] = set()
         search = Search(self.dictionary, self.gram(state, values, None))
-        found = search.run(members)
-        turned = self.turned
-        far = self._afar(state, values, search)
-        if far is not None and far[2].score > found.score:
-            state, values, found = far
-        else:
-            self.turned = turned
+        if begin is not None:
+            found = search.upheld(self.dictionary.like(begin))
+        if begin is None or (begin and not found.members):
+            state, values, found = self._from_nothing(state, values, search)
         about = dict.fromkeys([found, search.evaluated(())])
         self.dictionary.joined(in_proportion(self.dictionary, list(about)))
         for _ in range(PASSES):
@@ -118,6 +123,17 @@ class Inference:
             if search.key(found.members) in seen:
                 break
         return Inferred(self, search, found, state, self._padded(values), self.turned)
+
+    def _from_nothing(
+        self, state: State, values: Array, search: Search
+    ) -> tuple[State, Array, Set]:
+        """The best set about a state of nothing, and where it is about another one."""
+        found, turned = search.run(), self.turned
+        far = self._afar(state, values, search)
+        if far is not None and far[2].score > found.score:
+            return far
+        self.turned = turned
+        return state, values, found
 
     def _afar(
         self, state: State, values: Array, search: Search

@@ -47,6 +47,17 @@ class Search(Offers):
             best = better
         return self._of_effects(best)
 
+    def upheld(self, members: tuple[Member, ...]) -> Set:
+        """What of some causes is worth more than less of it."""
+        best = self.evaluated(members)
+        for _ in members:
+            less = [self.without(best, i) for i in range(len(best.members))]
+            fewer = max(less, key=_score, default=best)
+            if fewer.score <= best.score:
+                break
+            best = fewer
+        return best
+
     def _of_effects(self, best: Set) -> Set:
         """The best set of effects alone, where that it is no effect is unlikely.
 

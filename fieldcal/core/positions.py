@@ -23,6 +23,8 @@ class Position:
     rate : constant rate about the procedure axes on a rate table, rad/s
     gamma : third turn, rad
     sigma : how well all this is known, rad about any axis; None if the site says so
+    speed : of a table that turns the device about an axis nobody knows, rad/s
+    speed_sigma : how well that is known, rad/s
 
     """
 
@@ -32,6 +34,8 @@ class Position:
     rate: tuple[float, float, float] | None = None
     gamma: float = 0.0
     sigma: float | None = None
+    speed: float = 0.0
+    speed_sigma: float = 0.0
 
     @classmethod
     def deg(
@@ -52,6 +56,11 @@ class Position:
         return self.alpha is not None and self.beta is not None
 
     @property
+    def turning(self) -> bool:
+        """Whether a table turns the device."""
+        return self.speed > 0 or any(self.rate or ())
+
+    @property
     def all_degrees(self) -> tuple[float, float, float] | None:
         """All three angles in degrees, if known."""
         if self.alpha is None or self.beta is None:
@@ -70,8 +79,15 @@ class Position:
 
 
 def rates(positions: Sequence[Position]) -> Array:
-    """Rates of a rate table, (n, 3) rad/s about the procedure axes; 0 at rest."""
+    """Known rates of a rate table, (n, 3) rad/s about the procedure axes; else 0."""
     return np.array([p.rate or (0.0, 0.0, 0.0) for p in positions]).reshape(-1, 3)
+
+
+def speeds(positions: Sequence[Position]) -> tuple[Array, Array]:
+    """Speeds about axes that nobody knows and their ±, (n,) rad/s each; 0 elsewhere."""
+    both = [(p.speed, p.speed_sigma) for p in positions]
+    table = np.array(both, dtype=float).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
 
 
 def angles(positions: Sequence[Position]) -> tuple[Array, Array]:

@@ -104,7 +104,7 @@ class Rests:
         held = [
             i
             for i, row in enumerate(self.rows)
-            if not table_rate(session.about, row).any()
+            if not session.about.positions[row].turning
         ]
         return replace(
             self,
@@ -145,9 +145,9 @@ def rests(session: Session) -> Rests:
     # each tells the noise for the next
     held = session.about.in_time()
     for i, window in zip(held.numbers, held.windows, strict=True):
-        rate = table_rate(session.about, i)
         try:
-            if rate.any():
+            if session.about.positions[i].turning:
+                rate = table_rate(block, window, session.about, i)
                 found, remark = take_on_a_table(block, window, rate, grain)
             else:
                 found, noise, remark = take(block, window, noise, grain)

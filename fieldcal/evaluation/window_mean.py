@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.errors import Moved, SessionError
-from fieldcal.core.positions import rates
 from fieldcal.core.samples import Array, Block, Grain
+from fieldcal.model.rows import reduce
 from fieldcal.model.rows.turntable import going_round
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window, average
@@ -72,9 +72,18 @@ def _given(span: tuple[float, float] | None) -> tuple[float, float]:
     return span
 
 
-def table_rate(about: Description, row: int) -> Array:
-    """Rate of the table in a position by its number, in device axes, (3,) rad/s."""
-    turned: Array = rates(about.positions[row : row + 1])[0] @ about.mounting
+def table_rate(
+    block: Block, span: tuple[float, float] | None, about: Description, row: int
+) -> Array:
+    """Rate of the table in a position by its number, in device axes, (3,) rad/s.
+
+    About an axis that nobody knows it is along what the gyroscopes read in the window.
+    """
+    part = block.between(*_given(span)).gyr if about.positions[row].turning else None
+    if part is None or not len(part):
+        return np.zeros(3)
+    at = np.full(len(part), row, dtype=np.intp)
+    turned: Array = reduce.table_rate(about, at, part)[0] @ about.mounting
     return turned
 
 

@@ -96,7 +96,8 @@ class State:
 def rotated(x: Experience, small_rotation: Array) -> Experience:
     """Rows with each position rotated by a little: (p, 2) rad.
 
-    By alpha and beta where they are known; else about two axes across the force.
+    By alpha and beta where they are known; else about two axes across the force, and
+    where a table turns about an axis that nobody knows across its rate.
     """
     small = small_rotation[np.maximum(x.position, 0)] * (x.position >= 0)[:, None]
     free = ~x.oriented
@@ -108,6 +109,13 @@ def rotated(x: Experience, small_rotation: Array) -> Experience:
         length = np.linalg.norm(f[free], axis=1, keepdims=True)
         f[free] *= np.linalg.norm(x.f[free], axis=1, keepdims=True) / length
         x = replace(x, f=f)
+    spun = x.speed > 0
+    if spun.any():
+        w = x.w.copy()
+        one, two = across(w[spun])
+        w[spun] += small[spun, :1] * one + small[spun, 1:] * two
+        w[spun] *= (x.speed[spun] / np.linalg.norm(w[spun], axis=1))[:, None]
+        x = replace(x, w=w)
     return x
 
 

@@ -44,6 +44,8 @@ class Experience:
     variance : (n, 3) (m/s^2)^2, of vibration on the accelerometers
     position : (n,) index of the position, -1 while the device is turned
     rate : (n, 3) rad/s about the procedure axes, what a rate table adds
+    speed, speed_sigma : (n,) rad/s, length of `rate` and its ± where a table turns
+        about an axis that nobody knows: `rate` is then along what was read; else 0
     base_force : (3,) m/s^2, specific force in base axes
     base_rate : (3,) rad/s, the Earth's rate in base axes; zero where it is left out
     transport : (3,) rad/s, what a base that moves over the Earth adds to it
@@ -69,6 +71,8 @@ class Experience:
     variance: Array
     position: np.ndarray[Any, np.dtype[np.int_]]
     rate: Array
+    speed: Array
+    speed_sigma: Array
     base_force: Array
     base_rate: Array
     mounting: Array
@@ -106,6 +110,8 @@ class Experience:
             "variance": np.zeros((n, 3)),
             "position": np.arange(n),
             "rate": np.zeros((n, 3)),
+            "speed": np.zeros(n),
+            "speed_sigma": np.zeros(n),
             "base_force": force_home(gravity),
             "base_rate": np.zeros(3),
             "mounting": np.eye(3),

@@ -23,7 +23,7 @@ from fieldcal.core.frames import (
     mean_rotation,
     turn,
 )
-from fieldcal.core.positions import rates, third_angles
+from fieldcal.core.positions import rates, speeds, third_angles
 from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import observations
 from fieldcal.model.causes.planned import state_of
@@ -69,7 +69,7 @@ def residuals(material: Material) -> Residuals | None:
 
 
 def predicted(found: Calibration, seen: Observations) -> Array:
-    """Outputs that the calibration predicts, (n, 6); nan where angles are unknown."""
+    """Outputs that the calibration predicts, (n, 6); nan where nothing says where."""
     x = Experience.at_rest(
         *seen.angles,
         seen.gravity,
@@ -89,6 +89,7 @@ def predicted(found: Calibration, seen: Observations) -> Array:
          np.array([*nominal.acc_scale, *nominal.gyr_scale])),
     )  # fmt: skip
     out = state.output(state.experienced(x), np.full((1, len(x)), np.inf))
+    out[speeds(seen.positions)[0] > 0] = np.nan
     if seen.grade != "navigation":
         out[:, 3:] += _earth(seen, seen.mean[:, 3:] - out[:, 3:])
     return out

@@ -106,8 +106,9 @@ def _windows(material: Material, still: Rests) -> blocks.Table:
     for row, average in zip(still.rows, still.averages, strict=True):
         end = float(np.nextafter(average.end, np.inf))
         window = material.block.between(average.start, end)
-        rate = table_rate(material.session.about, row)
-        if rate.any():
+        about, span = material.session.about, (average.start, end)
+        if about.positions[row].turning:
+            rate = table_rate(material.block, span, about, row)
             window, _ = steadied(window, rate)
         worst = judge(_cells(window), StillnessLimits()).worst
         tone: Tone = "bad" if worst.ratio > 1 else "warn" if worst.ratio > NEAR else ""

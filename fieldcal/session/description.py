@@ -339,6 +339,8 @@ def _positions(
 def _position(number: int, table: Mapping[str, Any]) -> Position:
     label = one_line(str(table.get("name", "")))
     position = held(number, table, label)
+    if "speed_deg_s" in table:
+        return _turning(number, table, position)
     rate = table.get("rate_deg_s")
     if rate is None:
         return position
@@ -346,6 +348,24 @@ def _position(number: int, table: Mapping[str, Any]) -> Position:
         turning = " ".join(f"{r:g}" for r in rate)
         position = replace(position, name=f"{position.name}, {turning} °/s")
     return replace(position, rate=tuple(np.deg2rad(rate)))
+
+
+def _turning(number: int, table: Mapping[str, Any], position: Position) -> Position:
+    """A position in which a table turns about an axis that nobody knows."""
+    if "rate_deg_s" in table or position.oriented:
+        other = "rate_deg_s" if "rate_deg_s" in table else "an attitude"
+        raise InputError(
+            f"[[position]] number {number} has speed_deg_s and {other}: speed_deg_s is"
+            " for an axis that nobody knows; where it is known give rate_deg_s"
+        )
+    speed, sigma = table["speed_deg_s"], table.get("speed_sd_deg_s", 0.0)
+    label = table.get("name") or f"position {number}, {speed:g} °/s about any axis"
+    return replace(
+        position,
+        name=one_line(str(label)),
+        speed=float(np.deg2rad(speed)),
+        speed_sigma=float(np.deg2rad(sigma)),
+    )
 
 
 def _window(number: int, table: Mapping[str, Any]) -> tuple[float, float] | None:

@@ -48,7 +48,7 @@ class Fit:
     rms : root mean square residual, weighted by the windows' noise
     left_out : the same of windows that the fit did not see; nan where none could be
     rows : (p, 3) residuals, nan where nothing was measured; of a position whose
-        orientation nobody knows only along the force
+        orientation nobody knows only along the force, or along the rate of a table
 
     """
 
@@ -148,37 +148,42 @@ class _Seen:
     def along(self, values: Array, unsure: Array | None = None) -> Array:
         """Residuals of the means as a table, (p, 3).
 
-        Of a position whose orientation nobody knows there is one, along the force. One
-        whose variance says that no other window checks it is nan.
+        Of a position whose orientation nobody knows there is one, along the force, and
+        along the rate of a table whose axis nobody knows. A force whose variance says
+        that no other window checks it is nan.
         """
         out = np.full((len(self.d.held), 3), np.nan)
         out[np.nonzero(self.used.reshape(-1, 3))] = values
-        if 0 not in self.channels:
-            return out
-        for i in np.flatnonzero(self.d.free).tolist():
+        for i in np.flatnonzero(self.turned).tolist():
             out[i] = [self._normal(i) @ np.nan_to_num(out[i]), np.nan, np.nan]
-        if unsure is not None:
+        if unsure is not None and 0 in self.channels:
             for i in range(len(out)):
-                n = self._normal(i)[None] if self.d.free[i] else np.eye(3)
+                n = self._normal(i)[None] if self.turned[i] else np.eye(3)
                 if np.trace(n @ unsure[i] @ n.T) > UNCHECKED * self.d.unit[0] ** 2:
                     out[i] = np.nan
         return out
 
+    @property
+    def turned(self) -> Mask:
+        """Windows in which turns that nobody knows change the triad, (p,)."""
+        loose = self.gram.loose[: len(self.d.held), list(self.channels)]
+        return np.asarray(loose.any(axis=(1, 2)))
+
     def _normal(self, i: int) -> Array:
-        """What takes outputs to the force along itself, whatever the turns, (3,)."""
-        d = self.d
-        one, two = self.gram.loose[i][list(self.channels)].T
-        f = d.x.f[int(np.argmax(d.x.position == d.held[i]))]
+        """What takes outputs to the input along itself, whatever the turns, (3,)."""
+        d, at = self.d, list(self.channels)
+        one, two = self.gram.loose[i][at].T
+        inputs = d.x.f if 0 in self.channels else d.x.w
+        v = inputs[int(np.argmax(d.x.position == d.held[i]))]
         across = np.cross(one, two)
-        out: Array = across / (across @ (d.unit[:3] * f / np.linalg.norm(f)))
+        out: Array = across / (across @ (d.unit[at] * v / np.linalg.norm(v)))
         return out
 
     def rms(self, rows: Array) -> float:
         """Root mean square, weighted by the noise of the windows."""
         weight = self.gram.info[: len(rows), list(self.channels)].copy()
-        if 0 in self.channels:
-            free = np.flatnonzero(self.d.free)
-            weight[free, 0] = weight[free].mean(axis=1)
+        free = np.flatnonzero(self.turned)
+        weight[free, 0] = weight[free].mean(axis=1)
         known = np.isfinite(rows)
         if not known.any():
             return float("nan")

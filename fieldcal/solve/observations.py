@@ -147,9 +147,8 @@ class Observations:
 
     @property
     def rotating(self) -> Mask:
-        """Whether a table turns a position at a known rate, (n,)."""
-        turning: Mask = np.any(self.rates != 0.0, axis=1)
-        return turning
+        """Whether a table turns a position, (n,)."""
+        return np.array([p.turning for p in self.positions], dtype=bool)
 
     @property
     def forces(self) -> Array:

@@ -47,6 +47,11 @@ def solve(observations: Observations, asked: Asked) -> Calibration:
             f"the paper prints formulas for two angles, and {third[0]} has three: leave"
             " out --as-printed"
         )
+    if spun := [p.name for p in observations.positions if p.speed]:
+        raise InputError(
+            f"the paper prints formulas for known rates, and {spun[0]} turns about an"
+            " axis that nobody knows: leave out --as-printed"
+        )
     still = np.flatnonzero(~observations.rotating)
     parts, sentences = [], []
     method = asked.method

@@ -11,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE, force_home
-from fieldcal.core.positions import attitude_sigmas, rates, third_angles
-from fieldcal.core.samples import ACC, Array
+from fieldcal.core.positions import attitude_sigmas, speeds, third_angles
+from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model.rows.reduce import Rows, free_force
+from fieldcal.model.rows.turntable import table_rates
 from fieldcal.physics.experience import Experience
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.observations import Observations
@@ -34,7 +35,14 @@ def of_means(observations: Observations) -> Recorded:
         position=index,
         gamma=third_angles(observations.positions),
         attitude_sigma=attitude_sigmas(observations.positions),
-        rate=rates(observations.positions),
+        rate=table_rates(
+            observations.positions,
+            index,
+            (y[:, GYR] - nominal.gyr_bias) / np.array(nominal.gyr_scale),
+            observations.mounting,
+        ),
+        speed=speeds(observations.positions)[0],
+        speed_sigma=speeds(observations.positions)[1],
         base_force=force_home(observations.gravity)
         + observations.under_way.force * [1.0, 0.0, 1.0],
         transport=observations.under_way.rate,

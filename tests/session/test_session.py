@@ -194,6 +194,13 @@ def test_windows_of_a_live_session_stand_in_its_marks(tmp_path: Path) -> None:
         ),
         ("[[position]]\nstart_s = 5\nend_s = 5", "it must come before"),
         ("[[position]]\nrate_deg_s = [1]", "three numbers"),
+        ("[[position]]\nspeed_deg_s = 0", "more than 0"),
+        ("[[position]]\nspeed_sd_deg_s = 1", "speed_deg_s"),
+        (
+            "[[position]]\nspeed_deg_s = 5\nrate_deg_s = [1, 0, 0]",
+            "for an axis that nobody knows",
+        ),
+        ("[[position]]\nspeed_deg_s = 5\nalpha_deg = 1\nbeta_deg = 0", "an attitude"),
         ("[sampling]\nrate_hz = -1", "rate_hz = -1 cannot be"),
         ("x = [", "is not TOML"),
     ],

@@ -187,7 +187,7 @@ def recording(
         beta,
         about.gravity,
         gamma=gamma,
-        rate=table_rate(about, np.arange(len(alpha))),
+        rate=table_rate(about, np.arange(len(alpha)), np.full((len(alpha), 3), np.nan)),
         base_force=about.base_force,
         base_rate=about.base_rate,
         mounting=about.mounting,

@@ -178,6 +178,18 @@ def gravity(view: RowView) -> Array:
     return out[:, :, None]
 
 
+def speed(known: Array) -> Callable[[RowView], Array]:
+    """What more of each speed (k,) of a table brings about, of its size, (n, 6, k)."""
+
+    def of(view: RowView) -> Array:
+        table = view.state.scale * np.hstack([np.zeros_like(view.x.f), view.x.w])
+        here = view.x.speed[:, None] == known
+        out: Array = table[:, :, None] * here[:, None, :]
+        return out
+
+    return of
+
+
 def earth_sides(plain: Experience, state: State) -> Iterator[Pair]:
     """The rate of the base about each of its axes, rad/s."""
     for axis in np.eye(3):

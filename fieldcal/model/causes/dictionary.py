@@ -89,7 +89,7 @@ class Dictionary(ColumnTable):
         self.earth = self.attitude = -1
         self.always: list[Group] = [
             *self._calibration(), *self._gravity(), *self._earth_anyhow(),
-            *self._attitudes(),
+            *self._attitudes(), *self._speeds(),
         ]  # fmt: skip
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
@@ -209,6 +209,20 @@ class Dictionary(ColumnTable):
         wide = np.repeat(sigma[known], 3)
         yield Group("attitude", "", at.ravel(), wide, fixed=1.0, in_state=True)
 
+    def _speeds(self) -> Iterator[Group]:
+        """What the rate about an axis that nobody knows is off by, alike at each speed.
+
+        The Earth adds what of it lies along the axis, which is the same wherever the
+        device stands on the table.
+        """
+        known = np.unique(self.x.speed[self.x.speed > 0])
+        if not len(known) or not np.isin(self.observed, (3, 4, 5)).any():
+            return
+        at = self.add(General("speed", columns.speed(known)), len(known))
+        off = np.array([self.x.speed_sigma[self.x.speed == v].max() for v in known])
+        wide = np.hypot(off, EARTH_RATE / 3**0.5) / known
+        yield Group("speed", "gyr", at + np.arange(len(known)), wide, fixed=1.0)
+
     def _earth_anyhow(self) -> Iterator[Group]:
         """What the Earth may add alike wherever nobody knows the orientation.
 
@@ -222,9 +236,11 @@ class Dictionary(ColumnTable):
             yield Group("earth anyhow", "gyr", at + np.arange(3), size, fixed=1.0)
 
     def _is_free(self, p: int) -> bool:
-        """Whether nobody knows the orientation of a position that shows a force."""
+        """Whether nobody knows where the force of a position points, or its axis."""
         there = self.x.position == p
-        return bool(self.used[there, :3].any() and not self.x.oriented[there].all())
+        spun = self.used[there, 3:].any() and self.x.speed[there].any()
+        force = self.used[there, :3].any() and not self.x.oriented[there].all()
+        return bool(spun or force)
 
     def _instability(self) -> None:
         """What each window is off by for itself, by channel."""

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.positions import angles, attitude_sigmas, rates, third_angles
+from fieldcal.core.positions import angles, attitude_sigmas, speeds, third_angles
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.noise import rounding
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.model.rows.turntable import going_round
+from fieldcal.model.rows.turntable import going_round, table_rates
 from fieldcal.model.rows.vibration import shaking
 from fieldcal.physics.experience import Experience
 from fieldcal.session.description import Description
@@ -229,7 +229,7 @@ def averaged(
         heating=heating,
         variance=np.nan_to_num(variance),
         position=position,
-        rate=table_rate(about, position),
+        rate=table_rate(about, position, y[:, 3:]),
         base_force=about.base_force,
         base_rate=about.base_rate,
         transport=about.under_way.rate,
@@ -308,22 +308,27 @@ def _angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Arra
 
 
 def _attitudes(about: Description, position: NDArray[np.intp]) -> dict[str, Array]:
-    """The third turn of each row, and how well its position is known."""
+    """The third turn of each row, how well its position is known, and its speed."""
     if not about.positions:
         return {}
     positions = about.positions
     return {
         "gamma": third_angles(positions)[position],
         "attitude_sigma": attitude_sigmas(positions)[position],
+        "speed": speeds(positions)[0][position],
+        "speed_sigma": speeds(positions)[1][position],
     }
 
 
-def table_rate(about: Description, position: NDArray[np.intp]) -> Array:
-    """Rate that a table adds in some positions, (n, 3) rad/s about procedure axes."""
+def table_rate(about: Description, position: NDArray[np.intp], gyr: Array) -> Array:
+    """Rate that a table adds in some positions, (n, 3) rad/s about procedure axes.
+
+    `gyr` (n, 3) is what gyroscopes put out there, nan where that is not known.
+    """
     if not about.positions:
         return np.zeros((len(position), 3))
-    out: Array = rates(about.positions)[position]
-    return out
+    w = (gyr - about.nominal["gyr_bias"]) / about.nominal["gyr_scale"]
+    return table_rates(about.positions, position, w, about.mounting)
 
 
 def _force_of(about: Description, position: NDArray[np.intp], y: Array) -> Array:

@@ -14,15 +14,23 @@ Of less than a turn by an angle c the mean keeps at most 2 sin(c / 2) / c of it,
 direction that is not known:
 
     cov = (I - v v^T / v^2) 2/3 Omega^2 min(1/2, 1 / c^2)                           (2)
+
+About an axis that nobody knows a table has a speed only. Its axis is where what is read
+points, less a bias b that leaves every window its length, linear in b and |b|^2:
+
+    |w_i|^2 - v_i^2 = 2 b w_i - |b|^2                                               (3)
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.positions import Position, rates, speeds
 from fieldcal.core.samples import Array
 
 TURNS = 1.0
@@ -45,6 +53,51 @@ class Round:
 
     values: Array
     covariance: Array
+
+
+def table_rates(
+    positions: Sequence[Position],
+    position: NDArray[np.intp],
+    w: Array,
+    mounting: Array,
+) -> Array:
+    """Rates that a table adds, (n, 3) rad/s about procedure axes.
+
+    About an axis that nobody knows: along what is read in each position.
+
+    Parameters
+    ----------
+    positions : of the session
+    position : (n,) index of each row's
+    w : (n, 3) what the gyroscopes read, about rad/s in device axes; nan where nothing
+    mounting : (3, 3) P, procedure = P device
+
+    """
+    out: Array = rates(positions)[position]
+    speed, _ = speeds(positions)
+    if not speed.any():
+        return out
+    mean = np.zeros((len(positions), 3))
+    for p in np.unique(position):
+        mean[p] = np.nan_to_num(w[position == p]).mean(axis=0)
+    here = [p for p in np.unique(position) if not any(positions[p].rate or ())]
+    mean[here] -= _centre(mean[here], speed[here])
+    for p in np.flatnonzero(speed):
+        length = float(np.linalg.norm(mean[p]))
+        axis = mean[p] / length if length > 0 else np.array([0.0, 1.0, 0.0])
+        out[position == p] = speed[p] * (mounting @ axis)
+    return out
+
+
+def _centre(w: Array, speed: Array) -> Array:
+    """Offset that leaves rates (p, 3) of such lengths (p,), rad/s, (3,), by (3).
+
+    Nothing where they do not tell it: what is read is then all there is.
+    """
+    design = np.column_stack([2 * w, -np.ones(len(w))])
+    squares = np.sum(w**2, axis=1) - speed**2
+    found, _, rank, _ = np.linalg.lstsq(design, squares, 1e-6)
+    return found[:3] if rank == design.shape[1] else np.zeros(3)
 
 
 def going_round(

@@ -240,7 +240,7 @@ def only(x: Experience, rows: Sequence[int]) -> Experience:
         name: getattr(x, name)[list(rows)]
         for name in ("alpha", "beta", "f", "w", "w_dot", "t", "lasts", "since_start",
                      "since_turn", "warming", "heating", "variance", "position", "rate",
-                     "gamma", "attitude_sigma")
+                     "speed", "speed_sigma", "gamma", "attitude_sigma")
     }  # fmt: skip
     return replace(x, **per_row)
 

@@ -4,9 +4,10 @@ With tolerance +-T about the nominal value, m and t the mean and spread of the u
 (`spread`),
 
     Cp = T / (3 t),   Cpk = (T - |m - nominal|) / (3 t)                             (1)
-    var Cpk = 1 / (9 n) + Cpk^2 / (2 (n - 1))                                       (2)
+    var Cp = Cp^2 var t / t^2,   var Cpk = var m / (9 t^2) + Cpk^2 var t / t^2      (2)
 
-Source: (2) Bissell, Applied Statistics 39 (1990) 331.
+Without errors of the units, (2) is 1 / (9 n) + Cpk^2 / (2 (n - 1)), that of Bissell,
+Applied Statistics 39 (1990) 331; with them, the spread is known less well.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class LotParameter:
     units : (n,) number of each unit that has it
     x, sigma : (n,) value and uncertainty
     about : their spread
-    cp, cpk, cpk_sigma : (1), (2); None where there is no tolerance
+    cp, cp_sigma, cpk, cpk_sigma : (1), (2); None where there is no tolerance
     tolerance : from nominal
     charts : in the order of time
 
@@ -53,6 +54,7 @@ class LotParameter:
     about: UnitSpread
     tolerance: float | None
     cp: float | None
+    cp_sigma: float | None
     cpk: float | None
     cpk_sigma: float | None
     charts: tuple[ControlChart, ...]
@@ -69,6 +71,7 @@ class LotParameter:
             "median_sigma": float(np.median(self.sigma)),
             "tolerance": self.tolerance,
             "cp": self.cp,
+            "cp_sigma": self.cp_sigma,
             "cpk": self.cpk,
             "cpk_sigma": self.cpk_sigma,
         }
@@ -97,15 +100,18 @@ def capability(
     about = spread(x, sigma)
     parsed = ParameterName.of(name)
     tolerance = limits.tolerance(parsed.group)
-    cp = cpk = wide = None
+    cp = cp_sigma = cpk = cpk_sigma = None
     if tolerance is not None and about.spread > 0:
         off = abs(about.mean - (1.0 if parsed.is_scale else 0.0))
         cp = tolerance / (3 * about.spread)  # (1)
         cpk = (tolerance - off) / (3 * about.spread)
-        wide = float(np.sqrt(1 / (9 * len(x)) + cpk**2 / (2 * (len(x) - 1))))  # (2)
+        part = about.spread_sigma / about.spread
+        cp_sigma = cp * part  # (2)
+        cpk_sigma = float(np.hypot(about.mean_sigma / (3 * about.spread), cpk * part))
     quiet = len(x) * together * CHARTS / FALSE_ALARM
     z = (x - about.mean) / about.sigma
     charts = (ewma(z, quiet), cusum(z, quiet))
     return LotParameter(
-        name, unit, units, x, sigma, about, tolerance, cp, cpk, wide, charts
-    )
+        name, unit, units, x, sigma, about, tolerance, cp, cp_sigma, cpk, cpk_sigma,
+        charts,
+    )  # fmt: skip

@@ -5,14 +5,19 @@ Most units are of the lot, a few may be odd:
     x_i ~ (1 - p) N(m, t^2 + s_i^2) + p N(m, K^2 (t^2 + s_i^2))                     (1)
 
 with s_i the uncertainty of the unit's own value. At each spread t the mean and p are
-found by expectation and maximisation, with w_i the probability that a unit is none of
-the odd ones; then
+found by expectation and maximisation, with c_i the probability that a unit is none of
+the odd ones and w_i = c_i + (1 - c_i) / K^2; then
 
     ln L(t) = sum_i ln density(x_i) - ln(sum_i w_i / (t^2 + s_i^2)) / 2             (2)
 
 is largest at the spread (restricted maximum likelihood, which counts the mean), and its
-interval is where (2) is less by up to 1.92. Source: Harville, J. Am. Stat. Assoc. 72
-(1977) 320; mixtures for outliers: Tukey's contaminated normal.
+interval is where (2) is less by up to 1.92. What is known of t^2 is, with v_i = t^2 +
+s_i^2 and W_k = sum_i w_i / v_i^k,
+
+    var t^2 = 2 / (W_2 - 2 W_3 / W_1 + W_2^2 / W_1^2)                               (3)
+
+Source: Harville, J. Am. Stat. Assoc. 72 (1977) 320, with (3); mixtures for outliers:
+Tukey's contaminated normal.
 """
 
 from __future__ import annotations
@@ -50,8 +55,11 @@ class UnitSpread:
     ----------
     mean, mean_sigma : m with its standard uncertainty
     spread : t; what units differ by
+    spread_sigma : its standard uncertainty by (3); nan where it is zero
     low, high : its 95 % interval
-    typical : (n,) w_i, probability that each unit is none of the odd ones
+    square : t^2, averaged over every t as far as (2) has it likely
+    odd : p, the part of units that are odd
+    typical : (n,) c_i, probability that each unit is none of the odd ones
     sigma : (n,) what each unit is off by, its own uncertainty and that of the mean
         included
 
@@ -60,8 +68,11 @@ class UnitSpread:
     mean: float
     mean_sigma: float
     spread: float
+    spread_sigma: float
     low: float
     high: float
+    square: float
+    odd: float
     typical: Array
     sigma: Array
 
@@ -88,17 +99,29 @@ def spread(x: Array, sigma: Array) -> UnitSpread:
         middle = (weight * x).sum(axis=1) / weight.sum(axis=1)
         share = ((1 - typical).sum(axis=1) + COUNTS * ODD) / (len(x) + COUNTS)
     density = np.logaddexp(core, odd) - 0.5 * np.log(variance)
-    told = (typical / variance).sum(axis=1)
+    told = weight.sum(axis=1)
     likely = density.sum(axis=1) - 0.5 * np.log(told)  # (2)
     best = int(np.argmax(likely))
     inside = tried[likely > likely[best] - WITHIN]
-    off = np.sqrt(variance[best] + 1 / told[best])
+    weight = np.exp(likely - likely[best]) * np.gradient(tried)
     return UnitSpread(
         float(middle[best]),
         float(told[best] ** -0.5),
         float(tried[best]),
+        _unsure(float(tried[best]), typical[best], variance[best]),
         float(inside.min()),
         float(inside.max()),
+        float(weight @ tried**2 / weight.sum()),
+        float(share[best]),
         typical[best],
-        off,
+        np.sqrt(variance[best] + 1 / told[best]),
     )
+
+
+def _unsure(t: float, typical: Array, variance: Array) -> float:
+    """Standard uncertainty of the spread, (3)."""
+    if t == 0:
+        return float("nan")
+    one, two, three = ((typical / variance**k).sum() for k in (1, 2, 3))
+    told = two - 2 * three / one + (two / one) ** 2
+    return float(np.sqrt(2 / told) / (2 * t))

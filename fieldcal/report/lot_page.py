@@ -93,6 +93,7 @@ def _spreads(found: Lot) -> Table:
     rows = []
     for one in found.parameters.values():
         about = one.about
+        cp = "" if one.cp is None else f"{one.cp:.2f} ± {one.cp_sigma:.2f}"
         cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
         rows.append(
             [
@@ -104,7 +105,7 @@ def _spreads(found: Lot) -> Table:
                 f"{np.median(one.sigma):.2g}",
                 pretty(one.unit),
                 "" if one.tolerance is None else f"{one.tolerance:.3g}",
-                "" if one.cp is None else f"{one.cp:.2f}",
+                cp,
                 cpk,
             ]
         )

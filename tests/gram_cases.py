@@ -13,6 +13,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
@@ -33,6 +34,7 @@ class Columns:
     common: Array
     free: NDArray[np.bool_]
     small_rotation: int
+    known: KnownRows | None = None
 
 
 @dataclass

@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
+    from fieldcal.calibration.lot_prior import LotPrior
     from fieldcal.evaluation.observations import Rests
     from fieldcal.session.folder import Session
 
-RARE = ("as_printed", "method", "heading", "history")
+RARE = ("as_printed", "method", "heading", "history", "lot")
 
 EXAMPLE = """\
   fieldcal solve bench-7/2026-03-01
   fieldcal solve imu0 --cross --json > imu0.json
+  fieldcal solve unit-81 --lot lot=2026-11
 """
 
 
@@ -53,6 +55,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--heading", "how well z points north, 1σ; for the gyroscopes"),
     ):
         add(option, type=float, metavar="DEG", help=what)
+    add(
+        "--lot",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="add what the store says of such units: lot, model and so on, as in "
+        "fieldcal lot; may be given several times",
+    )
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
     add("--history", metavar="FILE", help="instead of the usual history")
     add(
@@ -64,6 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal.commands.borrowed_view import show_borrowed
     from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.installing import with_installed
     from fieldcal.commands.table import show
@@ -87,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(json.dumps(found.to_json()) + "\n")
     else:
         show(found)
+        show_borrowed(found)
         show_decision(found)
         sys.stdout.write(f"written: {path}\n")
     go = found.info.get("decision", {}).get("go", True)
@@ -94,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibration:
-    """What windows and turns say, estimated as the options want it."""
+    """What windows, turns and lot say, estimated as the options want it."""
     from fieldcal.evaluation.solution import solved
 
     return solved(
@@ -108,7 +120,23 @@ def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibra
         level_sigma_deg=args.level,
         heading_sigma_deg=args.heading,
         angle_sigma_deg=args.angles,
+        lot=_lot(args, session) if args.lot else None,
     )
+
+
+def _lot(args: argparse.Namespace, session: Session) -> LotPrior:
+    """What the store says of units as --lot wants them, but for the session's own."""
+    from fieldcal.fleet.lot_prior import lot_prior
+    from fieldcal.history import sessions
+    from fieldcal.history.database import Database
+    from fieldcal.history.place import default_place
+
+    wanted = sessions.parsed(args.lot)
+    database = Database(args.history or default_place())
+    some = database.done(lambda db: sessions.found(db, wanted, documents=True))
+    serial = str(session.about.device.get("serial", ""))
+    folder = str(session.folder.resolve())
+    return lot_prior(" ".join(args.lot), some, serial, folder)
 
 
 def _decided(

@@ -61,7 +61,9 @@ class SessionBatch:
         for first in range(0, len(names), CHUNK):
             some = names[first : first + CHUNK]
             yield self.database.done(
-                lambda db, some=some: sessions.found(db, folders=some, documents=True)  # type: ignore[misc]
+                lambda db, some=some: sessions.found(
+                    db, folders=some, documents=True, reduced=True
+                )  # type: ignore[misc]
             )
 
     def write(self, path: Path) -> None:

@@ -151,7 +151,7 @@ def lot(
         If fewer than `FEWEST` units have a result.
 
     """
-    units = _last(sessions)
+    units = last_of_units(sessions)
     useful = [one for one in units if one.good]
     if len(useful) < FEWEST:
         raise InputError(
@@ -192,6 +192,17 @@ def lot(
     )
 
 
+def last_of_units(sessions: Sequence[StoredSession]) -> list[StoredSession]:
+    """The last session of each unit that has a good result, else its last one."""
+    units: dict[str, StoredSession] = {}
+    for one in sorted(sessions, key=_when):
+        key = one.serial or one.folder
+        before = units.pop(key, None)
+        kept = before is not None and before.good and not one.good
+        units[key] = before if before is not None and kept else one
+    return sorted(units.values(), key=_when)
+
+
 def share(good: int, count: int) -> tuple[float, float, float]:
     """Share with its 95 % interval, (1).
 
@@ -202,17 +213,6 @@ def share(good: int, count: int) -> tuple[float, float, float]:
     low = 0.0 if not good else float(beta.ppf(0.025, a, b))
     high = 1.0 if good == count else float(beta.ppf(0.975, a, b))
     return good / count, low, high
-
-
-def _last(sessions: Sequence[StoredSession]) -> list[StoredSession]:
-    """The last session of each unit that has a good result, else its last one."""
-    units: dict[str, StoredSession] = {}
-    for one in sorted(sessions, key=_when):
-        key = one.serial or one.folder
-        before = units.pop(key, None)
-        kept = before is not None and before.good and not one.good
-        units[key] = before if before is not None and kept else one
-    return sorted(units.values(), key=_when)
 
 
 def _when(one: StoredSession) -> tuple[str, str]:

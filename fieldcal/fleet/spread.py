@@ -2,22 +2,25 @@
 
 Most units are of the lot, a few may be odd:
 
-    x_i ~ (1 - p) N(m, t^2 + s_i^2) + p N(m, K^2 (t^2 + s_i^2))                     (1)
+    x_i ~ (1 - p) N(m, v_i) + p C(m, K v_i^1/2),   v_i = t^2 + s_i^2                (1)
 
-with s_i the uncertainty of the unit's own value. At each spread t the mean and p are
-found by expectation and maximisation, with c_i the probability that a unit is none of
-the odd ones and w_i = c_i + (1 - c_i) / K^2; then
+with C that of Cauchy, since some are off by any number of spreads, and s_i the
+uncertainty of the unit's own value. At each spread t the mean and p are found by
+expectation and maximisation, with c_i the probability that a unit is none of the odd
+ones, z_i = (x_i - m) / v_i^1/2 and w_i = c_i + (1 - c_i) 2 / (K^2 + z_i^2); then
 
-    ln L(t) = sum_i ln density(x_i) - ln(sum_i w_i / (t^2 + s_i^2)) / 2             (2)
+    ln L(t) = sum_i ln density(x_i) - ln(sum_i w_i / v_i) / 2                       (2)
 
 is largest at the spread (restricted maximum likelihood, which counts the mean), and its
-interval is where (2) is less by up to 1.92. What is known of t^2 is, with v_i = t^2 +
-s_i^2 and W_k = sum_i w_i / v_i^k,
+interval is where (2) is less by up to 1.92. What is known of t^2 is, with W_k =
+sum_i c_i / v_i^k,
 
     var t^2 = 2 / (W_2 - 2 W_3 / W_1 + W_2^2 / W_1^2)                               (3)
 
-Source: Harville, J. Am. Stat. Assoc. 72 (1977) 320, with (3); mixtures for outliers:
-Tukey's contaminated normal.
+and what t may be is L(t) times the prior of Jeffreys, t W_2^1/2. Source: Harville, J.
+Am. Stat. Assoc. 72 (1977) 320, with (3); Tiao and Tan, Biometrika 52 (1965) 37;
+mixtures for outliers: Tukey's contaminated normal; weights of Cauchy: Lange, Little and
+Taylor, J. Am. Stat. Assoc. 84 (1989) 881.
 """
 
 from __future__ import annotations
@@ -30,7 +33,10 @@ from scipy.stats import t as student
 from fieldcal.core.samples import Array
 
 WIDER = 6.0
-"""K: an odd unit is so many times as far off as others."""
+"""K: an odd unit is typically so many times as far off as others."""
+
+CAUCHY = 0.5 * np.log(2 / np.pi)
+"""Peak of Cauchy's density against that of the normal one, ln."""
 
 ODD = 0.01
 """p before the units are seen, which counts as `COUNTS` units."""
@@ -57,7 +63,7 @@ class UnitSpread:
     spread : t; what units differ by
     spread_sigma : its standard uncertainty by (3); nan where it is zero
     low, high : its 95 % interval
-    square : t^2, averaged over every t as far as (2) has it likely
+    square : t^2, averaged over every t that it may be
     odd : p, the part of units that are odd
     typical : (n,) c_i, probability that each unit is none of the odd ones
     sigma : (n,) what each unit is off by, its own uncertainty and that of the mean
@@ -93,9 +99,10 @@ def spread(x: Array, sigma: Array) -> UnitSpread:
     for _ in range(STEPS):
         square = (x - middle[:, None]) ** 2 / variance
         core = np.log1p(-share)[:, None] - 0.5 * square
-        odd = np.log(share / WIDER)[:, None] - 0.5 * square / WIDER**2
+        odd = np.log(share / WIDER)[:, None] + CAUCHY - np.log1p(square / WIDER**2)
         typical = np.exp(core - np.logaddexp(core, odd))
-        weight = (typical + (1 - typical) / WIDER**2) / variance
+        weight = typical + (1 - typical) * 2 / (WIDER**2 + square)
+        weight /= variance
         middle = (weight * x).sum(axis=1) / weight.sum(axis=1)
         share = ((1 - typical).sum(axis=1) + COUNTS * ODD) / (len(x) + COUNTS)
     density = np.logaddexp(core, odd) - 0.5 * np.log(variance)
@@ -104,6 +111,7 @@ def spread(x: Array, sigma: Array) -> UnitSpread:
     best = int(np.argmax(likely))
     inside = tried[likely > likely[best] - WITHIN]
     weight = np.exp(likely - likely[best]) * np.gradient(tried)
+    weight *= tried * np.sqrt((typical / variance**2).sum(axis=1))
     return UnitSpread(
         float(middle[best]),
         float(told[best] ** -0.5),

@@ -60,10 +60,12 @@ class StoredSession:
 def of_calibration(
     folder: Path, found: Calibration, taken_at: str | None
 ) -> StoredSession:
-    """A session with its calibration and nothing else."""
+    """A session with its calibration and nothing else.
+
+    What it has from its lot is in no parameter: a lot is not to learn from itself.
+    """
     document = found.to_json()
     device = document.get("device", {})
-    rows = zip(found.values.tolist(), found.sigma.tolist(), found.units, strict=True)
     decision = document.get("decision")
     return StoredSession(
         str(folder.resolve()),
@@ -73,8 +75,23 @@ def of_calibration(
         None if decision is None else bool(decision.get("go", False)),
         found.good,
         document,
-        parameters=dict(zip(found.names, rows, strict=True)),
+        parameters=_by_itself(found),
     )
+
+
+def _by_itself(found: Calibration) -> dict[str, tuple[float, float, str]]:
+    """Parameters with their units, without what they have from the unit's lot."""
+    rows = zip(found.values.tolist(), found.sigma.tolist(), found.units, strict=True)
+    out = dict(zip(found.names, rows, strict=True))
+    told = found.info.get("borrowed", {})
+    if told and not told["refused"]:
+        for name, one in told["parameters"].items():
+            _, sigma, unit = out.pop(name)
+            if one["own_sigma"] is not None:
+                later = max(sigma**2 - one["sigma"] ** 2, 0.0)  # rounding
+                own = (one["own_sigma"] ** 2 + later) ** 0.5
+                out[name] = (one["own_value"], own, unit)
+    return out
 
 
 def keep(db: Connection, one: StoredSession) -> None:
@@ -161,6 +178,7 @@ def found(
     wanted: Mapping[str, str] | None = None,
     folders: Iterable[str] | None = None,
     documents: bool = False,
+    reduced: bool = False,
 ) -> list[StoredSession]:
     """Sessions that meet conditions, the oldest first.
 
@@ -169,7 +187,8 @@ def found(
     db : the store
     wanted : by the names in `FILTERS`; `since` and `until` are dates
     folders : only these
-    documents : whether with result, diagnosis and reduced rows
+    documents : whether with result and diagnosis
+    reduced : whether with reduced rows
 
     """
     some = [_condition(name, value) for name, value in (wanted or {}).items()]
@@ -181,11 +200,11 @@ def found(
     query = query.order_by(SESSION.c.taken_at, SESSION.c.folder)
     rows = db.execute(query).all()
     parameters = _parameters(db, some)
-    reduced: dict[int, bytes] = {}
-    if documents:
+    kept: dict[int, bytes] = {}
+    if reduced:
         blobs = select(REDUCED).join(SESSION).where(and_(True, *some))
-        reduced = {r.session: r.data for r in db.execute(blobs)}
-    return [_stored(r, parameters.get(r.id, {}), reduced.get(r.id)) for r in rows]
+        kept = {r.session: r.data for r in db.execute(blobs)}
+    return [_stored(r, parameters.get(r.id, {}), kept.get(r.id)) for r in rows]
 
 
 def _condition(name: str, value: str) -> Any:

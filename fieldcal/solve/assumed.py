@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.calibration import Method
+from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.solve.given import Tilt
 from fieldcal.solve.observations import Observations
@@ -30,6 +31,7 @@ class Asked:
     level_deg, heading_deg : how level the base is, how well z points north; None where
         nobody said
     angles_deg : how well each position's angles are set
+    lot : what the unit's lot says of it; None where it is not asked
 
     """
 
@@ -40,6 +42,7 @@ class Asked:
     level_deg: float | None = None
     heading_deg: float | None = None
     angles_deg: float = 0.0
+    lot: LotPrior | None = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS or self.tilt not in TILTS:
@@ -47,6 +50,8 @@ class Asked:
                 f"method {self.method!r} with tilt {self.tilt!r} is unknown: methods"
                 f" are {join(METHODS)}, tilts are {join(TILTS)}"
             )
+        if self.lot is not None and self.as_printed:
+            raise InputError("printed formulas know of no lot: leave one of them out")
         _refuse_none((self.level_deg, self.heading_deg, self.angles_deg))
 
     def method_for(self, observations: Observations) -> Method:

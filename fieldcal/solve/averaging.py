@@ -13,9 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import ParameterName, group_of
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import thresholds
+from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import Mixing, Mixture
@@ -82,22 +84,32 @@ def averaged_over(
 
 def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
     """Parameters of one explanation at the end of the recording, (2) of `shown`."""
-    picked, before = picked_by(given, found, nominal)
+    picked, before = picked_by(given, found.columns, nominal)
     return before + picked @ found.mean, picked @ found.covariance @ picked.T
 
 
-def picked_by(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
-    """Parameters by the columns of an estimate, (k, c), and what they are without."""
-    picked = np.zeros((len(given.names), len(found.columns)))
+def picked_by(given: Given, columns: Index, nominal: State) -> tuple[Array, Array]:
+    """Parameters by some columns, (k, c), and what they are without."""
+    picked = np.zeros((len(given.names), len(columns)))
     before = np.zeros(len(given.names))
     for i, name in enumerate(given.names):
-        picked[i, np.flatnonzero(found.columns == given.place(name)[0])[0]] = 1.0
+        picked[i, np.flatnonzero(columns == given.place(name)[0])[0]] = 1.0
         parameter = ParameterName.of(name)
         if parameter.sensor:
             scale, c = parameter.is_scale, parameter.channel
-            picked[i] += given.ending[int(scale)][c, found.columns]
+            picked[i] += given.ending[int(scale)][c, columns]
             before[i] = (nominal.scale if scale else nominal.bias)[c]
     return picked, before
+
+
+def known_rows(given: Given, lot: LotPrior, nominal: State) -> KnownRows | None:
+    """What a lot says of the columns of a set; None where it says nothing of them."""
+    lot = lot.only(given.names)
+    if not lot.names:
+        return None
+    picked, before = picked_by(given, np.arange(given.width), nominal)
+    at = [given.names.index(name) for name in lot.names]
+    return KnownRows.of(picked[at], lot.mean - before[at], lot.covariance)
 
 
 def determined(

@@ -19,12 +19,14 @@ from typing import Literal
 import numpy as np
 
 from fieldcal.calibration import Calibration, Method
+from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import group_of
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
 from fieldcal.solve import printed
 from fieldcal.solve.assumed import Asked
+from fieldcal.solve.borrowed import borrowed
 from fieldcal.solve.estimation import Estimated, Recorded, estimated
 from fieldcal.solve.given import Tilt, Wanted, earth_known, seen_by
 from fieldcal.solve.latitude import EarthVertical
@@ -53,6 +55,7 @@ def solve(
     heading_sigma_deg: float | None = None,
     angle_sigma_deg: float = 0.0,
     recorded: Recorded | None = None,
+    lot: LotPrior | None = None,
 ) -> Calibration:
     """Estimate the calibration.
 
@@ -71,6 +74,8 @@ def solve(
         axis
     recorded : the rows of the recording that the observations are means of, and its
         turns; of means alone there is one row for each window
+    lot : what the unit's lot says of its parameters, which the result then has in it
+        unless the unit is odd
 
     Raises
     ------
@@ -89,19 +94,33 @@ def solve(
     """
     asked = Asked(
         method, tilt, cross, as_printed,
-        level_sigma_deg, heading_sigma_deg, angle_sigma_deg,
+        level_sigma_deg, heading_sigma_deg, angle_sigma_deg, lot,
     )  # fmt: skip
     if as_printed:
         return printed.solve(observations, asked)
     chosen = asked.method_for(observations)
-    found, notes = _Session(observations, asked, chosen, recorded).best()
+    alone = replace(asked, lot=None)
+    found, notes = _fitted(observations, alone, chosen, recorded)
+    told = None
+    if lot is not None:
+        beside, others = _fitted(observations, asked, chosen, recorded)
+        found, told = borrowed(found, beside, lot)
+        notes = notes if told is None or told.refused else others
+    return calibration(chosen, observations, asked, found, notes, told)
+
+
+def _fitted(
+    observations: Observations, asked: Asked, method: Method, recorded: Recorded | None
+) -> tuple[Estimated, list[str]]:
+    """The set that fits, with the Earth's rate unless gyroscopes show none."""
+    found, notes = _Session(observations, asked, method, recorded).best()
     shown = EarthVertical.of(found.given, found.search, observations.latitude)
     if shown and shown.wrong:
-        still = _Session(observations, asked, chosen, recorded, earth=False)
+        still = _Session(observations, asked, method, recorded, earth=False)
         other, others = still.best()
         if other.score - found.score + np.log(priors.ELSEWHERE) > shown.gain:
-            found, notes = other, [NO_EARTH, *others]
-    return calibration(chosen, observations, asked, found, notes)
+            return other, [NO_EARTH, *others]
+    return found, notes
 
 
 class _Session:
@@ -179,6 +198,7 @@ class _Session:
             angles_deg=self.asked.angles_deg,
             earth=self.unknown,
             turned=turned,
+            lot=self.asked.lot,
         )
         return estimated(self.recorded, turning, self.nominal, wanted, follow)
 

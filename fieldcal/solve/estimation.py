@@ -22,7 +22,14 @@ from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turning
 from fieldcal.solve.agreement import Fit, agreement
-from fieldcal.solve.averaging import averaged_over, determined, mixed, picked_by
+from fieldcal.solve.averaging import (
+    Parameters,
+    averaged_over,
+    determined,
+    known_rows,
+    mixed,
+    picked_by,
+)
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.observations import Mask
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
@@ -73,6 +80,7 @@ class Estimated:
     Attributes
     ----------
     given : the set
+    every : all parameters of the set, in its order
     names : (k,) parameters that the rows determine
     values, covariance : (k,), (k, k)
     missing : parameters that they do not determine
@@ -90,6 +98,7 @@ class Estimated:
     """
 
     given: Given
+    every: Parameters
     names: tuple[str, ...]
     values: Array
     covariance: Array
@@ -186,6 +195,8 @@ def estimated(
         rows, np.abs(nominal.scale), since, turning is not None, wanted,
         recorded.shown, recorded.cut,
     )  # fmt: skip
+    if wanted.lot is not None:
+        given.known = known_rows(given, wanted.lot, nominal)
     turns = None if turning is None else Turns(turning, given, False)
     likely, bad = given.explanations[0], np.zeros(len(given.held), dtype=bool)
     score = np.nan
@@ -209,13 +220,13 @@ def estimated(
         bad |= worst
     found = replace(found, bad=np.where(bad, 1.0, found.bad))
     parameters = averaged_over(given, gram, found, nominal, averaged)
-    picked, _ = picked_by(given, found, nominal)
+    picked, _ = picked_by(given, found.columns, nominal)
     names, values, covariance, moved, missing = determined(given, parameters)
     at = [given.names.index(name) for name in names]
     elsewhere = turning.contradicted if turning else ()
     counts = set(given.held[found.bad <= thresholds.CERTAIN].tolist())
     return Estimated(
-        given, names, values, covariance, missing, found, score, moved,
+        given, parameters, names, values, covariance, missing, found, score, moved,
         Search(given, gram),
         agreement(gram, given, found, (0, 1, 2)),
         agreement(gram, given, found, (3, 4, 5)),

@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home
 from fieldcal.core.samples import CHANNELS, Array, Index
@@ -54,6 +55,7 @@ class Wanted:
     angles_deg : how well each angle is set
     earth : (3,) rad/s, what is not known of the Earth's rate in base axes
     turned : whether turns between positions were recorded
+    lot : what the unit's lot says of its parameters; None where nobody asks it
 
     """
 
@@ -65,6 +67,7 @@ class Wanted:
     angles_deg: float = 0.0
     earth: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turned: bool = False
+    lot: LotPrior | None = None
 
 
 class Given(Dictionary):

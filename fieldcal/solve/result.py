@@ -16,6 +16,7 @@ from fieldcal.core.samples import UNITS as CHANNEL_UNITS
 from fieldcal.model import thresholds
 from fieldcal.solve import words
 from fieldcal.solve.assumed import Asked
+from fieldcal.solve.borrowed import Borrowed
 from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
 from fieldcal.solve.latitude import EarthVertical
@@ -45,6 +46,7 @@ def calibration(
     asked: Asked,
     found: Estimated,
     notes: Sequence[str],
+    told: Borrowed | None = None,
 ) -> Calibration:
     """Put an estimate into a calibration.
 
@@ -61,6 +63,7 @@ def calibration(
     )
     sentences = [
         there,
+        told.sentence if told else "",
         *_open(method, observations, found),
         *notes,
         *_level(method, asked, observations),
@@ -94,7 +97,8 @@ def calibration(
         rms=found.acc.rms,
         warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
         good=good,
-        info=_info(method, observations, asked, found),
+        info=_info(method, observations, asked, found)
+        | ({"borrowed": told.to_json()} if told else {}),
     )
 
 

@@ -68,7 +68,9 @@ def put(place: Place, *some: StoredSession) -> None:
 
 
 def everything(place: Place, **wanted: str) -> list[StoredSession]:
-    return Database(place).done(lambda db: sessions.found(db, wanted, documents=True))
+    return Database(place).done(
+        lambda db: sessions.found(db, wanted, documents=True, reduced=True)
+    )
 
 
 def test_a_session_comes_back_as_it_was(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from fieldcal.model.causes.cause import CLOSURE, FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General
 from fieldcal.model.causes.effect_causes import at_points, of_effects
+from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.causes.random_causes import flicker, of_chance
 from fieldcal.model.causes.unknown_causes import of_no_effect
 from fieldcal.model.causes.wander import Wander
@@ -72,7 +73,13 @@ class Dictionary(ColumnTable):
     turns : whether the way between positions is seen
     wander : how the biases wander inside windows
 
+    Attributes
+    ----------
+    known : what is known of columns from elsewhere; None where nothing is
+
     """
+
+    known: KnownRows | None = None
 
     def __init__(
         self,

@@ -20,6 +20,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
@@ -143,6 +144,8 @@ def gram(
     total = [_add_windows(out, part, values) for part in linear]
     for i, turn in enumerate(turns, len(held)):
         total.append(_add_turn(out, i, turn, values))
+    if dictionary.known is not None:
+        total.append(_add_known(out, dictionary.known))
     for j in np.flatnonzero(dictionary.free):
         at = index[dictionary.small_rotation + 2 * int(held[j]) + np.arange(2)]
         out.loose[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
@@ -168,6 +171,15 @@ def _add_windows(out: Gram, part: Linear, values: Array) -> tuple[float, int]:
     out.means[windows[:, None], c, at] = mean
     out.off[windows, c], out.info[windows, c] = middle, weight
     return float(white @ white) - float(weight @ middle**2), len(white) - len(windows)
+
+
+def _add_known(out: Gram, known: KnownRows) -> tuple[float, int]:
+    """Add what is known from elsewhere of the columns that are here."""
+    all_ = out.index[known.columns]
+    at, design = all_[all_ >= 0], known.design[:, all_ >= 0]
+    out.within[np.ix_(at, at)] += design.T @ design
+    out.pull[at] += design.T @ known.off
+    return float(known.off @ known.off), len(known.off)
 
 
 def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, int]:

@@ -1,0 +1,30 @@
+"""What a result has from its unit's lot, as a person reads it."""
+
+from __future__ import annotations
+
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.wording import number, pretty, title
+
+
+def show_borrowed(found: Calibration) -> None:
+    """Print a row a parameter: by itself, the lot, both; nothing without a lot."""
+    from rich.table import Table
+
+    from fieldcal.commands.console import ShownConsole
+
+    told = found.info.get("borrowed")
+    if not told:
+        return
+    odd = f"odd with P = {told['odd_probability']:.2g}"
+    heading = f"Beside {told['lot']}: {odd}"
+    table = Table(title=heading, title_justify="left")
+    for column in ("parameter", "the lot", "± alone", "± both", "unit"):
+        left = column in ("parameter", "unit")
+        table.add_column(column, justify="left" if left else "right", no_wrap=True)
+    units = dict(zip(found.names, found.units, strict=True))
+    for name, one in told["parameters"].items():
+        alone = "none" if one["own_sigma"] is None else f"{one['own_sigma']:.2g}"
+        lot = " ± ".join(number(one["lot_value"], one["lot_sigma"]))
+        both = f"{one['sigma']:.2g}"
+        table.add_row(title(name), lot, alone, both, pretty(units.get(name, "")))
+    ShownConsole().print(table)

@@ -1,0 +1,247 @@
+"""What a unit borrows from its lot, unless it is odd.
+
+The lot's mean and covariance are rows of the model (`averaging.known_rows`), so that
+estimate, tilt and bad windows are found with them. A unit need not be as its lot is,
+(1) of `calibration.lot_prior`: with x, C what the unit says on its own, m the lot's
+mean, and of each hypothesis h the spread P_h,
+
+    C_h = (C^-1 + P_h^-1)^-1,    x_h = m + C_h C^-1 (x - m)                        (1)
+    ln Z_h = [(x_h - m)^T C_h^-1 (x_h - m) + ln |C_h| - ln |P_h|] / 2 + const       (2)
+
+and the answer is their mixture, as everywhere. A unit that is likelier odd than not
+has nothing from its lot at all. Source: Box and Tiao, Biometrika 55 (1968) 119.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration.gauge import GROUPS
+from fieldcal.calibration.lot_prior import LotPrior
+from fieldcal.calibration.names import group_of
+from fieldcal.calibration.wording import number, pretty
+from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
+from fieldcal.solve.estimation import Estimated
+
+UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
+
+EVERYTHING = ""
+"""In place of a parameter's name: none of them by itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Borrowed:
+    """What a unit has from its lot.
+
+    Attributes
+    ----------
+    lot : the parameters that both know
+    odd : probability that the unit is odd
+    parameter : in which it is, if it is; empty for all of them
+    own : value and standard uncertainty by full name, without the lot
+    found : the same with it
+
+    """
+
+    lot: LotPrior
+    odd: float
+    parameter: str
+    own: Mapping[str, tuple[float, float]]
+    found: Mapping[str, tuple[float, float]]
+
+    @property
+    def refused(self) -> bool:
+        """Whether the unit is odd, and has nothing from its lot."""
+        return self.odd > thresholds.NAMED
+
+    @property
+    def sentence(self) -> str:
+        """What is in the result, or why nothing is."""
+        units = f"{min(self.lot.units)} units of {self.lot.label}"
+        if self.refused:
+            return (
+                f"this unit is odd beside {units} (P = {self.odd:.2f}):"
+                f" {self._apart()}; nothing of the lot is in the result: see whether it"
+                " is the right lot, and examine the unit"
+            )
+        name = min(self.lot.names, key=self._share)
+        unit = _unit(name)
+        before = self.own.get(name)
+        instead = f"± {before[1]:.2g}" if before else "none"
+        perhaps = ""
+        if self.odd > thresholds.MENTIONED:
+            perhaps = (
+                f"; the unit may be odd, P = {self.odd:.2f}: {self._apart()}, which is"
+                " in the uncertainties"
+            )
+        return (
+            f"what {units} say is in this result: {name} has"
+            f" {instead} by itself and"
+            f" {f'± {self.found[name][1]:.2g} {unit}'.strip()} with it{perhaps}"
+        )
+
+    def _share(self, name: str) -> float:
+        """What is left of a parameter's uncertainty, as a part."""
+        return self.found[name][1] / self.own.get(name, (0.0, np.inf))[1]
+
+    def _apart(self) -> str:
+        """By what the unit differs most from its lot."""
+        known = [n for n in self.lot.names if n in self.own]
+        off = {
+            n: (self.own[n][0] - m) / np.hypot(self.own[n][1], s)
+            for n, m, s in zip(
+                self.lot.names, self.lot.mean, self.lot.sigma, strict=True
+            )
+            if n in known
+        }
+        name = self.parameter or max(off, key=lambda n: abs(off[n]), default="")
+        if name not in off:
+            return "in what several parameters are together"
+        i = self.lot.names.index(name)
+        own = " ± ".join(number(*self.own[name]))
+        usual = " ± ".join(number(float(self.lot.mean[i]), float(self.lot.sigma[i])))
+        unit = f" {_unit(name)}".rstrip()
+        return f"{name} is {own}{unit}, where the lot has {usual}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of result.json."""
+        rows = zip(
+            self.lot.names, self.lot.mean.tolist(), self.lot.sigma.tolist(),
+            self.lot.units, strict=True,
+        )  # fmt: skip
+        return {
+            "lot": self.lot.label,
+            "odd_probability": self.odd,
+            "odd_parameter": (self.parameter or None) if self.refused else None,
+            "refused": self.refused,
+            "parameters": {
+                name: {
+                    "units": units,
+                    "lot_value": mean,
+                    "lot_sigma": sigma,
+                    "own_value": self.own.get(name, (None, None))[0],
+                    "own_sigma": self.own.get(name, (None, None))[1],
+                    "sigma": self.found[name][1],
+                }
+                for name, mean, sigma, units in rows
+            },
+        }
+
+
+def _unit(name: str) -> str:
+    return pretty(UNITS[group_of(name)])
+
+
+def borrowed(
+    own: Estimated, found: Estimated, lot: LotPrior
+) -> tuple[Estimated, Borrowed | None]:
+    """An estimate with its lot, unless the unit is odd; None where both share nothing.
+
+    Parameters
+    ----------
+    own, found : without the lot and with it
+    lot : what it says
+
+    """
+    lot = lot.only([n for n in found.names if n in own.given.names])
+    if not lot.names:
+        return own, None
+    others = _Hypotheses.of(own, lot)
+    kept = own if others.odd > thresholds.NAMED else others.mixed_with(found)
+    lot = lot.only(kept.names)
+    told = Borrowed(lot, others.odd, others.parameter, _told(own), _told(kept))
+    return kept, told
+
+
+def _told(one: Estimated) -> dict[str, tuple[float, float]]:
+    rows = zip(one.values.tolist(), np.sqrt(np.diag(one.covariance)), strict=True)
+    return {n: (v, float(s)) for n, (v, s) in zip(one.names, rows, strict=True)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Hypotheses:
+    """In what a unit may be odd; the first hypothesis is that it is not.
+
+    Attributes
+    ----------
+    names : (k,) all parameters of the unit's own set
+    parameters : (h,) in which it is odd; empty where in none by itself
+    share : (h,) probability
+    means, covariances : (h, k), (h, k, k), (1)
+
+    """
+
+    names: tuple[str, ...]
+    parameters: tuple[str, ...]
+    share: Array
+    means: Array
+    covariances: Array
+
+    @classmethod
+    def of(cls, own: Estimated, lot: LotPrior) -> _Hypotheses:
+        """Weigh them by what the unit says on its own, (1) and (2)."""
+        names, every = own.given.names, own.every
+        at = np.array([names.index(name) for name in lot.names])
+        scale = np.sqrt(np.diag(every.covariance))
+        told = np.linalg.inv(every.covariance / scale / scale[:, None])
+        middle = np.zeros(len(names))
+        middle[at] = lot.mean / scale[at]
+        pull = told @ (every.values / scale - middle)
+        wide = lot.covariance / scale[at] / scale[at][:, None]
+        odd, chances, spreads = zip(*_spreads(lot, wide), strict=True)
+        covariances, score = [], np.log(chances)
+        for i, one in enumerate(spreads):
+            there = told.copy()
+            there[np.ix_(at, at)] += np.linalg.inv(one)
+            covariances.append(np.linalg.inv(there))
+            score[i] += 0.5 * float(pull @ covariances[i] @ pull)  # (2)
+            score[i] -= 0.5 * float(np.linalg.slogdet(there)[1])
+            score[i] -= 0.5 * float(np.linalg.slogdet(one)[1])
+        made = np.array(covariances)
+        return cls(
+            names, odd, np.exp(score - np.logaddexp.reduce(score)),
+            (middle + made @ pull) * scale,  # (1)
+            made * scale * scale[:, None],
+        )  # fmt: skip
+
+    @property
+    def odd(self) -> float:
+        """Probability that the unit is odd."""
+        return float(self.share[1:].sum())
+
+    @property
+    def parameter(self) -> str:
+        """In what it is then."""
+        return self.parameters[1 + int(np.argmax(self.share[1:]))]
+
+    def mixed_with(self, found: Estimated) -> Estimated:
+        """The estimate with the lot, and what it is where the unit is odd."""
+        ours = [i for i, name in enumerate(found.names) if name in self.names]
+        at = [self.names.index(found.names[i]) for i in ours]
+        means = np.tile(found.values, (len(self.share), 1))
+        covariances = np.tile(found.covariance, (len(self.share), 1, 1))
+        means[1:, ours] = self.means[1:, at]
+        both = np.ix_(range(1, len(self.share)), ours, ours)
+        covariances[both] = self.covariances[1:][:, at][:, :, at]
+        mean = self.share @ means
+        off = means - mean
+        covariance = np.einsum("h,hij->ij", self.share, covariances)
+        covariance += (self.share[:, None] * off).T @ off
+        return replace(found, values=mean, covariance=covariance)
+
+
+def _spreads(lot: LotPrior, wide: Array) -> Iterator[tuple[str, float, Array]]:
+    """In what a unit is odd, if it is, how likely that is, and P_h."""
+    yield EVERYTHING, 1.0, wide
+    more = lot.times**2 - 1
+    for j, name in enumerate(lot.names):
+        one = wide.copy()
+        one[j, j] += more * wide[j, j]
+        yield name, float(lot.odd[j] / (1 - lot.odd[j])), one
+    odd = float(lot.odd.mean())
+    yield EVERYTHING, odd / (1 - odd), (1 + more) * wide

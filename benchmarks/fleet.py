@@ -23,6 +23,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomlkit
 
+from benchmarks import borrow
 from fieldcal.calibration import limits
 from fieldcal.core.samples import Array
 from fieldcal.fleet.batch import SessionBatch
@@ -288,6 +289,7 @@ def main() -> None:
     """Print what is measured."""
     counts = [int(word) for word in sys.argv[1:] if word.isdigit()] or [20]
     lots()
+    borrow.compared(borrow.Made(), 40, TRIALS)
     rows: list[StoredSession] = []
     for count in counts:
         with TemporaryDirectory() as place:

@@ -40,20 +40,37 @@ def page(found: Lot, query: str) -> str:
         f" unit the last good session counts. Among odd units {100 * found.rate:.3g} %"
         " are expected to be false."
     )
-    verdict = "in control" if found.in_control else "look here"
     top = Head(
-        "lot", query, verdict, "good" if found.in_control else "warn", says, facts
-    )
+        query, "", _verdict(found), "good" if found.in_control else "warn", says,
+        facts, "IMUs of a lot",
+    )  # fmt: skip
     return rendered(
         top,
         [
             Section("odd", "Odd units", (_odd(found),)),
             Section("shifts", "What has shifted", tuple(_shifts(found))),
             Section("spread", "Spread and capability", (_spreads(found),)),
-            Section("values", "Units", tuple(map(_values, found.parameters.values()))),
+            Section(
+                "values",
+                "Units",
+                tuple(_values(found, one) for one in found.parameters.values()),
+            ),
             Section("control", "Control charts", tuple(_control(found))),
         ],
     )
+
+
+def _verdict(found: Lot) -> str:
+    """What there is to look at."""
+    if found.in_control:
+        return "in control"
+    shifted = {(one.parameter, one.level) for one in found.shifts}
+    counts = (
+        (len(found.odd), "odd unit"),
+        (len(shifted), "shift"),
+        (len(found.alarms), "drift"),
+    )
+    return ", ".join(f"{n} {what}{'s' * (n > 1)}" for n, what in counts if n)
 
 
 def _odd(found: Lot) -> Table | Text:
@@ -116,10 +133,10 @@ def _spreads(found: Lot) -> Table:
     return table("Process capability", columns, rows)
 
 
-def _values(one: LotParameter) -> Figure:
+def _values(found: Lot, one: LotParameter) -> Figure:
     """Units in the order of time, with their own ±."""
     about, unit = one.about, pretty(one.unit)
-    at = np.arange(1, len(one.x) + 1, dtype=float)
+    at = np.arange(len(one.x), dtype=float)
     seen = Series(
         one.name, at, one.x, 1, "points", one.x - one.sigma, one.x + one.sigma
     )
@@ -129,10 +146,16 @@ def _values(one: LotParameter) -> Figure:
         f"{len(one.x)} units; mean {about.mean:.4g}, spread {about.spread:.2g} {unit}."
     )
     chart = Chart(
-        f"values-{one.name}", one.name, alt, Axis("unit, in order of time"),
+        f"values-{one.name}", one.name, alt, _units(found, one),
         Axis("value", unit), (seen,), tuple(levels),
     )  # fmt: skip
     return Figure(chart, "Bars are each unit's own ± 1σ.")
+
+
+def _units(found: Lot, one: LotParameter) -> Axis:
+    """The units that have a parameter, by their serial numbers."""
+    serials = tuple(found.units[i].serial for i in one.units.tolist())
+    return Axis("unit, in order of time", names=serials)
 
 
 def _control(found: Lot) -> list[Block]:
@@ -144,12 +167,12 @@ def _control(found: Lot) -> list[Block]:
     ]
     for one in found.parameters.values():
         for chart in one.charts:
-            out.append(Figure(_chart(one, chart), ""))
+            out.append(Figure(_chart(found, one, chart), ""))
     return out
 
 
-def _chart(one: LotParameter, chart: ControlChart) -> Chart:
-    at = np.arange(1, len(chart.values) + 1, dtype=float)
+def _chart(found: Lot, one: LotParameter, chart: ControlChart) -> Chart:
+    at = np.arange(len(chart.values), dtype=float)
     limits = [
         Series(f"limit {sign:+d}", at, sign * chart.limit, 2, "line")
         for sign in (1, -1)
@@ -163,5 +186,5 @@ def _chart(one: LotParameter, chart: ControlChart) -> Chart:
     name = f"{chart.name}, {one.name}"
     return Chart(
         f"{chart.name}-{one.name}", name, f"{name}: {said}.",
-        Axis("unit, in order of time"), Axis(chart.name, "σ"), (seen, *limits),
+        _units(found, one), Axis(chart.name, "σ"), (seen, *limits),
     )  # fmt: skip

@@ -34,7 +34,7 @@ def page(found: NoiseResult) -> str:
         "Points are what was measured, lines what the processes say, with the band"
         " that holds 68 of 100 recordings of this length."
     )
-    top = Head(name, " · ".join(found.sessions), "noise", "", says, facts)
+    top = Head(name, " · ".join(found.sessions), "noise", "", says, facts, "IMU noise")
     return rendered(
         top,
         [

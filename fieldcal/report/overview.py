@@ -45,6 +45,7 @@ class Head:
     tone: Tone
     says: str
     facts: NameValues
+    kind: str = "IMU calibration report"
 
 
 def head(material: Material) -> Head:

@@ -29,7 +29,7 @@ from fieldcal.report.provenance import provenance
 from fieldcal.report.recording import recording
 from fieldcal.report.stillness import stillness
 
-SCRIPTS = ("unpack.js", "draw.js", "zoom.js", "start.js")
+SCRIPTS = ("unpack.js", "draw.js", "cursor.js", "zoom.js", "start.js")
 
 REPORT = "report.html"
 

@@ -154,18 +154,103 @@ def test_the_band_of_a_model_is_drawn_about_its_line(
     assert browser.value("document.querySelector('h1').offsetWidth") > 250
 
 
-def drag(browser: Browser, start: int, end: int) -> None:
-    """Drag over the recording from one x to another, CSS pixels."""
-    browser.value(f"{RECORD}.scrollIntoView({{block: 'center'}})")
-    y = browser.value(f"{RECORD}.getBoundingClientRect().top") + 100
-    for kind, x in (
-        ("Pressed", start),
-        ("Moved", end - 9),
-        ("Moved", end),
-        ("Released", end),
+def drag(browser: Browser, start: int, end: int, down: int = 0) -> None:
+    """Drag over the recording from one x to another, and down; CSS pixels."""
+    y = height_of(browser, RECORD)
+    for kind, x, by in (
+        ("Pressed", start, 0),
+        ("Moved", end - 9, down - 1),
+        ("Moved", end, down),
+        ("Released", end, down),
     ):
-        down = {"button": "left", "buttons": 1, "clickCount": 1}
-        browser.ask("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, **down)
+        left = {"button": "left", "buttons": 1, "clickCount": 1}
+        place = {"x": x, "y": y + by}
+        browser.ask("Input.dispatchMouseEvent", type=f"mouse{kind}", **place, **left)
+
+
+def height_of(browser: Browser, canvas: str) -> float:
+    """Where on the screen the first panel of a figure is, once it is in view."""
+    browser.value(f"{canvas}.scrollIntoView({{block: 'center'}})")
+    return float(browser.value(f"{canvas}.getBoundingClientRect().top")) + 50
+
+
+def ticks(browser: Browser) -> list[str]:
+    """What is written beside the recording and below it."""
+    found: list[str] = browser.value(
+        f"[...{RECORD}.querySelectorAll('text')].map(t => t.textContent)"
+    )
+    return found
+
+
+def test_a_panel_is_zoomed_in_height_and_given_back(
+    browser: Browser, folder: Path
+) -> None:
+    opened(browser, own(folder))
+    whole, before = view(browser), ticks(browser)
+    drag(browser, 500, 502, down=30)
+    assert view(browser) == whole, "drawn downwards it keeps the stretch of time"
+    high = ticks(browser)
+    changed = [a for a, b in zip(before, high, strict=False) if a != b]
+    assert changed and high[-8:] == before[-8:], "the first panel, not the last one"
+    drag(browser, 500, 560, down=20)
+    assert view(browser)[1] - view(browser)[0] < (whole[1] - whole[0]) / 4
+    browser.value("document.querySelector('#record .tools button:last-child').click()")
+    assert view(browser) == pytest.approx(whole) and ticks(browser) == before
+
+
+def two_of_one_clock(folder: Path) -> Path:
+    """Two figures over the same time, and one over another quantity."""
+    t = np.arange(5.0)
+    bias = Series("bias", t, 1.5 * t, 1, "both", 1.5 * t - 1, 1.5 * t + 1)
+    model = Series("model", t, np.full(5, 100.0), 2, "line")
+    time, value = Axis("time", "s"), Axis("bias", "mm/s²")
+    charts = [
+        Chart("one", "One", "", time, value, (bias, model)),
+        Chart("two", "Two", "", time, value, (bias,)),
+        Chart("three", "Three", "", Axis("τ", "s"), value, (bias,)),
+    ]
+    top = Head("a device", "", "noise", "", "said", NameValues(()))
+    page = folder / "clock.html"
+    figures = tuple(Figure(c, "") for c in charts)
+    page.write_text(rendered(top, [Section("all", "All", figures)]), "utf-8")
+    return page
+
+
+def test_a_cursor_reads_every_figure_of_the_same_clock(
+    browser: Browser, folder: Path
+) -> None:
+    opened(browser, two_of_one_clock(folder))
+    canvas = "document.querySelector('#one .canvas')"
+    middle = browser.value(f"{canvas}.getBoundingClientRect().left") + 66 + 500
+    y = height_of(browser, canvas)
+    browser.ask("Input.dispatchMouseEvent", type="mouseMoved", x=middle, y=y)
+    read = [
+        browser.value(f"document.querySelector('#{n} .readout').textContent")
+        for n in ("one", "two", "three")
+    ]
+    assert read[0].splitlines() == [
+        "time 2 s", "bias  3 (2 … 4) mm/s²", "model  100 mm/s²",
+    ]  # fmt: skip
+    assert read[1].splitlines() == ["time 2 s", "bias  3 (2 … 4) mm/s²"]
+    assert read[2] == "", "another quantity"
+    box = "document.querySelector('#one .readout').getBoundingClientRect()"
+    assert 0 < browser.value(f"{box}.left") - middle < 40, "beside the cursor"
+
+
+def test_a_legend_takes_a_curve_away_and_gives_it_back(
+    browser: Browser, folder: Path
+) -> None:
+    opened(browser, two_of_one_clock(folder))
+    lines = "document.querySelectorAll('#one .canvas .line').length"
+    top = "document.querySelector('#one .canvas').textContent"
+    before = browser.value(top)
+    assert browser.value(lines) == 2
+    for there in (1, 2):
+        browser.value("document.querySelectorAll('#one .legend button')[1].click()")
+        view_of = "new Promise(r => requestAnimationFrame(() => setTimeout(r, 20)))"
+        browser.value(view_of)
+        assert browser.value(lines) == there
+        assert (browser.value(top) == before) == (there == 2), "the scale goes by it"
 
 
 def test_hostile_names_do_nothing_and_break_nothing(

@@ -109,6 +109,7 @@ function frame(svg, plot, box, yAxis, range, last) {
     el(svg, "text", { class: "mark-name", x, y: box.y + 12 }, m.label);
     free = x + 7 * m.label.length;
   }
+  plot.boxes.push({ ...box, number: plot.boxes.length, range, v: (y) => y0 + ((box.y + box.h - y) / box.h) * (y1 - y0) });
   return { px, py, factor: rows.factor };
 }
 
@@ -124,6 +125,7 @@ function canvasOf(plot, height) {
   svg.setAttribute("viewBox", "0 0 " + plot.width + " " + height);
   svg.setAttribute("aria-hidden", "true");
   plot.canvas.replaceChildren(svg);
+  plot.boxes = [];
   return svg;
 }
 
@@ -139,7 +141,7 @@ function drawRecord(plot) {
       if (low[i] < lo) lo = low[i];
       if (high[i] > hi) hi = high[i];
     }
-    const s = frame(svg, plot, box, { label: "", names: [] }, padded(lo, hi, 0.08), c === panels.length - 1);
+    const s = frame(svg, plot, box, { label: "", names: [] }, plot.ranges.get(c) || padded(lo, hi, 0.08), c === panels.length - 1);
     const g = clip(svg, plot, box, c);
     el(g, "path", { class: (found.level.raw ? "line" : "band") + " tone" + panel.tone, d: outline(found, c, s) });
     plot.spec.spans.forEach((span, k) => {
@@ -205,9 +207,9 @@ function drawChart(plot) {
   for (const level of spec.levels) {
     const y = s.py(plot.v(level.at));
     el(g, "line", { class: "level", x1: box.x, x2: box.x + box.w, y1: y, y2: y });
-    el(g, "text", { x: box.x + box.w - 6, y: y - 5, "text-anchor": "end" }, level.label);
+    el(g, "text", { class: "level-name", x: box.x + box.w - 6, y: y - 5, "text-anchor": "end" }, level.label);
   }
-  for (const one of plot.series) drawSeries(g, one, s);
+  for (const one of plot.series) if (!one.hidden) drawSeries(g, one, s);
 }
 
 function drawSeries(g, one, s) {
@@ -239,8 +241,9 @@ function marker(tone, x, y, size) {
 function rangeOf(plot) {
   const [x0, x1] = plot.view;
   let lo = Infinity, hi = -Infinity;
+  if (plot.ranges.has(0)) return plot.ranges.get(0);
   for (const one of plot.series) {
-    one.u.forEach((u, i) => {
+    if (!one.hidden) one.u.forEach((u, i) => {
       if (u < x0 || u > x1) return;
       for (const v of [one.v[i], one.lo && one.lo[i], one.hi && one.hi[i]]) {
         if (Number.isFinite(v)) { lo = Math.min(lo, v); hi = Math.max(hi, v); }
@@ -255,10 +258,15 @@ function drawLegend(plot) {
   const legend = html(plot.canvas.parentNode, "div", { class: "legend" });
   plot.canvas.before(legend);
   for (const one of plot.series) {
-    const item = html(legend, "span");
+    const item = html(legend, "button", { type: "button", "aria-pressed": "true", title: "show or hide" });
     const icon = el(item, "svg", { viewBox: "0 0 22 12", "aria-hidden": "true" });
     if (one.draw !== "points") el(icon, "path", { class: "line tone" + one.tone, d: "M1 6H21" });
     if (one.draw !== "line") el(icon, "path", { class: "point tone" + one.tone, d: marker(one.tone === 6 ? 1 : one.tone, 11, 6, 4), style: "--c:var(--t" + one.tone + ")" });
     item.append(one.name);
+    item.addEventListener("click", () => {
+      one.hidden = !one.hidden;
+      item.setAttribute("aria-pressed", String(!one.hidden));
+      schedule(plot);
+    });
   }
 }

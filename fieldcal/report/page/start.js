@@ -26,10 +26,10 @@ function plotOf(figure) {
   plot.store = record ? new Store(spec.store) : null;
   plot.series = record ? [] : seriesOf(spec, plot.u, plot.v);
   plot.view = plot.full = fullOf(plot);
+  plot.ranges = new Map(); // of y, where one zoomed into it, by panel
   drawLegend(plot);
-  if (record) plot.fineness = html(figure, "p", { class: "fineness", role: "status" });
-  plot.readout = html(figure, "p", { class: "readout", "aria-hidden": "true" });
-  plot.canvas.after(...[plot.fineness, plot.readout].filter(Boolean));
+  if (record) plot.canvas.after(plot.fineness = html(figure, "p", { class: "fineness", role: "status" }));
+  readoutOf(plot);
   addTools(plot);
   listenPointers(plot);
   listenKeys(plot);

@@ -1,6 +1,6 @@
 // Zooming and moving: by mouse, fingers, keys and buttons.
 
-const FINEST = 1e-5;
+const FINEST = 1e-5, LEAST_WIDE = 6, LEAST_HIGH = 16;
 
 function setView(plot, from, to) {
   const [a, b] = plot.full, least = (b - a) * FINEST;
@@ -21,7 +21,7 @@ function moveBy(plot, part) {
   setView(plot, a + part * (b - a), b + part * (b - a));
 }
 
-function showAll(plot) { setView(plot, plot.full[0], plot.full[1]); }
+function showAll(plot) { plot.ranges.clear(); setView(plot, plot.full[0], plot.full[1]); }
 
 function schedule(plot) {
   if (plot.waiting) return;
@@ -45,43 +45,40 @@ function pixel(plot, u) {
   return LEFT + ((u - plot.view[0]) / (plot.view[1] - plot.view[0])) * (plot.width - LEFT - RIGHT);
 }
 
-function pick(plot, from, to) {
-  const svg = plot.canvas.firstChild, height = svg.viewBox.baseVal.height;
-  if (!plot.picked || plot.picked.parentNode !== svg) plot.picked = el(svg, "rect", { class: "picked", y: 0, height });
-  const [a, b] = [pixel(plot, from), pixel(plot, to)].sort((p, q) => p - q);
-  plot.picked.setAttribute("x", a);
-  plot.picked.setAttribute("width", b - a);
+// where a pointer is: the panel, and its height in what is drawn
+function aloft(plot, event) {
+  const box = plot.canvas.getBoundingClientRect(), y = ((event.clientY - box.top) * plot.width) / box.width;
+  const panel = plot.boxes.reduce((best, p) => (Math.abs(p.y + p.h / 2 - y) < Math.abs(best.y + best.h / 2 - y) ? p : best));
+  return { y: Math.min(Math.max(y, panel.y), panel.y + panel.h), panel };
 }
 
-function cursor(plot, u) {
-  const svg = plot.canvas.firstChild, x = pixel(plot, u), height = svg.viewBox.baseVal.height;
-  if (!plot.cursor || plot.cursor.parentNode !== svg) plot.cursor = el(svg, "line", { class: "cursor", y1: 0, y2: height - BOTTOM });
-  plot.cursor.setAttribute("x1", x);
-  plot.cursor.setAttribute("x2", x);
-  plot.readout.textContent = plot.spec.kind === "record" ? sayRecord(plot, u) : sayChart(plot, u);
+// what is dragged over: a stretch of x, of y, or of both
+function dragged(plot, start, event) {
+  const { panel } = start.aloft, y = Math.min(Math.max(aloft(plot, event).y, panel.y), panel.y + panel.h);
+  const [a, b] = [start.u, at(plot, event)].sort((p, q) => p - q), [c, d] = [start.aloft.y, y].sort((p, q) => p - q);
+  const wide = pixel(plot, b) - pixel(plot, a) > LEAST_WIDE, high = d - c > LEAST_HIGH;
+  return { a, b, c, d, wide, high, panel };
 }
 
-function sayRecord(plot, u) {
-  const { level } = plot.found, i = Math.max(0, Math.min(level.t.length - 1, search(level.t, u + 1e-12) - 1));
-  const values = plot.spec.panels.map((p, c) => {
-    const lo = level.low[c][i].toPrecision(5), hi = level.high[c][i].toPrecision(5);
-    return p.label + " " + (lo === hi ? lo : lo + " … " + hi);
-  });
-  const fine = level.raw ? "single samples" : "least and greatest of " + seconds(level.step);
-  return level.t[i].toFixed(3) + " s:  " + values.join("   ") + "   (" + fine + ")";
+function pick(plot, { a, b, c, d, wide, high, panel }) {
+  const svg = plot.canvas.firstChild, whole = svg.viewBox.baseVal.height;
+  if (!plot.picked || plot.picked.parentNode !== svg) plot.picked = el(svg, "rect", { class: "picked" });
+  const [x0, x1] = wide || !high ? [a, b].map((u) => pixel(plot, u)) : [panel.x, panel.x + panel.w];
+  const place = { x: x0, width: x1 - x0, y: high ? c : 0, height: high ? d - c : whole };
+  for (const [key, value] of Object.entries(place)) plot.picked.setAttribute(key, value);
 }
 
-function sayChart(plot, u) {
-  let best = null;
-  for (const one of plot.series) {
-    one.u.forEach((x, i) => {
-      if (one.v[i] === one.v[i] && (!best || Math.abs(x - u) < best.off)) best = { off: Math.abs(x - u), one, i };
-    });
+function zoomInto(plot, { a, b, c, d, wide, high, panel }) {
+  if (high) plot.ranges.set(panel.number, [panel.v(d), panel.v(c)]);
+  if (wide) setView(plot, a, b); else schedule(plot);
+}
+
+// about its middle, every panel
+function zoomHigh(plot, factor) {
+  for (const { number, range: [lo, hi] } of plot.boxes) {
+    plot.ranges.set(number, [lo + hi - factor * (hi - lo), lo + hi + factor * (hi - lo)].map((v) => v / 2));
   }
-  if (!best) return "";
-  const { one, i } = best, x = plot.spec.x, names = x.names;
-  const where = names.length ? names[Math.round(one.x[i])] : Number(one.x[i].toPrecision(5)) + (x.unit ? " " + x.unit : "");
-  return one.name + ", " + x.label + " " + where + ":  " + Number(one.y[i].toPrecision(5)) + " " + plot.spec.y.unit;
+  schedule(plot);
 }
 
 function listenPointers(plot) {
@@ -91,11 +88,11 @@ function listenPointers(plot) {
     if (e.button) return;
     fingers.set(e.pointerId, e.clientX);
     canvas.setPointerCapture(e.pointerId);
-    start = at(plot, e);
+    start = { u: at(plot, e), aloft: aloft(plot, e) };
     moving = e.shiftKey || e.pointerType === "touch" ? [e.clientX, plot.view] : null;
   });
   canvas.addEventListener("pointermove", (e) => {
-    if (!fingers.has(e.pointerId)) { cursor(plot, at(plot, e)); return; }
+    if (!fingers.has(e.pointerId)) { point(plot, at(plot, e)); return; }
     const spread = () => { const [p, q] = [...fingers.values()]; return Math.max(20, Math.abs(p - q)); };
     const before = fingers.size === 2 ? spread() : 0;
     fingers.set(e.pointerId, e.clientX);
@@ -103,19 +100,17 @@ function listenPointers(plot) {
     if (moving) {
       const [x, [a, b]] = moving, by = ((x - e.clientX) / canvas.clientWidth) * (b - a);
       setView(plot, a + by, b + by);
-    } else if (start !== null) pick(plot, start, at(plot, e));
+    } else if (start !== null) pick(plot, dragged(plot, start, e));
   });
   const end = (e) => {
     const there = fingers.delete(e.pointerId);
-    if (there && start !== null && !moving && e.type === "pointerup") {
-      const [a, b] = [start, at(plot, e)].sort((p, q) => p - q);
-      if (Math.abs(pixel(plot, a) - pixel(plot, b)) > 6) setView(plot, a, b); else schedule(plot);
-    }
+    if (there && moving && e.type === "pointerup" && Math.abs(e.clientX - moving[0]) < LEAST_WIDE) point(plot, at(plot, e));
+    if (there && start !== null && !moving && e.type === "pointerup") zoomInto(plot, dragged(plot, start, e));
     start = moving = null;
   };
   canvas.addEventListener("pointerup", end);
   canvas.addEventListener("pointercancel", end);
-  canvas.addEventListener("pointerleave", () => { if (plot.cursor) plot.cursor.remove(); plot.cursor = null; plot.readout.textContent = ""; });
+  canvas.addEventListener("pointerleave", (e) => { if (e.pointerType !== "touch") unpoint(plot); });
   canvas.addEventListener("dblclick", () => showAll(plot));
   canvas.addEventListener("wheel", (e) => {
     if (!e.ctrlKey && !e.metaKey) return;
@@ -128,12 +123,14 @@ function listenKeys(plot) {
   const keys = {
     ArrowLeft: () => moveBy(plot, -0.25), ArrowRight: () => moveBy(plot, 0.25),
     "+": () => zoomBy(plot, 0.5), "=": () => zoomBy(plot, 0.5), "-": () => zoomBy(plot, 2),
+    "Shift+ArrowUp": () => zoomHigh(plot, 0.5), "Shift+ArrowDown": () => zoomHigh(plot, 2),
     0: () => showAll(plot), Home: () => showAll(plot),
   };
   plot.canvas.addEventListener("keydown", (e) => {
-    if (!keys[e.key] || e.ctrlKey || e.metaKey || e.altKey) return;
+    const act = keys[(e.shiftKey && e.key.startsWith("Arrow") ? "Shift+" : "") + e.key];
+    if (!act || e.ctrlKey || e.metaKey || e.altKey) return;
     e.preventDefault();
-    keys[e.key]();
+    act();
   });
 }
 
@@ -150,5 +147,7 @@ function addTools(plot) {
   button("→", "move right", () => moveBy(plot, 0.25));
   button("−", "zoom out", () => zoomBy(plot, 2));
   button("+", "zoom in", () => zoomBy(plot, 0.5));
+  button("↕−", "zoom out in height", () => zoomHigh(plot, 2));
+  button("↕+", "zoom in in height", () => zoomHigh(plot, 0.5));
   button("all", "show all", () => showAll(plot));
 }

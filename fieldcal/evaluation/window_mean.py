@@ -13,7 +13,7 @@ import numpy as np
 
 from fieldcal.core.errors import Moved, SessionError
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.model.rows import reduce
+from fieldcal.model.rows.reduce import readings
 from fieldcal.model.rows.turntable import going_round
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window, average
@@ -83,8 +83,8 @@ def table_rate(
     if part is None or not len(part):
         return np.zeros(3)
     at = np.full(len(part), row, dtype=np.intp)
-    turned: Array = reduce.table_rate(about, at, part)[0] @ about.mounting
-    return turned
+    found: Array = readings(about, at, part).rates(about.mounting)[0] @ about.mounting
+    return found
 
 
 def steadied(block: Block, rate: Array) -> tuple[Block, Array]:

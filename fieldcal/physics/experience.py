@@ -143,6 +143,14 @@ class Experience:
         return known
 
     @property
+    def earth_seen(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Rows of unknown orientation whose gyroscopes show the Earth's rate, (n,)."""
+        seen: np.ndarray[Any, np.dtype[np.bool_]] = (
+            ~self.oriented & ~self.rate.any(axis=1) & self.w.any(axis=1)
+        )
+        return seen
+
+    @property
     def force_known(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Rows in which the turning of a rate table does not turn the force, (n,)."""
         speed = np.linalg.norm(self.rate, axis=1)

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.core.frames import EARTH_RATE, force_home
+from fieldcal.core.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.core.positions import attitude_sigmas, speeds, third_angles
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model.rows.reduce import Rows, free_force
-from fieldcal.model.rows.turntable import table_rates
+from fieldcal.model.rows.turntable import Readings
 from fieldcal.physics.experience import Experience
 from fieldcal.solve.estimation import Recorded
 from fieldcal.solve.observations import Observations
@@ -27,6 +27,12 @@ def of_means(observations: Observations) -> Recorded:
     y = observations.mean.copy()
     told = variances(observations)
     sd = np.sqrt(np.where(told > 0, told, np.nan))
+    read = Readings(
+        observations.positions,
+        index,
+        (y[:, GYR] - nominal.gyr_bias) / np.array(nominal.gyr_scale),
+        _earth(observations),
+    )
     x = Experience.at_rest(
         *observations.angles,
         observations.gravity,
@@ -35,12 +41,7 @@ def of_means(observations: Observations) -> Recorded:
         position=index,
         gamma=third_angles(observations.positions),
         attitude_sigma=attitude_sigmas(observations.positions),
-        rate=table_rates(
-            observations.positions,
-            index,
-            (y[:, GYR] - nominal.gyr_bias) / np.array(nominal.gyr_scale),
-            observations.mounting,
-        ),
+        rate=read.rates(observations.mounting),
         speed=speeds(observations.positions)[0],
         speed_sigma=speeds(observations.positions)[1],
         base_force=force_home(observations.gravity)
@@ -49,9 +50,12 @@ def of_means(observations: Observations) -> Recorded:
         mounting=observations.mounting,
         latitude=np.nan if observations.latitude is None else observations.latitude,
     )
+    free = ~x.oriented & ~x.rate.any(axis=1)
+    x = replace(x, w=np.where(free[:, None], read.earth_rates(), x.w))
     sd[~x.force_known, :3] = np.nan
     common = np.zeros_like(sd)
-    common[~x.oriented, 3:] = unseen_earth(nominal.gyr_scale) * (n > 1)
+    unseen = ~x.oriented & ~x.earth_seen
+    common[unseen, 3:] = unseen_earth(nominal.gyr_scale) * (n > 1)
     level = np.median(sd, axis=0)
     span = np.column_stack([x.t, x.t])
     rows = Rows(x, y, sd, common, np.ones(n), level, span)
@@ -87,6 +91,16 @@ def widened(rows: Rows, known: Array) -> Rows:
         beyond = np.maximum(np.nan_to_num(known[p]) - white, 0.0)
         common[at] = np.maximum(common[at], np.sqrt(beyond))
     return replace(rows, common=common)
+
+
+def _earth(observations: Observations) -> float:
+    """Length of the rate at rest, rad/s; 0 where the gyroscopes do not see it."""
+    if observations.grade != "navigation":
+        return 0.0
+    if observations.latitude is None:
+        return EARTH_RATE
+    rate = earth_rate_home(observations.latitude) + observations.under_way.rate
+    return float(np.linalg.norm(rate))
 
 
 def _force(observations: Observations) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.effects import catalogue
-from fieldcal.model.rows.reduce import masked, rate_of, spans, table_rate
+from fieldcal.model.rows.reduce import masked, rate_of, readings, spans
 from fieldcal.model.rows.vibration import usual_noise
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
@@ -182,12 +182,15 @@ def recording(
     else:
         alpha = beta = np.array([np.nan])
         gamma = np.zeros(1)
+    here = np.arange(len(alpha))
     x = Experience.at_rest(
         alpha,
         beta,
         about.gravity,
         gamma=gamma,
-        rate=table_rate(about, np.arange(len(alpha)), np.full((len(alpha), 3), np.nan)),
+        rate=readings(about, here, np.full((len(alpha), 3), np.nan)).rates(
+            about.mounting
+        ),
         base_force=about.base_force,
         base_rate=about.base_rate,
         mounting=about.mounting,

@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
-from fieldcal.model.state import State, Term
+from fieldcal.model.state import State, Term, across
 from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
 
@@ -209,10 +209,24 @@ def earth_anyhow(view: RowView) -> Array:
     """A rate in device axes wherever nobody knows the orientation, rad/s.
 
     Turned about one level axis by hand, a device has the Earth's rate along it in every
-    position and on the way.
+    position and on the way; not where gyroscopes show which way it points.
     """
-    free = ~view.plain.oriented[:, None, None]
-    out: Array = np.eye(6)[:, 3:] * view.state.scale[:, None] * free
+    free = ~view.plain.oriented & ~view.plain.earth_seen
+    out: Array = np.eye(6)[:, 3:] * view.state.scale[:, None] * free[:, None, None]
+    return out
+
+
+def earth_aside(view: RowView) -> Array:
+    """Two small turns of the Earth's rate that is shown, position by position, rad.
+
+    About axes across it, (n, 6, 2 p): its length is all that is known.
+    """
+    places = len(view.state.small_rotation)
+    out = np.zeros((len(view.x), 6, 2 * places))
+    seen = np.flatnonzero(view.plain.earth_seen & (view.plain.position >= 0))
+    for k, side in enumerate(across(view.x.w[seen])):
+        at = 2 * view.plain.position[seen] + k
+        out[seen[:, None], [3, 4, 5], at[:, None]] = view.state.scale[3:] * side
     return out
 
 

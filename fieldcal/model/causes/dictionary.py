@@ -237,7 +237,15 @@ class Dictionary(ColumnTable):
         """
         if not np.isin(self.observed, (3, 4, 5)).any() or len(self.held) < 2:
             return
-        if not self.x.oriented.all():
+        shown = self.x.earth_seen
+        if shown.any():
+            basis = General("earth aside", columns.earth_aside)
+            held = np.unique(self.x.position[shown])
+            own = (2 * held[:, None] + [0, 1]).ravel()
+            wide = np.full(len(own), 1 / priors.FREE)
+            own = self.add(basis, 2 * self.places) + own
+            yield Group("earth aside", "gyr", own, wide, fixed=priors.FREE)
+        if not (self.x.oriented | shown).all():
             at = self.add(General("earth anyhow", columns.earth_anyhow), 3)
             size = np.full(3, EARTH_RATE / 3**0.5)
             yield Group("earth anyhow", "gyr", at + np.arange(3), size, fixed=1.0)

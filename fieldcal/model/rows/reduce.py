@@ -14,11 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.positions import angles, attitude_sigmas, speeds, third_angles
+from fieldcal.core.positions import (
+    Position,
+    angles,
+    attitude_sigmas,
+    speeds,
+    third_angles,
+)
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.noise import rounding
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.model.rows.turntable import going_round, table_rates
+from fieldcal.model.rows.turntable import Readings, going_round
 from fieldcal.model.rows.vibration import shaking
 from fieldcal.physics.experience import Experience
 from fieldcal.session.description import Description
@@ -182,8 +188,8 @@ def reduce(source: RowSource) -> Rows:
     if source.left is not None:
         off = np.hypot(off, np.sqrt(source.left[out.x.position]))
     # the Earth turns a device of unknown orientation about any of its axes; one that
-    # was never turned has it in its bias
-    free = ~out.x.oriented & (len(held) > 1)
+    # was never turned has it in its bias, and some gyroscopes show where it points
+    free = ~out.x.oriented & (len(held) > 1) & ~out.x.earth_seen
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
     return replace(out, common=off)
@@ -229,7 +235,7 @@ def averaged(
         heating=heating,
         variance=np.nan_to_num(variance),
         position=position,
-        rate=table_rate(about, position, y[:, 3:]),
+        rate=readings(about, position, y[:, 3:]).rates(about.mounting),
         base_force=about.base_force,
         base_rate=about.base_rate,
         transport=about.under_way.rate,
@@ -238,6 +244,9 @@ def averaged(
         gravity_sigma=gravity_sigma(about),
         **_attitudes(about, position),
     )
+    free = ~x.oriented & ~x.rate.any(axis=1)
+    seen = readings(about, position, y[:, 3:]).earth_rates()
+    x = replace(x, w=np.where(free[:, None], seen, x.w))
     sd[~x.force_known, :3] = np.nan
     length = np.diff(bound, axis=1)[:, 0] / rate_of(block)
     _without_round(x, y[:, 3:], sd[:, 3:], length, about.nominal["gyr_scale"])
@@ -320,15 +329,11 @@ def _attitudes(about: Description, position: NDArray[np.intp]) -> dict[str, Arra
     }
 
 
-def table_rate(about: Description, position: NDArray[np.intp], gyr: Array) -> Array:
-    """Rate that a table adds in some positions, (n, 3) rad/s about procedure axes.
-
-    `gyr` (n, 3) is what gyroscopes put out there, nan where that is not known.
-    """
-    if not about.positions:
-        return np.zeros((len(position), 3))
+def readings(about: Description, position: NDArray[np.intp], gyr: Array) -> Readings:
+    """What gyroscopes read in each row, by their outputs (n, 3), nan where unknown."""
     w = (gyr - about.nominal["gyr_bias"]) / about.nominal["gyr_scale"]
-    return table_rates(about.positions, position, w, about.mounting)
+    positions = about.positions or (Position("all of it"),) * (int(position.max()) + 1)
+    return Readings(positions, position, w, float(np.linalg.norm(about.base_rate)))
 
 
 def _force_of(about: Description, position: NDArray[np.intp], y: Array) -> Array:

@@ -15,8 +15,8 @@ direction that is not known:
 
     cov = (I - v v^T / v^2) 2/3 Omega^2 min(1/2, 1 / c^2)                           (2)
 
-About an axis that nobody knows a table has a speed only. Its axis is where what is read
-points, less a bias b that leaves every window its length, linear in b and |b|^2:
+About an axis that nobody knows a table has a speed only. Its axis is where what is
+read points, less a bias b that leaves every window its length, linear in b and |b|^2:
 
     |w_i|^2 - v_i^2 = 2 b w_i - |b|^2                                               (3)
 """
@@ -35,6 +35,14 @@ from fieldcal.core.samples import Array
 
 TURNS = 1.0
 """Whole turns of a window from which what goes round is told from the mean."""
+
+SPREAD_AXES = 1e-3
+"""Least singular value of (3), of the largest, from which axes tell a bias."""
+
+ENOUGH, STRAIGHT = 6, 0.2
+"""Positions from which the Earth's rate is sought in them, and share by which what is
+left then may be longer or shorter: beyond, directions are not known well enough for
+what is linear about them."""
 
 CLEARLY = 5.0
 """Standard deviations by which something may seem larger than the Earth's rate."""
@@ -55,49 +63,90 @@ class Round:
     covariance: Array
 
 
-def table_rates(
-    positions: Sequence[Position],
-    position: NDArray[np.intp],
-    w: Array,
-    mounting: Array,
-) -> Array:
-    """Rates that a table adds, (n, 3) rad/s about procedure axes.
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """What gyroscopes read in the positions of a session.
 
-    About an axis that nobody knows: along what is read in each position.
-
-    Parameters
+    Attributes
     ----------
     positions : of the session
     position : (n,) index of each row's
-    w : (n, 3) what the gyroscopes read, about rad/s in device axes; nan where nothing
-    mounting : (3, 3) P, procedure = P device
+    w : (n, 3) what they read, about rad/s in device axes; nan where nothing
+    earth : rad/s, length of the rate at rest; 0 where it is not seen
 
     """
-    out: Array = rates(positions)[position]
-    speed, _ = speeds(positions)
-    if not speed.any():
+
+    positions: Sequence[Position]
+    position: NDArray[np.intp]
+    w: Array
+    earth: float = 0.0
+
+    def rates(self, mounting: Array) -> Array:
+        """Rates that a table adds, (n, 3) rad/s about procedure axes.
+
+        About an axis that nobody knows: along what is read in each position.
+        `mounting` (3, 3) is P, procedure = P device.
+        """
+        out: Array = rates(self.positions)[self.position]
+        speed, _ = speeds(self.positions)
+        if speed.any():
+            mean, _ = self._pointing(speed)
+            for p in np.flatnonzero(speed):
+                out[self.position == p] = speed[p] * (mounting @ _unit(mean[p]))
         return out
-    mean = np.zeros((len(positions), 3))
-    for p in np.unique(position):
-        mean[p] = np.nan_to_num(w[position == p]).mean(axis=0)
-    here = [p for p in np.unique(position) if not any(positions[p].rate or ())]
-    mean[here] -= _centre(mean[here], speed[here])
-    for p in np.flatnonzero(speed):
-        length = float(np.linalg.norm(mean[p]))
-        axis = mean[p] / length if length > 0 else np.array([0.0, 1.0, 0.0])
-        out[position == p] = speed[p] * (mounting @ axis)
-    return out
+
+    def earth_rates(self) -> Array:
+        """The Earth's rate in device axes where nobody knows the orientation, (n, 3).
+
+        Along what is read, where enough positions tell bias and direction; else 0.
+        """
+        out = np.zeros((len(self.position), 3))
+        free = [
+            p
+            for p in np.unique(self.position)
+            if not (self.positions[p].oriented or self.positions[p].turning)
+        ]
+        if not (self.earth and len(free) >= ENOUGH):
+            return out
+        speed, _ = speeds(self.positions)
+        mean, known = self._pointing(speed)
+        length = np.linalg.norm(mean[free], axis=1) / self.earth
+        if known and np.abs(length - 1).max() < STRAIGHT:
+            for p in free:
+                out[self.position == p] = self.earth * _unit(mean[p])
+        return out
+
+    def _pointing(self, speed: Array) -> tuple[Array, bool]:
+        """Means of the positions less their bias, and whether that is known, (3)."""
+        mean = np.zeros((len(self.positions), 3))
+        held = np.unique(self.position)
+        for p in held:
+            mean[p] = np.nan_to_num(self.w[self.position == p]).mean(axis=0)
+        here = [p for p in held if not any(self.positions[p].rate or ())]
+        length = np.where(speed > 0, speed, self.earth)
+        bias, known = _centre(mean[here], length[here])
+        mean[here] -= bias
+        return mean, known
 
 
-def _centre(w: Array, speed: Array) -> Array:
-    """Offset that leaves rates (p, 3) of such lengths (p,), rad/s, (3,), by (3).
+def _unit(w: Array) -> Array:
+    """Where a rate points; anywhere if it is none."""
+    length = float(np.linalg.norm(w))
+    return w / length if length > 0 else np.array([0.0, 1.0, 0.0])
+
+
+def _centre(w: Array, length: Array) -> tuple[Array, bool]:
+    """Offset that leaves rates (p, 3) of such lengths (p,), rad/s, and if it is known.
 
     Nothing where they do not tell it: what is read is then all there is.
     """
-    design = np.column_stack([2 * w, -np.ones(len(w))])
-    squares = np.sum(w**2, axis=1) - speed**2
-    found, _, rank, _ = np.linalg.lstsq(design, squares, 1e-6)
-    return found[:3] if rank == design.shape[1] else np.zeros(3)
+    size = float(np.abs(w).max(initial=1e-12))
+    design = np.column_stack([2 * w / size, -np.ones(len(w))])
+    squares = (np.sum(w**2, axis=1) - length**2) / size**2
+    found, _, rank, _ = np.linalg.lstsq(design, squares, SPREAD_AXES)
+    if rank < design.shape[1]:
+        return np.zeros(3), False
+    return size * found[:3], True
 
 
 def going_round(

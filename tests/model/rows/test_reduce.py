@@ -18,9 +18,9 @@ from fieldcal.model.rows.reduce import (
     free_force,
     masked,
     rate_of,
+    readings,
     reduce,
     spans,
-    table_rate,
 )
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import Description, parse
@@ -269,12 +269,11 @@ def test_a_table_that_turns_hides_the_force_across_its_axis() -> None:
     rows = reduce(source(samples(30.0), known))
     upright = rows.x.position == 0
     assert rows.used[upright].all() and not rows.used[~upright, :3].any()
-    rates = table_rate(known, rows.x.position, rows.y[:, 3:])
+    rates = readings(known, rows.x.position, rows.y[:, 3:]).rates(np.eye(3))
     expected = np.deg2rad(np.where(upright[:, None], [0, 90.0, 0], [30.0, 0, 0]))
     np.testing.assert_allclose(rates, expected)
-    np.testing.assert_array_equal(
-        table_rate(about(), np.zeros(4, int), np.zeros((4, 3))), np.zeros((4, 3))
-    )
+    none = readings(about(), np.zeros(4, int), np.zeros((4, 3)))
+    np.testing.assert_array_equal(none.rates(np.eye(3)), np.zeros((4, 3)))
 
 
 def test_what_goes_round_with_a_table_is_taken_out_of_its_window_alone() -> None:

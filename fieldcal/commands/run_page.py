@@ -48,8 +48,8 @@ def served(args: argparse.Namespace) -> Iterator[PageServer | None]:
         yield server
 
 
-def address_of(text: str) -> tuple[str, int]:
-    """Host and port of what --page says.
+def address_of(text: str, option: str = "--page") -> tuple[str, int]:
+    """Host and port of what an option says.
 
     >>> address_of("local"), address_of("192.168.1.5:8080"), address_of("[::1]:8080")
     (('local', 0), ('192.168.1.5', 8080), ('::1', 8080))
@@ -60,8 +60,8 @@ def address_of(text: str) -> tuple[str, int]:
     host = host.removeprefix("[").removesuffix("]")
     if not host or not port.isdecimal() or int(port) > 65535:
         raise InputError(
-            f"--page {text}: give an address of this computer, with a port if you like,"
-            " as in 192.168.1.5:8080; or nothing, for the local network"
+            f"{option} {text}: give an address of this computer, with a port if you"
+            " like, as in 192.168.1.5:8080"
         )
     return host, int(port)
 

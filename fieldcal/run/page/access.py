@@ -1,14 +1,16 @@
 """Who is let in to the page: whoever has the token, from this page and no other.
 
 The token comes once in the address that the code on the console holds, and goes into a
-cookie. Requests under another host's name (a name that was made to point here), and
-those that want something and do not come from the page itself, are refused.
+cookie; programs send theirs with each request. Requests under another host's name (a
+name that was made to point here), and those that want something and do not come from
+the page itself, are refused.
 """
 
 from __future__ import annotations
 
 import hmac
 import secrets
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
@@ -38,11 +40,15 @@ class Access:
     ----------
     hosts : names with ports under which the page is served
     token : what the address on the console holds
+    bearers : tokens of programs
+    uploads : largest body of a path that takes files, bytes
 
     """
 
     hosts: tuple[str, ...]
     token: str = field(default_factory=lambda: secrets.token_urlsafe(16))
+    bearers: tuple[str, ...] = ()
+    uploads: Mapping[str, int] = field(default_factory=dict)
 
     def refusal(self, scope: Scope) -> Response | None:
         """The answer to a request that is not let in; None for one that is."""
@@ -56,24 +62,34 @@ class Access:
             answer = RedirectResponse("/", 303)
             answer.set_cookie(COOKIE, self.token, httponly=True, samesite="lax")
             return answer
-        if not self._right(_cookie(headers.get("cookie", ""))):
+        scheme, _, sent = headers.get("authorization", "").partition(" ")
+        program = scheme.lower() == "bearer" and self._known(sent.strip())
+        if not program and not self._right(_cookie(headers.get("cookie", ""))):
             return _refused(403, "scan the code that the console shows, or open the"
                             " address beside it")  # fmt: skip
         if scope["method"] in ("GET", "HEAD"):
             return None
-        if headers.get("origin", "") not in {f"http://{host}" for host in self.hosts}:
+        here = {f"{s}://{host}" for host in self.hosts for s in ("http", "https")}
+        if not program and headers.get("origin", "") not in here:
             return _refused(403, "what is wanted has to come from the page itself")
-        if not headers.get("content-type", "").startswith("application/json"):
+        if scope["method"] == "DELETE":
+            return None
+        most = self.uploads.get(scope["path"])
+        kind = headers.get("content-type", "")
+        if most is None and not kind.startswith("application/json"):
             return _refused(415, "what is wanted comes as JSON")
-        length = headers.get("content-length", "")
-        if not length.isdecimal() or int(length) > LARGEST:
-            return _refused(
-                413, f"at most {LARGEST} bytes, and how many has to be said"
-            )
+        length, most = headers.get("content-length", ""), most or LARGEST
+        if not length.isdecimal() or len(length) > 15 or int(length) > most:
+            return _refused(413, f"at most {most} bytes, and how many has to be said")
         return None
 
     def _right(self, given: str) -> bool:
         return hmac.compare_digest(given.encode(), self.token.encode())
+
+    def _known(self, given: str) -> bool:
+        """Whether a program may have this token; all are compared, in the same time."""
+        found = [hmac.compare_digest(given.encode(), b.encode()) for b in self.bearers]
+        return any(found)
 
 
 class Gate:
@@ -90,8 +106,11 @@ class Gate:
 
         async def with_headers(message: dict[str, object]) -> None:
             if message["type"] == "http.response.start":
+                own = list(message["headers"])  # type: ignore[call-overload]
+                has = {k.lower() for k, _ in own}
                 more = [(k.encode(), v.encode()) for k, v in HEADERS.items()]
-                message = {**message, "headers": [*message["headers"], *more]}  # type: ignore[misc]
+                own += [(k, v) for k, v in more if k not in has]
+                message = {**message, "headers": own}
             await send(message)
 
         answer = self._access.refusal(scope) or self._app

@@ -56,7 +56,7 @@ class PageServer:
     def __init__(self, host: str, port: int = 0) -> None:
         self.buttons, self.board = Buttons(), Board("fieldcal", [])
         self._seen: dict[str, int] = {}
-        self._socket = _listening(host, port)
+        self._socket = listening(host, port)
         port = self._socket.getsockname()[1]
         name = f"[{host}]" if ":" in host else host
         self.access = Access((f"{name}:{port}",))
@@ -116,7 +116,15 @@ class PageServer:
             self._seen.pop(client, None)
 
 
-def _listening(host: str, port: int) -> socket.socket:
+def listening(host: str, port: int) -> socket.socket:
+    """Return a socket that listens there.
+
+    Raises
+    ------
+    InputError
+        If none can.
+
+    """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)

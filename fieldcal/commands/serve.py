@@ -1,0 +1,101 @@
+"""`fieldcal serve`: take in sessions over HTTP and give out their results."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+
+from fieldcal.core.errors import InputError
+
+RARE = ("history", "scheduler", "upload_mib", "jobs", "kept", "minutes", "known_as")
+
+EXAMPLE = """\
+  fieldcal serve
+  fieldcal serve --listen 192.168.1.5:8080 --tokens tokens.txt --folder /srv/fieldcal
+  curl -H "Authorization: Bearer $TOKEN" --data-binary @unit-7.zip \\
+    "http://127.0.0.1:8750/api/sessions?filename=unit-7.zip"
+"""
+
+LISTEN = "127.0.0.1:8750"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument
+    add(
+        "--listen",
+        default=LISTEN,
+        metavar="HOST:PORT",
+        help=f"where (default: {LISTEN}, this computer alone)",
+    )
+    for option, kind, metavar, what in (
+        ("--folder", Path, "FOLDER", "where sessions are kept (default: user's data)"),
+        ("--tokens", Path, "FILE", "tokens of programs, one a line"),
+        ("--history", str, "FILE", "instead of the usual store"),
+        ("--scheduler", str, "tcp://HOST:PORT", "Dask's, which sees the same folder"),
+    ):
+        add(option, type=kind, metavar=metavar, help=what)
+    add(
+        "--known-as",
+        action="append",
+        default=[],
+        metavar="HOST:PORT",
+        help="name by which a proxy passes requests on; may be given several times",
+    )
+    for option, default, what in (
+        ("--upload-mib", 256, "largest recording, MiB"),
+        ("--jobs", 32, "recordings that may wait"),
+        ("--kept", 1000, "sessions that are kept; the oldest go first"),
+        ("--minutes", 30, "processor time of one session, min"),
+    ):
+        add(option, type=int, default=default, metavar="N", help=f"{what} ({default})")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    try:
+        from fieldcal.service.server import Service, tokens_in
+    except ImportError as error:
+        raise InputError(
+            "the service needs starlette and uvicorn: pip install 'fieldcal[page]'"
+        ) from error
+    from fieldcal.commands.run_page import address_of
+    from fieldcal.fleet.workers import processes, scheduled
+    from fieldcal.history.database import Database
+    from fieldcal.history.place import default_place
+    from fieldcal.service.bounds import MIB, Bounds
+    from fieldcal.service.jobs import Jobs
+    from fieldcal.service.queue import JobQueue
+
+    few = ("upload_mib", "jobs", "kept", "minutes")
+    if wrong := next((n for n in few if getattr(args, n) < 1), None):
+        raise InputError(f"--{wrong.replace('_', '-')}: one at least is wanted")
+    bounds = Bounds(
+        upload=args.upload_mib * MIB, unpacked=8 * args.upload_mib * MIB,
+        jobs=args.jobs, kept=args.kept, seconds=60 * args.minutes,
+    )  # fmt: skip
+    tokens = tokens_in(args.tokens) if args.tokens else []
+    host, port = address_of(args.listen, "--listen")
+    with ExitStack() as open_:
+        if args.scheduler:
+            pool = open_.enter_context(scheduled(args.scheduler))
+        else:
+            pool = processes(1, ["fieldcal.service.work"])
+        jobs = Jobs((args.folder or _folder()).resolve(), bounds)
+        database = Database(args.history or default_place())
+        queue = JobQueue(jobs, database, pool)
+        service = Service.of(host, port, jobs, queue, tokens, args.known_as)
+        open_.enter_context(queue)
+        sys.stderr.write(f"page: {service.address}\n")
+        sys.stderr.write(f"sessions: {jobs.root}\nstore: {database.shown}\n")
+        sys.stderr.flush()
+        service.serve()
+    return 0
+
+
+def _folder() -> Path:
+    data = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
+    return Path(data) / "fieldcal" / "served"

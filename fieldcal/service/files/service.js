@@ -1,0 +1,70 @@
+"use strict";
+
+// What is served is shown as text and never as markup.
+
+const EVERY_MS = 2000;
+const say = (text) => { document.getElementById("said").textContent = text; };
+
+function cell(row, text) {
+  const made = row.insertCell();
+  made.textContent = text;
+  return made;
+}
+
+function decision(job) {
+  if (job.go !== null) return job.go ? "GO" : "NO-GO";
+  if (job.good !== null) return job.good ? "good" : "BAD";
+  return "";
+}
+
+function show(jobs) {
+  const rows = document.getElementById("rows");
+  rows.replaceChildren();
+  for (const job of jobs) {
+    const row = rows.insertRow();
+    cell(row, job.name);
+    cell(row, job.received_at.slice(0, 19).replace("T", " "));
+    cell(row, job.error ? `${job.state}: ${job.error}` : job.state).className = "error";
+    cell(row, decision(job));
+    cell(row, job.verdict || "");
+    const last = cell(row, "");
+    for (const name of job.documents) {
+      const link = document.createElement("a");
+      link.href = `api/sessions/${job.id}/${name}`;
+      link.target = "_blank";
+      link.textContent = name;
+      last.append(link);
+    }
+  }
+}
+
+async function look() {
+  try {
+    const answer = await fetch("api/sessions");
+    if (!answer.ok) throw new Error(await answer.text());
+    show(await answer.json());
+  } catch (error) {
+    say(`not reached: ${error.message}`);
+  }
+}
+
+document.getElementById("send").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const [file] = document.getElementById("file").files;
+  const name = file.name.replace(/[^A-Za-z0-9_.-]/g, "_").replace(/^[^A-Za-z0-9]+/, "");
+  say("sending …");
+  try {
+    const answer = await fetch(`api/sessions?filename=${encodeURIComponent(name || "recording")}`, {
+      method: "POST", body: file, headers: { "content-type": "application/octet-stream" },
+    });
+    const text = await answer.text();
+    say(answer.ok ? "sent" : text);
+  } catch (error) {
+    say(`not sent: ${error.message}`);
+  }
+  look();
+});
+
+document.getElementById("go").disabled = false;
+look();
+setInterval(look, EVERY_MS);

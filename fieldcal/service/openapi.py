@@ -1,0 +1,118 @@
+"""What can be asked of the service, as OpenAPI 3.1 has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fieldcal.core.version import __version__
+from fieldcal.service.work import JUNIT, OPTIONS, RECORD, REPORT
+from fieldcal.session.folder import RESULT
+from fieldcal.session.integrity import DIAGNOSIS
+
+SESSIONS, ONE = "/api/sessions", "/api/sessions/{id}"
+DOCUMENT, DESCRIPTION = "/api/sessions/{id}/{document}", "/api/openapi.json"
+
+DOCUMENTS = {
+    RESULT: "application/json",
+    DIAGNOSIS: "application/json",
+    REPORT: "text/html",
+    JUNIT: "application/xml",
+    RECORD: "application/json",
+}
+"""What is made of a session, with its type."""
+
+TEXT = {"type": ["string", "null"]}
+TRUTH = {"type": ["boolean", "null"]}
+
+JOB = {
+    "type": "object",
+    "required": ["id", "name", "received_at", "state", "documents"],
+    "properties": {
+        "id": {"type": "string"},
+        "name": {"type": "string"},
+        "received_at": {"type": "string", "format": "date-time"},
+        "state": {"enum": ["waiting", "working", "done", "failed"]},
+        "options": {"type": "object", "additionalProperties": {"type": "string"}},
+        "error": TEXT,
+        "go": TRUTH,
+        "good": TRUTH,
+        "verdict": TEXT,
+        "log": {"type": "string"},
+        "documents": {"type": "array", "items": {"enum": list(DOCUMENTS)}},
+    },
+}
+
+
+def _answer(what: str, schema: dict[str, Any] | None = None) -> dict[str, Any]:
+    out: dict[str, Any] = {"description": what}
+    if schema is not None:
+        out["content"] = {"application/json": {"schema": schema}}
+    return out
+
+
+def document() -> dict[str, Any]:
+    """Return the OpenAPI document."""
+    job = {"$ref": "#/components/schemas/Session"}
+    missing = {"404": _answer("There is none of this id.")}
+    one = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+    said = [
+        {
+            "name": name, "in": "query", "schema": {"type": "string"},
+            "description": f"{option} of fieldcal import; of recordings only",
+        }
+        for name, option in OPTIONS.items()
+    ]  # fmt: skip
+    named = {
+        "name": "filename", "in": "query", "required": True,
+        "schema": {"type": "string"},
+        "description": "name of the file, by whose ending some formats are known",
+    }  # fmt: skip
+    body = {"application/octet-stream": {"schema": {"type": "string"}}}
+    sent = {
+        "202": _answer("Taken in; it waits.", job),
+        "400": _answer("A name or an option is none."),
+        "413": _answer("It is too large, or its length is not said."),
+        "429": _answer("Too many wait already."),
+    }
+    kinds: dict[str, Any] = {kind: {"schema": {}} for kind in DOCUMENTS.values()}
+    wanted = {
+        "name": "document", "in": "path", "required": True,
+        "schema": {"enum": list(DOCUMENTS)},
+    }  # fmt: skip
+    found = {"200": {"description": "The document.", "content": kinds}, **missing}
+    every = {"type": "array", "items": job}
+    return {
+        "openapi": "3.1.0",
+        "info": {"title": "fieldcal", "version": __version__},
+        "security": [{"token": []}],
+        "paths": {
+            SESSIONS: {
+                "get": {"summary": "All sessions, the latest first.",
+                        "responses": {"200": _answer("The sessions.", every)}},
+                "post": {"summary": "Send a session (.zip of its folder) or a recording"
+                                    " that fieldcal import reads.",
+                         "parameters": [named, *said],
+                         "requestBody": {"required": True, "content": body},
+                         "responses": sent},
+            },
+            ONE: {
+                "parameters": [one],
+                "get": {"summary": "How far a session is.",
+                        "responses": {"200": _answer("The session.", job), **missing}},
+                "delete": {"summary": "Take a session away with all that is its.",
+                           "responses": {"204": _answer("It is gone."), **missing}},
+            },
+            DOCUMENT: {
+                "parameters": [one, wanted],
+                "get": {"summary": "What was made of a session.", "responses": found},
+            },
+            DESCRIPTION: {
+                "get": {"summary": "This document.",
+                        "responses": {"200": _answer("OpenAPI 3.1.", {})}},
+            },
+        },
+        "components": {
+            "schemas": {"Session": JOB},
+            "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
+        },
+    }  # fmt: skip

@@ -1,0 +1,58 @@
+"""The service's page in Chromium: what is sent there is done and shown."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from browser import Screen
+from processes import HANGS
+from test_service import BOUNDS, Held
+
+from fieldcal.fleet.workers import Pool
+from fieldcal.history.database import Database
+from fieldcal.report.browser import find
+from fieldcal.service.jobs import Jobs
+from fieldcal.service.queue import JobQueue
+from fieldcal.service.server import Service
+
+pytestmark = pytest.mark.skipif(
+    find() is None, reason="there is no Chromium to show the page in"
+)
+
+SEND = """(async () => {
+  const list = new DataTransfer();
+  list.items.add(new File(["%s"], "../<b>unit</b> 7.csv"));
+  document.getElementById("file").files = list.files;
+  document.getElementById("send").requestSubmit();
+})()"""
+
+
+@pytest.fixture
+def address(tmp_path: Path) -> Iterator[str]:
+    jobs, task = Jobs(tmp_path / "jobs", BOUNDS), Held()
+    task.may.set()
+    pool = Pool(lambda: ThreadPoolExecutor(1), 1)
+    with JobQueue(jobs, Database(tmp_path / "h"), pool, task) as queue:
+        service = Service.of("127.0.0.1", 0, jobs, queue)
+        thread = threading.Thread(target=service.serve)
+        thread.start()
+        yield service.address
+        service.server.should_exit = True
+        thread.join(HANGS)
+
+
+def test_what_is_sent_from_the_page_is_done_and_shown(address: str) -> None:
+    with Screen() as screen:
+        screen.go(address)
+        screen.until("document.getElementById('go')?.disabled === false")
+        for content, said in (("t,ax", "done"), ("bad", "failed: is bad")):
+            screen.value(SEND % content)
+            script = f"document.getElementById('rows').textContent.includes('{said}')"
+            screen.until(script)
+        shown = screen.text("rows")
+        assert "GO" in shown and "report.html" in shown and "unit" in shown
+        assert screen.value("document.querySelectorAll('#rows b').length") == 0

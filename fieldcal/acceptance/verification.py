@@ -152,13 +152,16 @@ def proposed(positions: Sequence[Position]) -> Position:
     """A position to verify with, from the joint angles that the set uses anyway.
 
     Of all combinations that are not in the set, the one farthest from its nearest
-    neighbour; if there is none, the first position turned back half-way to the last.
+    neighbour; if there is none, the first position turned back half-way to the last,
+    and home if all have a third angle.
 
     >>> from fieldcal.core.positions import FIVE
     >>> proposed(FIVE).name
     'α = 0°, β = 5°'
     """
     known = [p.degrees for p in positions if p.degrees is not None]
+    if not known:
+        return Position.deg(0.0, 0.0)
     grid = product({a for a, _ in known}, {b for _, b in known})
     free = sorted(pair for pair in grid if pair not in known)
     if not free:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.frames import angles_of
+from fieldcal.core.frames import about_y, angles_of
 from fieldcal.core.positions import Position, forces
 from fieldcal.core.samples import Array
 
@@ -49,7 +49,7 @@ class PositionCheck:
     ----------
     ok : whether averaging may begin
     alpha_deg, beta_deg : angles the accelerometers show, offset of the base removed
-        where an earlier position tells it
+        where an earlier position tells it; of three angles, if the third is as asked
     problem : one sentence for the operator, empty when ok
     limit_deg : how far it may be off; nan where only the norm is judged
 
@@ -81,7 +81,8 @@ def check_position(
 
     """
     norm = float(np.linalg.norm(f))
-    alpha, beta = np.rad2deg(angles_of(_without_offset(f, gravity, held)))
+    upright = about_y(_without_offset(f, gravity, held), np.array(-wanted.gamma))
+    alpha, beta = np.rad2deg(angles_of(upright))
     seen = (float(alpha), float(beta))
     if abs(norm - gravity) > NORM * gravity:
         problem = (
@@ -142,7 +143,7 @@ def _nearest_slip(
     others: Mapping[str, Position],
 ) -> tuple[str, float]:
     """The slip that would put the device nearest to where it is, and how near, rad."""
-    a, b = wanted.degrees or (0.0, 0.0)
+    a, b, c = wanted.all_degrees or (0.0, 0.0, 0.0)
     turned = [
         ((-a, b), "α is turned the wrong way"),
         ((a, -b), "β is turned the wrong way"),
@@ -154,8 +155,12 @@ def _nearest_slip(
         ((0.0, b), "α is not turned yet"),
     ]
     slips = [(p, said) for said, p in others.items() if p.oriented]
-    if wanted.degrees:
-        slips = [*((Position.deg(*at), said) for at, said in turned), *slips]
+    if wanted.oriented:
+        own = [(Position.deg(*at, gamma=c), said) for at, said in turned]
+        if c:
+            own.append((Position.deg(a, b, gamma=-c), "γ is turned the wrong way"))
+            own.append((Position.deg(a, b), "γ is not turned yet"))
+        slips = [*own, *slips]
     if held and held.position.oriented:
         slips.insert(0, (held.position, "it has not been turned yet"))
     if not slips:
@@ -170,13 +175,16 @@ def _nearest_slip(
 def _explain(
     wanted: Position, seen: tuple[float, float], slip: str, off_by: float
 ) -> str:
-    if wanted.degrees is None:  # two angles do not say how it stands
+    if wanted.all_degrees is None:
         asked = f"asked for is {wanted.name}"
         return f"{slip or f'the device is {off_by:.1f}° off'}: {asked}"
-    a, b = wanted.degrees
+    a, b, c = wanted.all_degrees
     now = [round_to_tenth(angle) for angle in seen]
     where = f"the device is at α = {now[0]:.1f}°, β = {now[1]:.1f}°"
     asked = f"asked for is α = {a:g}°, β = {b:g}°"
+    if c:  # gravity shows two angles, and not by which third one they come
+        where += f" if γ is {c:g}°"
+        asked += f", γ = {c:g}°"
     if slip:
         return f"{slip}: {where}, {asked}"
     off = {"α": round_to_tenth(a - seen[0]), "β": round_to_tenth(b - seen[1])}

@@ -57,11 +57,7 @@ def held(number: int, table: Mapping[str, Any], name: str) -> Position:
         turned = _rotation(number, given[0], np.array(table[given[0]], dtype=float))
         degrees = np.rad2deg(turns_of(turned.T)).round(9) + 0.0
         alpha, beta, gamma = degrees.tolist()
-        shown = " ".join(f"{v:g}" for v in table[given[0]])
-        kind = "turned by" if given[0] == FORMS[1] else "quaternion"
-        unit = "°" if given[0] == FORMS[1] else ""
-        label = name or f"{kind} {shown}{unit}"
-        position = Position.deg(alpha, beta, label, gamma=gamma)
+        position = Position.deg(alpha, beta, name, gamma=gamma)
     sigma = table.get("attitude_sigma_deg")
     if sigma is None:
         return position

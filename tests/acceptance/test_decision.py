@@ -387,3 +387,8 @@ def test_a_misfit_counts_by_what_it_does_to_the_navigator(
     fit = next(check for check in made.checks if check.name == "fit")
     assert (fit.ok, made.go) == (go, go)
     assert "57.0 with 22" in fit.says and ("no navigator" in fit.says) == go
+
+
+def test_where_all_positions_have_a_third_angle_home_verifies_them() -> None:
+    three = [Position.deg(a, 10.0, gamma=c) for a, c in ((0, 90), (30, -90))]
+    assert proposed(three) == Position.deg(0.0, 0.0)

@@ -90,6 +90,11 @@ def test_a_position_with_a_third_angle_is_found_and_missed() -> None:
     away = forces([Position.deg(20.0, 10.0)], 9.81)[0]
     found = check_position(wanted, away, 9.81, None)
     assert not found.ok and "asked for is α = 20°, β = 10°, γ = 40°" in found.problem
-    assert "° off" in found.problem
+    assert found.problem.startswith("γ is not turned yet: the device is at")
+    other = forces([Position.deg(26.0, 10.0, gamma=40.0)], 9.81)[0]
+    found = check_position(wanted, other, 9.81, AcceptedPosition(wanted, there))
+    assert (found.alpha_deg, found.beta_deg) == pytest.approx((26.0, 10.0))
+    assert "α = 26.0°, β = 10.0° if γ is 40°" in found.problem
+    assert found.problem.endswith("turn it by -6.0° in α")
     held = AcceptedPosition(Position.deg(20.0, 10.0), away)
     assert "not been turned yet" in check_position(wanted, away, 9.81, held).problem

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fieldcal.core.positions import FIVE
+from fieldcal.core.positions import FIVE, Position
 from fieldcal.drivers.driver import Health
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
@@ -291,7 +291,36 @@ def test_the_box_is_drawn_turned_clockwise(
     middle = (len(lowest) - 1) / 2
     assert (np.mean(dots) > middle) == right_lower
     assert (np.mean(dots) < middle) == left_lower
-    assert "facing N" in pictures(FIVE[1])[-1]
+    assert "facing N" in pictures(FIVE[1], 40, 5)[-1]
+
+
+@pytest.mark.parametrize("size", [(80, 24), (40, 15), (110, 40)])
+def test_a_position_of_three_angles_is_shown_whole(size: tuple[int, int]) -> None:
+    file = io.StringIO()
+    console = Console(file=file, width=size[0], height=size[1], force_terminal=True)
+    third = Position.deg(22.5, 2.5, gamma=120.0)
+    every = (*FIVE[:1], third, *FIVE[2:])
+    made = ConsoleOperator(
+        "fieldcal · positions", every, ManualMover(), console, keyboard=Keys()
+    )
+    made.place(hold := Hold(1, third, 30.0))
+    made.show(view("turning", hold=hold, reason=WaitReason(WaitState.TURNING)))
+    shown = [line.rstrip() for line in screen(made, *size).splitlines()]
+    kept = SCREENS / f"turning-gamma-{size[0]}x{size[1]}.txt"
+    assert "\n".join(shown).rstrip() + "\n" == kept.read_text(encoding="utf-8")
+
+
+def test_pictures_of_three_joints_stand_side_by_side_or_below_or_not_at_all() -> None:
+    third = Position.deg(10.0, 5.0, gamma=90.0)
+    wide, narrow = pictures(third, 40, 5), pictures(third, 30, 10)
+    for lines in (wide, narrow):
+        text = "\n".join(lines)
+        assert all(w in text for w in ("α, facing N", "β, facing E", "γ, from above"))
+    assert (len(wide), len(narrow)) == (5, 10)
+    assert pictures(third, 30, 9) == pictures(Position("by hand"), 99, 99) == []
+    # the arrow of gamma points east
+    arrow = picture(90.0)
+    assert [line[24:].strip() for line in wide[:4]] == [x.strip() for x in arrow]
 
 
 def test_a_terminal_without_the_letters_gets_no_drawing() -> None:

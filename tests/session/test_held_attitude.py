@@ -71,7 +71,7 @@ def test_each_has_its_own_uncertainty() -> None:
         {"position": [{"quaternion": [1, 0, 0, 0], "attitude_sigma_deg": 0.5}, {}]}
     )
     assert about.positions[0].sigma == pytest.approx(np.deg2rad(0.5))
-    assert about.positions[0].name == "quaternion 1 0 0 0"
+    assert about.positions[0].name == "α = 0°, β = 0°"
     assert about.positions[1].sigma is None
 
 

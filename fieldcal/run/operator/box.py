@@ -1,8 +1,10 @@
-"""The box as it should stand: what α and β are, drawn with the dots of braille letters.
+"""The box as it should stand: its angles, drawn with the dots of braille letters.
 
 α turns it about the axis to the north, clockwise for who looks north: its east side
 goes down. β turns it about its own east axis, clockwise for who looks east: its north
-side goes up. The arrow is the one that points up at home (-y).
+side goes up. The arrow is the one that points up at home (-y). γ, where it is asked
+for, turns it about its own vertical axis, clockwise for who looks from above, where the
+arrow is the one that points north at home (z).
 """
 
 from __future__ import annotations
@@ -14,6 +16,9 @@ from fieldcal.core.samples import Array
 
 COLUMNS, ROWS = 9, 4
 """Size of a picture, letters; a letter is two dots wide and four tall."""
+
+BETWEEN = 3
+"""Letters between two pictures."""
 
 HALF = np.array([6.0, 3.0])
 """Half width and half height of the box, dots."""
@@ -45,15 +50,28 @@ def picture(angle_deg: float) -> list[str]:
     return _letters(dots)
 
 
-def pictures(position: Position) -> list[str]:
-    """Both joints of a position side by side, with what is seen; empty if not known."""
-    if position.degrees is None:
+def pictures(position: Position, width: int, height: int) -> list[str]:
+    """All joints of a position, with what is seen.
+
+    Side by side where there are so many letters, else two and below them the third; all
+    or nothing, and nothing where they are not known.
+    """
+    if position.all_degrees is None:
         return []
-    alpha, beta = position.degrees
-    both = zip(picture(alpha), picture(beta), strict=True)
-    width = COLUMNS + 3
-    lines = [f"{one:<{width}}{two}".rstrip() for one, two in both]
-    return [*lines, f"{'α, facing N':<{width}}β, facing E"]
+    alpha, beta, gamma = position.all_degrees
+    drawn = [[*picture(alpha), "α, facing N"], [*picture(beta), "β, facing E"]]
+    if gamma:
+        drawn.append([*picture(gamma), "γ, from above"])
+    each = COLUMNS + BETWEEN
+    for many in (len(drawn), 2):
+        rows = [
+            "".join(f"{line:<{each}}" for line in lines).rstrip()
+            for first in range(0, len(drawn), many)
+            for lines in zip(*drawn[first : first + many], strict=True)
+        ]
+        if max(map(len, rows)) <= width and len(rows) <= height:
+            return rows
+    return []
 
 
 def _line(start: Array, end: Array) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.layout import Layout
+from rich.measure import Measurement
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
@@ -24,6 +25,9 @@ TALL = 32
 
 SMALL = (76, 22)
 """Columns and lines below which only what to do, why, how long and keys are shown."""
+
+APART = 3
+"""Columns between the list and the picture of the box."""
 
 FEWEST = 3
 """Positions that are listed however little room there is."""
@@ -67,9 +71,10 @@ class Screen:
         if self._keys():
             below.append(Text(HELP))
         rows = max(FEWEST, self._console.height - 2 - self._lines_of(*above, *below))
-        drawn = self._drawing() if rows > FEWEST else []
-        beside = Table.grid(padding=(0, 3))
-        beside.add_row(self._listing(rows), Text("\n".join(drawn[:rows])))
+        listing = self._listing(rows)
+        drawn = self._drawing(listing, rows) if rows > FEWEST else []
+        beside = Table.grid(padding=(0, APART))
+        beside.add_row(listing, Text("\n".join(drawn)))
         parts = Layout()
         foot = self._lines_of(*below) if below else 0
         parts.split_column(
@@ -124,10 +129,15 @@ class Screen:
             table.add_row(f"{i + 1}", name, self._shown.state(i), style=style)
         return table
 
-    def _drawing(self) -> list[str]:
-        """The box as it should stand, where the terminal has the letters."""
-        known = self._console.encoding.lower().startswith("utf")
-        return pictures(self._shown.hold.position) if known and self._shown.hold else []
+    def _drawing(self, listing: RenderableType, rows: int) -> list[str]:
+        """The box as it should stand, where there are letters and room for it."""
+        known, hold = self._console.encoding.lower().startswith("utf"), self._shown.hold
+        if not known or hold is None:
+            return []
+        options = self._console.options
+        taken = Measurement.get(self._console, options, listing).maximum
+        room = self._console.width - 4 - taken - APART
+        return pictures(hold.position, room, rows)
 
     def _lines_of(self, *parts: RenderableType) -> int:
         """Count the lines that parts of the screen take within its frame."""
@@ -153,8 +163,9 @@ def _angles(position: Position | None, width: int) -> list[str]:
     """Where to turn, large if there is room for it."""
     if position is None:
         return []
-    alpha, beta = position.degrees or (np.nan, np.nan)
-    text = f"α {alpha:g}°  β {beta:g}°"
+    alpha, beta, gamma = position.all_degrees or (np.nan, np.nan, 0.0)
+    third = f"  γ {gamma:g}°" if gamma else ""
+    text = f"α {alpha:g}°  β {beta:g}°{third}"
     drawn = large(text) if drawable(text) else [position.name]
     fits = max(map(len, drawn)) <= width
     return ["", *(drawn if fits else [position.name])]

@@ -29,6 +29,9 @@ HALF = 2 * (len(TICKS) - 1)
 RULER = "  -45  -5  0   5  45  "
 """What stands above the inclinometers, deg."""
 
+UNSEEN = "by its mark, gravity does not show it"
+"""Of a third angle: accelerometers at rest show two."""
+
 NEAR = 1.0
 """Off by less than this, deg, an angle is not asked to be turned."""
 
@@ -39,15 +42,19 @@ def alert(view: OperatorView) -> str:
 
 
 def angles(view: OperatorView) -> list[tuple[str, Text]]:
-    """Name and inclinometer of both joints, where the angles are known."""
-    wanted, now = view.hold.position.degrees, view.arrival
+    """Name and inclinometer of the joints, where the angles are known."""
+    wanted, now = view.hold.position.all_degrees, view.arrival
     if now is None or wanted is None:
         return []
     seen = (now.alpha_deg, now.beta_deg)
-    return [
+    rows = [
         (name, inclinometer(there, asked, now.limit_deg, now.ok))
-        for name, there, asked in zip("αβ", seen, wanted, strict=True)
+        for name, there, asked in zip("αβ", seen, wanted[:2], strict=True)
     ]
+    if wanted[2]:
+        set_to = f"{round_to_tenth(wanted[2]):+.1f}°"
+        rows.append(("γ", Text(f"set to {set_to} {UNSEEN}")))
+    return rows
 
 
 def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
@@ -153,17 +160,19 @@ def short(view: OperatorView) -> list[str]:
         left = max(0.0, view.hold.seconds - view.elapsed)
         reached = f", ± {known}" if (known := sigma(view)) else ""
         return [f"{left:.0f} s of {view.hold.seconds:.0f} s left{reached}"]
-    wanted, now = view.hold.position.degrees, view.arrival
+    wanted, now = view.hold.position.all_degrees, view.arrival
     lines = []
     if now is not None and wanted is not None:
         seen = (now.alpha_deg, now.beta_deg)
-        for name, there, asked in zip("αβ", seen, wanted, strict=True):
+        for name, there, asked in zip("αβ", seen, wanted[:2], strict=True):
             off = round_to_tenth(asked - there)
             near = now.ok or abs(off) < NEAR
             order = "ok" if near else f"turn {off:+.1f}°"
             lines.append(
                 f"{name} {round_to_tenth(there):+.1f}° to {asked:+.1f}°  {order}"
             )
+        if wanted[2]:
+            lines.append(f"γ to {round_to_tenth(wanted[2]):+.1f}°, not seen by gravity")
     return lines if alert(view) else [*lines, view.reason.text]
 
 

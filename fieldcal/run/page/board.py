@@ -110,11 +110,12 @@ class Board:
 
 
 def _angles(position: Position) -> dict[str, float] | None:
-    """Alpha and beta, deg."""
-    if position.degrees is None:
+    """Alpha and beta, and gamma where there is a third angle, deg."""
+    if position.all_degrees is None:
         return None
-    alpha, beta = position.degrees
-    return {"alpha_deg": alpha, "beta_deg": beta}
+    alpha, beta, gamma = position.all_degrees
+    third = {"gamma_deg": gamma} if gamma else {}
+    return {"alpha_deg": alpha, "beta_deg": beta, **third}
 
 
 def _measured(view: OperatorView) -> dict[str, Any]:

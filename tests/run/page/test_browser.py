@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import cos, radians, sin
 
+import numpy as np
 import pytest
 from browser import Screen
+from scipy.spatial.transform import Rotation
 
-from fieldcal.core.positions import FIVE
+from fieldcal.core.positions import FIVE, Position
+from fieldcal.drivers.driver import Health
 from fieldcal.planning.steps import Hold
 from fieldcal.report.browser import find
+from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.page.board import Board
 from fieldcal.run.page.server import PageServer
+from fieldcal.run.position_check import PositionCheck
+from fieldcal.run.wait_reason import WaitReason, WaitState
 
 pytestmark = pytest.mark.skipif(
     find() is None, reason="there is no Chromium to show the page in"
@@ -64,13 +70,38 @@ def test_it_shows_what_to_do_on_any_screen(
     assert page.value(large) > 40
 
 
+def test_a_third_angle_turns_the_box_about_its_own_vertical_axis(
+    page: Screen, server: PageServer
+) -> None:
+    """East, down, south are x, y, -z; clockwise from above turns east to south."""
+    position = Position.deg(20.0, 10.0, gamma=120.0)
+    hold = Hold(len(FIVE), position, 30.0)  # found on the way
+    server.board.asked(hold)
+    opened(page, server)
+    script = "turned(20, 10, 120).slice(9, -1).split(',').map(Number)"
+    m = page.value(script)
+    turned = Rotation.from_euler("ZXY", [20.0, 10.0, 120.0], degrees=True).as_matrix()
+    flip = np.diag([1.0, 1.0, -1.0])
+    seen = np.array([m[0:3], m[4:7], m[8:11]]).T
+    np.testing.assert_allclose(seen, flip @ turned @ flip, atol=1e-5)
+    page.until("document.getElementById('angles').textContent", position.name)
+    there = PositionCheck(False, 12.0, 10.0, "", 2.0)
+    server.board.seen(
+        OperatorView("turning", hold, there, 0.4, 0.0, np.full(6, np.nan),
+                     WaitReason(WaitState.TURNING), 100.0, 24.5, Health(samples=9))
+    )  # fmt: skip
+    row = "document.querySelector('#joints tbody').rows[2]"
+    page.until(f"{row}.hidden", False)
+    page.until(f"{row}.cells[2].textContent", "+120.0°")
+
+
 @pytest.mark.parametrize(("alpha", "beta"), [(22.5, 2.5), (-45.0, 90.0)])
 def test_the_box_stands_as_the_position_says(
     page: Screen, server: PageServer, alpha: float, beta: float
 ) -> None:
     """Of the box at home, east to the right, down, and towards who looks north."""
     opened(page, server)
-    script = f"turned({alpha}, {beta}).slice(9, -1).split(',').map(Number)"
+    script = f"turned({alpha}, {beta}, 0).slice(9, -1).split(',').map(Number)"
     m = page.value(script)
     east, down, south = m[0:3], m[4:7], m[8:11]
     a, b = radians(alpha), radians(beta)

@@ -5,7 +5,8 @@ const SIZE = [130, 62, 92]; // the box along x (east), y (down), z (north), px
 const SURE = 5000; // how long the second tap of a button is waited for, ms
 let sound = null, said = "";
 
-// -- the box, turned as the console says: alpha about z, then beta about the turned x
+// -- the box, turned as the console says: alpha about z, then beta about the turned x,
+// then gamma about the y that both have turned
 
 function box(into) {
   const [w, h, d] = SIZE;
@@ -27,19 +28,21 @@ function box(into) {
   into.append(arrow);
 }
 
-function turned(alpha, beta) {
-  const [a, b] = [alpha, beta].map((deg) => (deg * Math.PI) / 180);
-  const [ca, sa, cb, sb] = [Math.cos(a), Math.sin(a), Math.cos(b), Math.sin(b)];
+function turned(alpha, beta, gamma) {
+  const [a, b, c] = [alpha, beta, gamma].map((deg) => (deg * Math.PI) / 180);
+  const [ca, sa, cb, sb, cc, sc] = [a, b, c].flatMap((v) => [Math.cos(v), Math.sin(v)]);
   // rows are the box's axes in the base; z of the screen comes towards the viewer
-  const axes = [[ca, sa, 0], [-sa * cb, ca * cb, sb], [sa * sb, -ca * sb, cb]];
+  const [x, y, z] = [[ca, sa, 0], [-sa * cb, ca * cb, sb], [sa * sb, -ca * sb, cb]];
+  const axes = [x.map((v, i) => cc * v - sc * z[i]), y, x.map((v, i) => sc * v + cc * z[i])];
   const flip = [1, 1, -1];
   const columns = axes.map((axis, i) => [...axis.map((v, j) => v * flip[i] * flip[j]), 0]);
   return `matrix3d(${[...columns.flat(), 0, 0, 0, 1].map((v) => v.toFixed(6)).join(",")})`;
 }
 
-function stand(id, angles) {
+// gravity shows two angles: a third one is drawn as it is asked for
+function stand(id, angles, third) {
   at(id).hidden = !angles;
-  if (angles) at(id).style.transform = turned(angles.alpha_deg, angles.beta_deg);
+  if (angles) at(id).style.transform = turned(angles.alpha_deg, angles.beta_deg, third);
 }
 
 // -- what there is to see
@@ -58,6 +61,10 @@ function joints(now) {
       rows[i].cells[j + 1].textContent = text;
     });
   });
+  const third = now.wanted.gamma_deg;
+  rows[2].hidden = third === undefined;
+  if (third === undefined) return;
+  ["not seen", degrees(third), "by its mark"].forEach((text, j) => { rows[2].cells[j + 1].textContent = text; });
 }
 
 function filling(now) {
@@ -86,8 +93,9 @@ function show(now) {
   const name = turn && now.now !== null ? now.positions[now.now].name : "";
   at("angles").textContent = name;
   at("stage").hidden = !now.wanted || now.ended;
-  stand("wanted", now.wanted);
-  stand("there", now.phase === "averaging" || now.phase === "taken" ? now.wanted : now.there);
+  const third = now.wanted?.gamma_deg ?? 0;
+  stand("wanted", now.wanted, third);
+  stand("there", now.phase === "averaging" || now.phase === "taken" ? now.wanted : now.there, third);
   joints(now);
   filling(now);
   at("reason").textContent = now.reason || "";
@@ -159,7 +167,7 @@ function call(now, name) {
   if (!sound) return;
   tone(TONES[now.words] || [330, 260, 330]);
   if (!window.speechSynthesis) return;
-  const spoken = `${now.words.toLowerCase()}. ${name.replace("α =", "alpha").replace("β =", "beta").replaceAll("°", " degrees").replaceAll("-", "minus ")}. ${now.told.slice(-1).join("")}`;
+  const spoken = `${now.words.toLowerCase()}. ${name.replace("α =", "alpha").replace("β =", "beta").replace("γ =", "gamma").replaceAll("°", " degrees").replaceAll("-", "minus ")}. ${now.told.slice(-1).join("")}`;
   speechSynthesis.cancel();
   speechSynthesis.speak(new SpeechSynthesisUtterance(spoken));
 }

@@ -23,7 +23,7 @@ from fieldcal.core.positions import TWO, Position, forces, ladder
 from fieldcal.evaluation.observations import angle_setting
 from fieldcal.evaluation.so_far import SoFar
 from fieldcal.model import thresholds
-from fieldcal.planning.expected_gain import ExpectedGain, Worth
+from fieldcal.planning.expected_gain import COMMON, ExpectedGain, Worth
 from fieldcal.planning.holding import (
     hold_each,
     hold_until_still,
@@ -150,12 +150,17 @@ def _uncertain(so_far: SoFar) -> bool:
 
 
 def _named(so_far: SoFar) -> str:
-    """The cause that is certain, and nothing else may stand in its place."""
+    """The cause that is certain, and nothing else may stand in its place.
+
+    What a calibration finds anyway, the tilt of the base among it, is not wrong.
+    """
     if so_far.enough or so_far.explanation is None:
         return ""
-    standing = so_far.explanation.standing
-    sure = [s for s in standing if s.probability > thresholds.CERTAIN and not s.aliases]
-    return ", ".join(s.name for s in sure) if len(sure) == len(standing) else ""
+    own = {group_of(name) for name in so_far.found.names} if so_far.found else set()
+    own |= COMMON.keys()
+    wrong = [s for s in so_far.explanation.standing if s.name not in own]
+    sure = [s for s in wrong if s.probability > thresholds.CERTAIN and not s.aliases]
+    return ", ".join(s.name for s in sure) if len(sure) == len(wrong) else ""
 
 
 def _choice(worth: Worth | None, places: Sequence[Position], last: Position) -> int:

@@ -17,7 +17,7 @@ from fieldcal.calibration import limits
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.evaluation.so_far import SoFar
-from fieldcal.planning.steps import Hold
+from fieldcal.planning.steps import Add, Hold, Judge
 from fieldcal.run import plan_file
 from fieldcal.run.judging import judged
 from fieldcal.run.operator.protocol import OperatorView, Wish
@@ -48,7 +48,7 @@ class Run:
     go, named : whether it ended at GO; whether what is concealed is named, and no more
     off : standard uncertainties that the worst parameter is off by
     error : rms of the force in positions that were not taken, m/s^2
-    choices : processor time of each judgement with the next choice, s
+    choices : processor time from each window to the next choice, s
 
     """
 
@@ -127,23 +127,24 @@ def led(bench: Bench, run: Mapping[str, Any], places: Any, seed: int) -> Run:
 
 
 class Timed(SessionRun):
-    """A run that notes what each judgement with the next choice takes."""
+    """A run that notes what each choice takes, until it is shown."""
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self.choices: list[float] = []
 
     def _plan(self) -> Any:
-        plan, reply, since = super()._plan(), None, 0.0
+        plan, since = super()._plan(), np.nan
         try:
             step = next(plan)
             while True:
-                judging = type(step).__name__ == "Judge"
-                since = time.process_time() if judging else since
+                if isinstance(step, Judge) and np.isnan(since):
+                    since = time.process_time()
+                if isinstance(step, Add):
+                    self.choices.append(time.process_time() - since)
+                    since = np.nan
                 reply = yield step
                 step = plan.send(reply)
-                if judging:
-                    self.choices.append(time.process_time() - since)
         except StopIteration as done:
             return done.value
 

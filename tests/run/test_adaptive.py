@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,7 +14,9 @@ from fieldcal import procedures
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import Stopped
 from fieldcal.core.positions import Position
+from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.planning.steps import Hold
+from fieldcal.procedures import adaptive
 from fieldcal.run import plan_file
 from fieldcal.run.judging import judged
 from fieldcal.run.operator.protocol import OperatorView, Wish
@@ -155,6 +158,30 @@ def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -
     said = [t for t in bench.hand.told if t.startswith("NO-GO so far")]
     assert len(said) == max(bench.numbers) - 2
     assert all("one position more" in t and "then GO is expected" in t for t in said)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("base_tilt",), ""),
+        (("base_tilt", "quadratic"), "quadratic"),
+        (("quadratic", "warm_up"), "quadratic, warm_up"),
+        (("quadratic", "time"), ""),
+        ((), ""),
+    ],
+)
+def test_what_a_calibration_finds_anyway_is_not_what_is_wrong(
+    names: tuple[str, ...], said: str
+) -> None:
+    """It ended NO-GO where a tilted base was certain, which it takes into account."""
+    chances = {"time": 0.6}
+    standing = [Standing(n, (), chances.get(n, 0.9999), ()) for n in names]
+    so_far = SimpleNamespace(
+        enough=False,
+        explanation=SimpleNamespace(standing=standing),
+        found=SimpleNamespace(names=("acc_bias.x", "base_tilt.about_x_deg")),
+    )
+    assert adaptive._named(so_far) == said  # type: ignore[arg-type]
 
 
 def test_only_a_plan_that_finds_its_positions_says_how_many_there_are_at_most() -> None:

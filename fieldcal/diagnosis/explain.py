@@ -118,6 +118,7 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
     """Find what explains a recording, beginning with what explained a part of it."""
     inference = inference_of(prepared.source, prepared.rows, prepared)
     found = inference.run(None if before is None else before.best.set.members)
+    inference = found.inference
     windows = inference.system.linearised(found.state)
     best = Fitted(
         prepared.rows,

@@ -288,6 +288,11 @@ class Dictionary(ColumnTable):
         self.causes = [*self.causes, *causes]
         self._changed()
 
+    def chosen(self, causes: Iterable[Cause]) -> None:
+        """Leave only some of its causes."""
+        self.causes = list(causes)
+        self._changed()
+
     def _changed(self) -> None:
         """Forget what was made of the causes as they were."""
         self.shown = np.pad(self.shown, (0, self.width - len(self.shown)))

@@ -4,8 +4,18 @@ Where orientations are not known, only the length of the force says something ab
 accelerometers. On a table its direction stays within the noise of the rows of a window;
 in a hand it wanders, and would pass for biases that do. Then each window is one row:
 the mean of the force over it is as long as ever, to second order in the angle. The mean
-rate over T s is the angle between its ends: with a wander of the direction of a rad
-(rms) it is off by sqrt(2) a / T.
+rate over T s is the angle between its ends, over T: of one that wanders by a (rms) it
+is off by
+
+    sqrt(2) a / T                                                                  (1)
+
+How slowly hands wander is seen by the accelerometers, in all windows together. Where,
+and about which axis, a hand trembles more than that the gyroscopes see: what their rate
+sums up to has about a line the variance
+
+    a^2 + N^2 T / 15                                                               (2)
+
+with N the density of white noise, whose sum is a walk.
 """
 
 from __future__ import annotations
@@ -15,7 +25,15 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.reduce import Rows, RowSource, averaged, rate_of, reduce, spans
+from fieldcal.model.rows.reduce import (
+    Rows,
+    RowSource,
+    averaged,
+    masked,
+    rate_of,
+    reduce,
+    spans,
+)
 
 WANDERS = 6.0
 """Standard deviations of what the squares across the force have too many."""
@@ -41,11 +59,39 @@ def rows_of(source: RowSource) -> Rows:
     bound = spans(source.block, source.about)[held]
     shaken = [rows.x.variance[rows.x.position == p].mean(axis=0) for p in held]
     one = averaged(source, bound, held, np.array(level), rows.noise, np.array(shaken))
-    unsteady = np.sqrt(2.0) * angle / one.length
-    one.sd[:, 3:] = np.hypot(one.sd[:, 3:], unsteady[:, None])
+    rates = masked(source.block, source.usable).gyr
+    unsteady = [
+        _unsteady(rates[a:b], length, white)
+        for (a, b), length, white in zip(bound, one.length, one.sd[:, 3:], strict=True)
+    ]
+    slow = np.sqrt(2.0) * angle / one.length[:, None]  # (1)
+    one.sd[:, 3:] = np.sqrt(one.sd[:, 3:] ** 2 + slow**2 + np.square(unsteady))
     first = np.searchsorted(rows.x.position, held)
     force = angle * source.about.gravity * np.abs(source.about.nominal["acc_scale"])
     return replace(one, common=rows.common[first], wander=float(force.mean()))
+
+
+def _unsteady(rates: Array, length: float, white: Array) -> Array:
+    """What trembling adds to the mean rates of a window, by axis, (3,) outputs.
+
+    Parameters
+    ----------
+    rates : (n, 3) outputs, nan where missing
+    length : T, s
+    white : (3,) deviation of the mean by white noise, N / sqrt(T)
+
+    """
+    known = np.isfinite(rates)
+    mean = np.nan_to_num(rates).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    off = np.where(known, rates - mean, 0.0)
+    angle = np.cumsum(off, axis=0) * (length / len(off))
+    part = np.linspace(-1.0, 1.0, len(off))
+    line = np.linalg.qr(np.column_stack([np.ones_like(part), part]))[0]
+    angle -= line @ (line.T @ angle)
+    noise = (white * length) ** 2 / 15
+    square = np.maximum((angle**2).mean(axis=0) - noise, 0.0)  # (2)
+    out: Array = np.sqrt(2.0 * square) / length  # (1)
+    return out
 
 
 def wander(rows: Rows) -> float:

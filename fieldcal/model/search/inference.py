@@ -7,39 +7,32 @@ What a part of the same recording was explained by may be begun with as well.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search.proportion import in_proportion
-from fieldcal.model.search.selection import SETTLED, Search
-from fieldcal.model.state import State, Term
+from fieldcal.model.search.selection import SETTLED, Search, strange
+from fieldcal.model.search.settling import Settling
+from fieldcal.model.state import State
 from fieldcal.model.system.fitted import whole
-from fieldcal.model.system.linear_system import System, gram
 from fieldcal.model.system.turn_rows import TurnRows, Turns
-from fieldcal.model.system.window_rows import Linear
-from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.physics.shape import FINEST
 
 PASSES = 8
 """Linearisations at most; a set that comes and goes is settled by weight."""
 
-NEWTON = 6
-"""Steps of Gauss and Newton for one set."""
+STAYED = 1.0
+"""Largest step of a column, in standard deviations, after which rows of turns need not
+be linearised again."""
 
 AFAR = 0.05
 """An angle whose square shows, rad: half of it is 0.01 m/s^2 of gravity."""
-
-CONVERGED = 0.03
-"""Largest step of a column, in standard deviations, that counts as none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,27 +57,25 @@ class Inferred:
     values: Array
     turned: Sequence[TurnRows]
 
+    @property
+    def about_itself(self) -> float:
+        """Weight of the best set about its own state, ln, the way not looked at."""
+        own = Settling(self.inference.system, self.inference.nominal)
+        own.turns = self.inference.turns
+        gram = own.gram(self.state, self.values, None)
+        search = Search(own.dictionary, gram)
+        return search.evaluated(self.best.members, self.best.sizes).score
 
-class Inference:
-    """The inference of one session.
 
-    Parameters
-    ----------
-    system : rows and their dictionary
-    nominal : the state that a simulation starts from
-    turns : what makes rows of turns, if there are any
-
-    """
-
-    def __init__(
-        self, system: System, nominal: State, turns: Turns | None = None
-    ) -> None:
-        self.system, self.nominal, self.turns = system, nominal, turns
-        self.dictionary: Dictionary = system.dictionary
-        self.turned: list[TurnRows] = []
+class Inference(Settling):
+    """The inference of one session."""
 
     def run(self, begin: Sequence[Member] | None = None) -> Inferred:
         """Search until set and state stay.
+
+        A function that no effect makes bends the state to itself, and about that state
+        the effects that are there look worse than they are. Where it is in the best
+        set, effects are sought by themselves as well, and it in what they leave.
 
         Parameters
         ----------
@@ -92,10 +83,23 @@ class Inference:
             a position far from where it is said to be is then not looked for
 
         """
-        members: tuple[Member, ...] = ()
+        found = self._searched(begin)
+        if not strange(found.best):
+            return found
+        other = self._apart().effects_first()
+        return other if other.about_itself > found.about_itself else found
+
+    def _apart(self) -> Inference:
+        """The same inference, of which columns that are added are its own."""
+        system, turns = self.system.apart(), self.turns
+        if turns is not None:
+            turns = Turns(turns.turning, system.dictionary, turns.way)
+        return Inference(system, self.nominal, turns)
+
+    def _searched(self, begin: Sequence[Member] | None) -> Inferred:
+        """Search among all causes, from a device as it is nominally."""
         start: Array = np.zeros(self.dictionary.width)
         state, values, _ = self.settled(self.nominal, start, ())
-        seen: set[tuple[tuple[str, int], ...]] = set()
         search = Search(self.dictionary, self.gram(state, values, None))
         if begin is not None:
             found = search.upheld(self.dictionary.like(begin))
@@ -103,8 +107,27 @@ class Inference:
             state, values, found = self._from_nothing(state, values, search)
         about = dict.fromkeys([found, search.evaluated(())])
         self.dictionary.joined(in_proportion(self.dictionary, list(about)))
+        return self._until_it_stays(state, values, found, ())
+
+    def effects_first(self) -> Inferred:
+        """Search among effects alone, and from what was found on among all causes."""
+        every = self.dictionary.causes
+        self.dictionary.chosen(c for c in every if c.kind != "unknown")
+        start: Array = np.zeros(self.dictionary.width)
+        state, values, nothing = self.settled(self.nominal, start, ())
+        known = self._until_it_stays(state, values, nothing, ())
+        self.dictionary.joined(c for c in every if c.kind == "unknown")
+        return self._until_it_stays(
+            known.state, known.values, known.best, known.best.members
+        )
+
+    def _until_it_stays(
+        self, state: State, values: Array, found: Set, members: tuple[Member, ...]
+    ) -> Inferred:
+        """Settle and search in turn, from a set, and a state that has some members."""
+        seen: set[tuple[tuple[str, int], ...]] = set()
         for _ in range(PASSES):
-            seen.add(search.key(found.members))
+            seen.add(Search.key(found.members))
             if found.members != members:
                 state, values, _ = self.settled(
                     state, values, found.members, found.sizes
@@ -119,10 +142,14 @@ class Inference:
                 own = search.evaluated(members, found.sizes)  # with its own shapes
                 if found.score <= own.score + SETTLED:
                     found = own
-                    break
-            if search.key(found.members) in seen:
+                    there, moved, _ = self.settled(state, values, members, found.sizes)
+                    if self.step(found, values, moved) < STAYED:
+                        break
+                    state, values = there, moved
+                    continue
+            if Search.key(found.members) in seen:
                 break
-        return Inferred(self, search, found, state, self._padded(values), self.turned)
+        return Inferred(self, search, found, state, self.padded(values), self.turned)
 
     def _from_nothing(
         self, state: State, values: Array, search: Search
@@ -180,7 +207,7 @@ class Inference:
                 members = own._refined(
                     found.state, found.values, members, i, there.sizes
                 )
-        values = own._padded(found.values)
+        values = own.padded(found.values)
         wanted = own.wanted(members) | (values != 0)
         linear = own.system.linearised(found.state, wanted)
         search = Search(own.dictionary, own.gram_of(linear, values, wanted))
@@ -224,7 +251,7 @@ class Inference:
         sizes: Sizes,
     ) -> list[float]:
         """Weights of a set with each of some groups in the place of one member."""
-        values = self._padded(values)
+        values = self.padded(values)
         wanted = self.wanted([*members[:i], *members[i + 1 :]]) | (values != 0)
         for one in every:
             wanted[one.columns] = True
@@ -259,107 +286,3 @@ class Inference:
         for one in new:
             self.turned = [t.copied(group.columns, one.columns) for t in self.turned]
         return cause, new
-
-    def _padded(self, values: Array) -> Array:
-        """Values with those of columns that were added since: zero."""
-        return np.pad(values, (0, self.dictionary.width - len(values)))
-
-    def wanted(self, members: Sequence[Member]) -> NDArray[np.bool_]:
-        """Columns of a set, and the turns of unknown orientations."""
-        d = self.dictionary
-        wanted = np.zeros(d.width, dtype=bool)
-        for group in [*d.always, *(g for _, g in members)]:
-            wanted[group.columns] = True
-        if d.free.any():
-            wanted[d.small_rotation : d.small_rotation + 2 * d.places] = True
-        return wanted
-
-    def gram(self, state: State, values: Array, known: Set | None) -> Gram:
-        """What all rows say of all columns about a state."""
-        values = self._padded(values)
-        linear = self.system.linearised(state)
-        if self.turns is not None:
-            self.turned = self.turns.linearised(state, values, linear, known)
-        return gram(linear, self.dictionary, values, self.turned)
-
-    def gram_of(
-        self, linear: Sequence[Linear], values: Array, wanted: NDArray[np.bool_]
-    ) -> Gram:
-        """What rows say of some columns, linearised already; turns as they were."""
-        d, some = self.dictionary, np.flatnonzero(wanted)
-        return gram(linear, d, self._padded(values), self.turned, some)
-
-    def settled(
-        self,
-        state: State,
-        values: Array,
-        members: tuple[Member, ...],
-        sizes: Sizes | None = None,
-    ) -> tuple[State, Array, Set]:
-        """The state at the estimate of a set, by Gauss and Newton, and that set."""
-        values = self._padded(values)
-        for _ in range(NEWTON):
-            wanted = self.wanted(members) | (values != 0)
-            linear = self.system.linearised(state, wanted)
-            rows = self.gram_of(linear, values, wanted)
-            search = Search(self.dictionary, rows)
-            found = search.evaluated(members, sizes)
-            sizes = found.sizes
-            before = values
-            state, values = self.moved(found)
-            error = np.sqrt(np.maximum(np.diag(found.state.inverse), 1e-300))
-            step = np.abs(values - before)[found.state.columns] / error
-            counted = np.isin(found.state.columns, self._nonlinear(members))
-            if step[counted].max(initial=0.0) < CONVERGED:
-                break
-        return state, values, found
-
-    def _nonlinear(self, members: tuple[Member, ...]) -> Array:
-        """Columns whose values are in the state: all that are no course in time."""
-        groups = [*self.dictionary.always, *(g for _, g in members)]
-        return np.concatenate([g.columns for g in groups if g.in_state])
-
-    def on_turns(self, state: State, members: Sequence[Member]) -> Iterator[Array]:
-        """What some causes make of the outputs in each turn, (m + 1, 6)."""
-        if self.turns is None:
-            return
-        terms = tuple(
-            t for t in state.terms
-            if any(t.effect is g.effect for _, g in members)
-        )  # fmt: skip
-        yield from self.turns.courses(state, terms)
-
-    def moved(self, found: Set) -> tuple[State, Array]:
-        """The state at a set's estimate, and its columns' values."""
-        d = self.dictionary
-        kept = np.zeros(d.width, dtype=bool)
-        kept[self._nonlinear(found.members)] = True
-        if d.free.any():
-            kept[d.small_rotation : d.small_rotation + 2 * d.places] = True
-        values = np.where(kept, whole(found.state, d), 0.0)
-        nominal = self.nominal
-        small_rotation = values[
-            d.small_rotation : d.small_rotation + 2 * d.places
-        ].reshape(-1, 2)
-        terms = [Term(t.effect, t.values, t.shape, t.origin) for t in nominal.terms]
-        for _, group in found.members:
-            if group.effect is None or not isinstance(group.effect, Motion | Sensor):
-                continue
-            full = np.zeros(len(group.effect.params))
-            full[list(group.params)] = values[group.columns]
-            terms.append(Term(group.effect, full, group.shape, group.origin))
-        state = State(
-            nominal.bias + values[d.bias : d.bias + 6],
-            nominal.scale + values[d.scale : d.scale + 6],
-            small_rotation,
-            values[d.earth : d.earth + 3] if d.earth >= 0 else np.zeros(3),
-            tuple(terms),
-            *self._attitude(values),
-        )
-        return state, values
-
-    def _attitude(self, values: Array) -> Iterator[Array]:
-        """What measured attitudes are off by, (p, 3), where there are any."""
-        d = self.dictionary
-        if d.attitude >= 0:
-            yield values[d.attitude : d.attitude + 3 * d.places].reshape(-1, 3)

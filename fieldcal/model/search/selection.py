@@ -64,14 +64,14 @@ class Search(Offers):
         Alone it may be the likeliest, and still several effects that do the same,
         each a little less likely, are likelier together: those are to be told.
         """
-        if not _strange(best):
+        if not strange(best):
             return best
         every = list(self.visited.values())
         score = np.array([one.score for one in every])
         share = np.exp(score - np.logaddexp.reduce(score))
-        if share[[_strange(one) for one in every]].sum() >= thresholds.NAMED:
+        if share[[strange(one) for one in every]].sum() >= thresholds.NAMED:
             return best
-        return max((one for one in every if not _strange(one)), key=_score)
+        return max((one for one in every if not strange(one)), key=_score)
 
     def _step(self, there: Set) -> Set:
         """The best of the set with one or two more, with one less, or with one else."""
@@ -189,7 +189,7 @@ def _whole(cause: Cause, group: Group) -> Group:
     return whole if part else group
 
 
-def _strange(one: Set) -> bool:
+def strange(one: Set) -> bool:
     """Whether a set has a cause that is no effect."""
     return any(cause.kind == "unknown" for cause, _ in one.members)
 

@@ -108,7 +108,7 @@ def pulls(told: dict[str, Any], device: Device) -> Array:
         for n, v in truth.items()
         if n in told
     ]
-    every = np.concatenate([np.zeros(0), *out])
+    every: Array = np.concatenate([np.zeros(0), *out])
     return every[np.isfinite(every)]
 
 

@@ -163,7 +163,7 @@ def _outputs(
 ) -> Array:
     """What the device writes down, (n, 6)."""
     bias = np.concatenate([device.acc_bias, device.gyr_bias])
-    out = np.hstack([force @ device.acc.T, turning @ device.gyr.T]) + bias
+    out: Array = np.hstack([force @ device.acc.T, turning @ device.gyr.T]) + bias
     out += warmer[:, None] * device.warmth
     step = device.walk / np.sqrt(rate)
     out[:, 3:] += np.cumsum(step * rng.standard_normal(turning.shape), axis=0)

@@ -194,7 +194,7 @@ def test_the_drawing_of_the_architecture_has_rooms_that_exist() -> None:
     # those that all others use stand in the text beside it, the command line above it
     assert ROOMS - named == {
         *("core", "calibration", "planning", "twin", "commands", "noise", "against"),
-        *("fleet", "service", "thermal"),
+        *("fleet", "service", "thermal", "navigator"),
     }
     ends = {end for start, to, _ in architecture.ARROWS for end in (start, to)}
     assert ends == set(architecture.BOXES)

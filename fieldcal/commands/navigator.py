@@ -1,0 +1,41 @@
+"""`fieldcal navigator`: calibrate by the drift of a navigator at rest."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+EXAMPLE = """\
+  fieldcal navigator bench-7/drift
+  fieldcal navigator bench-7/drift --json
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    what = "folder with session.toml and the navigator's solution.csv"
+    parser.add_argument("session", type=Path, metavar="SESSION", help=what)
+    parser.add_argument("--json", action="store_true", help="print result.json")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command."""
+    from fieldcal.commands.table import show
+    from fieldcal.navigator.session_runs import calibrated
+    from fieldcal.session import description
+    from fieldcal.session.folder import DESCRIPTION, RESULT, write_whole
+
+    about = description.read(args.session / DESCRIPTION)
+    found = calibrated(args.session, about)
+    text = json.dumps(found.to_json(), allow_nan=False)
+    path = write_whole(args.session / RESULT, text + "\n")
+    if args.json:
+        for warning in found.warnings:
+            sys.stderr.write(f"fieldcal navigator: {warning}\n")
+        sys.stdout.write(text + "\n")
+    else:
+        show(found)
+        sys.stdout.write(f"written: {path}\n")
+    return 0

@@ -1,0 +1,148 @@
+"""The recorded solution of a navigator, run by run.
+
+A text table with a heading: ``t`` in s, and of the velocity ``vn``, ``ve``, ``vd`` in
+m/s, of the position ``pn``, ``pe``, ``pd`` in m from anywhere, north, East, down; what
+is not there is not used. A run is a [[position]] of session.toml from start_s, where
+the navigator began with its attitude entered and no velocity, to end_s.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
+
+COLUMNS = (("ve", "vd", "vn"), ("pe", "pd", "pn"))
+"""East, down, north: the order of the base axes of a base that points north."""
+
+INSTANTS = 24
+"""Of a run that are used, evenly from its start to its end."""
+
+SHORTEST_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """All that was recorded.
+
+    Attributes
+    ----------
+    t : (n,) s, ascending
+    values : (n, 6) velocity and position in East, down, north; nan where not recorded
+
+    """
+
+    t: Array
+    values: Array
+
+    @property
+    def used(self) -> list[int]:
+        """Columns that were recorded."""
+        return np.flatnonzero(np.isfinite(self.values).any(axis=0)).tolist()
+
+    def turned(self, base: Array) -> Solution:
+        """In other axes, the rows of `base` (3, 3); what is not there stays so."""
+        known = np.isfinite(self.values)
+        both = np.nan_to_num(self.values).reshape(-1, 2, 3) @ base.T
+        return Solution(self.t, np.where(known, both.reshape(-1, 6), np.nan))
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run, at instants step, 2 step, ... from its start.
+
+    Attributes
+    ----------
+    step : s
+    values : (m, 6) of the solution less what it began with: of the velocity nothing,
+        of the position where it was
+
+    """
+
+    step: float
+    values: Array
+
+
+def read(path: Path) -> Solution:
+    """Read the table.
+
+    Raises
+    ------
+    InputError
+        Naming the file, and the column or the line that is wrong.
+
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    heading = [name.strip() for name in rows[0]] if rows else []
+    names = [n for triad in COLUMNS for n in triad]
+    if "t" not in heading or not set(names) & set(heading):
+        raise InputError(
+            f"{path}: has no heading with t and one of {', '.join(names)}: name the"
+            " columns in its first line"
+        )
+    table = _numbers(path, rows[1:], len(heading))
+    t = table[:, heading.index("t")]
+    if len(t) < 2 or not (np.diff(t) > 0).all():
+        raise InputError(f"{path}: t does not ascend: sort the lines by time")
+    values = np.full((len(t), 6), np.nan)
+    for i, name in enumerate(names):
+        if name in heading:
+            values[:, i] = table[:, heading.index(name)]
+    return Solution(t, values)
+
+
+def _numbers(path: Path, rows: Sequence[Sequence[str]], width: int) -> Array:
+    out = np.empty((len(rows), width))
+    for i, row in enumerate(rows):
+        try:
+            out[i] = [float(cell) for cell in row]
+        except ValueError:
+            raise InputError(
+                f"{path}: line {i + 2} is not {width} numbers: mend it, or leave it out"
+            ) from None
+        if not np.isfinite(out[i]).all():
+            raise InputError(f"{path}: line {i + 2} has a number that is none")
+    return out
+
+
+def runs(
+    solution: Solution, windows: Sequence[tuple[float, float] | None]
+) -> list[Run]:
+    """The runs of some windows, s.
+
+    Raises
+    ------
+    InputError
+        If one is not within what was recorded, or too short.
+
+    """
+    out = []
+    for number, window in enumerate(windows, 1):
+        if window is None:
+            raise InputError(
+                f"[[position]] number {number} has no start_s and end_s: say when its"
+                " run began and ended"
+            )
+        start, end = window
+        if start < solution.t[0] or end > solution.t[-1] or end - start < SHORTEST_S:
+            raise InputError(
+                f"[[position]] number {number}: a run of {SHORTEST_S:.0f} s or more"
+                f" must lie within {solution.t[0]:g} to {solution.t[-1]:g} s, not"
+                f" {start:g} to {end:g} s"
+            )
+        step = (end - start) / INSTANTS
+        at = start + step * np.arange(INSTANTS + 1)
+        values = np.stack([np.interp(at, solution.t, v) for v in solution.values.T])
+        begun = values[:, :1] * (np.arange(6) >= 3)[:, None]
+        out.append(Run(step, (values - begun).T[1:]))
+    return out

@@ -1,0 +1,194 @@
+"""Calibration from a navigator's drift, against a mechanisation of its own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from drifting import FACES, LATITUDE_DEG, G, Sensors, axes, record
+from mechanisation import OMEGA, navigated
+
+from fieldcal.calibration import Calibration
+from fieldcal.cli import main
+from fieldcal.core.errors import InputError
+from fieldcal.navigator.growth import growth, matrix
+from fieldcal.navigator.large_angles import beyond_first_order
+from fieldcal.navigator.session_runs import calibrated
+from fieldcal.session import description
+
+EXACT = Sensors(np.zeros(3), np.ones(3), np.zeros(3))
+
+
+def solved(folder: Path, **how: Any) -> tuple[Calibration, Sensors]:
+    rng = np.random.default_rng(how.pop("seed", 1))
+    sensors = how.pop("sensors", None) or Sensors.drawn(rng)
+    record(folder, sensors, rng, **how)
+    about = description.read(folder / "session.toml")
+    return calibrated(folder, about), sensors
+
+
+def pulls(found: Calibration, sensors: Sensors) -> list[float]:
+    out = []
+    for name in found.names:
+        group, axis = name.split(".")
+        true = sensors.truth[group]["xyz".index(axis)]
+        out.append((found.value(name) - true) / found.uncertainty(name))
+    return out
+
+
+@pytest.mark.parametrize("attitude", [(0, 0), (90, 0), (30, -60)])
+def test_errors_grow_as_in_a_navigator_in_other_axes(attitude: tuple[int, int]) -> None:
+    """Small and large errors; Coriolis, Schuler and gravity's fall with height too."""
+    phi, n, dt = np.deg2rad(LATITUDE_DEG), 6000, 0.05
+    earth = OMEGA * np.array([0.0, -np.sin(phi), np.cos(phi)])
+    c = axes(*attitude).T
+    bias, drift = np.array([0.02, -0.01, 0.03]), np.array([2e-4, -1e-4, 1.5e-4])
+    began = np.array([1e-3, -2e-3, 5e-4])
+    force = c.T @ [0.0, -G, 0.0] + bias
+    told = (np.eye(3) - _cross(began)) @ c
+    v, p = navigated(
+        np.tile(c.T @ earth + drift, (n, 1)), np.tile(force, (n, 1)), dt, told, phi, G
+    )
+    grown = growth(matrix(earth, G), n * dt / 24, 24)
+    both = np.concatenate([c @ drift, c @ bias])
+    linear = grown.constant @ both + grown.start[:, :, :3] @ began
+    errors = np.concatenate([drift, bias, began])
+    inputs = (earth, np.array([0.0, -G, 0.0]))
+    more = beyond_first_order(n * dt / 24, 24, c, inputs, errors)
+    expected = linear[:, 3:] + more
+    there = np.hstack([v, p])[n // 24 - 1 :: n // 24]
+    scale = np.repeat([np.abs(v).max(), np.abs(p).max()], 3)
+    assert np.abs((expected - there) / scale).max() < 4e-3
+    assert np.abs((linear[:, 3:] - there) / scale).max() > 2e-2  # more is needed
+
+
+def _cross(v: np.ndarray) -> np.ndarray:
+    return np.asarray(np.cross(np.eye(3), v))
+
+
+def test_noise_grows_as_that_of_many_runs() -> None:
+    phi, n, dt = np.deg2rad(LATITUDE_DEG), 120, 0.5
+    rng = np.random.default_rng(2)
+    earth = OMEGA * np.array([0.0, -np.sin(phi), np.cos(phi)])
+    ends = []
+    for _ in range(150):
+        rates = earth + 1e-4 / np.sqrt(dt) * rng.standard_normal((n, 3))
+        forces = [0, -G, 0] + 2e-3 / np.sqrt(dt) * rng.standard_normal((n, 3))
+        v, p = navigated(rates, forces, dt, np.eye(3), phi, G)
+        ends.append(np.concatenate([v[-1], p[-1]]))
+    grown = growth(matrix(earth, G), n * dt / 4, 4)
+    whole = 1e-8 * grown.rate_noise + 4e-6 * grown.force_noise
+    sigma = np.sqrt(np.diag(whole)[-6:])
+    ratio = np.std(ends, axis=0) / sigma
+    assert np.all((ratio > 0.8) & (ratio < 1.2)), ratio
+
+
+@pytest.mark.statistical
+def test_parameters_are_as_uncertain_as_is_said(tmp_path: Path) -> None:
+    every, rng = [], np.random.default_rng(3)
+    for seed in range(8):
+        tilt = rng.normal(0, [0.02, 0.5, 0.02])
+        found, sensors = solved(tmp_path / str(seed), seed=seed, tilt_deg=tilt)
+        assert len(found.names) == 9
+        assert found.vector("gyr_bias")[1].max() < 1e-5
+        assert found.vector("acc_bias")[1].max() < 2e-3
+        every += pulls(found, sensors)
+    assert 0.7 < np.sqrt(np.mean(np.square(every))) < 1.3
+    assert np.abs(every).max() < 4.5
+
+
+def test_noise_is_found_in_the_drift(tmp_path: Path) -> None:
+    found, sensors = solved(tmp_path)
+    told = found.info["navigator"]
+    assert 0.5 < told["force_noise_m_s2_rthz"] / sensors.force_noise < 2
+    assert 0.5 < told["rate_noise_rad_s_rthz"] / sensors.rate_noise < 2
+    assert told["runs"] == 6 and not told["missing"]
+
+
+def test_a_base_that_points_elsewhere(tmp_path: Path) -> None:
+    found, sensors = solved(tmp_path, azimuth_deg=70.0)
+    assert np.abs(pulls(found, sensors)).max() < 4
+
+
+@pytest.mark.parametrize("columns", [("pn", "pe", "pd"), ("vn", "ve", "vd", "pd")])
+def test_positions_serve_as_well(tmp_path: Path, columns: tuple[str, ...]) -> None:
+    found, sensors = solved(tmp_path, columns=columns)
+    assert len(found.names) == 9 and np.abs(pulls(found, sensors)).max() < 4
+
+
+def test_what_one_attitude_cannot_tell_is_not_said(tmp_path: Path) -> None:
+    found, sensors = solved(tmp_path, faces=FACES[:1])
+    assert "acc_scale.y" not in found.names  # of y there is bias and scale factor
+    assert {"gyr_bias.x", "gyr_bias.z"} <= set(found.names)
+    assert any("not determined by these runs" in w for w in found.warnings)
+    assert np.abs(pulls(found, sensors)).max() < 4
+
+
+def test_without_the_vertical_velocity_levels_carry_it(tmp_path: Path) -> None:
+    found, sensors = solved(tmp_path, columns=("vn", "ve"))
+    assert np.abs(pulls(found, sensors)).max() < 4
+    assert not set(found.groups) & {"acc_scale"}
+
+
+def test_a_navigator_that_levelled_itself_hides_its_accelerometers(
+    tmp_path: Path,
+) -> None:
+    found, sensors = solved(tmp_path, aligned="itself", faces=FACES[:3])
+    assert any("found its level by its own" in w for w in found.warnings)
+    assert np.abs(pulls(found, sensors)).max() < 4
+    assert found.vector("gyr_bias")[1][0] < 1e-4
+
+
+def test_the_command_writes_a_result_that_others_take(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(4)
+    record(tmp_path, Sensors.drawn(rng), rng, faces=FACES[:4])
+    assert main(["navigator", str(tmp_path), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said == json.loads((tmp_path / "result.json").read_text())
+    assert Calibration.from_json(said).names == tuple(said["covariance"]["names"])
+    assert main(["navigator", str(tmp_path)]) == 0
+    assert "gyro bias x" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "says"),
+    [
+        ("solution.csv", "time,vn\n0,0\n", "no heading with t and one of"),
+        ("solution.csv", "t,vn\n0,0\n1,x\n", "line 3 is not 2 numbers"),
+        ("solution.csv", "t,vn\n0,0\n1,nan\n", "line 3 has a number that is none"),
+        ("solution.csv", "t,vn\n1,0\n0,0\n", "t does not ascend"),
+        ("solution.csv", "t,vn\n0,0\n5,0\n", "must lie within 0 to 5 s"),
+        ("solution.csv", "", "no heading"),
+        ("session.toml", "[[position]]\nstart_s=0\nend_s=9", "the attitude of its run"),
+        (
+            "session.toml",
+            "[[position]]\nalpha_deg=0\nbeta_deg=0\nstart_s=0\nend_s=90",
+            "latitude_deg is lacking",
+        ),
+        (
+            "session.toml",
+            "[site]\nlatitude_deg=5\n[[position]]\nalpha_deg=0\nbeta_deg=0",
+            "has no start_s",
+        ),
+        ("session.toml", "[navigator]\naligned='well'", "aligned"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(
+    tmp_path: Path, file: str, content: str, says: str
+) -> None:
+    record(tmp_path, EXACT, np.random.default_rng(1), faces=FACES[:1], seconds=20.0)
+    (tmp_path / file).write_text(content)
+    with pytest.raises(InputError, match=says):
+        calibrated(tmp_path, description.read(tmp_path / "session.toml"))
+
+
+def test_one_level_velocity_does_not_turn_with_the_azimuth(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    record(tmp_path, EXACT, rng, faces=FACES[:1], columns=("vn",), azimuth_deg=9.0)
+    with pytest.raises(InputError, match="has one of them"):
+        calibrated(tmp_path, description.read(tmp_path / "session.toml"))

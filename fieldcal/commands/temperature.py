@@ -123,12 +123,14 @@ def modelled(points: Sequence[ThermalPoint], limits: Path | None) -> ThermalMode
 
 def left_out(points: Sequence[ThermalPoint]) -> list[str]:
     """Groups that not all sessions have, a sentence each."""
+    from fieldcal.calibration.gauge import GROUPS
     from fieldcal.calibration.names import group_of
     from fieldcal.thermal.fit import common
 
     used = {name for names in common(points) for name in names}
     rest = {group_of(n) for p in points for n in p.calibration.names if n not in used}
-    return [f"{group} is not in every session, and left out" for group in sorted(rest)]
+    device = sorted(rest & GROUPS.keys())  # a tilt of the base is no part of it
+    return [f"{group} is not in every session, and left out" for group in device]
 
 
 def disagrees(found: ThermalModel) -> list[str]:

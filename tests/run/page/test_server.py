@@ -232,4 +232,5 @@ def test_a_run_is_watched_to_its_end(tmp_path: Path) -> None:
                         break
         run.stderr.read()
     assert run.returncode == 0
-    assert {"TURN TO", "HOLD STILL"} <= set(words) and words[-1] == "GO"
+    # what is shorter than the time between two views may not be among them
+    assert "HOLD STILL" in words and words[-1] == "GO"

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import multiprocessing.connection
+import os
+import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
@@ -54,7 +57,25 @@ def processes(count: int, preload: Sequence[str] = ()) -> Pool:
     context = multiprocessing.get_context(method)
     if method == "forkserver":
         context.set_forkserver_preload(list(preload))
-    return Pool(lambda: ProcessPoolExecutor(count, mp_context=context), count)
+    return Pool(
+        lambda: ProcessPoolExecutor(
+            count, mp_context=context, initializer=_end_with_parent
+        ),
+        count,
+    )
+
+
+def _end_with_parent() -> None:
+    """End this process when the one it works for has ended, however it did."""
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextlib.contextmanager

@@ -93,7 +93,7 @@ class Jobs:
             return None
         try:
             return Job(**json.loads((self.folder(number) / JOB).read_text("utf-8")))
-        except FileNotFoundError:
+        except (OSError, ValueError, TypeError):  # taken away, or somebody else's
             return None
 
     def waiting(self) -> list[Job]:

@@ -15,6 +15,9 @@ from fieldcal.history.sessions import StoredSession
 from fieldcal.service.jobs import Job, Jobs
 from fieldcal.service.work import JobTask
 
+AGAIN = 10.0
+"""Time after which a job is tried again that could not be written down, s."""
+
 
 class JobQueue:
     """Carries out jobs in the order in which they came; a context manager.
@@ -58,7 +61,10 @@ class JobQueue:
             if not waiting:
                 self._come.wait()
                 continue
-            self._done(waiting[0])
+            try:
+                self._done(waiting[0])
+            except (FieldcalError, OSError):
+                self._come.wait(AGAIN)  # for room on the disk, or a store
 
     def _done(self, job: Job) -> None:
         job = self.jobs.changed(job, state="working")

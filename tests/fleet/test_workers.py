@@ -5,11 +5,16 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import pytest
+from processes import HANGS
 
 from fieldcal.core.errors import InputError
 from fieldcal.fleet.workers import Pool, processes, results, scheduled
@@ -86,3 +91,39 @@ def test_a_pool_that_cannot_be_opened_again_says_so() -> None:
 
     with pytest.raises(InputError, match="is gone"):
         list(results(["a"], str.upper, Pool(shut, 1)))
+
+
+ALONE = """
+import os, pathlib, time
+from fieldcal.fleet.workers import processes, results
+def stay(path):
+    pathlib.Path(path).write_text(str(os.getpid()))
+    time.sleep(1000)
+if __name__ == "__main__":
+    list(results([{there!r}], stay, processes(1)))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="there is no /proc")
+def test_workers_end_with_the_process_that_they_work_for(tmp_path: Path) -> None:
+    script, there = tmp_path / "script.py", tmp_path / "worker"
+    script.write_text(ALONE.format(there=str(there)))
+    with subprocess.Popen([sys.executable, str(script)]) as process:
+        until = time.monotonic() + HANGS
+        while not (there.exists() and there.read_text()):
+            assert time.monotonic() < until and process.poll() is None
+            time.sleep(0.02)
+        process.kill()
+    worker = int(there.read_text())
+    while _runs(worker):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def _runs(number: int) -> bool:
+    """Whether a process is there and is more than its exit code."""
+    try:
+        state = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"

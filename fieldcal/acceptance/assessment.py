@@ -69,6 +69,7 @@ def assess(
         family=earlier,
         doubts=[*_doubts(marks), *taken_out],
         windows=still.at_rest(session).averages,
+        held=[session.about.positions[i] for i in still.rows],
     )
     warnings += [w for w in _restarts(marks) if w not in warnings]
     made = decide(found, session.about, limits, circumstances)
@@ -205,9 +206,10 @@ def _restarts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
             )
     counted = sum(int(m.get("restarts", 0)) for m in marks if m.get("event") == "link")
     if counted:
+        times = "once" if counted == 1 else f"{counted} times"
         said.append(
-            f"the device started anew {counted} times meanwhile: its bias at the next"
-            " start may be another"
+            f"the device started anew {times} meanwhile: its bias at the next start may"
+            " be another"
         )
     return said
 

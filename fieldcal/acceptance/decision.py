@@ -29,6 +29,7 @@ from fieldcal.acceptance.witnesses import has_witnesses, left_out, witnesses
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.chances import chi2_tail
+from fieldcal.core.positions import Position
 from fieldcal.core.shown import one_line
 from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
@@ -69,6 +70,7 @@ class Circumstances:
     family : earlier calibrations of the device, oldest first; None without a history
     doubts : sentences about what happened on the way that make it NO-GO
     windows : that it was made of
+    held : positions that have one; empty where all have
 
     """
 
@@ -78,6 +80,7 @@ class Circumstances:
     family: Sequence[Calibration] | None = None
     doubts: Sequence[str] = ()
     windows: Sequence[Average] = ()
+    held: Sequence[Position] = ()
 
 
 def decide(
@@ -136,7 +139,8 @@ def _remedy(
         for check in checks
         if check.ok is False and check.name.endswith(UNCERTAINTY)
     ]
-    return cheapest(found, about, limits, failed, sigma, float(np.ceil(seconds)))
+    length, held = float(np.ceil(seconds)), circumstances.held or about.positions
+    return cheapest(found, about, held, limits, failed, sigma, length)
 
 
 def with_decision(found: Calibration, made: Decision) -> Calibration:

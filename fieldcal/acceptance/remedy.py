@@ -73,6 +73,7 @@ class Remedy:
 def cheapest(
     found: Calibration,
     about: Description,
+    had: Sequence[Position],
     limits: GradeLimits,
     failed: Collection[str],
     sigma: float,
@@ -84,6 +85,7 @@ def cheapest(
     ----------
     found : calibration that is NO-GO
     about : its positions and where it was
+    had : those that have a window
     limits : of its grade
     failed : groups whose uncertainty is more than its limit
     sigma : error of the mean of a window, m/s^2
@@ -102,7 +104,7 @@ def cheapest(
         return None
     if all(sensor_of(group_of(name)) == "gyr" for name in over):
         return _longer(about, over, seconds)
-    return _besides(found, about, limits, over, sigma, seconds)
+    return _besides(found, about, had, limits, over, sigma, seconds)
 
 
 def _over(
@@ -137,6 +139,7 @@ def _longer(
 def _besides(
     found: Calibration,
     about: Description,
+    had: Sequence[Position],
     limits: GradeLimits,
     over: dict[str, float],
     sigma: float,
@@ -145,7 +148,7 @@ def _besides(
     """Further positions of the ladder, the best one after the other."""
     tilts = [g for g in ("angle_offset", "base_tilt") if g in found.groups]
     names = parameters(*(tilts or ["angle_offset"]))
-    held, angle = list(about.positions), _angle(found)
+    held, angle = list(had), _angle(found)
     before = _expected(names, held, about, sigma, angle)
     allowed = [limits.sigma(group_of(name)) or np.inf for name in names]
     chosen: list[Position] = []

@@ -18,11 +18,13 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
     """Print what is left for a navigator, checks and decision; nothing without one.
 
     The decision comes last, with its reasons just above it: what is on the screen when
-    all is over; behind a NO-GO the cheapest remedy. `folder` is the session of a run,
-    in which it can be taken.
+    all is over; behind a NO-GO the cheapest remedy, or positions that were left out.
+    `folder` is the session of a run, in which they can be taken.
     """
     from fieldcal.commands.console import ShownConsole
     from fieldcal.commands.table import say
+    from fieldcal.run.session_run import positions_left_out
+    from fieldcal.session.folder import Session
 
     decision = found.info.get("decision")
     if not decision:
@@ -37,11 +39,18 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
         say(console, MARKS[check["ok"]], check["says"])
     word, style = (GO, "green") if decision["go"] else (NO_GO, "red")
     console.print(f" {word} ", style=f"bold reverse {style}", markup=False)
-    if remedy := decision.get("remedy"):
+    remedy = decision.get("remedy")
+    if remedy:
         say(console, "to GO: ", remedy["says"])
-        if folder is not None:
-            call = f"fieldcal run --resume {shlex.quote(str(folder))}"
-            say(console, "       ", f"{call} takes it")
+    if folder is None or decision["go"]:
+        return
+    call = f"fieldcal run --resume {shlex.quote(str(folder))}"
+    if remedy:
+        say(console, "       ", f"{call} takes it")
+    elif left_out := positions_left_out(Session.open(folder)):
+        which = ", ".join(str(i + 1) for i in left_out)
+        what = "positions" if len(left_out) > 1 else "position"
+        say(console, "first: ", f"take {what} {which}, left out so far: {call}")
 
 
 def _growth(growth: dict[str, Any]) -> str:

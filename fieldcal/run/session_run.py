@@ -245,7 +245,7 @@ def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
     """A session to go on with, its tables, and positions to take once more.
 
     What is finished and NO-GO is gone on with by its remedy: positions besides, or one
-    that was taken already.
+    that was taken already; where it has none, by the positions that were left out.
 
     Raises
     ------
@@ -266,11 +266,18 @@ def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
         remedy = _remedy(folder, session)
         again = tuple(int(i) for i in remedy["again"])
         tables["position"] = [*tables.get("position", ()), *remedy["positions"]]
-        run["seconds"] = float(remedy["seconds"])
+        run["seconds"] = float(remedy.get("seconds", run.get("seconds", 30.0)))
     fixed = procedures.most(session.about, str(run.get("procedure", ""))) is None
     if fixed and len(tables.get("position", ())) > _planned(marks, session):
         run["procedure"] = "positions"  # whatever set it was, it has more now
     return session, {**tables, "run": run}, again
+
+
+def positions_left_out(session: Session) -> tuple[int, ...]:
+    """Numbers of the positions of which no window stands."""
+    marks = list(session.marks())
+    every = range(len(session.about.positions))
+    return tuple(i for i in every if not _stands(marks, i))
 
 
 def _planned(marks: Sequence[Mapping[str, Any]], session: Session) -> int:
@@ -303,6 +310,8 @@ def _remedy(folder: Path, session: Session) -> Mapping[str, Any]:
     remedy = decision.get("remedy")
     if isinstance(remedy, Mapping) and planned(session.about) is None:
         return remedy
+    if decision.get("go") is False and (left_out := positions_left_out(session)):
+        return {"again": left_out, "positions": ()}
     if decision.get("go") is False:
         raise SessionError(
             f"{folder}: is finished and NO-GO, and no position taken besides would"

@@ -82,7 +82,9 @@ def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:
     names = tuple(f"gyr_bias.{a}" for a in "xyz")
     found = found_with(names, [1e-4, 1e-4, 1.1 * LIMITS.gyr_bias_sigma])
     session = about(tmp_path / "s", five)
-    remedy = cheapest(found, session.about, LIMITS, ["gyr_bias"], 1e-3, 30.0)
+    remedy = cheapest(
+        found, session.about, session.about.positions, LIMITS, ["gyr_bias"], 1e-3, 30.0
+    )
     assert remedy is not None and "more at position 5, as it stands" in remedy.says
     assert remedy.positions == (five[-1],)
     # white noise: 150 s gave 1.1 of the limit, 0.9 of it take 1.49 times as long
@@ -94,11 +96,24 @@ def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
     names = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xy")
     session = about(tmp_path / "s", two)
     found = found_with(names, [1e-3] * 4)
-    remedy = cheapest(found, session.about, LIMITS, ["acc_scale"], 1e-4, 30.0)
+    remedy = cheapest(
+        found, session.about, session.about.positions, LIMITS, ["acc_scale"], 1e-4, 30.0
+    )
     assert remedy is not None and "not determined yet" in remedy.says
     assert set(remedy.positions) <= set(ladder(TWO)) - set(two)
     hopeless = replace(LIMITS, acc_scale_sigma=1e-9)
-    assert cheapest(found, session.about, hopeless, ["acc_scale"], 1e-4, 30.0) is None
+    assert (
+        cheapest(
+            found,
+            session.about,
+            session.about.positions,
+            hopeless,
+            ["acc_scale"],
+            1e-4,
+            30.0,
+        )
+        is None
+    )
 
 
 def test_a_position_that_disagrees_is_taken_again(tmp_path: Path) -> None:
@@ -107,6 +122,8 @@ def test_a_position_that_disagrees_is_taken_again(tmp_path: Path) -> None:
     found = replace(
         found_with(("acc_bias.x",), [1e-3]), info={"doubtful_position": doubtful}
     )
-    remedy = cheapest(found, session.about, LIMITS, [], 1e-3, 30.0)
+    remedy = cheapest(
+        found, session.about, session.about.positions, LIMITS, [], 1e-3, 30.0
+    )
     assert remedy is not None and remedy.again == (2,)
     assert remedy.says.startswith("take position 3 (α = 22.5°, β = 2.5°) again")

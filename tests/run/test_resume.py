@@ -12,10 +12,12 @@ import pytest
 from processes import wait_for_samples
 
 from benchmarks.kills import Bench, series, windows
+from fieldcal.calibration import Calibration
+from fieldcal.commands.decision_view import show_decision
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
-from fieldcal.run.session_run import recorded_averages, resume
+from fieldcal.run.session_run import positions_left_out, recorded_averages, resume
 from fieldcal.session import description
 from fieldcal.session.folder import MARKS, Session
 from fieldcal.session.recorder import SAMPLES, Recorder
@@ -143,6 +145,15 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
         recorder.mark("finished")
     assert Session.open(folder).windows[-1] == (1.0, 2.0)
     (folder / "result.json").write_text(json.dumps({"decision": {"go": False}}))
+    # no remedy, but what was repeated has no window since: that comes first
+    session, tables, again = resume(folder)
+    assert again == positions_left_out(session) and 0 in again
+    assert len(tables["position"]) == len(session.positions)
+    with Recorder(folder, None) as recorder:
+        for i in again:
+            start = 10.0 + 10.0 * i
+            recorder.mark("window", position=i, start_s=start, end_s=start + 2.0)
+        recorder.mark("finished")
     with pytest.raises(SessionError, match="no position taken besides would"):
         resume(folder)
 
@@ -196,3 +207,18 @@ def test_a_laptop_that_fell_asleep_goes_on_with_right_numbers(tmp_path: Path) ->
                 a <= np.nextafter(t[i], np.inf) and t[i + 1] <= b for a, b in left_out
             ), "sleep is no part of a window"
     assert len(pulls) >= 11 and np.abs(pulls).max() < 4.5
+
+
+def test_behind_a_no_go_stands_what_was_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorded(tmp_path / "s")
+    assert positions_left_out(Session.open(tmp_path / "s")) == (1,)
+    found = Calibration(
+        names=(), values=np.zeros(0), covariance=np.zeros((0, 0)), units=(),
+        method="joint", chi2=0.0, dof=0, rms=0.0,
+        info={"decision": {"go": False, "checks": []}},
+    )  # fmt: skip
+    show_decision(found, tmp_path / "s")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "first: take position 2, left out so far: fieldcal run --resume" in said

@@ -1,0 +1,49 @@
+"""Logs of a device that nobody fixed: far from nominal, in orientations not known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.hand_held.draws import GRAVITY, log
+from fieldcal.cli import main
+from fieldcal.diagnosis.explain import Explanation, explain
+from fieldcal.diagnosis.prepare import prepare
+from fieldcal.model.search.inference import STAYED
+from fieldcal.session.folder import Session
+
+EVERY = {"cross_coupling", "gyro_cross_coupling", "gyro_scale"}
+SEEDS = (88_000_036, pytest.param(88_000_011, marks=pytest.mark.thorough))
+
+
+def explained(seed: int, folder: Path) -> Explanation:
+    """A log as `fieldcal import` makes a session of it, explained."""
+    file, one = folder / "log.csv", folder / "s"
+    head = "t,ax,ay,az,gx,gy,gz,temp"
+    np.savetxt(file, log(seed).rows, "%.6f", ",", header=head, comments="")
+    assert main(["import", str(file), "-o", str(one)]) == 0
+    said = one / "session.toml"
+    said.write_text(said.read_text().replace("[site]", f"[site]\ngravity = {GRAVITY}"))
+    session = Session.open(one)
+    return explain(prepare(session.block, session.about))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_three_effects_are_found_of_which_none_is_seen_alone(
+    seed: int, tmp_path: Path
+) -> None:
+    """What bends |f| bends the turns as well, until accelerometers are set right."""
+    found = explained(seed, tmp_path)
+    assert {one.name for one in found.standing} == EVERY
+    assert found.posterior.nothing < 1e-6
+
+
+def test_the_state_stays_where_the_set_does(tmp_path: Path) -> None:
+    """Another step about rows of turns that are linearised there is a small one."""
+    inferred = explained(88_000_011, tmp_path).inferred
+    own, best = inferred.inference, inferred.best
+    own.gram(inferred.state, inferred.values, None)
+    _, moved, _ = own.settled(inferred.state, inferred.values, best.members, best.sizes)
+    assert own.step(best, inferred.values, moved) < STAYED

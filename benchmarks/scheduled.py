@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
+from typing import Any
 
 import distributed
 
@@ -38,6 +39,7 @@ class Noted(SessionTask):
 
 def main() -> None:
     """Print what is measured."""
+    engine: Any = distributed  # it states types of some functions only
     count = next((int(word) for word in sys.argv[1:] if word.isdigit()), 12)
     with TemporaryDirectory() as place:
         for i in range(count):
@@ -46,7 +48,7 @@ def main() -> None:
         spent = {}
         for workers in (1, 2):
             with (
-                distributed.LocalCluster(
+                engine.LocalCluster(
                     n_workers=workers, threads_per_worker=1, dashboard_address=None
                 ) as cluster,
                 scheduled(cluster.scheduler_address) as pool,

@@ -106,6 +106,10 @@ def likeliest(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
     return best, float(np.maximum(2 * (share**2).sum(), PRIOR_INFO) ** -0.5)
 
 
+ROUNDED = 1e-6
+"""Part of F that rounding makes, ln."""
+
+
 class Sizing:
     """The sizes of one set.
 
@@ -197,8 +201,30 @@ class Sizing:
     def _triad(self, channels: Sequence[int]) -> list[Array]:
         """F over the instabilities of each of some channels that are much alike.
 
-        They are set together: one by one none could leave the others behind.
+        They are set together: one by one none could leave the others behind. Where
+        several scatter what one of them could as well, as of a position of unknown
+        orientation, each alone would fall, and all together leave it unexplained:
+        then they are set one by one.
         """
+        before, level = list(self.instability), self._level()
+        profiles = self._together(channels)
+        if self._level() >= level - ROUNDED:
+            return profiles
+        self.instability = before
+        return [self._one(c) for c in channels]
+
+    def _level(self) -> float:
+        """F at the sizes as they are, but for what is known of groups' sizes."""
+        return self.eliminated().score + float(alike(self.instability, self.unstable))
+
+    def _one(self, c: int) -> Array:
+        """F over the instabilities of one channel, and its own at the top."""
+        profile = self._beside(c, self._channel(c))
+        self.instability[c] = int(np.argmax(profile))
+        return profile
+
+    def _together(self, channels: Sequence[int]) -> list[Array]:
+        """F over the instabilities of each channel, all at the top of their sum."""
         alone = [self._channel(c) for c in channels]
         index = np.arange(len(DENSITY))
         apart = np.subtract.outer(index, index) * STEP / priors.UNLIKE

@@ -11,7 +11,9 @@ from benchmarks.hand_held.draws import GRAVITY, log
 from fieldcal.cli import main
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare
+from fieldcal.model.evidence.sizing import EVEN, Sizes
 from fieldcal.model.search.inference import STAYED
+from fieldcal.model.search.selection import Search
 from fieldcal.session.folder import Session
 
 EVERY = {"cross_coupling", "gyro_cross_coupling", "gyro_scale"}
@@ -47,3 +49,20 @@ def test_the_state_stays_where_the_set_does(tmp_path: Path) -> None:
     own.gram(inferred.state, inferred.values, None)
     _, moved, _ = own.settled(inferred.state, inferred.values, best.members, best.sizes)
     assert own.step(best, inferred.values, moved) < STAYED
+
+
+def test_sizes_do_not_hang_on_where_they_begin(tmp_path: Path) -> None:
+    """Of |f| each axis alone may do without its scatter, all three together not."""
+    found = explained(88_001_001, tmp_path)
+    assert "temperature_bias" in {one.name for one in found.standing}
+    dictionary, gram = found.dictionary, found.inferred.search.gram
+    causes = {cause.key: cause for cause in dictionary.causes}
+    even = (EVEN,) * len(dictionary.always)
+    for key in ("temperature_bias:gyr", "bias_drift:gyr", "cross_coupling"):
+        member = causes[key], causes[key].variants[0]
+        starts = [None, *(Sizes(even, (n,) * 3 + (0,) * 4, (EVEN,)) for n in (24, 29))]
+        scores = [
+            Search(dictionary, gram).evaluated((member,), start).score
+            for start in starts
+        ]
+        assert max(scores) - min(scores) < 5.0

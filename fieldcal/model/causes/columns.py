@@ -206,14 +206,19 @@ earth = _of_sides(earth_sides)
 
 
 def earth_anyhow(view: RowView) -> Array:
-    """A rate in device axes wherever nobody knows the orientation, rad/s.
+    """Rates in device axes and along the force, where nobody knows the orientation.
 
     Turned about one level axis by hand, a device has the Earth's rate along it in every
-    position and on the way; not where gyroscopes show which way it points.
+    position and on the way; and however it lies, its upright part along the force. Not
+    where gyroscopes show which way it points. (n, 6, 4), rad/s.
     """
     free = ~view.plain.oriented & ~view.plain.earth_seen
-    out: Array = np.eye(6)[:, 3:] * view.state.scale[:, None] * free[:, None, None]
-    return out
+    f = view.x.f
+    up = f / np.maximum(np.linalg.norm(f, axis=1), 1e-12)[:, None]
+    along = np.hstack([np.zeros_like(up), up])[:, :, None]
+    every = np.tile(np.eye(6)[:, 3:], (len(f), 1, 1))
+    out: Array = np.concatenate([every, along], axis=2) * view.state.scale[:, None]
+    return out * free[:, None, None]
 
 
 def earth_aside(view: RowView) -> Array:

@@ -231,7 +231,7 @@ class Dictionary(ColumnTable):
         yield Group("speed", "gyr", at + np.arange(len(known)), wide, fixed=1.0)
 
     def _earth_anyhow(self) -> Iterator[Group]:
-        """What the Earth may add alike wherever nobody knows the orientation.
+        """What the Earth may add wherever nobody knows the orientation.
 
         One position alone has it in its bias.
         """
@@ -246,9 +246,9 @@ class Dictionary(ColumnTable):
             own = self.add(basis, 2 * self.places) + own
             yield Group("earth aside", "gyr", own, wide, fixed=priors.FREE)
         if not (self.x.oriented | shown).all():
-            at = self.add(General("earth anyhow", columns.earth_anyhow), 3)
-            size = np.full(3, EARTH_RATE / 3**0.5)
-            yield Group("earth anyhow", "gyr", at + np.arange(3), size, fixed=1.0)
+            at = self.add(General("earth anyhow", columns.earth_anyhow), 4)
+            size = EARTH_RATE * np.array([3**-0.5, 3**-0.5, 3**-0.5, 1.0])
+            yield Group("earth anyhow", "gyr", at + np.arange(4), size, fixed=1.0)
 
     def _is_free(self, p: int) -> bool:
         """Whether nobody knows where the force of a position points, or its axis."""

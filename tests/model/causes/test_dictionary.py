@@ -12,8 +12,9 @@ from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes import smooth
+from fieldcal.model.causes import columns, smooth
 from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
+from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.system.linear_system import System
@@ -91,7 +92,8 @@ def test_without_angles_the_earth_turns_with_the_device() -> None:
     d = made(ladder(free=(2, 5)))
     assert d.free.tolist() == [p in (2, 5) for p in range(9)]
     (one,) = (g for g in d.always if g.cause == "earth anyhow")
-    np.testing.assert_allclose(one.typical, EARTH_RATE / 3**0.5)
+    np.testing.assert_allclose(one.typical[:3], EARTH_RATE / 3**0.5)
+    np.testing.assert_allclose(one.typical[3:], [EARTH_RATE])
     assert one.part == "gyr" and one.fixed == 1.0 and not one.in_state
     assert not made(ladder(free=(2,)), (3, 4, 5)).free.any(), "no force is seen"
     assert not dictionary(ladder()).free.any()
@@ -341,3 +343,14 @@ def test_the_first_linearisation_tells_which_columns_windows_show() -> None:
     assert d.shown[d.small_rotation : d.small_rotation + 2 * len(LADDER)].any()
     lever = next(c for c in d.causes if c.name == "lever_arm").variants[0]
     assert not d.shown[lever.columns].any()
+
+
+def test_however_a_device_lies_the_earth_s_upright_rate_is_along_the_force() -> None:
+    """Three rates in its axes, and one along up; nothing where angles are known."""
+    x = ladder(free=(2, 5))
+    found = columns.earth_anyhow(RowView.of(x, np.array([x.since_turn]), nominal()))
+    free = np.isin(x.position, (2, 5))
+    assert not found[~free].any() and not found[:, :3].any()
+    up = x.f[free] / np.linalg.norm(x.f[free], axis=1)[:, None]
+    np.testing.assert_allclose(found[free][:, 3:, 3], up)
+    np.testing.assert_allclose(found[free][:, 3:, :3], np.tile(np.eye(3), (6, 1, 1)))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.concealed import kinds
 from benchmarks.concealed.draws import sized
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.diagnosis.explain import explain
@@ -36,3 +37,12 @@ def _having(name: str, seed: int) -> Session:
     values = sized(session, name, FADING[name], 30.0)
     assert values is not None
     return session.having({name: values})
+
+
+def test_the_earth_s_upright_rate_is_no_g_sensitivity() -> None:
+    """Where orientations are not known it follows the force, and is the Earth's."""
+    draw, _ = kinds()["cross_coupling"]
+    session = draw(np.random.default_rng(32_002_000))
+    assert not session.angles
+    found = explain(prepare(session.record(32_002_000), session.about))
+    assert [one.name for one in found.standing] == ["cross_coupling"]

@@ -33,8 +33,8 @@ APART = (
 """A report has all in itself, and nothing of the page that it is opened from."""
 
 
-def app(jobs: Jobs, queue: JobQueue) -> Starlette:
-    """Return the application.
+class SessionsApi:
+    """What is answered to each request for sessions.
 
     Parameters
     ----------
@@ -43,28 +43,34 @@ def app(jobs: Jobs, queue: JobQueue) -> Starlette:
 
     """
 
-    def shown(job: Job) -> dict[str, Any]:
-        return {**asdict(job), "documents": jobs.documents(job.id)}
+    def __init__(self, jobs: Jobs, queue: JobQueue) -> None:
+        self.jobs, self.queue = jobs, queue
 
-    async def every(_: Request) -> Response:
-        some = await run_in_threadpool(jobs.all)
-        return JSONResponse([shown(job) for job in some])
+    def shown(self, job: Job) -> dict[str, Any]:
+        """A job as it is told."""
+        return {**asdict(job), "documents": self.jobs.documents(job.id)}
 
-    async def sent(request: Request) -> Response:
+    async def every(self, _: Request) -> Response:
+        """All of them."""
+        some = await run_in_threadpool(self.jobs.all)
+        return JSONResponse([self.shown(job) for job in some])
+
+    async def sent(self, request: Request) -> Response:
+        """Take one in."""
         said = dict(request.query_params)
         name = said.pop("filename", "")
         if refusal := _refusal(name, said):
             return _error(400, refusal)
-        if not await run_in_threadpool(jobs.room):
+        if not await run_in_threadpool(self.jobs.room):
             return _error(429, "too many recordings wait already: send it again later")
-        part = await run_in_threadpool(jobs.begun)
+        part = await run_in_threadpool(self.jobs.begun)
         try:
             (part / UPLOAD).mkdir()
             with (part / UPLOAD / name).open("xb") as file:
                 async for piece in request.stream():
                     await run_in_threadpool(file.write, piece)
             now = datetime.now(UTC).isoformat()
-            job = await run_in_threadpool(jobs.added, part, name, now, said)
+            job = await run_in_threadpool(self.jobs.added, part, name, now, said)
         except FieldcalError as error:
             shutil.rmtree(part, ignore_errors=True)
             return _error(429, str(error))
@@ -74,44 +80,61 @@ def app(jobs: Jobs, queue: JobQueue) -> Starlette:
         except ClientDisconnect:
             shutil.rmtree(part, ignore_errors=True)
             return Response(status_code=400)
-        queue.come()
-        return JSONResponse(shown(job), 202)
+        self.queue.come()
+        return JSONResponse(self.shown(job), 202)
 
-    async def one(request: Request) -> Response:
-        job = jobs.get(request.path_params["id"])
-        return JSONResponse(shown(job)) if job else _missing()
+    async def one(self, request: Request) -> Response:
+        """How far one is."""
+        job = self.jobs.get(request.path_params["id"])
+        return JSONResponse(self.shown(job)) if job else _missing()
 
-    async def removed(request: Request) -> Response:
-        found = await run_in_threadpool(jobs.removed, request.path_params["id"])
+    async def removed(self, request: Request) -> Response:
+        """Take one away."""
+        number = request.path_params["id"]
+        found = await run_in_threadpool(self.jobs.removed, number)
         return Response(status_code=204) if found else _missing()
 
-    async def document(request: Request) -> Response:
+    async def document(self, request: Request) -> Response:
+        """What was made of one."""
         number, name = (request.path_params[k] for k in ("id", "document"))
-        if jobs.get(number) is None or name not in jobs.documents(number):
+        if self.jobs.get(number) is None or name not in self.jobs.documents(number):
             return _missing()
         more = {"content-security-policy": APART} if name == REPORT else {}
-        path = jobs.folder(number) / RESULTS / name
+        path = self.jobs.folder(number) / RESULTS / name
         return FileResponse(path, media_type=openapi.DOCUMENTS[name], headers=more)
 
-    async def described(_: Request) -> Response:
-        return JSONResponse(openapi.document())
 
-    def file(path: Path) -> Route:
-        async def given(_: Request) -> Response:
-            return FileResponse(path)
+async def _described(_: Request) -> Response:
+    return JSONResponse(openapi.document())
 
-        return Route("/" if path.suffix == ".html" else f"/{path.name}", given)
 
+def _file(path: Path) -> Route:
+    async def given(_: Request) -> Response:
+        return FileResponse(path)
+
+    return Route("/" if path.suffix == ".html" else f"/{path.name}", given)
+
+
+def app(jobs: Jobs, queue: JobQueue) -> Starlette:
+    """Return the application.
+
+    Parameters
+    ----------
+    jobs : that it takes in and shows
+    queue : what does them
+
+    """
+    api = SessionsApi(jobs, queue)
     return Starlette(
         routes=[
-            Route(openapi.SESSIONS, every),
-            Route(openapi.SESSIONS, sent, methods=["POST"]),
-            Route(openapi.ONE, one),
-            Route(openapi.ONE, removed, methods=["DELETE"]),
-            Route(openapi.DESCRIPTION, described),
-            Route(openapi.DOCUMENT, document),
-            *(file(path) for path in sorted(FILES.iterdir())),
-            file(page.FILES / "page.css"),
+            Route(openapi.SESSIONS, api.every),
+            Route(openapi.SESSIONS, api.sent, methods=["POST"]),
+            Route(openapi.ONE, api.one),
+            Route(openapi.ONE, api.removed, methods=["DELETE"]),
+            Route(openapi.DESCRIPTION, _described),
+            Route(openapi.DOCUMENT, api.document),
+            *(_file(path) for path in sorted(FILES.iterdir())),
+            _file(page.FILES / "page.css"),
         ]
     )
 

@@ -50,11 +50,8 @@ def _answer(what: str, schema: dict[str, Any] | None = None) -> dict[str, Any]:
     return out
 
 
-def document() -> dict[str, Any]:
-    """Return the OpenAPI document."""
-    job = {"$ref": "#/components/schemas/Session"}
-    missing = {"404": _answer("There is none of this id.")}
-    one = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+def _sending(job: dict[str, Any]) -> dict[str, Any]:
+    """What may be sent, and what is answered."""
     said = [
         {
             "name": name, "in": "query", "schema": {"type": "string"},
@@ -68,12 +65,26 @@ def document() -> dict[str, Any]:
         "description": "name of the file, by whose ending some formats are known",
     }  # fmt: skip
     body = {"application/octet-stream": {"schema": {"type": "string"}}}
-    sent = {
-        "202": _answer("Taken in; it waits.", job),
-        "400": _answer("A name or an option is none."),
-        "413": _answer("It is too large, or its length is not said."),
-        "429": _answer("Too many wait already."),
+    return {
+        "summary": "Send a session (.zip of its folder) or a recording that fieldcal"
+        " import reads.",
+        "parameters": [named, *said],
+        "requestBody": {"required": True, "content": body},
+        "responses": {
+            "202": _answer("Taken in; it waits.", job),
+            "400": _answer("A name or an option is none."),
+            "413": _answer("It is too large, or its length is not said."),
+            "429": _answer("Too many wait already."),
+            "507": _answer("It cannot be kept: the disk is full."),
+        },
     }
+
+
+def document() -> dict[str, Any]:
+    """Return the OpenAPI document."""
+    job = {"$ref": "#/components/schemas/Session"}
+    missing = {"404": _answer("There is none of this id.")}
+    one = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
     kinds: dict[str, Any] = {kind: {"schema": {}} for kind in DOCUMENTS.values()}
     wanted = {
         "name": "document", "in": "path", "required": True,
@@ -89,11 +100,7 @@ def document() -> dict[str, Any]:
             SESSIONS: {
                 "get": {"summary": "All sessions, the latest first.",
                         "responses": {"200": _answer("The sessions.", every)}},
-                "post": {"summary": "Send a session (.zip of its folder) or a recording"
-                                    " that fieldcal import reads.",
-                         "parameters": [named, *said],
-                         "requestBody": {"required": True, "content": body},
-                         "responses": sent},
+                "post": _sending(job),
             },
             ONE: {
                 "parameters": [one],

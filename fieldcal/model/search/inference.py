@@ -16,9 +16,9 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member, Sizes
+from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportion import in_proportion
 from fieldcal.model.search.selection import SETTLED, Search, strange
-from fieldcal.model.search.settling import Settling
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import whole
 from fieldcal.model.system.turn_rows import TurnRows, Turns
@@ -60,14 +60,14 @@ class Inferred:
     @property
     def about_itself(self) -> float:
         """Weight of the best set about its own state, ln, the way not looked at."""
-        own = Settling(self.inference.system, self.inference.nominal)
+        own = GaussNewton(self.inference.system, self.inference.nominal)
         own.turns = self.inference.turns
         gram = own.gram(self.state, self.values, None)
         search = Search(own.dictionary, gram)
         return search.evaluated(self.best.members, self.best.sizes).score
 
 
-class Inference(Settling):
+class Inference(GaussNewton):
     """The inference of one session."""
 
     def run(self, begin: Sequence[Member] | None = None) -> Inferred:

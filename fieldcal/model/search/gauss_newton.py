@@ -30,7 +30,7 @@ CONVERGED = 0.03
 """Largest step of a column, in standard deviations, that counts as none."""
 
 
-class Settling:
+class GaussNewton:
     """States of one session, and what its rows say about them.
 
     Parameters

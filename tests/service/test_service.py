@@ -181,6 +181,8 @@ def test_nobody_is_let_in_without_a_token(served: Served) -> None:
         paths = ("/api/sessions", "/api/openapi.json", "/", "/service.js")
         assert {stranger.ask(path).status for path in paths} == {403}
         assert stranger.send("x", b"x").status == 403
+        remedy = b"--tokens" if token else b"scan the code"
+        assert remedy in stranger.ask("/api/sessions").body
     assert (
         served.client.ask("/api/sessions", headers={"Host": "evil.example"}).status
         == 421

@@ -64,6 +64,9 @@ class Access:
             return answer
         scheme, _, sent = headers.get("authorization", "").partition(" ")
         program = scheme.lower() == "bearer" and self._known(sent.strip())
+        if scheme.lower() == "bearer" and not program:
+            return _refused(403, "this token is none of a program: fieldcal serve takes"
+                            " those of its --tokens file")  # fmt: skip
         if not program and not self._right(_cookie(headers.get("cookie", ""))):
             return _refused(403, "scan the code that the console shows, or open the"
                             " address beside it")  # fmt: skip

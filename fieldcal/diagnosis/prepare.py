@@ -15,7 +15,7 @@ from fieldcal.diagnosis.signal.line import Remains, Tone
 from fieldcal.diagnosis.signal.spectrum import tones, without
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.hand_tremor import rows_of
-from fieldcal.model.rows.means import median_sigma, rows_of_means
+from fieldcal.model.rows.means import rows_of_means
 from fieldcal.model.rows.reduce import Rows, RowSource, masked, spans
 from fieldcal.model.rows.rest_onset import arrivals
 from fieldcal.model.rows.swaying import Swaying, swaying
@@ -135,15 +135,13 @@ def _where(block: Block, mended: Block) -> Block:
 
 
 def _of_means(block: Block, about: Description) -> Prepared:
-    """Means alone: nothing was sampled, so nothing of the chain can be checked."""
+    """Means alone: one row each, and no turns between."""
     about.refuse_overlap()
-    sigma = about.mean_sigma
-    usable = np.isfinite(block.six)
-    checked = Checked(block, usable, (), median_sigma(sigma))
+    checked = check(block, about)
     warmth = Thermometer.of(block)
     rest = np.full(len(about.positions), -np.inf)
-    source = RowSource(block, about, usable, rest, warmth)
-    rows = rows_of_means(source, sigma)
+    source = RowSource(block, about, checked.usable, rest, warmth)
+    rows = rows_of_means(source, about.mean_sigma)
     if not rows.used.any():
         raise InputError(
             "session.toml says of no position how well its means are known: write"

@@ -19,6 +19,9 @@ from fieldcal.importing.scales import FEW, FEWEST
 FEWEST_MEANS, MOST_MEANS = 3, 200
 """Rows of a table of means, one for each position."""
 
+FEWEST_FACES, FEWEST_ON_SPHERE = 6, 9
+"""Rows on a sphere that show its middle: of rows in all directions, and of others."""
+
 APART = np.deg2rad(10.0)
 """Angle between successive rows that samples do not have, rad."""
 
@@ -69,8 +72,13 @@ def are_means(acc: Array) -> bool:
     Samples that follow each other point nearly the same way; means of positions do not.
     """
     acc = _readings(acc)
+    if not FEWEST_MEANS <= len(acc) <= MOST_MEANS:
+        return False
+    # a large offset hides how much the directions differ
+    center, radius = _sphere(acc, FEWEST_FACES)
+    acc = acc - center if radius else acc
     length = np.linalg.norm(acc, axis=1)
-    if not FEWEST_MEANS <= len(acc) <= MOST_MEANS or not length.all():
+    if not length.all():
         return False
     usual = float(np.median(length))
     if np.quantile(np.abs(length / usual - 1), 0.8) > _ALIKE:
@@ -130,15 +138,18 @@ def with_length(acc: Array, size: float) -> Gravity | None:
     return Gravity(size, center, True)
 
 
-def _sphere(points: Array) -> tuple[Array, float]:
-    """Center and radius of a sphere through points; radius 0 if they lie on none."""
+def _sphere(points: Array, fewest: int = FEWEST_ON_SPHERE) -> tuple[Array, float]:
+    """Center and radius of a sphere through points; radius 0 if they lie on none.
+
+    Nor do fewer than `fewest` tell one.
+    """
     middle = points.mean(axis=0)
     unit = float(np.abs(points - middle).max()) or 1.0
     x = (points - middle) / unit
     # |x|^2 = 2 c x + r^2 - c^2
     left = np.column_stack([2 * x, np.ones(len(x))])
     found, *_, singular = np.linalg.lstsq(left, (x**2).sum(axis=1), rcond=None)
-    if len(x) < 9 or singular[-1] < 1e-3 * singular[0]:
+    if len(x) < fewest or singular[-1] < 1e-3 * singular[0]:
         return middle, 0.0
     radius = float(np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
     away = x - found[:3]

@@ -53,6 +53,14 @@ _WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world",
                     "earth")  # fmt: skip
 """Words of accelerations that may lack gravity, or lie in axes of the Earth."""
 
+SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "noise")
+"""Words of columns that hold how much values scatter."""
+
+MEAN = ("mean", "avg", "average")
+
+REFERENCE = ("true", "truth", "ref", "reference", "expected", "ideal")
+"""Words of columns that hold what an output ought to be."""
+
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
 """Words that tell no IMU from another where all of one kind have them."""
@@ -176,10 +184,27 @@ def _of_words(words: list[str], unit: str | None) -> Meaning | None:
         if word in words:
             label = tuple(w for w in words if w != word)
             return Meaning("temperature", "", unit, label)
-    if words in (["x"], ["y"], ["z"]):
-        return Meaning("", words[0], unit)
+    if (alone := axis_alone(words)) is not None:
+        return Meaning("", alone[0], unit, alone[1])
     # whatever it is called, an axis in rad/s is one of a gyroscope
     return _with_axis("", words, unit) if unit in TELLING else None
+
+
+def axis_alone(words: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
+    """An axis of no said sensor, and what of it is meant: ``x_mean``, ``y``, ``std_z``.
+
+    None where any other word is there.
+    """
+    label = tuple(w for w in words if w in (*MEAN, *SCATTER, *REFERENCE))
+    rest = [w for w in words if w not in label]
+    return (rest[0], label) if rest in (["x"], ["y"], ["z"]) else None
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name without its unit, in small letters."""
+    bracketed = _BRACKETS.fullmatch(name.strip())
+    bare = bracketed.group(1) if bracketed else name
+    return [w.lower() for w in _WORD.findall(bare)]
 
 
 def _place(words: Sequence[str], phrase: Sequence[str]) -> int | None:

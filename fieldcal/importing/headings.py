@@ -14,13 +14,15 @@ from shlex import quote
 from typing import NamedTuple
 
 from fieldcal.importing.heading_units import UNITS
-from fieldcal.importing.heading_words import Meaning, bare_label, meaning
+from fieldcal.importing.heading_words import (
+    MEAN,
+    REFERENCE,
+    SCATTER,
+    Meaning,
+    bare_label,
+    meaning,
+)
 from fieldcal.importing.recording import ReadOptions
-
-SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "noise")
-"""Words of columns that hold how much values scatter."""
-
-MEAN = ("mean", "avg", "average")
 
 NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
                "magnitude", "norm", "drift", "delta")  # fmt: skip
@@ -121,7 +123,7 @@ def read(columns: Sequence[Column], skip: str = "") -> tuple[HeadingMatch, ...]:
         and (said := meaning(column.name, column.unit)) is not None
         and not set(said.label) & set(NOT_SAMPLES)
     ]
-    named = _with_gravity(_with_temperature(columns, named))
+    named = _with_gravity(_with_temperature(columns, _measured(named)))
     acc, gyr = _triads(named, "a"), _triads(named, "g")
     if acc is None or gyr is None:
         return ()
@@ -164,6 +166,13 @@ def _with_temperature(columns: Sequence[Column], named: Sequence[Named]) -> list
         return [*named]
     as_warm = [n._replace(says=Meaning("temperature", "", None)) for n in warm]
     return [n for n in named if n not in warm] + as_warm
+
+
+def _measured(named: Sequence[Named]) -> list[Named]:
+    """Columns without those of what outputs ought to be, where outputs are there."""
+    ought = [n for n in named if set(n.says.label) & set(REFERENCE)]
+    outputs = {n.says.kind for n in named if n not in ought}
+    return [n for n in named if n not in ought or n.says.kind not in outputs]
 
 
 def _with_gravity(named: Sequence[Named]) -> list[Named]:

@@ -16,11 +16,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, concat
-from fieldcal.importing.heading_words import meaning
-from fieldcal.importing.headings import SCATTER, Column
+from fieldcal.importing.heading_words import SCATTER, axis_alone, meaning, words_of
+from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import MeanScatter, Recording
 
 COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
@@ -28,6 +29,15 @@ COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
 
 COUPLED, PLAIN = 9, 6
 """Parameters of (1) with coupling and without."""
+
+REPEATS = 5
+"""Times that the scatter is measured and the fit repeated with it."""
+
+NORMAL = 1.4826
+"""Standard deviation over the median of absolute values, of normal noise."""
+
+OUT = 6.0
+"""Standard deviations beyond which a mean is none of the same scatter (2e-9)."""
 
 SPARE = 3
 """Degrees of freedom that tell a scatter."""
@@ -52,14 +62,21 @@ class Spread(NamedTuple):
 
 
 def scatter_columns(columns: Sequence[Column]) -> Mapping[str, int]:
-    """Columns that hold the scatter of a channel, or "n", by the channel."""
+    """Columns that hold the scatter of a channel, or "n", by the channel.
+
+    A scatter that names no sensor, ``x_std``, is of the only one that there is.
+    """
     found: dict[str, int] = {}
+    kinds = {said.kind for c in columns if (said := meaning(c.name, c.unit))} & {*"ag"}
     for i, column in enumerate(columns):
         if column.name.strip().lower() in COUNTS:
             found["n"] = i
         elif (said := meaning(column.name, column.unit)) and said.kind in ("a", "g"):
             if set(said.label) & set(SCATTER):
                 found[said.kind + said.axis] = i
+        elif (alone := axis_alone(words_of(column.name))) and len(kinds) == 1:
+            if set(alone[1]) & set(SCATTER):
+                found[min(kinds) + alone[0]] = i
     return found
 
 
@@ -117,16 +134,48 @@ def _from_row_to_row(gyr: Array) -> Array:
 
 def _off_the_sphere(acc: Array, gravity: float) -> float:
     """What remains of (1), m/s^2; nan where too few rows tell."""
-    from scipy.optimize import least_squares
-
     acc = acc[np.isfinite(acc).all(axis=1)]
     for free in (COUPLED, PLAIN):
         if len(acc) < free + SPARE:
             continue
-        start: Array = np.zeros(free)
-        found = least_squares(_misfit, start, args=(acc, gravity))
-        return float(np.sqrt(2 * found.cost / (len(acc) - free)))
+        return _fit(acc[_agreeing(acc, free, gravity)], free, gravity)[1]
     return float("nan")
+
+
+def _fit(acc: Array, free: int, gravity: float) -> tuple[Array, float]:
+    """Parameters of (1), and the standard deviation that remains, m/s^2."""
+    from scipy.optimize import least_squares
+
+    found = least_squares(_misfit, np.zeros(free), args=(acc, gravity))
+    return found.x, float(np.sqrt(2 * found.cost / (len(acc) - free)))
+
+
+def _agreeing(acc: Array, free: int, gravity: float) -> NDArray[np.bool_]:
+    """Rows but those that no scatter of the others brings: one that was moved.
+
+    Rows bear witness against one only where more of them are to spare than the
+    parameters use up.
+    """
+    from scipy.optimize import least_squares
+
+    # from what fits all, narrower step by step: far off, every row is one by itself
+    x, size = _fit(acc, free, gravity)
+    few = np.sqrt(len(acc) / (len(acc) - free))
+    for _ in range(REPEATS):
+        x = least_squares(
+            _misfit, x, args=(acc, gravity), loss="cauchy", f_scale=size or 1.0
+        ).x
+        left = np.abs(_misfit(x, acc, gravity))
+        size = NORMAL * few * float(np.median(left))
+    all_of_them = np.ones(len(acc), dtype=bool)
+    near = left <= OUT * size
+    for _ in range(REPEATS):
+        if near.sum() < max(2 * free, len(acc) / 2):
+            return all_of_them
+        # the narrow fit leaves out some that the scatter of those that agree brings
+        x, size = _fit(acc[near], free, gravity)
+        near = np.abs(_misfit(x, acc, gravity)) <= OUT * size
+    return near
 
 
 def _misfit(free: Array, acc: Array, gravity: float) -> Array:

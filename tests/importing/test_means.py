@@ -10,8 +10,10 @@ import pytest
 from laid_about import G, write
 
 from fieldcal.cli import main
+from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.importing.gravity_size import are_means
+from fieldcal.importing.headings import Column, read
 from fieldcal.importing.means import spread
 from fieldcal.session.folder import Session
 
@@ -100,10 +102,71 @@ def test_what_remains_of_gravity_is_the_error_of_the_means() -> None:
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(SIGMA, rel=0.1)
 
 
+@pytest.mark.statistical
+def test_a_position_that_was_moved_is_no_part_of_the_scatter() -> None:
+    found = []
+    for seed in range(30):
+        table = means(100 + seed, 40, 0.01)
+        table[seed, 2] += 0.8
+        found.append(spread(table, np.full((40, 6), np.nan), None, G).sigma[0, 0])
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(SIGMA, rel=0.15)
+    # where hardly more rows than parameters are there, none can be told from the others
+    few = means(7, 12, 0.01)
+    few[3, 2] += 0.8
+    assert spread(few, np.full((12, 6), np.nan), None, G).sigma[0, 0] > 9 * SIGMA
+
+
+def test_a_position_that_was_moved_is_named_and_costs_the_others_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = means(8, 40)[:, :3]
+    table[12, 2] += 0.8
+    out, _ = session(tmp_path, table, "ax,ay,az")
+    capsys.readouterr()
+    assert main(["solve", str(out), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert "position 13 disagrees" in " ".join(found["warnings"])
+    # the jumps of the table are no bytes that were decoded wrongly
+    assert "decoded" not in " ".join(found["warnings"])
+    off = np.array(found["parameters"]["acc_bias"]["value"]) - BIAS
+    assert np.abs(off).max() < 1e-3
+    assert max(found["parameters"]["acc_bias"]["sigma"]) < 5e-4
+
+
+def test_a_mean_its_scatter_and_what_it_ought_to_be_stand_beside_each_other(
+    tmp_path: Path,
+) -> None:
+    # six faces of a device with 0.25 g of bias, as a table of a report has them
+    offset = np.array([0.09, 0.05, -0.25])
+    faces = np.vstack([np.eye(3), -np.eye(3)])
+    table = [
+        [part for axis in range(3) for part in (f[axis], f[axis] + offset[axis], 4e-3)]
+        for f in faces
+    ]
+    heading = ",".join(f"{c}_true (g),{c}_mean (g),{c}_std" for c in "xyz")
+    _, made = session(tmp_path, np.array(table), heading)
+    np.testing.assert_allclose(made.block.acc, (faces + offset) * G0, atol=1e-6)
+    np.testing.assert_allclose(made.about.mean_sigma[:, :3], 4e-3 * G0, rtol=1e-3)
+
+
+def test_what_outputs_ought_to_be_is_taken_where_it_stands_alone() -> None:
+    def found(*names: str) -> list[tuple[str, ...]]:
+        return [h.columns for h in read([Column(n, n) for n in names])]
+
+    true = [f"true_acc_{c} (m/s^2)" for c in "xyz"]
+    sensed = [f"acc_{c} (m/s^2)" for c in "xyz"]
+    assert found(*true, *sensed) == [tuple(f"a{n[4]}={n}" for n in sensed)]
+    assert found(*true) == [tuple(f"a{n[9]}={n}" for n in true)]
+
+
 def test_samples_are_no_means() -> None:
     assert are_means(means(5, 12)[:, :3])
     angle = np.deg2rad(np.arange(60.0))
     slow = G * np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])
+    # counts about an offset that is larger than gravity
+    assert are_means(means(6, 12)[:, :3] * 40 + 33000)
+    noise = np.random.default_rng(7).normal(0, 0.01, (60, 3)) + [0.1, -0.2, 9.8]
+    assert not are_means(noise)
     assert not are_means(slow) and not are_means(slow[:2]) and not are_means(0 * slow)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.effects import catalogue
+from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.reduce import masked, rate_of, readings, spans
 from fieldcal.model.rows.vibration import usual_noise
 from fieldcal.physics.effect import Chain
@@ -58,8 +59,14 @@ class Checked:
 
 
 def check(block: Block, about: Description) -> Checked:
-    """Look for every fault of the chain, and act on what is found."""
-    usable = np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)])
+    """Look for every fault of the chain, and act on what is found.
+
+    Of means alone nothing of the chain is to be seen: from one row to the next the
+    device was turned.
+    """
+    usable = np.isfinite(block.six)
+    if about.means_only:
+        return Checked(block, usable, (), median_sigma(about.mean_sigma))
     faults: list[tuple[str, Fault]] = []
     samples = recording(block, usable, about)
     for name in _treated("mend"):

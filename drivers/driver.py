@@ -58,7 +58,7 @@ class ClockLine(NamedTuple):
         return abs(self.fast_ppm) < REAL_TIME
 
 
-class Readings(NamedTuple):
+class ReadBack(NamedTuple):
     """What a device was asked about what it does to its samples by itself.
 
     Attributes
@@ -149,12 +149,12 @@ class Driver(ABC):
         return {}
 
     @property
-    def readings(self) -> Readings:
+    def read_back(self) -> ReadBack:
         """What it said of its own processing, where it can be asked."""
-        return Readings()
+        return ReadBack()
 
     def read_again(self) -> None:
-        """Ask it once more; `readings` is pending until it has answered."""
+        """Ask it once more; `read_back` is pending until it has answered."""
         return
 
     def blocks(self, timeout: float = 3.0) -> Iterator[Block]:

@@ -26,7 +26,7 @@ import numpy as np
 
 from fieldcal.core.errors import DeviceError, FieldcalError, InputError
 from fieldcal.core.samples import Block, Grain
-from fieldcal.drivers.driver import Driver, Health, Readings
+from fieldcal.drivers.driver import Driver, Health, ReadBack
 from fieldcal.drivers.mavlink_log import PlayedMavlinkLog, is_log
 from fieldcal.drivers.mavlink_talk import Talk, listed
 from fieldcal.drivers.options import Options, split
@@ -175,10 +175,10 @@ class MavlinkImu(Driver):
         return self._reader is not None and self._reader.reconnecting
 
     @property
-    def readings(self) -> Readings:
+    def read_back(self) -> ReadBack:
         """How often the installed calibration was read, and had changed."""
         same, changed = self._talk.readings
-        return Readings(same, changed, self._asked_again or self._talk.rereads)
+        return ReadBack(same, changed, self._asked_again or self._talk.rereads)
 
     def read_again(self) -> None:
         """Have the installed calibration read again by whoever receives."""

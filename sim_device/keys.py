@@ -25,7 +25,7 @@ STEPS = {
 EVERY_S = 0.2
 
 
-class Keys:
+class SteeringKeys:
     """Keys of a terminal as orders to a stream; a context that sets the terminal back.
 
     Parameters

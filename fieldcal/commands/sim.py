@@ -309,7 +309,7 @@ def _keys(stream: DeviceStream, steps: tuple[float, float]) -> Iterator[list[Wat
     if not sys.stdin.isatty():
         yield []
         return
-    from fieldcal.sim_device.keys import Keys
+    from fieldcal.sim_device.keys import SteeringKeys
 
-    with Keys(stream, steps, sys.stdin.fileno()) as keys:
+    with SteeringKeys(stream, steps, sys.stdin.fileno()) as keys:
         yield [keys]

@@ -17,8 +17,9 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import HeldOut, in_question
 from fieldcal.model.posterior.probabilities import Posterior, Standing
 from fieldcal.model.posterior.reported import reported
+from fieldcal.model.rows.bounds import rate_of, spans
 from fieldcal.model.rows.noise import grain_of
-from fieldcal.model.rows.reduce import Rows, RowSource, rate_of, spans
+from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import beginnings
 from fieldcal.model.search.inference import Inference, Inferred
 from fieldcal.model.search.selection import Search

@@ -14,9 +14,11 @@ from fieldcal.diagnosis.signal.chain import Checked, check, checked_again
 from fieldcal.diagnosis.signal.line import Remains, Tone
 from fieldcal.diagnosis.signal.spectrum import tones, without
 from fieldcal.effects import catalogue
+from fieldcal.model.rows.block_means import masked
+from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.hand_tremor import rows_of
 from fieldcal.model.rows.means import rows_of_means
-from fieldcal.model.rows.reduce import Rows, RowSource, masked, spans
+from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import arrivals
 from fieldcal.model.rows.swaying import Swaying, swaying
 from fieldcal.model.rows.thermometer import Thermometer

@@ -40,7 +40,7 @@ from fieldcal.diagnosis.wording.paragraph import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import Standing
-from fieldcal.model.rows.reduce import spans
+from fieldcal.model.rows.bounds import spans
 from fieldcal.session.description import Description
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from fieldcal.core.errors import Moved, SessionError
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.model.rows.reduce import readings
+from fieldcal.model.rows.orientation import readings
 from fieldcal.model.rows.turntable import going_round
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window, average

@@ -117,7 +117,7 @@ class Companion:
                     recorded = self._recorder.append(block)
                     self._times.add(recorded)
                 marks.take(recorded)
-                if self._ends and not self._driver.readings.pending:
+                if self._ends and not self._driver.read_back.pending:
                     break
             marks.end()
         except FieldcalError as fault:

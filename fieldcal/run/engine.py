@@ -342,10 +342,10 @@ class Engine:
     def _confirm(self, watch: WindowWatch) -> None:
         """Have the device say that it did the same to all samples of a window."""
         self._driver.read_again()
-        if self._driver.readings.pending:
+        if self._driver.read_back.pending:
             for block in self._incoming.pieces:
                 watch.check_same(float(block.t[-1]))
-                if not self._driver.readings.pending:
+                if not self._driver.read_back.pending:
                     return
 
     def _say_if_cold(self) -> None:

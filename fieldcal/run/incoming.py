@@ -55,7 +55,7 @@ class IncomingSamples:
     @property
     def same(self) -> tuple[int, int]:
         """What changes when samples are no longer like those before."""
-        return self._driver.health.restarts, self._driver.readings.changed
+        return self._driver.health.restarts, self._driver.read_back.changed
 
     def silent(self) -> WaitReason | None:
         """Take note of half a second without samples; why, once it is to be said."""

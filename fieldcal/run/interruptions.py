@@ -94,7 +94,7 @@ class WindowWatch:
         self._driver, self._seconds, self._lost_share = driver, seconds, lost_share
         health = driver.health
         self._restarts, self._missing = health.restarts, health.missing
-        self._changed = driver.readings.changed
+        self._changed = driver.read_back.changed
         self._first = self._last = float("nan")
         self._samples = 0
 
@@ -127,7 +127,7 @@ class WindowWatch:
 
     def check_same(self, now: float) -> None:
         """Raise Moved if the device has changed what it does to its samples."""
-        if self._driver.readings.changed != self._changed:
+        if self._driver.read_back.changed != self._changed:
             raise Unlike(
                 f"the device changed its own calibration before {now:.2f} s, as"
                 " autopilots do when they start",

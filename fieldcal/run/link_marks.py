@@ -63,15 +63,15 @@ class LinkMarks:
         self._clocked = monotonic()
         self._grain = Grain()
         self._facts = self._told()
-        self._same, self._sure = driver.readings.same, float("nan")
+        self._same, self._sure = driver.read_back.same, float("nan")
 
     def take(self, block: Block) -> None:
         """Note what happened up to these samples."""
         edges = np.concatenate([[self._last], block.t])
         steps = np.diff(edges)
-        if self._driver.readings.same != self._same:
+        if self._driver.read_back.same != self._same:
             # the answer may be older than these samples, but not than those before
-            self._same, self._sure = self._driver.readings.same, self._last
+            self._same, self._sure = self._driver.read_back.same, self._last
         self._last = float(block.t[-1])
         if self._grain != self._driver.grain:
             self._grain = self._driver.grain

@@ -98,15 +98,21 @@ def solve(
     )  # fmt: skip
     if as_printed:
         return printed.solve(observations, asked)
-    chosen = asked.method_for(observations)
+    return _solved(observations, asked, asked.method_for(observations), recorded)
+
+
+def _solved(
+    observations: Observations, asked: Asked, method: Method, recorded: Recorded | None
+) -> Calibration:
+    """The calibration by the session alone, or with its lot where that fits."""
     alone = replace(asked, lot=None)
-    found, notes = _fitted(observations, alone, chosen, recorded)
+    found, notes = _fitted(observations, alone, method, recorded)
     told = None
-    if lot is not None:
-        beside, others = _fitted(observations, asked, chosen, recorded)
-        found, told = borrowed(found, beside, lot)
+    if asked.lot is not None:
+        beside, others = _fitted(observations, asked, method, recorded)
+        found, told = borrowed(found, beside, asked.lot)
         notes = notes if told is None or told.refused else others
-    return calibration(chosen, observations, asked, found, notes, told)
+    return calibration(method, observations, asked, found, notes, told)
 
 
 def _fitted(

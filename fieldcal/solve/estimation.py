@@ -1,7 +1,7 @@
-"""A given set fitted to rows: relinearised until it stays, then mixed.
+"""A given set fitted to rows, and what it then says of the parameters.
 
-The state is moved to the estimate of the set (`model.inference`), turns between windows
-are followed about it, and the answer is taken there (`mixture`).
+The set is fitted until it has settled (`settling`); there the answer is taken, averaged
+over what may be beside what was asked for (`averaging`).
 """
 
 from __future__ import annotations
@@ -15,10 +15,8 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
-from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turning
 from fieldcal.solve.agreement import Fit, agreement
@@ -27,21 +25,12 @@ from fieldcal.solve.averaging import (
     averaged_over,
     determined,
     known_rows,
-    mixed,
     picked_by,
 )
 from fieldcal.solve.given import Given, Wanted
-from fieldcal.solve.observations import Mask
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
+from fieldcal.solve.settling import without_bad_windows
 from fieldcal.solve.shown import Shown
-
-FOLLOWED, NEAR = 6, 0.01
-"""Times that turns are followed at most, and the change of a scale factor from which
-once more: they are followed again in the end, and what is linear in a change leaves its
-square, 1e-4 and then 1e-8."""
-
-NO_WEIGHT = 1e5
-"""Times its noise that a bad window is given where it must not bend the state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,35 +179,15 @@ def estimated(
     averaged : whether over all explanations, or the likeliest is enough
 
     """
-    rows, since = recorded.rows, recorded.since
     given = Given(
-        rows, np.abs(nominal.scale), since, turning is not None, wanted,
-        recorded.shown, recorded.cut,
+        recorded.rows, np.abs(nominal.scale), recorded.since, turning is not None,
+        wanted, recorded.shown, recorded.cut,
     )  # fmt: skip
     if wanted.lot is not None:
         given.known = known_rows(given, wanted.lot, nominal)
     turns = None if turning is None else Turns(turning, given, False)
-    likely, bad = given.explanations[0], np.zeros(len(given.held), dtype=bool)
-    score = np.nan
-    # one bad window of six can be told from scatter, two of six cannot
-    for _ in range(1 + max(1, len(bad) // 6)):
-        inference = Inference(System(_without(rows, given, bad), given), nominal, turns)
-        gram = inference.gram(*_settled(inference, given), None)
-        found = mixed(given, Search(given, gram), likely.members)
-        worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
-        if worst.any() and (found.bad[worst] > thresholds.SUSPECT).all():
-            # a gross error bends the state so far that nothing is linear about it
-            others = System(_without(rows, given, bad | worst), given)
-            beside = Inference(others, nominal, turns)
-            gram = inference.gram(*_settled(beside, given), None)
-            found = mixed(given, Search(given, gram), likely.members)
-        if not bad.any():
-            score = found.score
-        worst &= (found.bad > thresholds.CERTAIN) & ~bad
-        if not worst.any() or bad.sum() >= max(1, len(bad) // 6):
-            break
-        bad |= worst
-    found = replace(found, bad=np.where(bad, 1.0, found.bad))
+    fit = without_bad_windows(recorded.rows, given, nominal, turns)
+    found, gram = fit.found, fit.gram
     parameters = averaged_over(given, gram, found, nominal, averaged)
     picked, _ = picked_by(given, found.columns, nominal)
     names, values, covariance, moved, missing = determined(given, parameters)
@@ -226,40 +195,14 @@ def estimated(
     elsewhere = turning.contradicted if turning else ()
     counts = set(given.held[found.bad <= thresholds.CERTAIN].tolist())
     return Estimated(
-        given, parameters, names, values, covariance, missing, found, score, moved,
+        given, parameters, names, values, covariance, missing, found, fit.score, moved,
         Search(given, gram),
         agreement(gram, given, found, (0, 1, 2)),
         agreement(gram, given, found, (3, 4, 5)),
-        tuple(inference.turned),
+        fit.turned,
         tuple(pair for pair in elsewhere if counts.issuperset(pair)),
         tuple(wrong_angles(given, found, names, picked[at])),
     )  # fmt: skip
-
-
-def _without(rows: Rows, given: Given, bad: Mask) -> Rows:
-    """Rows of which some windows (p,) have no weight."""
-    left = np.isin(rows.x.position, given.held[bad])
-    return replace(rows, sd=np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd))
-
-
-def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
-    """The state where the set has settled, and the columns' values in it."""
-    start: Array = np.zeros(given.width)
-    state, values, _ = inference.settled(inference.nominal, start, given.members)
-    if inference.turns is None:
-        return state, values
-    # windows see no rate but the Earth's, too little to follow turns by
-    gyr = np.s_[given.scale + 3 : given.scale + 6]
-    values[gyr] = 0.0
-    nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
-    state = replace(state, scale=nominal)
-    for _ in range(FOLLOWED):
-        inference.gram(state, values, None)
-        before = state.scale
-        state, values, _ = inference.settled(state, values, given.members)
-        if np.abs(state.scale / before - 1).max() < NEAR:
-            break
-    return state, values
 
 
 def scatter_of(found: Mixture, channels: tuple[int, ...]) -> float:

@@ -13,7 +13,8 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.core.positions import attitude_sigmas, speeds, third_angles
 from fieldcal.core.samples import ACC, GYR, Array
-from fieldcal.model.rows.reduce import Rows, free_force
+from fieldcal.model.rows.orientation import free_force
+from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.rows.turntable import Readings
 from fieldcal.physics.experience import Experience
 from fieldcal.solve.estimation import Recorded

@@ -23,7 +23,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import FoundEffect
 from fieldcal.diagnosis.signal.line import Tone
 from fieldcal.effects import catalogue
-from fieldcal.model.rows.reduce import rate_of
+from fieldcal.model.rows.bounds import rate_of
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import State, Term
 from fieldcal.physics.effect import Chain, Effect, Scatter

@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.model.rows.reduce import spans
+from fieldcal.model.rows.bounds import spans
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.turns.turn import Turn, only

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fieldcal.sim_device import VirtualDevice
-from fieldcal.sim_device.keys import Keys
+from fieldcal.sim_device.keys import SteeringKeys
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link_serial import SerialLink
 from fieldcal.sim_device.orders import carry_out
@@ -45,7 +45,7 @@ def test_keys_turn_bump_and_quit(
     person, program = terminal
     screen = io.StringIO()
     device = stream.device
-    with Keys(stream, (22.5, 2.5), program, screen) as keys:
+    with SteeringKeys(stream, (22.5, 2.5), program, screen) as keys:
         os.write(person, RIGHT + RIGHT + LEFT + UP + DOWN + DOWN + b"?b")
         keys.serve()
         np.testing.assert_allclose(np.rad2deg(device.angles), [22.5, -2.5])

@@ -20,7 +20,7 @@ from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import Standing
-from fieldcal.model.rows.reduce import spans
+from fieldcal.model.rows.bounds import spans
 from fieldcal.physics.recording import Fault
 
 

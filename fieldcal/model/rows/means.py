@@ -13,7 +13,8 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.reduce import Rows, RowSource, averaged, spans
+from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.reduce import Rows, RowSource, averaged
 
 
 def median_sigma(sigma: Array) -> Array:

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.reduce import RowSource, rate_of, spans
+from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.model.rows.reduce import RowSource
 from fieldcal.session.description import Description
 
 PIECE_S = 0.2

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.reduce import Rows, RowSource, rate_of
+from fieldcal.model.rows.bounds import rate_of
+from fieldcal.model.rows.reduce import Rows, RowSource
 
 MARGIN_S = 0.6
 """Time before and after the motion that is taken along."""

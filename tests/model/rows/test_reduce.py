@@ -3,127 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from still_samples import FORCE, G, about, place, samples, source
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows import reduce as module
-from fieldcal.model.rows.reduce import (
-    RowSource,
-    averaged,
-    edges,
-    free_force,
-    masked,
-    rate_of,
-    readings,
-    reduce,
-    spans,
-)
-from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import Description, parse
-
-RATE, G = 50.0, 9.8
-FORCE = {0.0: (0.0, -G, 0.0), 90.0: (-G, 0.0, 0.0)}
-"""By alpha, deg; beta is 0."""
-
-
-def place(start: float, end: float, alpha: float | None = 0.0) -> dict[str, Any]:
-    angles = {} if alpha is None else {"alpha_deg": alpha, "beta_deg": 0.0}
-    return {**angles, "start_s": start, "end_s": end}
-
-
-def about(*places: dict[str, Any], **tables: Any) -> Description:
-    site = {"gravity": G, "latitude_deg": 50.0}
-    return parse({"format": 1, "site": site, "position": list(places), **tables})
-
-
-def samples(seconds: float, seed: int = 1, acc: float = 0.01) -> Block:
-    """Noise of 0.01 m/s^2 and 1e-3 rad/s about home, from t = 2 s on."""
-    rng = np.random.default_rng(seed)
-    t = 2.0 + np.arange(round(seconds * RATE)) / RATE
-    white = rng.standard_normal((len(t), 6)) * np.repeat([acc, 1e-3], 3)
-    return Block.of(t, white[:, :3] + FORCE[0.0], white[:, 3:], 20 + 0.01 * t)
-
-
-def source(block: Block, known: Description) -> RowSource:
-    usable = np.ones((len(block), 6), dtype=bool)
-    arrived = np.full(max(len(known.positions), 1), 1.0)
-    return RowSource(block, known, usable, arrived, Thermometer.of(block))
-
-
-def test_the_rate_is_that_of_the_clock_whatever_the_stamps() -> None:
-    t = 3.0 + np.arange(1000) / 40.0
-    still = np.zeros((1000, 3))
-    assert rate_of(Block.of(t, still)) == pytest.approx(40.0)
-    bursts = t[np.arange(1000) // 10 * 10] + 1e-5 * (np.arange(1000) % 10)
-    assert rate_of(Block.of(bursts, still)) == pytest.approx(40.0)
-    gap = t + 100.0 * (t > 20.0)
-    assert rate_of(Block.of(gap, still)) == pytest.approx(40.0)
-    assert rate_of(Block.of(t[:2], still[:2])) == pytest.approx(40.0)
-    assert rate_of(Block.of(t[:1], still[:1])) == 1.0
-
-
-def test_every_so_many_steps_are_enough_for_the_rate(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Of steps of 0.1 and 0.3 s in turn those looked at are of one kind."""
-    monkeypatch.setattr(module, "STEPS", 10)
-    t = np.cumsum(np.tile([0.1, 0.3], 20))
-    assert rate_of(Block.of(t, np.zeros((40, 3)))) == pytest.approx(1 / 0.2, rel=0.6)
-
-
-def test_a_window_is_the_samples_from_its_start_to_before_its_end() -> None:
-    block = samples(10.0)
-    known = about(place(2.0, 4.0), place(100.0, 101.0), place(5.01, 6.0))
-    np.testing.assert_array_equal(spans(block, known), [[0, 100], [500, 500],
-                                                        [151, 200]])  # fmt: skip
-    late = about({"alpha_deg": 0.0, "beta_deg": 0.0}, place(3.0, 4.0))
-    np.testing.assert_array_equal(spans(block, late), [[500, 500], [50, 100]])
-    np.testing.assert_array_equal(spans(block, about()), [[0, 500]])
-
-
-@pytest.mark.parametrize("length", [0.3, 1.4, 5.0, 39.6])
-def test_a_short_window_has_a_row_a_second(length: float) -> None:
-    found = edges(7.0, 7.0 + length, 9)
-    even = np.linspace(7.0, 7.0 + length, max(1, round(length)) + 1)
-    np.testing.assert_allclose(found, even, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("windows", "rows"), [(0, 120), (1, 120), (4, 90), (9, 40), (45, 8), (90, 8)]
-)
-def test_a_long_window_has_so_many_rows_each_longer_by_the_same_ratio(
-    windows: int, rows: int
-) -> None:
-    found = edges(3.0, 3.0 + 600.0, windows)
-    each = np.diff(found)
-    assert len(each) == rows
-    assert found[0] == 3.0 and found[-1] == 603.0
-    assert each[0] == pytest.approx(1.0)
-    ratio = each[1:] / each[:-1]
-    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
-    assert ratio[0] > 1.0
-    assert len(edges(3.0, 3.0 + rows, windows)) == rows + 1
-    np.testing.assert_allclose(np.diff(edges(3.0, 3.0 + rows, windows)), 1.0)
-
-
-def test_what_may_not_be_used_is_nan_and_nothing_else() -> None:
-    block = samples(1.0)
-    usable = np.ones((50, 6), dtype=bool)
-    assert masked(block, usable) is block
-    usable[3, 1] = usable[4, 5] = False
-    found = masked(block, usable)
-    np.testing.assert_array_equal(np.isnan(found.six), ~usable)
-    np.testing.assert_array_equal(found.six[usable], block.six[usable])
-    usable[4, 5] = True
-    assert masked(block, usable).gyr is block.gyr
-    again = masked(found, usable)
-    np.testing.assert_array_equal(np.isnan(again.acc), np.isnan(found.acc))
-    already = replace(block, acc=np.where(usable[:, :3], block.acc, np.nan))
-    assert masked(already, usable) is already
+from fieldcal.model.rows.orientation import readings
+from fieldcal.model.rows.reduce import averaged, reduce
 
 
 def test_rows_are_means_over_a_second_with_their_noise() -> None:
@@ -290,13 +177,3 @@ def test_what_goes_round_with_a_table_is_taken_out_of_its_window_alone() -> None
     assert np.abs(rows.y[on][:, [3, 5]]).max() < 1e-6
     assert np.abs(rows.y[~on][:, [3, 5]]).max() > 2e-5
     np.testing.assert_allclose(rows.y[on, 4], np.pi / 2, atol=1e-6)
-
-
-def test_a_free_force_is_one_for_all_rows_of_a_position() -> None:
-    f = np.array([[3.0, 0.0, 4.1], [3.0, 0.0, 3.9], [0.0, -2.0, 0.0], [0.0] * 3])
-    position = np.array([0, 0, 1, 2])
-    found: Array = free_force(10.0, position, f)
-    expected = [[6.0, 0.0, 8.0]] * 2 + [[0.0, -10.0, 0.0], [0.0] * 3]
-    np.testing.assert_allclose(found, expected, atol=1e-12)
-    f[0, 1] = np.nan
-    np.testing.assert_allclose(free_force(10.0, position, f), expected, atol=1e-12)

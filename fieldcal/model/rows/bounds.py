@@ -1,0 +1,80 @@
+"""Where samples are cut: bounds of each position's window, and of the blocks in it.
+
+Blocks are a second long, and longer ones later in the window when there are many
+seconds: what happens after a turn happens at the start.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.session.description import Description
+
+ROWS = 360
+"""Rows aimed at, over all windows."""
+
+FEWEST, MOST = 8, 120
+"""Rows of one window."""
+
+FIRST_S = 1.0
+
+STEPS = 100_000
+"""Steps between samples that tell the rate; more would only take time."""
+
+SPAN = 50
+"""Samples over which stamps that come in bursts are even."""
+
+
+def rate_of(block: Block) -> float:
+    """Samples a second, from the times."""
+    if len(block) < 2:
+        return 1.0
+    first = np.arange(0, len(block) - 1, max(len(block) // STEPS, 1))
+    step = float(np.median(block.t[first + 1] - block.t[first]))
+    over = block.t[SPAN::SPAN] - block.t[:-SPAN:SPAN]  # stamps may come in bursts
+    return 1 / max(step, float(np.median(over)) / SPAN if len(over) else 0.0)
+
+
+def spans(block: Block, about: Description) -> NDArray[np.intp]:
+    """First and one past the last sample of each position's window, (p, 2).
+
+    A session without positions is one window, the whole of it. A position without a
+    window, or with one that no sample lies in, gets an empty span.
+    """
+    if not about.positions:
+        return np.array([[0, len(block)]])
+    ends = [w if w is not None else (np.inf, np.inf) for w in about.windows]
+    return np.searchsorted(block.t, np.array(ends)).astype(np.intp)
+
+
+def edges(start: float, end: float, windows: int) -> Array:
+    """Edges of the blocks of a window, s: a second each, later ones longer if need be.
+
+    >>> edges(0.0, 5.0, 9).tolist()
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    """
+    length = end - start
+    count = int(np.clip(ROWS // max(windows, 1), FEWEST, MOST))
+    if length <= count * FIRST_S:
+        return np.linspace(start, end, max(1, round(length / FIRST_S)) + 1)
+    low, high = 1.0, 10.0
+    for _ in range(60):
+        ratio = (low + high) / 2
+        longer = FIRST_S * np.sum(ratio ** np.arange(count)) > length
+        low, high = (low, ratio) if longer else (ratio, high)
+    lengths = FIRST_S * low ** np.arange(count)
+    out = start + np.concatenate([[0.0], np.cumsum(lengths)])
+    out[-1] = end
+    return out
+
+
+def block_bounds(
+    t: Array, first: int, last: int, rate: float, windows: int
+) -> NDArray[np.intp]:
+    """First and one past the last sample of each block of a window, (k, 2)."""
+    grid = edges(float(t[first]), float(t[last - 1]) + 0.5 / rate, windows)
+    at = first + np.searchsorted(t[first:last], grid)
+    keep = np.diff(at) > 0
+    return np.column_stack([at[:-1][keep], at[1:][keep]])

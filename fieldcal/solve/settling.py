@@ -1,0 +1,114 @@
+"""A given set fitted to rows: relinearised until it stays, bad windows left out.
+
+The state is moved to the estimate of the set (`model.inference`), turns between windows
+are followed about it, and the likeliest explanation is taken there (`mixture`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.model import thresholds
+from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.posterior.mixture import Mixture
+from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.search.inference import Inference
+from fieldcal.model.search.selection import Search
+from fieldcal.model.state import State
+from fieldcal.model.system.linear_system import System
+from fieldcal.model.system.turn_rows import TurnRows, Turns
+from fieldcal.solve.averaging import mixed
+from fieldcal.solve.given import Given
+from fieldcal.solve.observations import Mask
+
+FOLLOWED, NEAR = 6, 0.01
+"""Times that turns are followed at most, and the change of a scale factor from which
+once more: they are followed again in the end, and what is linear in a change leaves its
+square, 1e-4 and then 1e-8."""
+
+NO_WEIGHT = 1e5
+"""Times its noise that a bad window is given where it must not bend the state."""
+
+
+@dataclass(frozen=True, slots=True)
+class SettledSet:
+    """A set at the state where it settled.
+
+    Attributes
+    ----------
+    found : the mixture of the likeliest explanation
+    gram : products of rows and columns there
+    turned : rows of the turns there
+    score : ln of its evidence from all windows, before any was left out
+
+    """
+
+    found: Mixture
+    gram: Gram
+    turned: tuple[TurnRows, ...]
+    score: float
+
+
+def without_bad_windows(
+    rows: Rows, given: Given, nominal: State, turns: Turns | None
+) -> SettledSet:
+    """The fit of the windows that agree, while those left out are few."""
+
+    def inference(left: Mask) -> Inference:
+        return Inference(System(_without(rows, given, left), given), nominal, turns)
+
+    bad, score = np.zeros(len(given.held), dtype=bool), np.nan
+    # one bad window of six can be told from scatter, two of six cannot
+    most = max(1, len(bad) // 6)
+    for _ in range(1 + most):
+        now = inference(bad)
+        gram, found = _settled_fit(now, now, given)
+        worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
+        if worst.any() and (found.bad[worst] > thresholds.SUSPECT).all():
+            # a gross error bends the state so far that nothing is linear about it
+            gram, found = _settled_fit(now, inference(bad | worst), given)
+        if not bad.any():
+            score = found.score
+        worst &= (found.bad > thresholds.CERTAIN) & ~bad
+        if not worst.any() or bad.sum() >= most:
+            break
+        bad |= worst
+    found = replace(found, bad=np.where(bad, 1.0, found.bad))
+    return SettledSet(found, gram, tuple(now.turned), score)
+
+
+def _settled_fit(
+    inference: Inference, settling: Inference, given: Given
+) -> tuple[Gram, Mixture]:
+    """The likeliest explanation about the state where other rows have settled."""
+    gram = inference.gram(*_settled(settling, given), None)
+    return gram, mixed(given, Search(given, gram), given.explanations[0].members)
+
+
+def _without(rows: Rows, given: Given, bad: Mask) -> Rows:
+    """Rows of which some windows (p,) have no weight."""
+    left = np.isin(rows.x.position, given.held[bad])
+    return replace(rows, sd=np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd))
+
+
+def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
+    """The state where the set has settled, and the columns' values in it."""
+    start: Array = np.zeros(given.width)
+    state, values, _ = inference.settled(inference.nominal, start, given.members)
+    if inference.turns is None:
+        return state, values
+    # windows see no rate but the Earth's, too little to follow turns by
+    gyr = np.s_[given.scale + 3 : given.scale + 6]
+    values[gyr] = 0.0
+    nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
+    state = replace(state, scale=nominal)
+    for _ in range(FOLLOWED):
+        inference.gram(state, values, None)
+        before = state.scale
+        state, values, _ = inference.settled(state, values, given.members)
+        if np.abs(state.scale / before - 1).max() < NEAR:
+            break
+    return state, values

@@ -1,0 +1,67 @@
+"""Where windows and blocks are cut."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from still_samples import about, place, samples
+
+from fieldcal.core.samples import Block
+from fieldcal.model.rows import bounds
+from fieldcal.model.rows.bounds import edges, rate_of, spans
+
+
+def test_the_rate_is_that_of_the_clock_whatever_the_stamps() -> None:
+    t = 3.0 + np.arange(1000) / 40.0
+    still = np.zeros((1000, 3))
+    assert rate_of(Block.of(t, still)) == pytest.approx(40.0)
+    bursts = t[np.arange(1000) // 10 * 10] + 1e-5 * (np.arange(1000) % 10)
+    assert rate_of(Block.of(bursts, still)) == pytest.approx(40.0)
+    gap = t + 100.0 * (t > 20.0)
+    assert rate_of(Block.of(gap, still)) == pytest.approx(40.0)
+    assert rate_of(Block.of(t[:2], still[:2])) == pytest.approx(40.0)
+    assert rate_of(Block.of(t[:1], still[:1])) == 1.0
+
+
+def test_every_so_many_steps_are_enough_for_the_rate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of steps of 0.1 and 0.3 s in turn those looked at are of one kind."""
+    monkeypatch.setattr(bounds, "STEPS", 10)
+    t = np.cumsum(np.tile([0.1, 0.3], 20))
+    assert rate_of(Block.of(t, np.zeros((40, 3)))) == pytest.approx(1 / 0.2, rel=0.6)
+
+
+def test_a_window_is_the_samples_from_its_start_to_before_its_end() -> None:
+    block = samples(10.0)
+    known = about(place(2.0, 4.0), place(100.0, 101.0), place(5.01, 6.0))
+    np.testing.assert_array_equal(spans(block, known), [[0, 100], [500, 500],
+                                                        [151, 200]])  # fmt: skip
+    late = about({"alpha_deg": 0.0, "beta_deg": 0.0}, place(3.0, 4.0))
+    np.testing.assert_array_equal(spans(block, late), [[500, 500], [50, 100]])
+    np.testing.assert_array_equal(spans(block, about()), [[0, 500]])
+
+
+@pytest.mark.parametrize("length", [0.3, 1.4, 5.0, 39.6])
+def test_a_short_window_has_a_row_a_second(length: float) -> None:
+    found = edges(7.0, 7.0 + length, 9)
+    even = np.linspace(7.0, 7.0 + length, max(1, round(length)) + 1)
+    np.testing.assert_allclose(found, even, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("windows", "rows"), [(0, 120), (1, 120), (4, 90), (9, 40), (45, 8), (90, 8)]
+)
+def test_a_long_window_has_so_many_rows_each_longer_by_the_same_ratio(
+    windows: int, rows: int
+) -> None:
+    found = edges(3.0, 3.0 + 600.0, windows)
+    each = np.diff(found)
+    assert len(each) == rows
+    assert found[0] == 3.0 and found[-1] == 603.0
+    assert each[0] == pytest.approx(1.0)
+    ratio = each[1:] / each[:-1]
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
+    assert ratio[0] > 1.0
+    assert len(edges(3.0, 3.0 + rows, windows)) == rows + 1
+    np.testing.assert_allclose(np.diff(edges(3.0, 3.0 + rows, windows)), 1.0)

@@ -22,7 +22,7 @@ from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.drivers.can_fields import Bytes, Field
 from fieldcal.drivers.can_frames import EXTENDED
 from fieldcal.drivers.options import Options
-from fieldcal.session.description import ACC_UNITS, GYR_UNITS
+from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 if TYPE_CHECKING:
     from cantools.database.can import Database, Message, Signal

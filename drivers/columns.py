@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
-from fieldcal.session.description import ACC_UNITS
+from fieldcal.session.units import ACC_UNITS
 
 REST = 0.1
 """What no gyroscope of a device at rest reads, rad/s: 6 deg/s."""

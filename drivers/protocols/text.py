@@ -31,7 +31,7 @@ from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask
 from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sequence import Sequence
-from fieldcal.session.description import ACC_UNITS, GYR_UNITS
+from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 LONGEST = 1024
 """Longest line, bytes; what is longer is no line."""

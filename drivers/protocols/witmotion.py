@@ -29,7 +29,7 @@ from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, rows
 from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
-from fieldcal.session.description import ACC_UNITS, GYR_UNITS
+from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 SIZE = 11
 TIME, ACC, GYR = 0x50, 0x51, 0x52

@@ -231,7 +231,7 @@ def _bring(
 ) -> ImportedSession:
     from fieldcal.importing.ingest import import_stream
     from fieldcal.importing.unit_guess import settle_units
-    from fieldcal.session.description import UNSCALED
+    from fieldcal.session.units import UNSCALED
 
     name = recording.path.name.split(".")[0]
     about: dict[str, Any] = {"format": 1, **site_tables(args, name)}

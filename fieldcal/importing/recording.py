@@ -20,7 +20,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.gzip_stream import PIECE, pieces
-from fieldcal.session.description import ACC_UNITS, GYR_UNITS
+from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 ROWS = 1 << 15
 """Rows that are looked at together."""

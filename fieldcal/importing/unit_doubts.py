@@ -13,7 +13,7 @@ from fieldcal.importing.gravity_size import Gravity, gravity_in
 from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.scales import ACC_SCALES, GYR_SCALES, Scale
-from fieldcal.session.description import UNSCALED
+from fieldcal.session.units import UNSCALED
 
 FAR = 0.25
 """Logarithm of what no sensor in the unit that is said is out by."""

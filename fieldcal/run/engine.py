@@ -25,15 +25,7 @@ from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Add, Hold, Judge, Note, Plan, Repeat, Step
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.incoming import SAID, IncomingSamples
-from fieldcal.run.interruptions import (
-    THIN,
-    Disturbed,
-    SamplesLost,
-    Unlike,
-    WindowWatch,
-    kept_notice,
-    restart_notice,
-)
+from fieldcal.run.interruptions import Disturbed, kept_notice, restart_notice
 from fieldcal.run.link_marks import MarkedRecorder
 from fieldcal.run.operator.desk import OperatorDesk
 from fieldcal.run.operator.protocol import Display, Operator
@@ -41,9 +33,10 @@ from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 from fieldcal.run.waiting import PositionWait, force
 from fieldcal.run.warm_up import WarmUpWatch
+from fieldcal.run.window_taking import WindowTaking
 from fieldcal.session.description import Description
 from fieldcal.session.folder import ADDED
-from fieldcal.windows import Average, LearnedNoise, PiecedWindow, StillnessLimits
+from fieldcal.windows import Average
 
 R = TypeVar("R")
 
@@ -91,20 +84,20 @@ class Engine:
         self._give_up = give_up
         self._taken = {} if taken is None else taken
         self._warm_up = warm_up
-        self._lost_share = lost_share
         self._judge = judge
         self._added = [] if added is None else added
-        self._thin: dict[int, int] = {}
         self._held: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
-        self._noise: LearnedNoise | None = None
-        self._left: int | None = None
         self._before: int | None = None
         self._units = GyroUnitWatch(about.gravity)
         self._warned_of_unit = False
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver)
         self._incoming = IncomingSamples(driver, recorder, self._heard, self._units.add)
+        self._windows = WindowTaking(
+            driver, about, recorder, self._desk, self._display, self._incoming,
+            lost_share,
+        )  # fmt: skip
         driver.on_silence = self._silent
 
     def run(self, plan: Plan[R]) -> R:
@@ -191,23 +184,22 @@ class Engine:
 
         None if the operator wants to begin it again.
         """
-        pieces, same = self._new_window(), self._incoming.same
+        pieces, same = self._windows.new(), self._incoming.same
         while True:
             self._arrive(hold)
             if self._incoming.same != same:  # what is sent now is not what was before
-                pieces, same = self._new_window(), self._incoming.same
+                pieces, same = self._windows.new(), self._incoming.same
             away = self._incoming.breaks
             try:
-                return self._average(hold, pieces)
+                average = self._windows.average(hold, pieces)
+                if average is not None:
+                    self._say_if_cold()
+                return average
             except Disturbed as disturbed:
                 moved, kept = disturbed.moved, disturbed.kept
                 self._desk.tell(kept_notice(moved, kept, hold.seconds, pieces.dropped))
             if self._incoming.breaks != away:  # who knows how it stands by now
                 self._operator.place(hold)
-
-    def _new_window(self) -> PiecedWindow:
-        limits = StillnessLimits.swaying() if self._about.sways else None
-        return PiecedWindow(self._noise, self._driver.grain, limits)
 
     def _heard(self, block: Block) -> None:
         """Look at samples that have just been recorded."""
@@ -227,7 +219,7 @@ class Engine:
 
     def _arrive(self, hold: Hold) -> None:
         """Wait until the device rests where it should."""
-        left = self._left == hold.index
+        left = self._windows.left == hold.index
         waiting = PositionWait(hold, self._about, self._held, left, self._units)
         asked = self._driver.host_time()
         insisted = warned = False
@@ -288,65 +280,6 @@ class Engine:
                 "; if it is the base that sways, say so with --sways"
             )
             raise WrongPosition(f"{hold.position.name}: {what}")
-
-    def _average(self, hold: Hold, pieces: PiecedWindow) -> Average | None:
-        """Fill a window; None if the operator wants to begin it again."""
-        try:
-            while True:
-                if not self._fill(hold, pieces):
-                    return None
-                average = pieces.average()
-                if average is not None:
-                    break
-                self._desk.tell(kept_notice(None, 0.0, hold.seconds, pieces.dropped))
-        except Moved as moved:
-            self._left = hold.index
-            if isinstance(moved, SamplesLost):
-                self._thin[hold.index] = self._thin.get(hold.index, 0) + 1
-            what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
-            kept = 0.0 if isinstance(moved, Unlike) else pieces.keep(moved)
-            if kept:
-                self._recorder.mark("kept", position=hold.index, kept_s=kept, **what)
-                raise Disturbed(moved, kept) from moved
-            self._recorder.mark("rejected", position=hold.index, **what)
-            raise
-        end = float(np.nextafter(average.end, np.inf))
-        where: dict[str, object] = {"start_s": average.start, "end_s": end}
-        if pieces.without:
-            where["without_s"] = pieces.without
-        self._recorder.mark("window", position=hold.index, **where)
-        self._noise = pieces.noise and pieces.noise.spectrum
-        self._display.taken(hold, pieces)
-        self._say_if_cold()
-        return average
-
-    def _fill(self, hold: Hold, pieces: PiecedWindow) -> bool:
-        """Take samples until a window is long enough; False if it is to begin again."""
-        share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
-        watch = WindowWatch(self._driver, hold.seconds, share)
-        for block in self._incoming.pieces:
-            watch.check(block)
-            pieces.add(block)
-            if moved := pieces.moved:
-                raise moved
-            if self._desk.wish(hold) == "repeat":
-                self._recorder.mark("repeated", position=hold.index)
-                return False
-            self._display.averaging(hold, pieces)
-            early = not self._about.sways and pieces.done(hold.sigma)
-            if pieces.full(hold.seconds) or early:
-                break
-        self._confirm(watch)
-        return True
-
-    def _confirm(self, watch: WindowWatch) -> None:
-        """Have the device say that it did the same to all samples of a window."""
-        self._driver.read_again()
-        if self._driver.read_back.pending:
-            for block in self._incoming.pieces:
-                watch.check_same(float(block.t[-1]))
-                if not self._driver.read_back.pending:
-                    return
 
     def _say_if_cold(self) -> None:
         if self._warm_up and (said := self._warm_up.says):

@@ -17,38 +17,19 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Gauge
-from fieldcal.calibration.gauge import SI
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.frames import earth_rate_home, force_home, mounting_matrix
-from fieldcal.core.gravity import G0, gravity
+from fieldcal.core.gravity import gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.core.shown import one_line
 from fieldcal.core.under_way import UnderWay
-from fieldcal.session.attitude import held
+from fieldcal.session.position_tables import positions_of
 from fieldcal.session.schemas import refusal, validator
+from fieldcal.session.units import UNITS, full_scales, gauge_of, nominal_of
 
 FORMAT = 1
 """The format of session.toml."""
-
-ACC_UNITS = {"m/s^2": 1.0, "g": G0, "mg": 1e-3 * G0, "V": 1.0, "count": 1.0}
-GYR_UNITS = {
-    "rad/s": 1.0,
-    "deg/s": np.pi / 180,
-    "mrad/s": 1e-3,
-    "V": 1.0,
-    "count": 1.0,
-}
-"""SI units in one of each; outputs in V or counts are divided by the gauge."""
-
-UNSCALED = ("V", "count")
-"""Units whose scale only the nominal scale factors give."""
-
-_UNITS = {"acceleration": ACC_UNITS, "angular_rate": GYR_UNITS}
-
-NOMINAL_SCALES = ("acc_scale", "gyr_scale")
-NOMINAL = {"acc_bias": 0.0, "acc_scale": 1.0, "gyr_bias": 0.0, "gyr_scale": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +51,7 @@ class Description:
         not stated
     angle_setting_deg : how well each position's angles are set, likewise
     axes : the mounting, procedure axis x, y, z is device axis ...
-    nominal : (3,) for each key of `NOMINAL`: the calibration a simulation starts from
+    nominal : (3,) for each key of `units.NOMINAL`: what a simulation starts from
     gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
     model : parameters of the effects that the simulation includes, by id
     positions : as session.toml lists them
@@ -239,14 +220,14 @@ def parse(raw: Mapping[str, Any]) -> Description:
         raise InputError(wrong)
     device, site = raw.get("device", {}), raw.get("site", {})
     given = raw.get("units", {})
-    units = {k: given.get(k, next(iter(known))) for k, known in _UNITS.items()}
+    units = {k: given.get(k, next(iter(known))) for k, known in UNITS.items()}
     latitude = float(site.get("latitude_deg", 45.0))
     height = float(site.get("height_m", 0.0))
-    positions, windows = _positions(raw.get("position", ()))
+    positions, windows = positions_of(raw.get("position", ()))
     axes = raw.get("frame", {}).get("mounting", ("+x", "+y", "+z"))
     mounting_matrix(axes)
-    nominal = _nominal(raw.get("nominal", {}))
-    gauge = _gauge(units, nominal)
+    nominal = nominal_of(raw.get("nominal", {}))
+    gauge = gauge_of(units, nominal)
     grade = device.get("grade", "tactical")
     moving = UnderWay.at(*_velocity(site), float(np.deg2rad(latitude)), height)
     level = _known(site.get("level_deg"))
@@ -257,7 +238,7 @@ def parse(raw: Mapping[str, Any]) -> Description:
         grade=grade,
         rate_hz=_known(raw.get("sampling", {}).get("rate_hz")),
         units=units,
-        limits=_limits(raw.get("range", {}), units, gauge),
+        limits=full_scales(raw.get("range", {}), units, gauge),
         latitude_deg=latitude,
         height_m=height,
         gravity=float(site.get("gravity") or gravity(latitude, height))
@@ -296,85 +277,9 @@ def _known(value: float | None) -> float | None:
     return None if value is None else float(value)
 
 
-def _nominal(table: Mapping[str, Any]) -> dict[str, Array]:
-    given = {name: table.get(name, [usual] * 3) for name, usual in NOMINAL.items()}
-    return {name: np.array(three, float) for name, three in given.items()}
-
-
-def _gauge(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
-    """Output scale of channels in volts or counts, by the nominal scale factors."""
-    size, named = [1.0, 1.0], list(SI)
-    for i, (kind, scale) in enumerate(zip(_UNITS, NOMINAL_SCALES, strict=True)):
-        if units[kind] in UNSCALED:
-            size[i], named[i] = float(np.abs(nominal[scale]).mean()), units[kind]
-    if not all(size):
-        raise InputError("[nominal] a scale factor is 0: give one that is not")
-    return Gauge((size[0], size[1]), (named[0], named[1]))
-
-
-def _limits(
-    table: Mapping[str, Any], units: Mapping[str, str], gauge: Gauge
-) -> dict[str, float]:
-    scale = {
-        k: _UNITS[k][units[k]] / c for k, c in zip(_UNITS, gauge.size, strict=True)
-    }
-    return {k: float(table[k]) * scale[k] for k in _UNITS if k in table}
-
-
 def _model(table: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     found = {name: table.get(name, {}) for name in table.get("effects", ())}
     for name, parameters in found.items():
         if not isinstance(parameters, Mapping):
             raise InputError(f"[model] {name} cannot be: write a table [model.{name}]")
     return found
-
-
-def _positions(
-    tables: Iterable[Mapping[str, Any]],
-) -> tuple[tuple[Position, ...], tuple[tuple[float, float] | None, ...]]:
-    rows = [(_position(i, t), _window(i, t)) for i, t in enumerate(tables, 1)]
-    return tuple(p for p, _ in rows), tuple(w for _, w in rows)
-
-
-def _position(number: int, table: Mapping[str, Any]) -> Position:
-    label = one_line(str(table.get("name", "")))
-    position = held(number, table, label)
-    if "speed_deg_s" in table:
-        return _turning(number, table, position)
-    rate = table.get("rate_deg_s")
-    if rate is None:
-        return position
-    if any(rate) and not label:
-        turning = " ".join(f"{r:g}" for r in rate)
-        position = replace(position, name=f"{position.name}, {turning} °/s")
-    return replace(position, rate=tuple(np.deg2rad(rate)))
-
-
-def _turning(number: int, table: Mapping[str, Any], position: Position) -> Position:
-    """A position in which a table turns about an axis that nobody knows."""
-    if "rate_deg_s" in table or position.oriented:
-        other = "rate_deg_s" if "rate_deg_s" in table else "an attitude"
-        raise InputError(
-            f"[[position]] number {number} has speed_deg_s and {other}: speed_deg_s is"
-            " for an axis that nobody knows; where it is known give rate_deg_s"
-        )
-    speed, sigma = table["speed_deg_s"], table.get("speed_sd_deg_s", 0.0)
-    label = table.get("name") or f"position {number}, {speed:g} °/s about any axis"
-    return replace(
-        position,
-        name=one_line(str(label)),
-        speed=float(np.deg2rad(speed)),
-        speed_sigma=float(np.deg2rad(sigma)),
-    )
-
-
-def _window(number: int, table: Mapping[str, Any]) -> tuple[float, float] | None:
-    if "start_s" not in table:
-        return None
-    start, end = float(table["start_s"]), float(table["end_s"])
-    if start >= end:
-        raise InputError(
-            f"[[position]] number {number} start_s = {start:g} cannot be: it must come"
-            f" before end_s = {end:g}"
-        )
-    return start, end

@@ -30,8 +30,9 @@ from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, too_quick
 from fieldcal.session import description, sample_files
 from fieldcal.session.clock import SteadyClock, steadied
-from fieldcal.session.description import ACC_UNITS, GYR_UNITS, Description
+from fieldcal.session.description import Description
 from fieldcal.session.installed import in_one_calibration, stretches
+from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 DESCRIPTION = "session.toml"
 MARKS = "marks.jsonl"

@@ -1,0 +1,141 @@
+"""Takes the windows of a run: samples while the device rests, until they are enough."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.errors import Moved
+from fieldcal.drivers.driver import Driver
+from fieldcal.planning.steps import Hold
+from fieldcal.run.incoming import IncomingSamples
+from fieldcal.run.interruptions import (
+    THIN,
+    Disturbed,
+    SamplesLost,
+    Unlike,
+    WindowWatch,
+    kept_notice,
+)
+from fieldcal.run.link_marks import MarkedRecorder
+from fieldcal.run.operator.desk import OperatorDesk
+from fieldcal.run.operator.protocol import Display
+from fieldcal.session.description import Description
+from fieldcal.windows import Average, LearnedNoise, PiecedWindow, StillnessLimits
+
+
+class WindowTaking:
+    """Windows of one device, one after another.
+
+    Parameters
+    ----------
+    driver : the device
+    about : whether the base sways
+    recorder : where windows are marked
+    desk, display : the operator's
+    incoming : samples that have been recorded
+    lost_share : share of a window's samples that may be missing; with more it is taken
+        again, if that helps
+
+    Attributes
+    ----------
+    left : index of the position whose window was disturbed last, None before any
+
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        about: Description,
+        recorder: MarkedRecorder,
+        desk: OperatorDesk,
+        display: Display,
+        incoming: IncomingSamples,
+        lost_share: float = np.inf,
+    ) -> None:
+        self._driver, self._about, self._recorder = driver, about, recorder
+        self._desk, self._display, self._incoming = desk, display, incoming
+        self._lost_share = lost_share
+        self._thin: dict[int, int] = {}
+        self._noise: LearnedNoise | None = None
+        self.left: int | None = None
+
+    def new(self) -> PiecedWindow:
+        """A window that nothing is in, judged by the noise of the one before."""
+        limits = StillnessLimits.swaying() if self._about.sways else None
+        return PiecedWindow(self._noise, self._driver.grain, limits)
+
+    def average(self, hold: Hold, pieces: PiecedWindow) -> Average | None:
+        """Fill a window and mark it.
+
+        Parameters
+        ----------
+        hold : the position, where the device rests
+        pieces : what is averaged, what was calm before a disturbance included
+
+        Returns
+        -------
+        None if the operator wants to begin the window again.
+
+        Raises
+        ------
+        Disturbed
+            If the device moved, and what was calm before is kept.
+        Moved
+            If it moved, and nothing is kept.
+
+        """
+        try:
+            while True:
+                if not self._fill(hold, pieces):
+                    return None
+                average = pieces.average()
+                if average is not None:
+                    break
+                self._desk.tell(kept_notice(None, 0.0, hold.seconds, pieces.dropped))
+        except Moved as moved:
+            self.left = hold.index
+            if isinstance(moved, SamplesLost):
+                self._thin[hold.index] = self._thin.get(hold.index, 0) + 1
+            what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
+            kept = 0.0 if isinstance(moved, Unlike) else pieces.keep(moved)
+            if kept:
+                self._recorder.mark("kept", position=hold.index, kept_s=kept, **what)
+                raise Disturbed(moved, kept) from moved
+            self._recorder.mark("rejected", position=hold.index, **what)
+            raise
+        end = float(np.nextafter(average.end, np.inf))
+        where: dict[str, object] = {"start_s": average.start, "end_s": end}
+        if pieces.without:
+            where["without_s"] = pieces.without
+        self._recorder.mark("window", position=hold.index, **where)
+        self._noise = pieces.noise and pieces.noise.spectrum
+        self._display.taken(hold, pieces)
+        return average
+
+    def _fill(self, hold: Hold, pieces: PiecedWindow) -> bool:
+        """Take samples until a window is long enough; False if it is to begin again."""
+        share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
+        watch = WindowWatch(self._driver, hold.seconds, share)
+        for block in self._incoming.pieces:
+            watch.check(block)
+            pieces.add(block)
+            if moved := pieces.moved:
+                raise moved
+            if self._desk.wish(hold) == "repeat":
+                self._recorder.mark("repeated", position=hold.index)
+                return False
+            self._display.averaging(hold, pieces)
+            early = not self._about.sways and pieces.done(hold.sigma)
+            if pieces.full(hold.seconds) or early:
+                break
+        self._confirm(watch)
+        return True
+
+    def _confirm(self, watch: WindowWatch) -> None:
+        """Have the device say that it did the same to all samples of a window."""
+        self._driver.read_again()
+        if self._driver.read_back.pending:
+            for block in self._incoming.pieces:
+                watch.check_same(float(block.t[-1]))
+                if not self._driver.read_back.pending:
+                    return

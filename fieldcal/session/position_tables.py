@@ -1,0 +1,73 @@
+"""The tables [[position]] of session.toml: how the device was held, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.positions import Position
+from fieldcal.core.shown import one_line
+from fieldcal.session.attitude import held
+
+
+def positions_of(
+    tables: Iterable[Mapping[str, Any]],
+) -> tuple[tuple[Position, ...], tuple[tuple[float, float] | None, ...]]:
+    """Each position, and its window where it has one, in s of device time.
+
+    Raises
+    ------
+    InputError
+        Naming the position, counted from 1, and the key.
+
+    """
+    rows = [(_position(i, t), _window(i, t)) for i, t in enumerate(tables, 1)]
+    return tuple(p for p, _ in rows), tuple(w for _, w in rows)
+
+
+def _position(number: int, table: Mapping[str, Any]) -> Position:
+    label = one_line(str(table.get("name", "")))
+    position = held(number, table, label)
+    if "speed_deg_s" in table:
+        return _turning(number, table, position)
+    rate = table.get("rate_deg_s")
+    if rate is None:
+        return position
+    if any(rate) and not label:
+        turning = " ".join(f"{r:g}" for r in rate)
+        position = replace(position, name=f"{position.name}, {turning} °/s")
+    return replace(position, rate=tuple(np.deg2rad(rate)))
+
+
+def _turning(number: int, table: Mapping[str, Any], position: Position) -> Position:
+    """A position in which a table turns about an axis that nobody knows."""
+    if "rate_deg_s" in table or position.oriented:
+        other = "rate_deg_s" if "rate_deg_s" in table else "an attitude"
+        raise InputError(
+            f"[[position]] number {number} has speed_deg_s and {other}: speed_deg_s is"
+            " for an axis that nobody knows; where it is known give rate_deg_s"
+        )
+    speed, sigma = table["speed_deg_s"], table.get("speed_sd_deg_s", 0.0)
+    label = table.get("name") or f"position {number}, {speed:g} °/s about any axis"
+    return replace(
+        position,
+        name=one_line(str(label)),
+        speed=float(np.deg2rad(speed)),
+        speed_sigma=float(np.deg2rad(sigma)),
+    )
+
+
+def _window(number: int, table: Mapping[str, Any]) -> tuple[float, float] | None:
+    if "start_s" not in table:
+        return None
+    start, end = float(table["start_s"]), float(table["end_s"])
+    if start >= end:
+        raise InputError(
+            f"[[position]] number {number} start_s = {start:g} cannot be: it must come"
+            f" before end_s = {end:g}"
+        )
+    return start, end

@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import Prepared, prepare
 from fieldcal.diagnosis.verdict import concluded
-from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.model.rows.bounds import spans
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 from fieldcal.windows.noise import short_lag

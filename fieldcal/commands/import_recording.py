@@ -10,6 +10,8 @@ from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
@@ -26,7 +28,16 @@ if TYPE_CHECKING:
     )
 
 RARE = (
-    *("join", "options", "sigma", "skip", "separator", "acc_lsb", "gyr_lsb"),
+    *(
+        "join",
+        "in_order",
+        "options",
+        "sigma",
+        "skip",
+        "separator",
+        "acc_lsb",
+        "gyr_lsb",
+    ),
     *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
     *("lot", "station", "operator"),
 )
@@ -60,6 +71,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="leave out bad rows and what is damaged or cut off, and say which",
     )
     add("--join", action="store_true", help="FILEs hold channels of one IMU, same rows")
+    add(
+        "--in-order",
+        action="store_true",
+        help="FILEs are of one IMU, one after another, such as one a position",
+    )
     add("--options", default="", metavar="QUERY", help="as in a device's address")
     _add_columns(parser)
     add(
@@ -114,7 +130,7 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.importers import open_recording
-    from fieldcal.importing.merge import MergedFiles
+    from fieldcal.importing.merge import FilesInOrder, MergedFiles
 
     if len(args.columns) not in (0, 1, len(args.files)):
         raise InputError("give --columns once, or once for each file")
@@ -122,26 +138,45 @@ def run(args: argparse.Namespace) -> int:
         open_recording(path, _wanted(args, i), args.format, args.repair)
         for i, path in enumerate(args.files)
     ]
+    if args.join and args.in_order:
+        raise InputError("FILEs hold either the same time or one time after another")
     if args.join:
         opened = [MergedFiles(opened)]
+    if args.in_order:
+        opened = [FilesInOrder(opened)]
     if args.list:
         return _list(opened)
     written: list[Path] = []
+    rests: list[Array] = []
     try:
         for recording in opened:
-            _bring_all(args, recording, len(opened) > 1, written)
+            rests += _bring_all(args, recording, len(opened) > 1, written)
     except InputError:
         # the same command with the answer must find its folders free
         for folder in written:
             rmtree(folder)
             sys.stderr.write(f"{folder}: removed again, for this is not all\n")
         raise
+    _say_one_each(args.files, rests)
     return 0
+
+
+def _say_one_each(files: Sequence[Path], rests: Sequence[Array]) -> None:
+    """Say that files, each of one rest, look like the positions of one IMU."""
+    from fieldcal.importing.gravity_size import are_means
+
+    if len(files) > 1 and all(len(one) == 1 for one in rests):
+        if are_means(np.concatenate(rests)):
+            sys.stderr.write(
+                f"each of these {len(files)} files holds one rest, and each faces"
+                " another way: if they are positions of one IMU, import them again with"
+                " --in-order, which makes one session of them\n"
+            )
 
 
 def _bring_all(
     args: argparse.Namespace, recording: Recording, among: bool, written: list[Path]
-) -> None:
+) -> list[Array]:
     """Make a session of each IMU that is wanted, and note the folders.
 
     Parameters
@@ -149,6 +184,10 @@ def _bring_all(
     args, recording : what is wanted of which
     among : whether it is one of several files
     written : folders, grows
+
+    Returns
+    -------
+    of each IMU the means (m, 3) of the accelerometers at rest, m/s^2
 
     """
     name = recording.path.name.split(".")[0]
@@ -167,6 +206,7 @@ def _bring_all(
         written.append(there)
     if len(names) > 1:
         _say_instances(folder, rests, float(args.gravity or G0))
+    return list(rests.values())
 
 
 def _wanted(args: argparse.Namespace, i: int) -> ReadOptions:

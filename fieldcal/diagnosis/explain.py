@@ -9,6 +9,7 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
+from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.model import thresholds
 from fieldcal.model.causes.dictionary import Dictionary
@@ -17,7 +18,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import HeldOut, in_question
 from fieldcal.model.posterior.probabilities import Posterior, Standing
 from fieldcal.model.posterior.reported import reported
-from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import beginnings

@@ -27,6 +27,7 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
+from fieldcal.core.sampling import rate_of, unbroken
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.recording import CheckedSamples, Fault
 
@@ -95,14 +96,17 @@ def rate_unit(recording: CheckedSamples, held: Sequence[int], f: Array) -> str:
     """Unit of the gyroscopes, if it is not the declared one; empty if it is.
 
     Of the turns between windows by number, where the force is f (n, 3); those that are
-    too small say nothing.
+    too small, or of which a part was not recorded, say nothing.
     """
     block, ratios = recording.block, []
+    often = rate_of(block)
     for (p, one), (q, two) in pairwise(zip(held, f, strict=True)):
         cosine = one @ two / np.linalg.norm(one) / np.linalg.norm(two)
         angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
         gap = slice(recording.windows[p, 1], recording.windows[q, 0])
         if not angle > LEAST or gap.stop - gap.start < 2:
+            continue
+        if not unbroken(block.t, gap.start, gap.stop, often):
             continue
         rest = block.gyr[slice(*recording.windows[p])].mean(axis=0)
         rate = np.linalg.norm((block.gyr[gap] - rest) / recording.scale[3:], axis=1)

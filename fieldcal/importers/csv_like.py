@@ -87,14 +87,12 @@ class TextColumns(ColumnRecording):
 
     Attributes
     ----------
-    from_first : whether times count from the first line
     member : the file of a .zip that is the text; "" if it is the file itself
     sensor : what bare axes are of, as the name of the file says it; "" if it does not
     instance : which of several IMUs that come in turn is read; "" for the first
 
     """
 
-    from_first = True
     member = sensor = instance = ""
     _skip = 0
 

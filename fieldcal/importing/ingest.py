@@ -16,7 +16,6 @@ import numpy as np
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
 from fieldcal.core.samples import Array, Block, too_quick
-from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.spool import SpooledRows
 from fieldcal.importing.stream_facts import StreamFacts
@@ -207,12 +206,11 @@ def _marks(
     steps: list[ClockStep],
 ) -> str:
     """What is kept of where the samples come from."""
-    parts = recording.parts if isinstance(recording, MergedFiles) else [recording]
     now = round(time(), 3)
     imported = {
         "event": "imported",
-        "files": [digest(path) for part in parts for path in part.files()],
-        "format": type(parts[0]).__module__.rpartition(".")[2],
+        "files": [digest(path) for path in recording.files()],
+        "format": type(recording.parts[0]).__module__.rpartition(".")[2],
         "stream": stream,
         **facts.table(),
         "repairs": repairs,

@@ -1,10 +1,11 @@
-"""Several files that hold the channels of one IMU, merged row by row."""
+"""Several files of one IMU: side by side, row by row, or one after another."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
@@ -12,9 +13,17 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing.recording import ImuStream, Recording
 
+BETWEEN = 10.0
+"""Time taken to have passed between two files of which no clock tells, s."""
 
-class MergedFiles(Recording):
-    """Files with the same times, each with other channels.
+AS_NAMED = (
+    f"that of the files as they are named, {BETWEEN:g} s apart, since their times start"
+    " anew: what goes with time from file to file is not to be believed"
+)
+
+
+class SeveralFiles(Recording):
+    """Files that hold one IMU together.
 
     Parameters
     ----------
@@ -23,9 +32,14 @@ class MergedFiles(Recording):
     """
 
     def __init__(self, parts: Sequence[Recording]) -> None:
-        self.parts = parts
+        self._parts = list(parts)
         first = parts[0]
         super().__init__(first.path, first.wanted, first.repair)
+
+    @property
+    def parts(self) -> list[Recording]:
+        """The files."""
+        return self._parts
 
     def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
@@ -35,15 +49,91 @@ class MergedFiles(Recording):
             if len(streams) > 1:
                 raise InputError(f"{part.path}: holds several IMUs; import it alone")
             found += streams
-        return [ImuStream(found[0].name, "; ".join(s.says for s in found))]
+        says = dict.fromkeys(s.says for s in found)
+        return [ImuStream(found[0].name, "; ".join(says))]
 
-    def alone(self, stream: str) -> Recording:
+    def alone(self, stream: str) -> Self:
         """The files, each with what is said of its one IMU alone."""
-        return MergedFiles([p.alone(p.streams()[0].name) for p in self.parts])
+        return type(self)([p.alone(p.streams()[0].name) for p in self.parts])
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return what each file says, by its name."""
         return {"files": {p.path.name: p.notes(stream) for p in self.parts}}
+
+    def files(self) -> list[Path]:
+        """The files that it is read from."""
+        return [path for part in self.parts for path in part.files()]
+
+    def _tell(self) -> None:
+        """Say what the files said while they were read, each sentence once."""
+        for part in self.parts:
+            self.says += [s for s in part.says if s not in self.says]
+            self.mended += part.mended
+
+
+class FilesInOrder(SeveralFiles):
+    """Files that were recorded one after another: a file for each position, say."""
+
+    def __init__(self, parts: Sequence[Recording]) -> None:
+        super().__init__(parts)
+        self._rows: list[int] = []
+        for part in parts:
+            # only their own zeros tell whether one clock ran through them all
+            part.from_first = False
+
+    def place(self, row: int) -> str:
+        """Name a sample as its own file does, with the file."""
+        for part, rows in zip(self.parts, self._rows, strict=False):
+            if row < rows:
+                return f"{part.path.name}, {part.place(row)}"
+            row -= rows
+        last = self.parts[min(len(self._rows), len(self.parts) - 1)]
+        return f"{last.path.name}, {last.place(row)}"
+
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """Samples of one file after the other.
+
+        Times of a file that do not go on behind those of the file before begin anew,
+        and are taken to follow after a pause.
+        """
+        yield from self._in_order(p.blocks(p.streams()[0].name) for p in self.parts)
+        self._tell()
+
+    def first_rows(self, stream: str, most: int) -> Block:
+        """Rows at the beginning of each file, so many in all."""
+        each = most // len(self.parts)
+        flows = ([p.first_rows(p.streams()[0].name, each)] for p in self.parts)
+        return concat(list(self._in_order(flows)))
+
+    def _in_order(self, flows: Iterable[Iterable[Block]]) -> Iterator[Block]:
+        self._rows, last, shift = [], np.nan, 0.0
+        for flow in flows:
+            rows, begun = 0, False
+            for block in flow:
+                known = block.t[np.isfinite(block.t)]
+                if len(known) and not begun:
+                    begun, shift = True, self._shift(float(known[0]), last, shift)
+                block = replace(block, t=block.t + shift)
+                last = float(np.fmax(last, np.max(known + shift, initial=-np.inf)))
+                rows += len(block)
+                yield block
+            self._rows.append(rows)
+
+    def _shift(self, begins: float, last: float, before: float) -> float:
+        """What is added to the times of a file that begins so, s.
+
+        Behind a file that ended at `last`, to whose times `before` was added.
+        """
+        if np.isnan(last):
+            return -begins
+        if begins + before > last:
+            return before
+        self.guessed["order"] = AS_NAMED
+        return last + BETWEEN - begins
+
+
+class MergedFiles(SeveralFiles):
+    """Files with the same times, each with other channels."""
 
     def place(self, row: int) -> str:
         """Name a sample as the first file does."""
@@ -77,8 +167,7 @@ class MergedFiles(Recording):
                     f"{part.path}: {part.place(row)}: the other files have ended; join"
                     " files with the same rows"
                 )
-        self.says += [sentence for part in self.parts for sentence in part.says]
-        self.mended += [sentence for part in self.parts for sentence in part.mended]
+        self._tell()
 
     def _merged(self, blocks: list[Block], row: int) -> Block:
         whole = blocks[0]

@@ -18,7 +18,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing.gzip_stream import PIECE, pieces
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
@@ -174,6 +174,9 @@ class Recording(ABC):
     """
 
     ends_early = False
+    from_first = True
+    """Whether times count from the first row, of formats whose zero says nothing."""
+
     asks_units = False
     """Whether units are the user's to say; other formats say them."""
 
@@ -201,6 +204,20 @@ class Recording(ABC):
     @abstractmethod
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of one of them in the order of the file, SI units, device axes."""
+
+    @property
+    def parts(self) -> list[Recording]:
+        """The files of which it is made up."""
+        return [self]
+
+    def first_rows(self, stream: str, most: int) -> Block:
+        """Rows at its beginning, so many at most."""
+        blocks: list[Block] = []
+        for block in self.blocks(stream):
+            blocks.append(block)
+            if sum(map(len, blocks)) >= most:
+                break
+        return concat(blocks)[:most]
 
     def alone(self, stream: str) -> Recording:
         """The recording with what is said of one of its IMUs alone."""

@@ -14,9 +14,8 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import Array, Block, concat
+from fieldcal.core.samples import Array, Block
 from fieldcal.importing.gravity_size import Gravity, are_means, gravity_in, with_length
-from fieldcal.importing.merge import MergedFiles
 from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import (
     LARGEST,
@@ -75,27 +74,21 @@ def settle_units(recording: Recording, stream: str) -> Settled:
         With a question and its answers, where several or none would do.
 
     """
-    parts = recording.parts if isinstance(recording, MergedFiles) else [recording]
-    block = _beginning(recording.alone(stream), stream)
+    parts, heard = recording.parts, recording.alone(stream)
+    block = _beginning(heard, stream)
     if not all(part.asks_units for part in parts):
         hold_own_units(recording, block)
-        return Settled({})
+        return Settled(heard.guessed)
     guess = _Guess(str(recording.path), _said(parts), block)
     for part in parts:
         part.wanted = guess.on(part.wanted)
     parts[0].says += guess.doubts
-    columns = {k: why for part in parts for k, why in part.guessed.items()}
-    return Settled(columns | guess.found, guess.acc_bias)
+    taken = {k: why for one in (*parts, heard) for k, why in one.guessed.items()}
+    return Settled(taken | guess.found, guess.acc_bias)
 
 
 def _beginning(recording: Recording, stream: str) -> Block:
-    blocks, rows = [], 0
-    for block in recording.blocks(stream):
-        blocks.append(block)
-        rows += len(block)
-        if rows >= ROWS:
-            break
-    whole = concat(blocks)[:ROWS]
+    whole = recording.first_rows(stream, ROWS)
     # such values tell no unit; whoever takes the rows says where they stand
     acc, gyr = (np.where(np.abs(three) > LARGEST, np.nan, three)
                 for three in (whole.acc, whole.gyr))  # fmt: skip

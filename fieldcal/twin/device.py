@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import FoundEffect
 from fieldcal.diagnosis.signal.line import Tone
 from fieldcal.effects import catalogue
-from fieldcal.model.rows.bounds import rate_of
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import State, Term
 from fieldcal.physics.effect import Chain, Effect, Scatter

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.core.sampling import rate_of
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.orientation import readings
 from fieldcal.model.rows.vibration import usual_noise

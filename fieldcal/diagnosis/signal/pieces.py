@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.core.sampling import rate_of
+from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.physics.experience import Experience
 

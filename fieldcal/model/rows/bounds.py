@@ -20,22 +20,6 @@ FEWEST, MOST = 8, 120
 
 FIRST_S = 1.0
 
-STEPS = 100_000
-"""Steps between samples that tell the rate; more would only take time."""
-
-SPAN = 50
-"""Samples over which stamps that come in bursts are even."""
-
-
-def rate_of(block: Block) -> float:
-    """Samples a second, from the times."""
-    if len(block) < 2:
-        return 1.0
-    first = np.arange(0, len(block) - 1, max(len(block) // STEPS, 1))
-    step = float(np.median(block.t[first + 1] - block.t[first]))
-    over = block.t[SPAN::SPAN] - block.t[:-SPAN:SPAN]  # stamps may come in bursts
-    return 1 / max(step, float(np.median(over)) / SPAN if len(over) else 0.0)
-
 
 def spans(block: Block, about: Description) -> NDArray[np.intp]:
     """First and one past the last sample of each position's window, (p, 2).

@@ -25,8 +25,9 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.reduce import Rows, RowSource, averaged, reduce
 
 WANDERS = 6.0

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Block
+from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.block_means import block_means, masked
-from fieldcal.model.rows.bounds import block_bounds, rate_of, spans
+from fieldcal.model.rows.bounds import block_bounds, spans
 from fieldcal.model.rows.noise import rounding
 from fieldcal.model.rows.orientation import (
     force_read,

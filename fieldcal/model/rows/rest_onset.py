@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.core.sampling import rate_of
+from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.session.description import Description
 

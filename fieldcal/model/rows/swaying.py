@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from fieldcal.core.positions import rates
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.core.sampling import rate_of
+from fieldcal.model.rows.bounds import spans
 from fieldcal.session.description import Description
 from fieldcal.windows.sway import waves_of
 from fieldcal.windows.sway_process import needed

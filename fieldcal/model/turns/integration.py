@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.bounds import rate_of
+from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.turns.attitude import between
 from fieldcal.model.turns.rotation import carry, small_turns

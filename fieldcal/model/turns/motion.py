@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.bounds import rate_of
+from fieldcal.core.sampling import rate_of, unbroken
 from fieldcal.model.rows.reduce import Rows, RowSource
 
 MARGIN_S = 0.6
@@ -41,7 +41,7 @@ def moving(
     gap, m = slice(first, last), max(2, round(0.1 * rate))
     if last - first < 4 * m or not source.usable[gap].all():
         return None
-    if np.diff(block.t[gap]).max() > 3.5 / rate:
+    if not unbroken(block.t, first, last, rate):
         return None
     rest = [np.nanmean(rows.y[rows.x.position == p, 3:], axis=0) for p in pair]
     total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])

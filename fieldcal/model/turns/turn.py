@@ -21,7 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.rows.bounds import rate_of, spans
+from fieldcal.core.sampling import rate_of
+from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.state import State
 from fieldcal.model.turns.attitude import (

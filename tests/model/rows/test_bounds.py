@@ -6,30 +6,7 @@ import numpy as np
 import pytest
 from still_samples import about, place, samples
 
-from fieldcal.core.samples import Block
-from fieldcal.model.rows import bounds
-from fieldcal.model.rows.bounds import edges, rate_of, spans
-
-
-def test_the_rate_is_that_of_the_clock_whatever_the_stamps() -> None:
-    t = 3.0 + np.arange(1000) / 40.0
-    still = np.zeros((1000, 3))
-    assert rate_of(Block.of(t, still)) == pytest.approx(40.0)
-    bursts = t[np.arange(1000) // 10 * 10] + 1e-5 * (np.arange(1000) % 10)
-    assert rate_of(Block.of(bursts, still)) == pytest.approx(40.0)
-    gap = t + 100.0 * (t > 20.0)
-    assert rate_of(Block.of(gap, still)) == pytest.approx(40.0)
-    assert rate_of(Block.of(t[:2], still[:2])) == pytest.approx(40.0)
-    assert rate_of(Block.of(t[:1], still[:1])) == 1.0
-
-
-def test_every_so_many_steps_are_enough_for_the_rate(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Of steps of 0.1 and 0.3 s in turn those looked at are of one kind."""
-    monkeypatch.setattr(bounds, "STEPS", 10)
-    t = np.cumsum(np.tile([0.1, 0.3], 20))
-    assert rate_of(Block.of(t, np.zeros((40, 3)))) == pytest.approx(1 / 0.2, rel=0.6)
+from fieldcal.model.rows.bounds import edges, spans
 
 
 def test_a_window_is_the_samples_from_its_start_to_before_its_end() -> None:

@@ -1,0 +1,115 @@
+"""Several files of one IMU become one session: one after another, or side by side."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laid_about import G, write
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Array
+from fieldcal.session.folder import Session
+
+FACES = [*np.eye(3), *-np.eye(3)]
+BIAS, RATE = np.array([0.38, -0.13, 0.44]), np.array([0.028, 0.027, 0.011])
+SCALE = np.array([1.002, 1.006, 1.018])
+HEADING = "t (s),ax (m/s^2),ay (m/s^2),az (m/s^2),gx (rad/s),gy (rad/s),gz (rad/s)"
+HZ, ROWS = 50.0, 400
+
+
+def face(number: int, starts: float, seed: int = 3) -> Array:
+    """Rows t, a, w of one side of a device whose clock begins so, SI."""
+    rng = np.random.default_rng([seed, number])
+    t = starts + np.arange(ROWS) / HZ
+    acc = SCALE * G * FACES[number] + BIAS + rng.normal(0, 0.01, (ROWS, 3))
+    return np.column_stack([t, acc, RATE + rng.normal(0, 2e-3, (ROWS, 3))])
+
+
+def faces(folder: Path, apart: float) -> list[str]:
+    """A file for each side; clocks that start anew, or so many seconds later each."""
+    return [
+        str(write(folder, face(i, 0.4 + apart * i), f"side_{i}.csv", HEADING))
+        for i in range(6)
+    ]
+
+
+def brought(folder: Path, files: list[str]) -> Session:
+    out = folder / "out"
+    call = ["import", *files, "--in-order", "-o", str(out), "--gravity", str(G)]
+    assert main(call) == 0
+    return Session.open(out)
+
+
+def test_a_file_for_each_position_is_one_session(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = brought(tmp_path, faces(tmp_path, 0.0))
+    assert len(made.block) == 6 * ROWS and len(made.about.positions) == 6
+    assert (np.diff(made.block.t) > 0).all()
+    assert "that of the files as they are named" in made.about.raw["guessed"]["order"]
+    capsys.readouterr()
+    assert main(["solve", str(tmp_path / "out"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    for name, truth in (("acc_bias", BIAS), ("acc_scale", SCALE), ("gyr_bias", RATE)):
+        off = np.array(found["parameters"][name]["value"]) - truth
+        assert (np.abs(off) < 4 * np.array(found["parameters"][name]["sigma"])).all()
+    # how the device came from one face to the next was not recorded
+    assert main(["diagnose", str(tmp_path / "out"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["effects"] == []
+
+
+def test_times_that_go_on_from_file_to_file_are_kept(tmp_path: Path) -> None:
+    made = brought(tmp_path, faces(tmp_path, 25.0))
+    every = np.concatenate([face(i, 0.4 + 25.0 * i)[:, 0] for i in range(6)])
+    np.testing.assert_allclose(made.block.t, every - 0.4, atol=1e-9)
+    assert "order" not in made.about.raw.get("guessed", {})
+
+
+def test_files_of_one_rest_each_are_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files, out = faces(tmp_path, 0.0), str(tmp_path / "apart")
+    assert main(["import", *files, "-o", out]) == 0
+    assert "import them again with --in-order" in capsys.readouterr().err
+    assert main(["import", *files[:1] * 2, "-o", str(tmp_path / "same")]) == 2
+    # devices that lie on a shelf side by side are no positions of one
+    flat = [write(tmp_path, face(0, 0.0, s), f"imu_{s}.csv", HEADING) for s in range(3)]
+    assert main(["import", *map(str, flat), "-o", str(tmp_path / "flat")]) == 0
+    assert "--in-order" not in capsys.readouterr().err
+
+
+def test_a_bad_row_is_named_by_its_own_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = faces(tmp_path, 0.0)
+    lines = Path(files[2]).read_text().splitlines()
+    lines[100] = "0.1," + lines[100].split(",", 1)[1]
+    Path(files[2]).write_text("\n".join(lines))
+    call = ["import", *files, "--in-order", "-o", str(tmp_path / "out")]
+    assert main(call) == 2
+    assert "side_2.csv, line 101" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert main([*call, "--join"]) == 2
+    assert "one time after another" in capsys.readouterr().err
+
+
+def test_channels_side_by_side_have_the_same_times(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = face(0, 0.0)
+    first = write(tmp_path, whole[:, :4], "acc.csv", HEADING.split(",gx")[0])
+    names = "t (s),gx (rad/s),gy (rad/s),gz (rad/s)"
+    second = write(tmp_path, whole[:, [0, 4, 5, 6]], "gyr.csv", names)
+    call = ["import", str(first), str(second), "--join", "-o"]
+    assert main([*call, str(tmp_path / "out")]) == 0
+    np.testing.assert_allclose(Session.open(tmp_path / "out").block.six, whole[:, 1:])
+    late = whole[:, [0, 4, 5, 6]] + [0.01, 0, 0, 0]
+    write(tmp_path, late, "gyr.csv", names)
+    assert main([*call, str(tmp_path / "late")]) == 2
+    assert "join files with the same times" in capsys.readouterr().err
+    write(tmp_path, whole[:-9, [0, 4, 5, 6]], "gyr.csv", names)
+    assert main([*call, str(tmp_path / "short")]) == 2
+    assert "the other files have ended" in capsys.readouterr().err

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fieldcal.core.errors import DeviceError, FieldcalError, InputError
+from fieldcal.core.errors import DeviceError, FieldcalError, InputError, LinkLost
 from fieldcal.core.samples import Block, Grain
 from fieldcal.drivers.driver import Driver, Health, ReadBack
 from fieldcal.drivers.mavlink_log import PlayedMavlinkLog, is_log
@@ -125,6 +125,11 @@ class MavlinkImu(Driver):
         self._reader = Reader(endpoint, connect, patience)
         try:
             self._greet()
+        except LinkLost:
+            # it talked and went: what came is handed out first, then this is met again
+            if not self._early or self._talk.unset:
+                self.close()
+                raise
         except BaseException:
             self.close()
             raise

@@ -22,6 +22,10 @@ from fieldcal.run.operator.protocol import Display
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, PiecedWindow, StillnessLimits
 
+LOOK = 0.5
+"""Device time from one look at a window that fills to the next, s: all of its cells are
+judged anew each time, and nobody reads faster."""
+
 
 class WindowTaking:
     """Windows of one device, one after another.
@@ -116,17 +120,22 @@ class WindowTaking:
         """Take samples until a window is long enough; False if it is to begin again."""
         share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
         watch = WindowWatch(self._driver, hold.seconds, share)
+        looked = -np.inf
         for block in self._incoming.pieces:
             watch.check(block)
             pieces.add(block)
-            if moved := pieces.moved:
-                raise moved
             if self._desk.wish(hold) == "repeat":
                 self._recorder.mark("repeated", position=hold.index)
                 return False
+            full, now = pieces.full(hold.seconds), float(block.t[-1])
+            if not full and now < looked + LOOK:
+                continue
+            looked = now
+            if moved := pieces.moved:
+                raise moved
             self._display.averaging(hold, pieces)
             early = not self._about.sways and pieces.done(hold.sigma)
-            if pieces.full(hold.seconds) or early:
+            if full or early:
                 break
         self._confirm(watch)
         return True

@@ -33,7 +33,7 @@ def dbc(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def same(a: Block, b: Block) -> None:
+def assert_same(a: Block, b: Block) -> None:
     for name in ("t", "acc", "gyr", "temperature", "seq", "t_host"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
@@ -71,7 +71,7 @@ def test_spoilt_streams_give_right_samples_however_they_are_cut(
     cuts = sorted(data.draw(st.lists(st.integers(0, len(rows)), max_size=30)))
     whole, _ = decode(dbc, query, rows)
     pieces, health = decode(dbc, query, rows, cuts)
-    same(whole, pieces)
+    assert_same(whole, pieces)
     if "seq" in query:  # without a counter a lost pair may be taken for one sample
         got = numbers(pieces)
         assert got == sorted(set(got)) and len(got) == health.samples
@@ -220,5 +220,5 @@ def test_frames_of_noise_break_nothing_however_they_are_cut(
     ]
     whole, _ = decode(dbc, query, rows)
     pieces, _ = decode(dbc, query, rows, sorted(cuts))
-    same(whole, pieces)
+    assert_same(whole, pieces)
     assert (np.diff(whole.t) > 0).all()

@@ -42,7 +42,7 @@ def fed(codec: Codec, pieces: list[bytes]) -> Block:
     return concat(block for block in blocks if block is not None)
 
 
-def same(one: Block, other: Block) -> None:
+def assert_same(one: Block, other: Block) -> None:
     np.testing.assert_array_equal(one.six, other.six)
     np.testing.assert_array_equal(one.temperature, other.temperature)
     np.testing.assert_array_equal(one.t, other.t)
@@ -78,7 +78,7 @@ def test_any_pieces_give_the_same(name: str, step: int) -> None:
     stream = FEW[name]
     joined = b"".join(stream.pieces)
     whole, pieces = decoder(name, stream), decoder(name, stream)
-    same(fed(whole, [joined]), fed(pieces, cut(joined, step)))
+    assert_same(fed(whole, [joined]), fed(pieces, cut(joined, step)))
     assert whole.health == pieces.health
 
 
@@ -94,7 +94,7 @@ def test_garbage_between_samples_costs_none(
     pad = bytes(3000)
     step = data.draw(st.integers(1, 300))
     clean = fed(decoder(name, stream), [b"".join(stream.pieces)])
-    same(fed(decoder(name, stream), cut(dirty + pad, step)), clean)
+    assert_same(fed(decoder(name, stream), cut(dirty + pad, step)), clean)
 
 
 @every_format

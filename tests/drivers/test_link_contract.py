@@ -168,7 +168,7 @@ def test_a_minute_at_1_khz_without_a_loss_and_the_truth_in_it(
 ) -> None:
     block, health = heard(name, tmp_path / "truth.json")
     datagrams = "datagrams" in name
-    whole_and_true(block, health, tmp_path / "truth.json", reference, datagrams)
+    assert_whole_and_true(block, health, tmp_path / "truth.json", reference, datagrams)
 
 
 def test_the_same_on_a_bus_of_datagrams(
@@ -183,10 +183,12 @@ def test_the_same_on_a_bus_of_datagrams(
     assert host.stdout and host.stdout.readline() == b"listening\n"
     with device(sent, tmp_path / "truth.json", "5", *namespace):
         block, health = pickle.loads(host.communicate()[0])
-    whole_and_true(block, health, tmp_path / "truth.json", reference, datagrams=True)
+    assert_whole_and_true(
+        block, health, tmp_path / "truth.json", reference, datagrams=True
+    )
 
 
-def whole_and_true(
+def assert_whole_and_true(
     block: Block,
     health: Health,
     file: Path,

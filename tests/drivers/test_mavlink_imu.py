@@ -16,12 +16,17 @@ import pytest
 pytest.importorskip("fastcrc")
 pytest.importorskip("pymavlink")
 
+from can_wires import until_the_end
 from processes import RUN, simulated
+from pymavlink.dialects.v20 import all as dialect
 
 from fieldcal.core.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.mavlink_imu import MavlinkImu
+from fieldcal.sim_device.device import VirtualDevice
+from fieldcal.sim_device.mavlink_packing import HIGHRES, messages
+from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.pty_port import PtyPort
 
 BIAS, SCALE = np.array([0.2, -0.3, 0.1]), np.array([1.006, 0.992, 1.008])
@@ -233,6 +238,28 @@ def test_a_peer_that_closes_is_one_sentence() -> None:
         peer.join()
     with pytest.raises(DeviceError, match="check host and port"):
         open_driver(f"mavlink:tcp:127.0.0.1:{port}")
+
+
+def test_what_came_before_a_peer_closed_is_heard() -> None:
+    """Also if it went before it had answered anything."""
+    block = VirtualDevice(Profile(), seed=2).take(100)
+    packing = dialect.MAVLink(None, 1, 1)
+    said = b"".join(m.pack(packing) for m in messages(dialect, HIGHRES, block))
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+
+        def talk() -> None:
+            call, _ = server.accept()
+            with call:
+                call.sendall(said)
+
+        peer = Thread(target=talk)
+        peer.start()
+        with opened(f"mavlink:tcp:127.0.0.1:{port}?reconnect=0") as imu:
+            heard = until_the_end(imu)
+        peer.join()
+    np.testing.assert_allclose(heard.acc, block.acc, atol=1e-6)
+    assert len(heard) == len(block)
 
 
 def test_a_link_that_comes_back_goes_on_with_a_gap() -> None:

@@ -24,7 +24,7 @@ def imported(path: Path, *more: str) -> Session:
     return Session.open(folder)
 
 
-def same(session: Session, rows: Array) -> None:
+def assert_same(session: Session, rows: Array) -> None:
     np.testing.assert_allclose(session.block.t, rows[:, 0], atol=1e-6)
     np.testing.assert_allclose(session.block.acc, rows[:, 1:4], rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(session.block.gyr, rows[:, 4:], rtol=1e-5, atol=1e-6)
@@ -54,7 +54,7 @@ def test_columns_without_names_are_told_whatever_their_order(
     log = np.column_stack([parts[name] for name in order if name in parts])
     path = write(tmp_path_factory.mktemp("log"), log)
     session = imported(path)
-    same(session, rows)
+    assert_same(session, rows)
     why = session.about.raw["guessed"]["columns"]
     assert "gravity turns" in why and "t" in why.partition(":")[0].split(",")
 
@@ -72,7 +72,7 @@ def test_columns_without_names_are_told_whatever_their_order(
 )  # fmt: skip
 def test_headings_as_they_come_need_no_option(tmp_path: Path, heading: str) -> None:
     rows = turned(2, 50.0)
-    same(imported(write(tmp_path, rows, heading=heading)), rows)
+    assert_same(imported(write(tmp_path, rows, heading=heading)), rows)
 
 
 def test_a_rate_above_the_numbers_is_taken(
@@ -80,7 +80,7 @@ def test_a_rate_above_the_numbers_is_taken(
 ) -> None:
     rows = turned(3, 50.0)
     top = "Fs,50\nLogging Type,0\nax,ay,az,gx,gy,gz"
-    same(imported(write(tmp_path, rows[:, 1:], heading=top)), rows)
+    assert_same(imported(write(tmp_path, rows[:, 1:], heading=top)), rows)
     assert "it says the rate: 'Fs,50'" in capsys.readouterr().err
 
 
@@ -125,7 +125,7 @@ def test_a_heading_that_physics_contradicts_is_asked_about(
     said = capsys.readouterr().err
     assert answer in said and said.count("\n") == 1
     option, unit = answer.split()[:2]
-    same(imported(path, option, unit), rows)
+    assert_same(imported(path, option, unit), rows)
 
 
 def test_accelerations_without_gravity_are_refused(
@@ -156,8 +156,10 @@ def test_several_imus_go_into_folders_of_their_own(tmp_path: Path) -> None:
     n = min(len(rows), len(other))
     path = write(tmp_path, np.hstack([rows[:n], other[:n, 1:]]), heading=heading)
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
-    same(Session.open(tmp_path / "out" / "0"), rows[:n])
-    same(Session.open(tmp_path / "out" / "1"), np.c_[rows[:n, :1], other[:n, 1:]])
+    assert_same(Session.open(tmp_path / "out" / "0"), rows[:n])
+    assert_same(
+        Session.open(tmp_path / "out" / "1"), np.c_[rows[:n, :1], other[:n, 1:]]
+    )
 
 
 @pytest.mark.parametrize("ticks", [1e4, 1e6])
@@ -172,7 +174,7 @@ def test_ticks_of_a_device_are_told_by_the_rate_or_by_their_name(
     heading = f"{name},Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z"
     top = "// Update Rate: 50.0Hz\n" if said else ""
     session = imported(write(tmp_path, log, heading=top + heading))
-    same(session, rows)
+    assert_same(session, rows)
     assert session.about.raw["guessed"]["time"].startswith(
         "0.1ms" if ticks == 1e4 else "us"
     )
@@ -198,7 +200,7 @@ def test_a_clock_of_whole_seconds_is_asked_about_with_its_rate(
     asks = "about 50 rows in each.*add --columns _,ax,ay,az,gx,gy,gz --rate 50"
     assert re.search(asks, capsys.readouterr().err)
     answer = ("--columns", "_,ax,ay,az,gx,gy,gz", "--rate", "50")
-    same(imported(path, *answer), rows)
+    assert_same(imported(path, *answer), rows)
 
 
 def test_axes_without_a_name_beside_gyroscopes_are_asked_about(
@@ -265,7 +267,7 @@ def test_names_are_never_put_over_other_columns(
     path = tmp_path / "log.csv"
     text = "\n".join([heading, *(f"{before}{line}{behind}" for line in lines)])
     path.write_text(text + "\n")
-    same(imported(path), rows)
+    assert_same(imported(path), rows)
 
 
 def test_columns_of_a_text_are_chosen_by_name(
@@ -274,7 +276,7 @@ def test_columns_of_a_text_are_chosen_by_name(
     rows = turned(12, 50.0)
     path = write(tmp_path, rows, heading="clock,u1,u2,u3,v1,v2,v3")
     named = "t=clock,ax=u1,ay=u2,az=u3,gx=v1,gy=v2,gz=v3"
-    same(imported(path, "--columns", named), rows)
+    assert_same(imported(path, "--columns", named), rows)
     out = str(tmp_path / "other")
     wrong = ["--columns", named.replace("u1", "w1"), "-o", out]
     assert main(["import", str(path), *wrong]) == 2

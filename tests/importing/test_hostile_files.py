@@ -20,7 +20,7 @@ from fieldcal.session.folder import mark_line
 NAMES = "t,ax,ay,az,gx,gy,gz"
 
 
-def refused(*arguments: str, capsys: pytest.CaptureFixture[str]) -> str:
+def assert_refused(*arguments: str, capsys: pytest.CaptureFixture[str]) -> str:
     assert main([*arguments]) == 2
     said = capsys.readouterr().err
     assert len(said.strip().splitlines()) == 1
@@ -40,9 +40,9 @@ def test_toml_without_end(
     (tmp_path / "session.toml").write_text(f"format = 1\n{text}\n")
     limits = tmp_path / "limits.toml"
     limits.write_text(text)
-    assert says in refused("solve", str(tmp_path), capsys=capsys)
+    assert says in assert_refused("solve", str(tmp_path), capsys=capsys)
     plan = ["run", "two_position", "--virtual", "--limits", str(limits)]
-    assert says in refused(*plan, "-o", str(tmp_path / "s"), capsys=capsys)
+    assert says in assert_refused(*plan, "-o", str(tmp_path / "s"), capsys=capsys)
 
 
 def table(cells: Mapping[tuple[int, int], str]) -> str:
@@ -82,7 +82,7 @@ def test_tables_of_what_no_sensor_says(
 ) -> None:
     (tmp_path / "log.csv").write_text(table(cells))
     arguments = ("import", str(tmp_path / "log.csv"), "-o", str(tmp_path / "s"))
-    assert says in refused(*arguments, capsys=capsys)
+    assert says in assert_refused(*arguments, capsys=capsys)
     assert not (tmp_path / "s").exists()
 
 
@@ -93,9 +93,9 @@ def test_json_without_end(
     (tmp_path / "session.toml").write_text("format = 1\n")
     (tmp_path / "result.json").write_text(text)
     folder = str(tmp_path)
-    refused("compare", folder, folder, capsys=capsys)
-    refused("export", folder, "--format", "json", capsys=capsys)
-    refused("undo", str(tmp_path / "result.json"), capsys=capsys)
+    assert_refused("compare", folder, folder, capsys=capsys)
+    assert_refused("export", folder, "--format", "json", capsys=capsys)
+    assert_refused("undo", str(tmp_path / "result.json"), capsys=capsys)
 
 
 @pytest.mark.parametrize("bits", ["0|100000", "510|16", "0|16@1- (1e999,0)"])
@@ -115,7 +115,7 @@ def test_a_signal_that_no_frame_holds(
         f'VERSION ""\nBU_: X\nBO_ 256 F: 8 X\n {signal}\nBO_ 257 G: 8 X\n{others}'
     )
     log.write_text("(0.01) can0 100#0011223344556677\n" * 50)
-    refused("import", str(log), "--options", f"dbc={dbc}", capsys=capsys)
+    assert_refused("import", str(log), "--options", f"dbc={dbc}", capsys=capsys)
 
 
 def test_an_empty_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -129,7 +129,7 @@ def test_an_empty_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
             writer.add_message(topic, i, bytes(400), i)
         writer.finish()  # type: ignore[no-untyped-call]
     for repair in ([], ["--repair"]):
-        said = refused("import", str(path), *repair, capsys=capsys)
+        said = assert_refused("import", str(path), *repair, capsys=capsys)
         assert "none of the kind that they are called" in said
 
 
@@ -142,11 +142,11 @@ def test_times_that_no_imu_has(
     path = tmp_path / "quick.csv"
     np.savetxt(path, rows, delimiter=",", fmt="%.18g")
     columns = ["--columns", NAMES, "--time-unit", "s"]
-    assert "no IMU does" in refused("import", str(path), *columns, capsys=capsys)
+    assert "no IMU does" in assert_refused("import", str(path), *columns, capsys=capsys)
     (tmp_path / "session.toml").write_text("format = 1\n")
     header = NAMES + "\n"
     (tmp_path / "samples.csv").write_text(header + path.read_text())
-    assert "--time-unit" in refused("diagnose", str(tmp_path), capsys=capsys)
+    assert "--time-unit" in assert_refused("diagnose", str(tmp_path), capsys=capsys)
 
 
 def test_an_archive_that_unpacks_to_gigabytes(
@@ -160,13 +160,15 @@ def test_an_archive_that_unpacks_to_gigabytes(
             )
             for _ in range(7 * 48 // 8):
                 file.write(bytes(1 << 23))
-    said = refused("import", str(path), "--columns", NAMES, capsys=capsys)
+    said = assert_refused("import", str(path), "--columns", NAMES, capsys=capsys)
     assert "as no recording of a sensor does" in said
 
 
 def test_a_device_is_no_file(capsys: pytest.CaptureFixture[str]) -> None:
     for named in ([], ["--format", "csv_like"]):
-        assert "has no end" in refused("import", "/dev/zero", *named, capsys=capsys)
+        assert "has no end" in assert_refused(
+            "import", "/dev/zero", *named, capsys=capsys
+        )
 
 
 def test_topics_that_differ_in_signs_havefolders_of_of_their_own() -> None:

@@ -54,7 +54,7 @@ def mark(folder: Path, event: str) -> dict[str, Any]:
     return next(m for m in Session.open(folder).marks() if m["event"] == event)
 
 
-def same(found: Block, expected: Block, atol: float = 0.0) -> None:
+def assert_same(found: Block, expected: Block, atol: float = 0.0) -> None:
     np.testing.assert_allclose(
         found.t - found.t[0], expected.t - expected.t[0], atol=1e-6
     )
@@ -70,7 +70,7 @@ def test_px4_sensors_are_kept_apart_with_their_own_calibration(tmp_path: Path) -
     assert main(["import", str(path), "-o", str(out)]) == 0
     for n, block in units.items():
         folder = out / f"sensor_accel.{n}"
-        same(Session.open(folder).block, block)
+        assert_same(Session.open(folder).block, block)
         np.testing.assert_array_equal(
             Session.open(folder).block.temperature, block.temperature
         )
@@ -97,8 +97,8 @@ def test_a_px4_log_in_small_pieces_is_the_same(
     monkeypatch.setattr(recordings.Recording.pieces, "__defaults__", (997,))
     parts = list(open_recording(path, WANTED).blocks("sensor_accel.0"))
     assert len(parts) > 3
-    same(concat(parts), whole)
-    same(whole, imu(1))
+    assert_same(concat(parts), whole)
+    assert_same(whole, imu(1))
 
 
 def test_ardupilot_sensors_and_what_is_installed(
@@ -120,7 +120,7 @@ def test_ardupilot_sensors_and_what_is_installed(
     reader.close()
     for n, block in units.items():
         found = Session.open(out / f"IMU.{n}").block
-        same(found, block)
+        assert_same(found, block)
         np.testing.assert_array_equal(found.temperature, block.temperature)
     np.testing.assert_array_equal(Session.open(out / "IMU.1").block.acc, theirs)
     told = mark(out / "IMU.0", "device")["installed"]
@@ -136,7 +136,7 @@ def test_a_telemetry_log_of_two_sensors(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert main(["import", str(path), "-o", str(out)]) == 0
     for n, block in units.items():
-        same(Session.open(out / f"HIGHRES_IMU.{n}").block, block)
+        assert_same(Session.open(out / f"HIGHRES_IMU.{n}").block, block)
     device = mark(out / "HIGHRES_IMU.0", "device")
     assert device["acc_unit"] == "m/s^2"
     assert device["installed"]["parameters"] == pytest.approx(INSTALLED)
@@ -149,7 +149,7 @@ def test_can_logs(tmp_path: Path, ending: str) -> None:
     (tmp_path / f"drive{ending}").rename(tmp_path / "drive.dat")
     options = f"dbc={tmp_path / 'imu.dbc'}&map={CAN_MAP}"
     found = session(tmp_path / "s", str(tmp_path / "drive.dat"), "--options", options)
-    same(found.block, imu(1), atol=6e-4)
+    assert_same(found.block, imu(1), atol=6e-4)
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_can_logs_of_several_buses_are_never_mixed(
     for bus in (0, 1):
         chosen = f"{options}&channel=can{bus}"
         found = session(tmp_path / f"s{bus}", str(path), "--options", chosen)
-        same(found.block, imu(bus), atol=6e-4)
+        assert_same(found.block, imu(bus), atol=6e-4)
     none = f"{options}&channel=can7"
     assert main(["import", str(path), "--options", none]) == 2
     assert "comes from can7, but from can0, can1" in capsys.readouterr().err
@@ -223,11 +223,11 @@ def test_arrays_of_any_kind(tmp_path: Path, ending: str) -> None:
     arrays(tmp_path / f"log{ending}", imu(1))
     path = tmp_path / "log.data"
     path.write_bytes(gzip.compress((tmp_path / f"log{ending}").read_bytes()))
-    same(session(tmp_path / "s", str(path), "--columns", COLUMNS).block, imu(1))
+    assert_same(session(tmp_path / "s", str(path), "--columns", COLUMNS).block, imu(1))
     name = {".npy": "array", ".h5": "group/imu"}.get(ending, "imu")
     named = [f"{c}={name}.{i}" for i, c in enumerate(COLUMNS.split(","))]
     again = session(tmp_path / "n", str(path), "--columns", ",".join(named))
-    same(again.block, imu(1))
+    assert_same(again.block, imu(1))
 
 
 @pytest.mark.parametrize("kind", ["parquet", "stream", "feather"])
@@ -245,7 +245,7 @@ def test_tables_with_named_columns(tmp_path: Path, kind: str) -> None:
         with new(path, made.schema) as writer:
             writer.write_table(made)
     columns = "t=time,ax=acc_x,ay=acc_y,az=acc_z,gx,gy,gz"
-    same(session(tmp_path / "s", str(path), "--columns", columns).block, imu(1))
+    assert_same(session(tmp_path / "s", str(path), "--columns", columns).block, imu(1))
 
 
 def test_files_of_one_imu_are_joined_where_their_times_agree(
@@ -332,7 +332,7 @@ def test_what_is_in_a_file_is_listed_and_chosen(
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("\t")[1] for line in lines] == ["IMU.0", "IMU.2"]
     assert all("m/s^2" in line for line in lines)
-    same(session(tmp_path / "s", str(path), "--instance", "IMU.2").block, imu(2))
+    assert_same(session(tmp_path / "s", str(path), "--instance", "IMU.2").block, imu(2))
     call = ["import", str(path), "--instance", "IMU.1", "-o", str(tmp_path / "x")]
     assert main(call) == 2
     assert "has no IMU.1; there are IMU.0, IMU.2" in capsys.readouterr().err
@@ -469,7 +469,7 @@ def test_flags_of_a_px4_log_that_end_too_early_are_read_as_far_as_they_go(
     flags = struct.pack("<HB", 25, ord("B")) + bytes(25)
     path = tmp_path / "log.ulg"
     path.write_bytes(data[:16] + flags + data[16:])
-    same(whole(path, ReadOptions()), imu(1, 40))
+    assert_same(whole(path, ReadOptions()), imu(1, 40))
 
 
 def test_every_format_is_tried() -> None:
@@ -529,7 +529,7 @@ def test_bytes_of_a_port_are_named_by_their_wire_format(
     call = [str(path), "--rate", "100"]
     named = session(tmp_path / "a", *call, "--format", "witmotion").block
     found = session(tmp_path / "b", *call).block
-    same(named, found)
+    assert_same(named, found)
     assert len(named) >= 59
     np.testing.assert_allclose(named.acc[:, 2], 9.8, atol=0.02)
     assert main(["import", str(path), "--format", "morse"]) == 2

@@ -195,7 +195,7 @@ def imported(path: Path, *more: str) -> Path:
     return folder
 
 
-def same(folder: Path, per_row: float = 0.02, tolerance: float = 1e-3) -> None:
+def assert_same(folder: Path, per_row: float = 0.02, tolerance: float = 1e-3) -> None:
     block = Session.open(folder).block
     n = len(block)
     # the last of two sensors in turn may be alone
@@ -209,7 +209,7 @@ def same(folder: Path, per_row: float = 0.02, tolerance: float = 1e-3) -> None:
 def test_a_form_is_read_with_nothing_said(tmp_path: Path, name: str) -> None:
     path = tmp_path / "log.txt"
     path.write_text(FORMS[name]() + "\n", encoding="utf-8")
-    same(imported(path))
+    assert_same(imported(path))
 
 
 def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
@@ -221,7 +221,7 @@ def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
             rows.append(",".join(f"{x:.8g}" for x in own))
     path.write_text("\n".join(rows) + "\n")
     folder = imported(path)
-    same(folder / "0")
+    assert_same(folder / "0")
     other = Session.open(folder / "1").block
     np.testing.assert_allclose(other.acc[:, 2], A[:, 2] + 1, atol=1e-5)
 
@@ -255,7 +255,7 @@ def test_a_workbook_is_read(tmp_path: Path) -> None:
         *(f"Gyro {x} (dps)" for x in "XYZ"),
     ]
     write_workbook(path, [names, *np.column_stack([T, A / G, DEG]).tolist()])
-    same(imported(path))
+    assert_same(imported(path))
 
 
 @pytest.mark.parametrize("version", ["v7", "v7.3"])
@@ -268,7 +268,7 @@ def test_a_timetable_is_read(tmp_path: Path, version: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         matio.save_to_mat(str(path), {"imu": frame}, version=version)
-    same(imported(path))
+    assert_same(imported(path))
 
 
 def test_a_folder_of_oxts_samples_is_read(tmp_path: Path) -> None:
@@ -279,7 +279,7 @@ def test_a_folder_of_oxts_samples_is_read(tmp_path: Path) -> None:
     for i, (a, w) in enumerate(zip(A.tolist(), W.tolist(), strict=True)):
         row = [49.0, 8.4, 112.8, *[0.0] * 8, *a, *a, *w, *w, 0.5, 0.1, 4, 10, 4, 4, 0]
         (folder / "data" / f"{i:010}.txt").write_text(" ".join(map(str, row)))
-    same(imported(folder))
+    assert_same(imported(folder))
     (folder / "data" / "0000000000.txt").unlink()
     out = tmp_path / "again"
     assert main(["import", str(folder), "-o", str(out)]) == 2

@@ -35,7 +35,9 @@ def plan(**run: Any) -> dict[str, Any]:
 
 
 def test_the_schema_is_one() -> None:
-    Draft202012Validator.check_schema(plan_file.schema())
+    schema = plan_file.schema()
+    Draft202012Validator.check_schema(schema)
+    assert set(schema["required"]) <= set(schema["properties"])
 
 
 def test_a_whole_plan_is_taken() -> None:

@@ -46,7 +46,7 @@ def fill(stick: Path, left: int = 0) -> None:
     (stick / "fill").write_bytes(bytes(max(0, free - left)))
 
 
-def refused(
+def assert_refused(
     stick: Path, capsys: pytest.CaptureFixture[str], *call: str, left: str = ""
 ) -> None:
     """The command ends with one sentence, and leaves but what is named."""
@@ -75,8 +75,8 @@ def test_nothing_half_written_is_left(
     text = str(tmp_path / "x.csv")
     wanted = ["--columns", "_,ax,ay,az,gx,gy,gz", "--rate", "100"]
     wanted += ["--acc-unit", "m/s^2", "--gyr-unit", "rad/s"]
-    refused(stick, capsys, "import", text, *wanted, "-o", there)
-    refused(stick, capsys, "report", str(source), "-o", f"{there}.html")
+    assert_refused(stick, capsys, "import", text, *wanted, "-o", there)
+    assert_refused(stick, capsys, "report", str(source), "-o", f"{there}.html")
 
 
 def test_results_are_written_whole_or_not_at_all(
@@ -93,9 +93,9 @@ def test_results_are_written_whole_or_not_at_all(
     fill(stick)
     for kind in ("ardupilot", "json", "mcap"):
         out = str(stick / f"new.{kind}")
-        refused(stick, capsys, "export", str(copy), "--format", kind, "-o", out)
+        assert_refused(stick, capsys, "export", str(copy), "--format", kind, "-o", out)
     for ending in (".csv", ".csv.gz", ".parquet"):
-        refused(stick, capsys, "apply", str(copy), str(stick / f"new{ending}"))
+        assert_refused(stick, capsys, "apply", str(copy), str(stick / f"new{ending}"))
 
 
 def test_a_run_keeps_what_found_room(
@@ -103,10 +103,10 @@ def test_a_run_keeps_what_found_room(
 ) -> None:
     call = ("run", "two_position", "--virtual", "--speed", "20", "--headless", "-o")
     fill(stick)
-    refused(stick, capsys, *call, str(stick / "run"))
+    assert_refused(stick, capsys, *call, str(stick / "run"))
     (stick / "fill").unlink()
     fill(stick, 100_000)
-    refused(stick, capsys, *call, str(stick / "run"), left="run")
+    assert_refused(stick, capsys, *call, str(stick / "run"), left="run")
     kept = Session.open(stick / "run").block
     assert len(kept) > 300 and (np.diff(kept.t) > 0).all()
     says = [finding for finding in findings(stick / "run")]

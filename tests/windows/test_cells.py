@@ -112,7 +112,7 @@ def test_nothing_yet_is_an_empty_table() -> None:
     assert len(nothing.take_complete()) == 0
 
 
-def same(one: CellTable, other: CellTable) -> None:
+def assert_same(one: CellTable, other: CellTable) -> None:
     np.testing.assert_allclose(one.times, other.times, rtol=1e-12)
     np.testing.assert_allclose(one.sums, other.sums, rtol=1e-9, atol=1e-12)
     np.testing.assert_array_equal(one.origin, other.origin)
@@ -126,7 +126,7 @@ def test_how_samples_come_does_not_matter(cuts: list[int], seed: int) -> None:
     pieces = Cells()
     for a, b in zip(edges, edges[1:], strict=False):
         pieces.add(samples[a:b])
-    same(pieces.table, filled(samples).table)
+    assert_same(pieces.table, filled(samples).table)
     assert pieces.n == len(samples)
 
 
@@ -136,7 +136,7 @@ def test_long_blocks_are_summed_in_parts_and_short_ones_added_up(
     samples = block(1000)
     whole = filled(samples).table
     monkeypatch.setattr(cells, "_CHUNK", 17)
-    same(filled(samples).table, whole)
+    assert_same(filled(samples).table, whole)
 
 
 def test_cells_are_handed_over_once_and_the_last_is_kept() -> None:
@@ -150,7 +150,7 @@ def test_cells_are_handed_over_once_and_the_last_is_kept() -> None:
     tables = [*taken, made.table]
     times = np.concatenate([table.times for table in tables])
     sums = np.vstack([table.sums for table in tables])
-    same(CellTable(times, sums, whole.origin), whole)
+    assert_same(CellTable(times, sums, whole.origin), whole)
 
 
 def test_a_time_that_misses_its_edge_by_rounding_lies_in_its_cell() -> None:

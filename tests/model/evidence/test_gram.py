@@ -15,7 +15,7 @@ FREE = pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
 SEEDS = pytest.mark.parametrize("seed", range(4))
 
 
-def agree(found: Array, expected: Array) -> None:
+def assert_agree(found: Array, expected: Array) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
 
 
@@ -29,14 +29,14 @@ def test_information_is_that_of_the_rows(seed: int, free: tuple[int, ...]) -> No
     one = case(seed, free)
     rows, every = one.gram.weighed(TAU), np.arange(WIDTH)
     inner, pull = one.dense.information()
-    agree(rows.matrix(every, every), inner[:WIDTH, :WIDTH])
-    agree(rows.matrix(SET, None), inner[SET])
-    agree(rows.pull(SET), pull[SET])
-    agree(rows.pull(None), pull)
+    assert_agree(rows.matrix(every, every), inner[:WIDTH, :WIDTH])
+    assert_agree(rows.matrix(SET, None), inner[SET])
+    assert_agree(rows.pull(SET), pull[SET])
+    assert_agree(rows.pull(None), pull)
     blocks = [np.array([[0, 1], [5, 2]]), np.array([[8]])]
     for at, found in zip(blocks, rows.diagonals(blocks), strict=True):
         for block, there in zip(at, found, strict=True):
-            agree(there, inner[np.ix_(block, block)])
+            assert_agree(there, inner[np.ix_(block, block)])
 
 
 @SEEDS
@@ -66,7 +66,7 @@ def test_each_mean_has_the_information_that_the_rest_of_its_window_leaves(
         spread = one.shared[p] ** 2 + TAU[one.kind[p]] ** 2
         spread += one.bent[p] ** 2 @ TAU[:6] ** 2
         cov += np.diag(1 / one.info[p][there] + spread[there])
-        agree(weight[there], np.diag(np.linalg.inv(cov)))
+        assert_agree(weight[there], np.diag(np.linalg.inv(cov)))
         assert not weight[~there].any()
 
 
@@ -79,8 +79,8 @@ def test_evidence_and_estimates_are_those_of_least_squares(
     found = Eliminated.of(one.gram.weighed(TAU), SET, WIDE)
     assert found.score == pytest.approx(one.dense.evidence(SET, WIDE), rel=1e-9)
     mean, cov = one.dense.posterior(SET, WIDE)
-    agree(found.estimate, mean)
-    agree(found.inverse, cov)
+    assert_agree(found.estimate, mean)
+    assert_agree(found.inverse, cov)
 
 
 @SEEDS
@@ -89,7 +89,7 @@ def test_a_column_that_two_causes_have_may_stand_there_twice(seed: int) -> None:
     twice, wide = np.array([0, 3, 3]), np.array([0.7, 0.4, 1.5])
     found = Eliminated.of(one.gram.weighed(TAU), twice, wide)
     assert found.score == pytest.approx(one.dense.evidence(twice, wide), rel=1e-9)
-    agree(found.estimate, one.dense.posterior(twice, wide)[0])
+    assert_agree(found.estimate, one.dense.posterior(twice, wide)[0])
 
 
 def test_with_nothing_in_it_the_evidence_is_that_of_the_noise() -> None:

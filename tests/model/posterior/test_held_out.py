@@ -105,7 +105,7 @@ def _with(cause: Cause, group: Group) -> Cause:
     return replace(cause, variants=(group, *cause.variants[1:]))
 
 
-def agree(found: Array, expected: Array) -> None:
+def assert_agree(found: Array, expected: Array) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9)
 
 
@@ -126,7 +126,7 @@ def test_residuals_are_those_of_a_refit_without_the_position(
         at = one.dictionary.small_rotation + 2 * p + np.arange(2)
         value[at] = one.fitted.values[at]
         expected = one.dense.y - one.dense.design @ value
-        agree(found[left], expected.reshape(ROWS, 6)[left])
+        assert_agree(found[left], expected.reshape(ROWS, 6)[left])
 
 
 @SETS
@@ -180,7 +180,7 @@ def test_a_positions_own_angles_are_sought_in_it(free: tuple[int, ...]) -> None:
         if wide.any():
             turned, _ = own.posterior(at, wide)
             rest = rest - one.dense.design[:, at] @ turned
-        agree(found[left], rest.reshape(ROWS, 6)[left])
+        assert_agree(found[left], rest.reshape(ROWS, 6)[left])
 
 
 def test_sets_are_chosen_again() -> None:
@@ -230,7 +230,7 @@ def test_residuals_of_what_is_fitted_are_those_of_a_dense_fit(
         value[at] += priors.SMALL_ROTATION**2 * one.dense.design[:, at].T @ back
     np.testing.assert_allclose(whole(state, d), value, rtol=1e-5, atol=1e-9)
     rest = (one.dense.y - one.dense.design @ value).reshape(ROWS, 6)
-    agree(one.fitted.residual(), rest)
+    assert_agree(one.fitted.residual(), rest)
 
 
 def test_squares_are_those_of_the_covariance() -> None:

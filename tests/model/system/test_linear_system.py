@@ -91,7 +91,7 @@ class Columns:
             seen = part.design / part.weight[:, None]
             self.table[part.rows[:, None], part.channel, part.columns] = seen
 
-    def agree(self, column: int, numerical: Array, step: float) -> None:
+    def assert_agree(self, column: int, numerical: Array, step: float) -> None:
         """As well as differences of outputs can tell, `step` apart."""
         found = self.table[:, :, column]
         size = np.abs(output(self.dictionary, self.state)).max(axis=0)
@@ -125,7 +125,9 @@ def test_columns_of_an_effect_are_what_its_parameters_change(
             for j, column in enumerate(group.columns.tolist()):
                 step = small * effect.params[group.params[j]].typical
                 up, down = (with_more(one.state, group, j, s) for s in (step, -step))
-                one.agree(column, derivative(one.dictionary, up, down, step), step)
+                one.assert_agree(
+                    column, derivative(one.dictionary, up, down, step), step
+                )
                 checked += 1
     assert checked
 
@@ -138,7 +140,7 @@ def test_what_moves_the_force_moves_what_is_coupled_to_it(name: str) -> None:
     group = cause.variants[0]
     for j, column in enumerate(group.columns.tolist()):
         up, down = (with_more(one.state, group, j, s) for s in (1e-5, -1e-5))
-        one.agree(column, derivative(one.dictionary, up, down, 1e-5), 1e-5)
+        one.assert_agree(column, derivative(one.dictionary, up, down, 1e-5), 1e-5)
 
 
 @everywhere
@@ -151,7 +153,7 @@ def test_columns_of_bias_and_scale_are_what_these_change(one: Columns) -> None:
                 replace(state, **{name: getattr(state, name) + s})
                 for s in (step, -step)
             )
-            one.agree(first + c, derivative(d, up, down, 1e-3), 1e-3)
+            one.assert_agree(first + c, derivative(d, up, down, 1e-3), 1e-3)
 
 
 @everywhere
@@ -167,7 +169,7 @@ def test_columns_of_turns_are_what_these_change(one: Columns) -> None:
                 for s in (step, -step)
             )
             turned = derivative(d, up, down, 1e-4)
-            one.agree(d.small_rotation + 2 * p + joint, turned, 1e-4)
+            one.assert_agree(d.small_rotation + 2 * p + joint, turned, 1e-4)
 
 
 @everywhere
@@ -177,7 +179,7 @@ def test_columns_of_the_earths_rate_are_what_it_changes(one: Columns) -> None:
     for axis in range(3 if d.earth >= 0 else 0):
         step = 1e-5 * np.eye(3)[axis]
         up, down = (replace(state, earth=state.earth + s) for s in (step, -step))
-        one.agree(d.earth + axis, derivative(d, up, down, 1e-5), 1e-5)
+        one.assert_agree(d.earth + axis, derivative(d, up, down, 1e-5), 1e-5)
 
 
 def test_of_some_columns_the_rest_is_left_out() -> None:

@@ -269,7 +269,7 @@ def _fault(
         sigmas={"at_s": 0.05 + 1 / rate, "for_s": 0.1 + 1 / rate},
         from_s=at,
         to_s=at + length,
-        rows=np.arange(max(start, start + a - margin), start + b + margin),
+        rows=start + np.arange(max(a - margin, 0), min(b + margin, len(z))),
         size=float(np.abs(z[a:b, worst]).max() * recording.noise[worst]),
         sigma=float(np.abs(z[a:b, worst]).max()),
         channels=tuple(np.array(CHANNELS)[np.abs(z[a:b]).max(axis=0) > LARGEST]),

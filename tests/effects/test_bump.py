@@ -1,0 +1,39 @@
+"""Bumps at the very ends of windows, and of a recording."""
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.diagnosis.signal.chain import check
+from fieldcal.session.description import parse
+
+HZ, N, G = 50.0, 1000, 9.8
+
+
+def touched(at: int, many: int = 8) -> tuple[Array, list[Array]]:
+    """What is usable, (n,), and the rows masked of a recording touched from a row on."""
+    rng = np.random.default_rng(4)
+    t = np.arange(N) / HZ
+    acc = np.array([0.0, -G, 0.0]) + rng.normal(0, 0.01, (N, 3))
+    acc[at : at + many, 0] += 0.4 * np.resize([1, -1], len(acc[at : at + many]))
+    block = Block.of(t, acc, rng.normal(0, 1e-3, (N, 3)))
+    windows = [{"start_s": 0.0, "end_s": 9.99}, {"start_s": 9.99, "end_s": 20.0}]
+    held = [{"alpha_deg": 0.0, "beta_deg": 0.0, **w} for w in windows]
+    site = {"gravity": G, "latitude_deg": 50.0}
+    about = parse({"format": 1, "site": site, "position": held})
+    checked = check(block, about)
+    rows = [fault.rows for name, fault in checked.faults if name == "bump"]
+    return checked.usable.all(axis=1), rows
+
+
+@pytest.mark.parametrize("at", [0, 3, 492, 500, 700, N - 8, N - 4])
+def test_a_bump_is_masked_within_its_own_window(at: int) -> None:
+    usable, rows = touched(at)
+    (masked,) = rows
+    bumped = np.arange(at, min(at + 8, N))
+    first, last = (0, 500) if at < 500 else (500, N)
+    assert set(bumped) <= set(masked) and first <= masked.min() <= masked.max() < last
+    # a fifth of a second on either side goes with it
+    assert masked.min() == max(at - 10, first)
+    assert masked.max() == min(bumped[-1] + 10, last - 1)
+    np.testing.assert_array_equal(np.flatnonzero(~usable), masked)

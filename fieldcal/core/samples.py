@@ -154,3 +154,14 @@ def pieces(block: Block, seconds: float) -> Iterator[Block]:
     for first, last in pairwise(rows):
         if last > first:
             yield block[first:last]
+
+
+def runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """First and one past the last of each run of True, (m, 2).
+
+    >>> runs(np.array([False, True, True, False, True])).tolist()
+    [[1, 3], [4, 5]]
+    """
+    padded = np.concatenate([[False], flags, [False]]).astype(np.int8)
+    steps = np.diff(padded)
+    return np.column_stack([np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)])

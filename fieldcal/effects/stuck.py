@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, runs
 from fieldcal.physics.effect import Chain
-from fieldcal.physics.recording import CheckedSamples, Fault, grids_of, runs
+from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
 from fieldcal.physics.shape import Shape
 
 ODDS = 1e-6

@@ -24,9 +24,15 @@ from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
 from fieldcal.session.lock import SessionLock
 from fieldcal.windows.cells import Cells
+from fieldcal.windows.jumps import Jumps
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.stretch_ends import reasons
 from fieldcal.windows.stretches import still_stretches_of_file, summary, why_none
+
+ONLY_RESTS = (
+    "it has no times and turns within no row, so only its rests were recorded, and each"
+    " stretch between two jumps is taken for a position"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,13 +141,15 @@ def _fill(
     import tomlkit
 
     judge = RowValidator(str(recording.path), recording.place, recording.repair)
-    facts, cells, clock = StreamFacts(), Cells(), SteadyClock()
+    facts, cells, clock, jumps = StreamFacts(), Cells(), SteadyClock(), Jumps()
     with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
         for block in _steadied(clock, recording.blocks(stream)):
             good = judge.good(block)
             if len(good):
                 facts.add(good)
                 cells.add(without_spikes(good))
+                if recording.wanted.rate_hz:
+                    jumps.add(good)
                 rows.add(summary(cells.take_complete()))
                 written.add(good)
         if not facts.rows:
@@ -157,10 +165,15 @@ def _fill(
         written.close()
         rest = cells.table
         rows.add(summary(rest))
-        stretches = still_stretches_of_file(rows, rest.origin, written.between, still)
+        held = jumps.positions if still < np.inf else []
+        stretches = held or still_stretches_of_file(
+            rows, rest.origin, written.between, still
+        )
         why = "" if stretches or still == np.inf else why_none(rows, rest.origin)
         ends = reasons(rows, rest.origin, stretches)
         rests = np.array([_mean_of(written.between(*span)) for span in stretches])
+    if held:
+        recording.says.append(f"{ONLY_RESTS}: it jumps {len(held) - 1} times")
     repairs = [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
     # an empty list would be in the way of the tables that the user adds

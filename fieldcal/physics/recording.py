@@ -102,17 +102,6 @@ class Fault:
     channels: tuple[str, ...] = ()
 
 
-def runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """First and one past the last of each run of True, (m, 2).
-
-    >>> runs(np.array([False, True, True, False, True])).tolist()
-    [[1, 3], [4, 5]]
-    """
-    padded = np.concatenate([[False], flags, [False]]).astype(np.int8)
-    steps = np.diff(padded)
-    return np.column_stack([np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)])
-
-
 def medians(values: Array) -> Array:
     """Median of what is known in each row, (n,); nan where nothing is.
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, runs
 from fieldcal.windows.cells import CELL, CellTable, hold_last
 
 SPAN = 10
@@ -44,8 +44,6 @@ _PAUSE = 5.0
 
 _RATE = 0.02
 """Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
-
-Runs = list[tuple[int, int]]
 
 Spans = tuple[int, Array, Array]
 """First of some spans, the spread and the mean of each, (k, 6)."""
@@ -155,7 +153,7 @@ def at_rest(rows: CellRows, bound: Array) -> list[RestRun]:
         own = np.maximum(np.quantile(spread, 0.3, axis=0), quiet)
         own = np.maximum(own, usual.flips / _OWN)
         own = np.where(own > 0, own, np.inf)
-        for a, b in _runs((spread < _OWN * own).all(axis=1)):
+        for a, b in runs(np.all(spread < _OWN * own, axis=1)):
             rate = np.median(level[a:b, 3:], axis=0)
             kept.append(RestRun(first + a, first + b, rate))
     if not kept:
@@ -174,7 +172,7 @@ def _calm(spans: Iterable[Spans], bound: Array) -> Iterator[Spans]:
     waiting: list[tuple[Array, Array]] = []
     began = length = 0
     for first, spread, level in spans:
-        for a, b in _runs((spread < bound).all(axis=1)):
+        for a, b in runs(np.all(spread < bound, axis=1)):
             goes_on = began + length == first + a and length + b - a <= _LONGEST
             if waiting and not goes_on:
                 yield began, *_joined(waiting)
@@ -211,8 +209,3 @@ def _valley(ratio: Array) -> float:
     between = n * (len(logs) - n) * (above - below) ** 2
     k = int(np.argmax(between))
     return float(np.exp((below[k] + above[k]) / 2))
-
-
-def _runs(flags: Any) -> Runs:
-    edges = np.flatnonzero(np.diff(flags.astype(int), prepend=0, append=0))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

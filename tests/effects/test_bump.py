@@ -2,16 +2,18 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.chain import check
+from fieldcal.physics.recording import Rows
 from fieldcal.session.description import parse
 
 HZ, N, G = 50.0, 1000, 9.8
 
 
-def touched(at: int, many: int = 8) -> tuple[Array, list[Array]]:
-    """What is usable, (n,), and the rows masked of a recording touched from a row on."""
+def touched(at: int, many: int = 8) -> tuple[NDArray[np.bool_], list[Rows]]:
+    """What is usable, (n,), and the rows masked, of a recording touched from a row."""
     rng = np.random.default_rng(4)
     t = np.arange(N) / HZ
     acc = np.array([0.0, -G, 0.0]) + rng.normal(0, 0.01, (N, 3))
@@ -23,7 +25,8 @@ def touched(at: int, many: int = 8) -> tuple[Array, list[Array]]:
     about = parse({"format": 1, "site": site, "position": held})
     checked = check(block, about)
     rows = [fault.rows for name, fault in checked.faults if name == "bump"]
-    return checked.usable.all(axis=1), rows
+    usable: NDArray[np.bool_] = np.all(checked.usable, axis=1)
+    return usable, rows
 
 
 @pytest.mark.parametrize("at", [0, 3, 492, 500, 700, N - 8, N - 4])

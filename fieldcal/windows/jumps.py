@@ -1,0 +1,124 @@
+"""Positions of a recording that holds rests alone: its rows jump from one to the next.
+
+    d_i = |median(x_i .. x_(i+4)) - median(x_(i-5) .. x_(i-1))| > 8 s               (1)
+
+s is the noise of a row. A single wild row moves no median. At a jump between two rows
+(1) holds at five rows, or six with a wild one beside it; at a turn that was recorded it
+holds at more. At rest the first and the last median of a position differ by less.
+Whoever presses a key at each position, and takes a hundred rows then, leaves such a
+recording.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array, Block, concat
+
+HALF = 5
+"""Rows of a median in (1)."""
+
+FAR = 8.0
+"""Times the noise of a row that a jump is at least."""
+
+FEWEST_ROWS, FEWEST = 20, 3
+"""Rows of a position, and positions, that tell such a recording from another."""
+
+MOSTLY = 0.95
+"""Part of the changes that are jumps, and of the positions that rest: a hand errs."""
+
+DEVIATION = 1.4826
+"""Standard deviation in a median of absolute values."""
+
+
+class Change(NamedTuple):
+    """Rows where (1) holds, one after another.
+
+    Attributes
+    ----------
+    row, time : of each, (k,)
+    before, after : the medians about it, (k, 3) m/s^2
+
+    """
+
+    row: NDArray[np.intp]
+    time: Array
+    before: Array
+    after: Array
+
+
+class Jumps:
+    """Finds where the rows of a recording jump, block by block."""
+
+    def __init__(self) -> None:
+        self._held = concat([])
+        self._rows = 0
+        self._size = np.full(3, np.nan)
+        self._changes: list[Change] = []
+        self._begin = self._end = (np.nan, np.full(3, np.nan))
+
+    def add(self, block: Block) -> None:
+        """Take in the block that follows."""
+        if not len(block):
+            return
+        if np.isnan(self._size).any():
+            self._size = FAR * _noise(block.acc)
+        self._rows += len(block)
+        block = concat([self._held, block])
+        self._held = block[max(len(block) - 2 * HALF + 1, 0) :]
+        if len(block) < 2 * HALF:
+            return
+        view = np.lib.stride_tricks.sliding_window_view(block.acc, HALF, axis=0)
+        middle = np.median(view, axis=-1)
+        if np.isnan(self._begin[0]):
+            self._begin = float(block.t[0]), middle[0]
+        self._end = float(block.t[-1]), middle[-1]
+        before, after = middle[:-HALF], middle[HALF:]
+        far: NDArray[np.bool_] = np.any(np.abs(after - before) > self._size, axis=1)
+        at = np.flatnonzero(far)  # (1)
+        row = at + HALF + self._rows - len(block)
+        self._changes.append(Change(row, block.t[at + HALF], before[at], after[at]))
+
+    @property
+    def positions(self) -> list[tuple[float, float]]:
+        """Start and end of each position, s; none if the rows do not rest and jump."""
+        if not self._changes:
+            return []
+        some = Change(*map(np.concatenate, zip(*self._changes, strict=True)))
+        if not len(some.row):
+            return []
+        parts = np.flatnonzero(np.diff(some.row) > 1) + 1
+        first, last = np.append(0, parts), np.append(parts, len(some.row)) - 1
+        if np.mean(last - first <= HALF) < MOSTLY:
+            return []
+        begins = np.vstack([self._begin[1], some.after[last]])
+        closes = np.vstack([some.before[first], self._end[1]])
+        rests = (np.abs(closes - begins) <= self._size).all(axis=1)
+        middle = (first + last) // 2
+        return self._spans(some.row[middle], some.time[middle], rests)
+
+    def _spans(
+        self, row: NDArray[np.intp], time: Array, rests: NDArray[np.bool_]
+    ) -> list[tuple[float, float]]:
+        """Start and end of each position, s, of which the next begin there."""
+        rows = np.diff(np.concatenate([[0], row, [self._rows]]))
+        long = rows >= FEWEST_ROWS
+        if long.sum() < FEWEST or rests[long].mean() < MOSTLY:
+            return []
+        starts = np.append(self._begin[0], time)
+        ends = np.append(time, self._end[0])
+        # a position ends with the last row before the next
+        ends[:-1] -= ((ends - starts) / rows)[:-1]
+        return list(zip(starts[long].tolist(), ends[long].tolist(), strict=True))
+
+
+def _noise(acc: Array) -> Array:
+    """Standard deviation of a row by those beside it, (3,); of coarse ones a step."""
+    step = np.abs(np.diff(acc, axis=0))
+    usual = DEVIATION * np.nanmedian(step, axis=0) / np.sqrt(2)
+    least = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
+    noise: Array = np.maximum(usual, np.where(np.isfinite(least), least, 0.0))
+    return noise

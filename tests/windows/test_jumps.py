@@ -1,0 +1,94 @@
+"""Recordings of rests alone, told by how rows go from one position to the next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from laid_about import G, turned, write
+
+from fieldcal.cli import main
+from fieldcal.core.samples import Array, Block
+from fieldcal.session.folder import Session
+from fieldcal.windows.jumps import Jumps
+
+HZ, NOISE = 50.0, 0.012
+
+
+def rests(seed: int, lengths: list[int], wild: float = 0.0) -> Array:
+    """Rows (n, 3) of a device laid down so often, for so many rows, with wild rows."""
+    rng = np.random.default_rng(seed)
+    up = rng.normal(size=(len(lengths), 3))
+    up *= G / np.linalg.norm(up, axis=1, keepdims=True)
+    acc = np.repeat(up, lengths, axis=0) + [0.3, -0.2, 0.4]
+    acc += rng.normal(0, NOISE, acc.shape)
+    hit = rng.random(len(acc)) < wild
+    acc[hit, 1] += 0.15 * rng.choice([-1, 1], hit.sum())
+    return acc
+
+
+def found(acc: Array, cut: int = 10**9) -> list[tuple[float, float]]:
+    """Positions of rows that come in blocks of so many."""
+    jumps, t = Jumps(), np.arange(len(acc)) / HZ
+    for first in range(0, len(acc), cut):
+        some = slice(first, first + cut)
+        jumps.add(Block.of(t[some], acc[some]))
+    return jumps.positions
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_every_rest_is_a_position_from_its_first_row_to_its_last(seed: int) -> None:
+    lengths = np.random.default_rng(seed).integers(20, 200, 30).tolist()
+    ends = np.cumsum(lengths)
+    spans = np.column_stack([ends - lengths, ends - 1]) / HZ
+    np.testing.assert_allclose(found(rests(seed, lengths)), spans)
+    # a wild row now and then is none that was laid down for itself
+    near = found(rests(seed, lengths, wild=0.01))
+    assert len(near) == len(spans)
+    assert np.abs(near - spans).max() <= 1.5 / HZ
+
+
+@settings(max_examples=25, deadline=None)
+@given(cut=st.integers(1, 300), seed=st.integers(0, 50))
+def test_it_is_no_matter_how_the_rows_are_cut(cut: int, seed: int) -> None:
+    acc = rests(seed, [60, 33, 100, 45])
+    # what a row's noise is, the first block tells
+    first = 50
+    jumps, t = Jumps(), np.arange(len(acc)) / HZ
+    jumps.add(Block.of(t[:first], acc[:first]))
+    for a in range(first, len(acc), cut):
+        jumps.add(Block.of(t[a : a + cut], acc[a : a + cut]))
+    assert jumps.positions == found(acc)
+
+
+def test_what_was_recorded_while_it_turned_is_no_such_recording() -> None:
+    assert found(turned(3, HZ)[:, 1:4]) == []
+    angle = np.deg2rad(0.85 * np.arange(2000))
+    noise = np.random.default_rng(1).normal(0, NOISE, (2000, 3))
+    slow = G * np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)]) + noise
+    assert found(slow) == []
+    assert found(noise + [0, 0, G]) == [] and found(slow[:6]) == []
+    # two positions are too few to tell it from a device that was knocked over
+    assert found(rests(4, [100, 100])) == []
+    # a coarse output flips between two steps
+    coarse = np.round((noise + [0.1, 0.2, G]) / 0.04) * 0.04
+    assert found(coarse) == []
+
+
+def test_a_log_of_rests_without_times_needs_no_more_than_its_rate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    acc = rests(5, [100] * 24) / G
+    path = write(tmp_path, acc, heading="ax,ay,az")
+    assert main(["import", str(path), "-o", str(tmp_path / "s"), "--rate", "100"]) == 0
+    assert "only its rests were recorded" in capsys.readouterr().err
+    made = Session.open(tmp_path / "s")
+    assert len(made.about.positions) == 24
+    # with times of their own the pauses between the rests would show
+    timed = np.column_stack([np.arange(len(acc)) / 100, acc])
+    path = write(tmp_path, timed, "timed.csv", "t (s),ax,ay,az")
+    assert main(["import", str(path), "-o", str(tmp_path / "timed")]) == 0
+    assert "only its rests" not in capsys.readouterr().err

@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="leave out bad rows and what is damaged or cut off, and say which",
     )
-    add("--join", action="store_true", help="FILEs hold channels of one IMU, same rows")
+    add("--join", action="store_true", help="FILEs hold channels of one IMU, same time")
     add(
         "--in-order",
         action="store_true",

@@ -196,7 +196,7 @@ def axis_alone(words: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
     None where any other word is there.
     """
     label = tuple(w for w in words if w in (*MEAN, *SCATTER, *REFERENCE))
-    rest = [w for w in words if w not in label]
+    rest = [w for w in words if w not in (*label, "axis")]
     return (rest[0], label) if rest in (["x"], ["y"], ["z"]) else None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Any, Self
 
@@ -11,10 +12,14 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
+from fieldcal.importing.alignment import AlignedPair
 from fieldcal.importing.recording import ImuStream, Recording
 
 BETWEEN = 10.0
 """Time taken to have passed between two files of which no clock tells, s."""
+
+PEEKED = 64
+"""Rows that tell whether two files have the same times."""
 
 AS_NAMED = (
     f"that of the files as they are named, {BETWEEN:g} s apart, since their times start"
@@ -54,7 +59,7 @@ class SeveralFiles(Recording):
 
     def alone(self, stream: str) -> Self:
         """The files, each with what is said of its one IMU alone."""
-        return type(self)([p.alone(p.streams()[0].name) for p in self.parts])
+        return type(self)([p.alone(_name(p)) for p in self.parts])
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return what each file says, by its name."""
@@ -96,13 +101,13 @@ class FilesInOrder(SeveralFiles):
         Times of a file that do not go on behind those of the file before begin anew,
         and are taken to follow after a pause.
         """
-        yield from self._in_order(p.blocks(p.streams()[0].name) for p in self.parts)
+        yield from self._in_order(p.blocks(_name(p)) for p in self.parts)
         self._tell()
 
     def first_rows(self, stream: str, most: int) -> Block:
         """Rows at the beginning of each file, so many in all."""
         each = most // len(self.parts)
-        flows = ([p.first_rows(p.streams()[0].name, each)] for p in self.parts)
+        flows = ([p.first_rows(_name(p), each)] for p in self.parts)
         return concat(list(self._in_order(flows)))
 
     def _in_order(self, flows: Iterable[Iterable[Block]]) -> Iterator[Block]:
@@ -133,7 +138,7 @@ class FilesInOrder(SeveralFiles):
 
 
 class MergedFiles(SeveralFiles):
-    """Files with the same times, each with other channels."""
+    """Files of the same time, each with other channels."""
 
     def place(self, row: int) -> str:
         """Name a sample as the first file does."""
@@ -142,12 +147,55 @@ class MergedFiles(SeveralFiles):
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples with the channels of every file.
 
+        Rows of the same times go together; where accelerometers and gyroscopes have
+        times of their own, each sample goes with the nearest (`alignment`).
+
         Raises
         ------
         InputError
             If times or numbers of rows differ; names file, row and column.
 
         """
+        pair = self._triads()
+        yield from self._aligned(*pair) if pair else self._row_by_row(stream)
+        self._tell()
+
+    def _triads(self) -> tuple[Recording, Recording] | None:
+        """Accelerometers and gyroscopes of different times; None of others."""
+        if len(self.parts) != 2:
+            return None
+        heads = [_by_the_clock(p).first_rows(_name(p), PEEKED) for p in self.parts]
+        n = min(map(len, heads))
+        if np.array_equal(heads[0].t[:n], heads[1].t[:n], equal_nan=True):
+            return None
+        acc = [bool(np.isfinite(h.acc).any()) for h in heads]
+        gyr = [bool(np.isfinite(h.gyr).any()) for h in heads]
+        if acc == gyr[::-1] == [True, False]:
+            return self.parts[0], self.parts[1]
+        if acc == gyr[::-1] == [False, True]:
+            return self.parts[1], self.parts[0]
+        return None
+
+    def _aligned(self, acc: Recording, gyr: Recording) -> Iterator[Block]:
+        pair, begin = AlignedPair(), np.nan
+        flows = [_by_the_clock(p).blocks(_name(p)) for p in (acc, gyr)]
+        together = False
+        for a, g in chain(zip_longest(*flows), [(None, None)]):
+            block = pair.rest() if a is g is None else pair.feed(a, g)
+            begin = float(block.t[0]) if np.isnan(begin) and len(block) else begin
+            together = together or bool(np.isfinite(block.gyr).any())
+            yield replace(block, t=block.t - begin)
+        if not together:
+            raise InputError(
+                f"{gyr.path}: no sample is at a time at which {acc.path.name} has one;"
+                " join files of one clock"
+            )
+        self.says.append(
+            "its accelerometers and gyroscopes have times of their own: each sample of"
+            f" the first goes with the nearest, {1e3 * pair.worst:.2g} ms apart at most"
+        )
+
+    def _row_by_row(self, stream: str) -> Iterator[Block]:
         flows = [part.blocks(stream) for part in self.parts]
         waiting = [concat([]) for _ in flows]
         row = 0
@@ -167,7 +215,6 @@ class MergedFiles(SeveralFiles):
                     f"{part.path}: {part.place(row)}: the other files have ended; join"
                     " files with the same rows"
                 )
-        self._tell()
 
     def _merged(self, blocks: list[Block], row: int) -> Block:
         whole = blocks[0]
@@ -193,3 +240,14 @@ class MergedFiles(SeveralFiles):
 
 def _known(first: Array, second: Array) -> Array:
     return second if np.isnan(first).all() else first
+
+
+def _name(part: Recording) -> str:
+    return part.streams()[0].name
+
+
+def _by_the_clock(part: Recording) -> Recording:
+    """A file whose times count from its clock's zero, not from its own first row."""
+    one = part.alone(_name(part))
+    one.from_first = False
+    return one

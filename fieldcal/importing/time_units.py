@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing.recording import TIME_UNITS
 from fieldcal.importing.scales import FEW, FEWEST
@@ -50,6 +51,28 @@ def time_units(t: Array) -> list[str]:
         return both
     span = float(steps.sum())
     return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST] or usual
+
+
+def unit_taken(name: str, t: Array) -> tuple[str, str]:
+    """Unit taken for the times (n,) of a recording, and why; "" where it is s.
+
+    Raises
+    ------
+    InputError
+        With a question and its answers, where several would do.
+
+    """
+    fits, step = time_units(t), _step(t)
+    if len(fits) > 1:
+        rates = (f"{1 / (TIME_UNITS[u] * step):.4g} Hz in {u}" for u in fits)
+        raise InputError(
+            f"{name}: its times may be {' or '.join(rates)}: add"
+            f" {' or '.join(f'--time-unit {u}' for u in fits)}"
+        )
+    if not fits or fits == ["s"]:
+        return "", ""
+    rate = 1 / (TIME_UNITS[fits[0]] * step) if step else np.nan
+    return fits[0], f"{fits[0]}, which makes {rate:.4g} Hz"
 
 
 def counts_from_long_ago(t: Array) -> bool:

@@ -17,12 +17,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.gravity_size import Gravity, are_means, gravity_in, with_length
 from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.recording import (
-    LARGEST,
-    TIME_UNITS,
-    ReadOptions,
-    Recording,
-)
+from fieldcal.importing.recording import LARGEST, ReadOptions, Recording
 from fieldcal.importing.scales import (
     ACC_OUT,
     ACC_SCALES,
@@ -33,7 +28,7 @@ from fieldcal.importing.scales import (
     gains,
 )
 from fieldcal.importing.thermometers import temperature_counts, temperature_fits
-from fieldcal.importing.time_units import step_of, time_units
+from fieldcal.importing.time_units import step_of, unit_taken
 from fieldcal.importing.unit_answers import answers, as_written, unusual
 from fieldcal.importing.unit_doubts import SaidUnits, hold_own_units
 
@@ -74,7 +69,9 @@ def settle_units(recording: Recording, stream: str) -> Settled:
         With a question and its answers, where several or none would do.
 
     """
-    parts, heard = recording.parts, recording.alone(stream)
+    parts = recording.parts
+    times = [why for part in parts if len(parts) > 1 and (why := _timed(part))]
+    heard = recording.alone(stream)
     block = _beginning(heard, stream)
     if not all(part.asks_units for part in parts):
         hold_own_units(recording, block)
@@ -84,7 +81,24 @@ def settle_units(recording: Recording, stream: str) -> Settled:
         part.wanted = guess.on(part.wanted)
     parts[0].says += guess.doubts
     taken = {k: why for one in (*parts, heard) for k, why in one.guessed.items()}
+    taken |= {"time": times[0]} if times else {}
     return Settled(taken | guess.found, guess.acc_bias)
+
+
+def _timed(part: Recording) -> str:
+    """Give one of several files the unit of its own times, and say why; "" if it has.
+
+    Each has a clock column of its own, while each unit of a sensor stands in one.
+    """
+    wanted = part.wanted
+    if not part.asks_units or wanted.time_unit or wanted.rate_hz:
+        return ""
+    stream = part.streams()[0].name
+    unit, why = unit_taken(
+        str(part.path), part.alone(stream).first_rows(stream, ROWS).t
+    )
+    part.wanted = replace(part.wanted, time_unit=unit or "s")
+    return why
 
 
 def _beginning(recording: Recording, stream: str) -> Block:
@@ -127,8 +141,11 @@ class _Guess:
         self.acc_bias: list[float] | None = None
         self.doubts: list[str] = []
         self._name, self.said, self._read = name, said, said
-        if not (said.time_unit or said.rate_hz):
-            self._time(block.t, are_means(block.acc))
+        # of means, the pauses between them say nothing
+        if not (said.time_unit or said.rate_hz or are_means(block.acc)):
+            unit, why = unit_taken(name, block.t)
+            self.said = replace(said, time_unit=unit)
+            self.found |= {"time": why} if why else {}
         gravity = gravity_in(block.acc)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
@@ -159,22 +176,6 @@ class _Guess:
         if "temperature" in self.found:
             wanted = replace(wanted, temp_unit=found.temp_unit)
         return wanted
-
-    def _time(self, t: Array, means: bool) -> None:
-        # of means, the pauses between them say nothing
-        fits = [] if means else time_units(t)
-        steps = np.diff(t[np.isfinite(t)])
-        step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-        if len(fits) == 1 and fits != ["s"]:
-            rate = 1 / (TIME_UNITS[fits[0]] * step) if step else np.nan
-            self.said = replace(self.said, time_unit=fits[0])
-            self.found["time"] = f"{fits[0]}, which makes {rate:.4g} Hz"
-        elif len(fits) > 1:
-            rates = (f"{1 / (TIME_UNITS[u] * step):.4g} Hz in {u}" for u in fits)
-            self._ask(
-                f"its times may be {' or '.join(rates)}",
-                [f"--time-unit {u}" for u in fits],
-            )
 
     def _acceleration(self, gravity: Gravity, acc: Array) -> None:
         fits = fitting(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])

@@ -106,10 +106,44 @@ def test_channels_side_by_side_have_the_same_times(
     call = ["import", str(first), str(second), "--join", "-o"]
     assert main([*call, str(tmp_path / "out")]) == 0
     np.testing.assert_allclose(Session.open(tmp_path / "out").block.six, whole[:, 1:])
-    late = whole[:, [0, 4, 5, 6]] + [0.01, 0, 0, 0]
-    write(tmp_path, late, "gyr.csv", names)
-    assert main([*call, str(tmp_path / "late")]) == 2
-    assert "join files with the same times" in capsys.readouterr().err
     write(tmp_path, whole[:-9, [0, 4, 5, 6]], "gyr.csv", names)
     assert main([*call, str(tmp_path / "short")]) == 2
     assert "the other files have ended" in capsys.readouterr().err
+    warm = np.column_stack([whole[:, 0] + 0.01, np.full(ROWS, 20.0)])
+    second.write_text("t,temperature\n" + "\n".join(f"{a},{b}" for a, b in warm))
+    both = ["--columns", "t,ax,ay,az", "--columns", "t,temperature"]
+    assert main([*call, str(tmp_path / "late"), *both]) == 2
+    assert "join files with the same times" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("unit", ["s", "ms"])
+def test_accelerometers_and_gyroscopes_may_have_times_of_their_own(
+    unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The gyroscopes begin later, come twice as often, and in another unit of time."""
+    t = 1.7e9 + np.arange(600) / HZ
+    acc = np.column_stack([t, np.sin(t), np.cos(t), 9 + 0 * t])
+    late = 1.7e9 + 1.003 + np.arange(1100) / (2 * HZ)
+    scale = {"s": 1.0, "ms": 1e3}[unit]
+    gyr = np.column_stack([late * scale, np.sin(3 * late), late - 1.7e9, 0 * late])
+    lines = [",".join(f"{x:.7f}" for x in row) for row in acc]
+    first, second = tmp_path / "acc.csv", tmp_path / "gyr.csv"
+    names = "x-axis (m/s^2),y-axis (m/s^2),z-axis (m/s^2)"
+    first.write_text("\n".join(["time (s)," + names, *lines]))
+    lines = [",".join(f"{x:.7f}" for x in row) for row in gyr]
+    names = "x-axis (rad/s),y-axis (rad/s),z-axis (rad/s)"
+    second.write_text("\n".join(["time," + names, *lines]))
+    for order in ([first, second], [second, first]):
+        out = tmp_path / order[0].stem
+        call = ["import", *map(str, order), "--join", "-o", str(out)]
+        assert main(call) == 0
+        assert "times of their own" in capsys.readouterr().err
+        block = Session.open(out).block
+        np.testing.assert_allclose(block.t, t - t[0], atol=1e-6)
+        np.testing.assert_allclose(block.acc, acc[:, 1:], atol=1e-6)
+        # half a period of the accelerometers at most is between the two of a pair
+        apart = block.gyr[:, 1] - block.t
+        assert np.isnan(apart[:49]).all() and np.isfinite(apart[52:598]).all()
+        assert np.nanmax(np.abs(apart)) <= 0.5 / HZ
+        np.testing.assert_allclose(block.gyr[60:90, 0], np.sin(3 * (1.7e9 + block.gyr[
+            60:90, 1])), atol=1e-5)  # fmt: skip

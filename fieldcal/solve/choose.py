@@ -33,7 +33,7 @@ from fieldcal.solve.latitude import EarthVertical
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import ladder_remedy
 from fieldcal.solve.result import calibration
-from fieldcal.solve.rows import of_means
+from fieldcal.solve.rows import of_means, without_angles
 from fieldcal.solve.words import join
 
 TILTED: tuple[Tilt, ...] = ("angle_offset", "base_tilt")
@@ -160,8 +160,7 @@ class _Session:
         given = recorded or of_means(observations)
         rows = given.rows
         if method == "scalar":
-            nowhere = np.full(len(rows.x), np.nan)
-            rows = replace(rows, x=replace(rows.x, alpha=nowhere, beta=nowhere))
+            rows = without_angles(rows, observations.nominal)
         self.recorded = replace(given, rows=seen_by(rows, base))
         self.turning = self.recorded.turning() if observations.has_gyr else None
         nominal = observations.nominal

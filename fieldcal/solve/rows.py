@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.calibration import Nominal
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.core.positions import attitude_sigmas, speeds, third_angles
 from fieldcal.core.samples import ACC, GYR, Array
@@ -61,6 +62,14 @@ def of_means(observations: Observations) -> Recorded:
     span = np.column_stack([x.t, x.t])
     rows = Rows(x, y, sd, common, np.ones(n), level, span)
     return Recorded(rows, np.full((1, n), np.inf))
+
+
+def without_angles(rows: Rows, nominal: Nominal) -> Rows:
+    """Rows of which nobody says how the device lay: the force is along what is read."""
+    nowhere = np.full(len(rows.x), np.nan)
+    apart = (rows.y[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
+    f = free_force(rows.x.gravity, rows.x.position, apart)
+    return replace(rows, x=replace(rows.x, alpha=nowhere, beta=nowhere, f=f))
 
 
 def variances(observations: Observations) -> Array:

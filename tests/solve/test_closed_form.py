@@ -261,6 +261,9 @@ def test_axes_that_few_positions_leave_open_are_left_out() -> None:
     assert found.names == ("acc_bias.x", "acc_scale.x", "angle_offset.alpha0_deg")
     with pytest.raises(NotObservable, match="three different"):
         five_position(observe(TWO, outputs(TWO)))
+    # on a tilted base x needs of y what beta = 0 does not show
+    with pytest.raises(NotObservable, match="on no axis"):
+        five_position(observe(places, outputs(places)), "base_tilt")
 
 
 def earth(a: float, b: float) -> Array:

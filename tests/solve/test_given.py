@@ -249,3 +249,4 @@ def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
     assert np.count_nonzero(table[:, 1:, 0]) == 0
     plain = Given(rows, np.ones(6), recorded.since, False, Wanted())
     assert "rounding" not in {g.cause for _, g in plain.asked}
+    assert d.width == plain.width + 3, "a column for each accelerometer"

@@ -266,6 +266,8 @@ def test_a_base_known_to_be_nearly_level_helps() -> None:
     assert 0.9 < np.std(pulls) < 1.1
     free = solve(observe(places, u), tilt="base_tilt")
     assert (result.sigma[:3] < free.sigma[:3]).all()
+    named = solve(observe(places, u), tilt="base_tilt", level_sigma_deg=0.3)
+    np.testing.assert_allclose(named.sigma[:6], result.sigma[:6])
 
 
 def set_by_hand(

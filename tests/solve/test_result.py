@@ -35,7 +35,7 @@ def estimated(**known: Any) -> Estimated:
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "missing": (), "given": given, "acc": fit(),
         "gyr": fit(rms=np.nan), "contradicted": (), "closures": (0.0, 0),
-        "found": SimpleNamespace(scatter=np.array([3, 4, 0, 1, 1, 1, 5.0])),
+        "found": SimpleNamespace(scatter=np.array([3, 4, 0, 2, 1, 0, 5.0])),
     }  # fmt: skip
     return cast(Estimated, SimpleNamespace(**(nothing | known)))
 
@@ -166,7 +166,7 @@ def test_scatter_of_each_triad_and_of_turns_is_said_with_its_unit() -> None:
     assert acc.startswith("the positions disagree")
     assert spread.format("2.9", "m/s^2") in acc
     assert gyr.startswith("the gyroscopes' means disagree")
-    assert spread.format("1", "rad/s") in gyr
+    assert spread.format("1.3", "rad/s") in gyr
     assert turns.startswith("the turns disagree") and "dof 6" in turns
     assert spread.format("5", "rad") in turns
     both.given.free[:] = True
@@ -235,6 +235,10 @@ def test_conditions_are_those_that_were_given() -> None:
     assert plain["conditions"]["latitude_deg"] is None
     assert plain["conditions"]["temperature_degc"] is None
     assert plain["gyroscopes"]["unit"] == "rad/s" and plain["gyroscopes"]["dof"] == 12
+    assert plain["gyroscopes"]["rms"] == pytest.approx(0.0, abs=1e-9)
+    unknown = estimated(bad=np.zeros(5), wrong_angles=(), causes={}, turns=())
+    said = result._info("joint", observed(), Asked(), unknown)
+    assert said["gyroscopes"]["rms"] is None, "JSON has no nan"
     assert "level_sigma_deg" not in plain
     two = solve(observed(TWO, gyr=False), level_sigma_deg=0.3).info
     assert two["level_sigma_deg"] == 0.3

@@ -62,6 +62,15 @@ def test_a_common_rotation_does_not_show() -> None:
     np.testing.assert_allclose(a.values, b.values, atol=1e-5)
 
 
+def test_stated_angles_are_nothing_to_it() -> None:
+    """Not even if none of them is right."""
+    u = shown(spread_over_the_sphere(12, 5))
+    angles = tuple(Position.deg(15.0 * i, 5.0 * i) for i in range(12))
+    stated = solve(observe(angles, u), "scalar")
+    np.testing.assert_allclose(stated.values, solve(observe(by_hand(12), u)).values)
+    assert stated.dof == 6
+
+
 @pytest.mark.parametrize(
     "cross", [pytest.param(False, marks=pytest.mark.thorough), True]
 )

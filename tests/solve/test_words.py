@@ -113,5 +113,7 @@ def test_two_positions_of_the_same_kind_say_what_a_tilt_would_do() -> None:
     found = solve(observe(places, outputs(places)))
     assert any("0.017 m/s^2 unseen" in w for w in found.warnings)
     assert words.NO_DOF in found.warnings
+    # whoever asks for two positions has not asked for the tilt
+    assert not any("do not show the tilt" in w for w in found.warnings)
     level = solve(observe(places, outputs(places)), level_sigma_deg=0.1)
     assert not any("unseen" in w for w in level.warnings)

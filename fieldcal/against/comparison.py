@@ -9,11 +9,10 @@ import numpy as np
 from fieldcal.against import causes, offsets, prediction, samples
 from fieldcal.against.facts import facts
 from fieldcal.against.pairing import Pairing
-from fieldcal.against.result import Difference, Match
+from fieldcal.against.result import Difference, Match, verdict_of
 from fieldcal.against.side import Side, side
 from fieldcal.against.wording import paragraph
 from fieldcal.core.samples import CHANNELS, Block
-from fieldcal.diagnosis.result import Verdict
 from fieldcal.session.description import Description
 
 
@@ -50,7 +49,7 @@ def matched(real: Side, sim: Side) -> Match:
         *samples.noise(real, sim),
     ]
     differences = tuple(sorted(apart, key=lambda d: -d.probability))
-    verdict = _verdict(differences)
+    verdict = verdict_of(differences)
     predicted = prediction.before(found), prediction.after(real)
     warnings = (*_of(real), *_of(sim), *_quieted(sim), *_missing(found))
     return Match(
@@ -64,14 +63,6 @@ def matched(real: Side, sim: Side) -> Match:
         warnings,
         paragraph(verdict, differences, predicted),
     )
-
-
-def _verdict(differences: Sequence[Difference]) -> Verdict:
-    if any(not d.explained for d in differences):
-        return "unexplained"
-    if any(d.aliases for d in differences):
-        return "ambiguous"
-    return "left_out" if differences else "consistent"
 
 
 def _probability(found: causes.Decided, differences: Sequence[Difference]) -> float:

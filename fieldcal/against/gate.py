@@ -25,6 +25,9 @@ PREDICTION = "chi2_per_dof"
 ALWAYS = (*CALIBRATION, "noise")
 """What every recording is compared in."""
 
+IN_MOTION = (*CALIBRATION, "misalignment")
+"""The same where the simulator follows the motion."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limit:
@@ -64,7 +67,7 @@ def limits(given: Iterable[str] | Mapping[str, float | str]) -> dict[str, Limit]
     """
     if not isinstance(given, Mapping):
         given = dict(_parted(text) for text in given)
-    known = (*ALWAYS, PREDICTION, *catalogue())
+    known = (*ALWAYS, *IN_MOTION[-1:], PREDICTION, *catalogue())
     for name in given:
         if name not in known:
             raise InputError(
@@ -95,7 +98,8 @@ def _limit(name: str, text: str) -> Limit:
 
 def checks(found: Match, allowed: Mapping[str, Limit]) -> list[MatchCheck]:
     """Everything that was compared, in the order of what every recording has."""
-    names = [*ALWAYS, *found.alike, *(d.id for d in found.differences)]
+    every = ALWAYS if found.aligned is None else IN_MOTION
+    names = [*every, *found.alike, *(d.id for d in found.differences)]
     out = [_check(name, found, allowed) for name in dict.fromkeys(names)]
     if (limit := allowed.get(PREDICTION)) is not None:
         value = found.before.chi2_per_dof

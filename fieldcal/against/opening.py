@@ -9,7 +9,7 @@ if there are as many.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -31,6 +31,25 @@ INSIDE = 0.9
 """Part of a window that must lie in a rest, for the window to be held there."""
 
 
+@dataclass(frozen=True, slots=True)
+class SimulatorOutput:
+    """What a simulator wrote.
+
+    Attributes
+    ----------
+    block : its samples
+    about : what session.toml says; None of a file
+    rests : in which the simulated device rests, of a file
+    says : what the user must know
+
+    """
+
+    block: Block
+    about: Description | None
+    rests: tuple[Span, ...]
+    says: tuple[str, ...]
+
+
 def opened(
     path: Path, real: tuple[Block, Description]
 ) -> tuple[Block, Description, list[str]]:
@@ -49,10 +68,28 @@ def opened(
         If it is a folder that is no session.
 
     """
+    read = read_output(path)
+    if read.about is not None:
+        return read.block, read.about, list(read.says)
+    about = _placed(path, read.block, read.rests, *real)
+    return read.block, about, list(read.says)
+
+
+def read_output(path: Path) -> SimulatorOutput:
+    """Read a simulator's output, whatever it shows.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    SessionError
+        If it is a folder that is no session.
+
+    """
     if path.is_dir():
         session = Session.open(path)
         block = session.block  # before its warnings, which reading adds to
-        return block, session.about, list(session.warnings)
+        return SimulatorOutput(block, session.about, (), tuple(session.warnings))
     recording = open_recording(path, ReadOptions())
     stream = _only_stream(recording)
     guessed, _ = settle_units(recording, stream)
@@ -60,9 +97,8 @@ def opened(
         there = Path(folder) / "simulated"
         made = import_stream(recording, stream, there, {"format": 1}, STILL_S)
         block = Session.open(there).block
-    about = _placed(path, block, made.stretches, *real)
-    said = [f"{what.replace('_', ' ')} taken as {why}" for what, why in guessed.items()]
-    return block, about, said
+    said = (f"{what.replace('_', ' ')} taken as {why}" for what, why in guessed.items())
+    return SimulatorOutput(block, None, tuple(made.stretches), tuple(said))
 
 
 def _only_stream(recording: Recording) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
@@ -100,6 +100,15 @@ class Difference:
         }
 
 
+def verdict_of(differences: Sequence[Difference]) -> Verdict:
+    """The verdict that differences come to."""
+    if any(not d.explained for d in differences):
+        return "unexplained"
+    if any(d.aliases for d in differences):
+        return "ambiguous"
+    return "left_out" if differences else "consistent"
+
+
 @dataclass(frozen=True, slots=True)
 class SimulatorPrediction:
     """How a simulator predicts a recording that it was not fitted to.
@@ -164,6 +173,37 @@ def _quantities(some: Mapping[str, Quantity]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, slots=True)
+class Aligned:
+    """Where two recordings of one motion stand beside each other.
+
+    Attributes
+    ----------
+    delay : by which the recording's clock is ahead of the simulator's, at `at_s`
+    drift : by how much the simulator's clock is the quicker one
+    turn : from the simulator's axes to the recording's, about x, y and z
+    at_s : s of the recording's clock
+    compared_s : of common motion
+
+    """
+
+    delay: Quantity
+    drift: Quantity
+    turn: Mapping[str, Quantity]
+    at_s: float
+    compared_s: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of against.json."""
+        return {
+            "delay": self.delay.to_json(),
+            "drift": self.drift.to_json(),
+            "turn": _quantities(self.turn),
+            "at_s": number(self.at_s),
+            "compared_s": number(self.compared_s),
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class Match:
     """A recording held against a simulator's.
 
@@ -178,6 +218,7 @@ class Match:
     real, simulator : what each recording is made of
     warnings : what limits the comparison
     says : a paragraph for a person
+    aligned : where two recordings of one motion stand; None of positions
 
     """
 
@@ -191,6 +232,7 @@ class Match:
     simulator: Facts
     warnings: tuple[str, ...]
     says: str
+    aligned: Aligned | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of against.json."""
@@ -209,4 +251,4 @@ class Match:
             },
             "warnings": list(self.warnings),
             "says": self.says,
-        }
+        } | ({} if self.aligned is None else {"alignment": self.aligned.to_json()})

@@ -28,8 +28,12 @@ def paragraph(
     verdict: Verdict,
     differences: Sequence[Difference],
     predicted: tuple[SimulatorPrediction, SimulatorPrediction],
+    parts: str = "Positions",
 ) -> str:
-    """Say verdict, differences and what they do to the prediction."""
+    """Say verdict, differences and what they do to the prediction.
+
+    `parts` are what was left out of everything to be predicted.
+    """
     if verdict == "consistent":
         return (
             "Recording and simulator agree: the simulator predicts the recording with"
@@ -47,10 +51,12 @@ def paragraph(
             f"The other recording could not have shown {', '.join(unseen)}: whether it"
             " is there as well is not known."
         )
-    return " ".join([*out, _predicted(*predicted)])
+    return " ".join([*out, _predicted(*predicted, parts)])
 
 
-def _predicted(before: SimulatorPrediction, after: SimulatorPrediction) -> str:
+def _predicted(
+    before: SimulatorPrediction, after: SimulatorPrediction, parts: str
+) -> str:
     said = []
     for one, two, unit in (
         (before.rms_acc, after.rms_acc, "m/s^2"),
@@ -59,7 +65,7 @@ def _predicted(before: SimulatorPrediction, after: SimulatorPrediction) -> str:
         if one == one and two == two:
             said.append(f"{one:.2g} to {two:.2g} {unit}")
     return (
-        "Positions that it was not fitted to are predicted with what was found: the rms"
+        f"{parts} that it was not fitted to are predicted with what was found: the rms"
         f" goes from {' and from '.join(said)}, χ²/dof from"
         f" {before.chi2_per_dof:.3g} to {after.chi2_per_dof:.3g}."
     )

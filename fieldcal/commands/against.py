@@ -9,12 +9,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.core.errors import InputError
+
 if TYPE_CHECKING:
     from fieldcal.against import Match
     from fieldcal.against.rounds import SimulatorRun
     from fieldcal.against.sensor_model import SensorModel
     from fieldcal.against.side import Side
     from fieldcal.session.folder import Session
+
+    Compared = tuple[Match, SensorModel | None, list[str]]
+    """What was found, the sensors of a patch, and what the user must know."""
 
 PLAIN = "json"
 """Format of the patches of a command unless another is named."""
@@ -23,16 +28,12 @@ PLAIN = "json"
 def run(args: argparse.Namespace) -> int:
     """Carry out the comparison: 0 if the two agree within the limits, 1 if not."""
     from fieldcal.against.gate import checks, limits, write_junit
-    from fieldcal.against.rounds import is_command
-    from fieldcal.against.side import side
     from fieldcal.report.gather import AGAINST
     from fieldcal.session.folder import Session
 
     allowed = limits(args.limit)
     session = Session.open(args.session)
-    real = side(str(args.session), session.block, session.about)
-    compared = _rounds if is_command(args.against) else _once
-    found, model, said = compared(args, session, real)
+    found, model, said = _compared(args, session)
     content = found.to_json() | {"against": args.against}
     written = [session.write_json(AGAINST, content)]
     if model is not None:
@@ -56,9 +57,40 @@ def run(args: argparse.Namespace) -> int:
     return 1 if beyond else 0
 
 
-def _once(
-    args: argparse.Namespace, session: Session, real: Side
-) -> tuple[Match, SensorModel | None, list[str]]:
+def _compared(args: argparse.Namespace, session: Session) -> Compared:
+    """Compare by positions, or by the motion where there are too few to tell."""
+    from fieldcal.against.rounds import is_command
+    from fieldcal.against.side import side
+    from fieldcal.model.causes.cause import FEW
+
+    held = sum(w is not None for w in session.about.windows)
+    if args.motion or held < FEW:
+        return _in_motion(args, session)
+    real = side(str(args.session), session.block, session.about)
+    compared = _rounds if is_command(args.against) else _once
+    return compared(args, session, real)
+
+
+def _in_motion(args: argparse.Namespace, session: Session) -> Compared:
+    """Compare with what follows the motion; the patch that was asked for."""
+    from fieldcal.against.motion import compared_in_motion
+    from fieldcal.against.opening import read_output
+    from fieldcal.against.rounds import is_command
+    from fieldcal.against.sensor_model import patched
+
+    if is_command(args.against):
+        raise InputError(
+            f"--against {args.against}: a command is run again for recordings of"
+            " positions; run it yourself, and name the file that it writes"
+        )
+    read = read_output(Path(args.against))
+    found = compared_in_motion(
+        (session.block, session.about), read.block, (str(args.session), args.against)
+    )
+    return found, patched(found) if args.patch else None, list(read.says)
+
+
+def _once(args: argparse.Namespace, session: Session, real: Side) -> Compared:
     """Compare with a file or a session; the patch that was asked for."""
     from fieldcal.against import matched
     from fieldcal.against.opening import opened
@@ -70,9 +102,7 @@ def _once(
     return found, patched(found) if args.patch else None, said
 
 
-def _rounds(
-    args: argparse.Namespace, session: Session, real: Side
-) -> tuple[Match, SensorModel | None, list[str]]:
+def _rounds(args: argparse.Namespace, session: Session, real: Side) -> Compared:
     """Run a command, patch it, and run it again; the last patch that was tried."""
     from fieldcal.against.rounds import rounds
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import IO
 
+from fieldcal.against.motion.wording import aligned_as
 from fieldcal.against.result import Match
 from fieldcal.against.wording import lines
 from fieldcal.calibration.wording import position_numbers, pretty
@@ -37,6 +38,8 @@ def show(
     else:
         console.print(found.says, markup=False)
     console.print(_prediction(found))
+    if found.aligned is not None and found.differences:
+        console.print(aligned_as(found.aligned), markup=False)
     if details:
         if found.differences:
             console.print(f"\n{found.says}", markup=False)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 HELP = "say what physics the simulation leaves out of a recording"
 
-RARE = ("rounds", "limit", "junit", "jobs", "history")
+RARE = ("motion", "rounds", "limit", "junit", "jobs", "history")
 
 EXAMPLE = """\
   fieldcal diagnose bench-7/2026-03-01
@@ -61,8 +61,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--against",
         metavar="SIM",
         help="say what differs from a simulator's output: a session folder, or a file"
-        " that import reads, of the same positions; or a command with {patch} and"
-        " {out} in it, which is run, patched and run again",
+        " that import reads, of the same positions or motion; or a command with {patch}"
+        " and {out} in it, which is run, patched and run again",
+    )
+    add(
+        "--motion",
+        action="store_true",
+        help="with --against: moment by moment, where SIM follows the motion of the"
+        " recording; so it is wherever fewer than three positions are held",
     )
     add(
         "--patch",
@@ -107,9 +113,9 @@ def run(args: argparse.Namespace) -> int:
         if args.twin:
             raise InputError("name --twin or --against: each is an answer of its own")
         return against.run(args)
-    if args.patch or args.limit or args.junit:
+    if args.patch or args.limit or args.junit or args.motion:
         raise InputError(
-            "--patch, --limit and --junit need --against: name a simulator"
+            "--motion, --patch, --limit and --junit need --against: name a simulator"
         )
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare

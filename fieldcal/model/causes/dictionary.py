@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,7 +116,7 @@ class Dictionary(ColumnTable):
         out.always = [replace(g, fixed=free) for g in known]
         return out
 
-    def apart(self) -> Dictionary:
+    def apart(self) -> Self:
         """The same, of which columns that are added are its own."""
         out = copy(self)
         out.bases = list(self.bases)

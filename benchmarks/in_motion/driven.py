@@ -1,0 +1,117 @@
+"""A motion program of its own: numpy, and nothing else.
+
+A body moves along sums of sines, in place and in attitude. Its IMU sits off the centre
+and is read by a clock of its own; its outputs may be off in all ways that a strap-down
+IMU is. Nothing here is shared with what estimates. SI units; z up, f = (0, 0, g) at
+rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+GRAVITY, TINY = 9.8106, 1e-3
+
+
+class Drive:
+    """One drawn motion: places (m) and angles (rad) as sums of sines."""
+
+    def __init__(
+        self, seed: int, brisk: float = 1.0, amplitude: float = 0.35, waves: int = 7
+    ) -> None:
+        rng = np.random.default_rng(seed)
+        self.hz = brisk * np.exp(rng.uniform(np.log(0.05), np.log(1.2), (6, waves)))
+        size = amplitude / np.sqrt(waves) * rng.uniform(0.5, 1.5, (6, waves))
+        size[:3] *= 2.0 / (0.3 + self.hz[:3] ** 1.5)
+        self.sine = size * np.exp(2j * np.pi * rng.random((6, waves)))
+
+    def course(self, t: Any, order: int = 0) -> Any:
+        """Place and angles, or a derivative of them, (n, 6)."""
+        turn = 2j * np.pi * self.hz
+        waves = np.exp(np.multiply.outer(t, turn)) * self.sine * turn**order
+        return waves.imag.sum(axis=2)
+
+    def axes(self, t: Any) -> Any:
+        """Rows are the axes of the body in the world, (n, 3, 3)."""
+        out = np.broadcast_to(np.eye(3), (len(t), 3, 3))
+        angles = self.course(t)[:, 3:]
+        for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+            one = np.tile(np.eye(3), (len(t), 1, 1))
+            c, s = np.cos(angles[:, i]), np.sin(angles[:, i])
+            one[:, j, j] = one[:, k, k] = c
+            one[:, j, k], one[:, k, j] = s, -s
+            out = one @ out
+        return out
+
+    def rate(self, t: Any) -> Any:
+        """Angular rate in body axes, (n, 3): C' C^T = -[w x]."""
+        change = (self.axes(t + TINY) - self.axes(t - TINY)) / (2 * TINY)
+        step = change @ np.swapaxes(self.axes(t), 1, 2)
+        pairs = ((1, 2), (2, 0), (0, 1))
+        return np.stack([(step[:, i, j] - step[:, j, i]) / 2 for i, j in pairs], axis=1)
+
+    def force(self, t: Any, arm: Any = (0.0, 0.0, 0.0)) -> Any:
+        """Specific force at a place of the body, in body axes, (n, 3)."""
+        world = self.course(t, 2)[:, :3] + [0.0, 0.0, GRAVITY]
+        held = [np.swapaxes(self.axes(t + k * TINY), 1, 2) @ np.asarray(arm, float)
+                for k in (-1, 0, 1)]  # fmt: skip
+        world = world + (held[0] - 2 * held[1] + held[2]) / TINY**2
+        return (self.axes(t) @ world[:, :, None])[:, :, 0]
+
+
+def low_passed(drive: Drive, t: Any, arm: Any, tau: float, gyro: bool) -> Any:
+    """A channel triad after a first-order low-pass, by a fine sum over its past."""
+    past = np.arange(0.5, 60.0) / 60.0
+    ages = -tau * np.log(1 - past)  # of equal weight
+    seen = [drive.rate(t - a) if gyro else drive.force(t - a, arm) for a in ages]
+    return sum(seen) / len(ages)
+
+
+def coloured(rng: Any, n: int, step: float, noise: Mapping[str, Any]) -> Any:
+    """White noise, a walk, and a first-order process, (n, 6), of given sizes (6,)."""
+    six = np.ones(6)
+    white = noise.get("white", 0.0) * six * rng.standard_normal((n, 6))
+    walk = noise.get("walk", 0.0) * six * np.cumsum(rng.standard_normal((n, 6)), axis=0)
+    out = white + walk * np.sqrt(step)
+    tau, size = noise.get("tau", 1.0), noise.get("markov", 0.0) * six
+    if np.any(size):
+        from scipy.signal import lfilter
+
+        keep = np.exp(-step / tau)
+        drive = rng.standard_normal((n, 6)) * np.sqrt(1 - keep**2)
+        out = out + size * lfilter([1.0], [1.0, -keep], drive, axis=0)
+    return out
+
+
+def recorded(
+    drive: Drive, device: Mapping[str, Any], seconds: float = 120.0, hz: float = 50.0
+) -> Any:
+    """Times and outputs of an IMU on the body, (n, 7).
+
+    `device` may have "start" (s of the motion), "clock" (delay s and rate), "turn" (R),
+    "arm", "bias", "matrix_acc", "matrix_gyr", "g" (3, 3), "late" of the gyroscopes,
+    "lag" (time constants of both triads), "cubic" (3,), "noise" and "seed".
+    """
+    rng = np.random.default_rng(device.get("seed", 0))
+    n = int(seconds * hz)
+    stamped = np.arange(n) / hz
+    delay, rate = device.get("clock", (0.0, 0.0))
+    t = device.get("start", 0.0) + (stamped - delay) * (1 + rate)
+    arm = np.asarray(device.get("arm", (0.0, 0.0, 0.0)), float)
+    turn = np.asarray(device.get("turn", np.eye(3)), float)
+    late, lags = device.get("late", 0.0), device.get("lag", (0.0, 0.0))
+    arm = turn.T @ arm
+    f = low_passed(drive, t, arm, lags[0], False) if lags[0] else drive.force(t, arm)
+    g = t - late
+    w = low_passed(drive, g, arm, lags[1], True) if lags[1] else drive.rate(g)
+    f, w = f @ turn.T, w @ turn.T
+    acc = f @ np.asarray(device.get("matrix_acc", np.eye(3))).T
+    acc = acc + f**3 * device.get("cubic", np.zeros(3))
+    gyr = w @ np.asarray(device.get("matrix_gyr", np.eye(3))).T
+    gyr = gyr + f @ np.asarray(device.get("g", np.zeros((3, 3)))).T
+    out = np.hstack([acc, gyr]) + device.get("bias", np.zeros(6))
+    out = out + coloured(rng, n, 1 / hz, device.get("noise", {}))
+    return np.column_stack([stamped, out])

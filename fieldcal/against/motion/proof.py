@@ -1,0 +1,176 @@
+"""Stretches of a recording in motion, predicted from the others.
+
+A few stretches on end are left out of everything: alignment, noise, which of the sets
+in question, sizes and values are found again from the rest, in columns that were made
+linear about the fit of all. What a prediction does not know counts as in (1) of
+`fieldcal.against.prediction`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.against.motion.following import Following
+from fieldcal.against.prediction import unsure_squares
+from fieldcal.against.result import SimulatorPrediction
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.held_out import in_question
+from fieldcal.model.rows.motion import MotionRows, frequencies
+from fieldcal.model.search.selection import Search
+from fieldcal.model.state import State
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.motion_rows import noise_levels
+from fieldcal.model.system.window_rows import Linear
+
+FOLDS = 6
+"""Parts that a recording is left out in, each of stretches on end."""
+
+ROUNDS = 2
+"""Times that noise and values are found from each other where a part is left out."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A recording as the simulator predicts it, and with what was found.
+
+    Attributes
+    ----------
+    before : as the simulator is, nothing being fitted but where the two stand
+    after : each part as the others predict it
+
+    """
+
+    before: SimulatorPrediction
+    after: SimulatorPrediction
+
+
+def proof(found: Following) -> Proof:
+    """Predict each part of a recording."""
+    return Proof(_before(found), _after(found))
+
+
+def _before(found: Following) -> SimulatorPrediction:
+    system = found.fit.system
+    d, nominal = system.dictionary, found.fit.nominal
+    nothing = np.zeros(d.width, dtype=bool)
+    nothing[d.bias : d.bias + 6] = True  # a channel has rows where it has a column
+    places = np.zeros((d.places, 2))
+    bare = State(nominal.bias, nominal.scale, places, np.zeros(3))
+    linear = system.linearised(bare, nothing)
+    squares = sum(float(part.white @ part.white) for part in linear)
+    off = _Sizes()
+    for part in linear:
+        off.add(part, part.white)
+    return off.prediction(squares, sum(len(part.white) for part in linear))
+
+
+def _after(found: Following) -> SimulatorPrediction:
+    inferred, system = found.inferred, found.fit.system
+    visited = list(inferred.search.visited.values())
+    sets = in_question(inferred.best, visited)
+    d, values = system.dictionary, inferred.inference.padded(inferred.values)
+    wanted = inferred.inference.wanted([m for s in sets for m in s.members])
+    linear = system.linearised(inferred.state, wanted | (values != 0))
+    rows, fold = found.rows, _folds(found)
+    squares, count, off = 0.0, 0, _Sizes()
+    for i in np.unique(fold):
+        kept, gone = np.flatnonzero(fold != i), np.flatnonzero(fold == i)
+        rest = [_of_stretches(part, rows, kept) for part in linear]
+        frequency = frequencies(len(kept) * rows.length, rows.length, rows.step)
+        for _ in range(ROUNDS):
+            search = Search(d, gram(rest, d, values, (), np.flatnonzero(wanted)))
+            best = max((search.evaluated(s.members, s.sizes) for s in sets), key=_score)
+            levels = noise_levels(found.fit.bands, frequency, rest, values, best.state)
+            rest = [_weighed(found, p, levels, frequency) for p in rest]
+        frequency = frequencies(len(gone) * rows.length, rows.length, rows.step)
+        left = [_of_stretches(part, rows, gone) for part in linear]
+        left = [_weighed(found, part, levels, frequency) for part in left]
+        squares += _squares(left, values, best)
+        for part in left:
+            off.add(part, _residual(part, values, best))
+            count += len(part.white)
+    return off.prediction(squares, count)
+
+
+class _Sizes:
+    """Squares of what is left of each triad, and their number."""
+
+    def __init__(self) -> None:
+        self.square, self.count = np.zeros(2), np.zeros(2)
+
+    def add(self, part: Linear, white: Array) -> None:
+        """Add coefficients of a channel; their squares are those of its rows."""
+        triad = part.channel // 3
+        self.square[triad] += float(np.sum((white / part.weight) ** 2))
+        self.count[triad] += len(white)
+
+    def prediction(self, squares: float, count: int) -> SimulatorPrediction:
+        """The rms of both triads, with chi squared."""
+        with np.errstate(invalid="ignore"):
+            acc, gyr = np.sqrt(self.square / self.count)
+        return SimulatorPrediction(float(acc), float(gyr), squares / count)
+
+
+def _score(one: Set) -> float:
+    return one.score
+
+
+def _folds(found: Following) -> Index:
+    """The part that each stretch is left out in, (s,)."""
+    count = int(found.rows.stretch[-1]) + 1
+    return np.arange(count) * min(FOLDS, count) // count
+
+
+def _of_stretches(part: Linear, rows: MotionRows, some: Index) -> Linear:
+    """A channel's coefficients of some stretches alone, weighed as those of all."""
+    every = np.column_stack([part.white, part.design]) / part.weight[:, None]
+    raw = rows.of_stretches(every, some)
+    weight = part.weight.reshape(-1, rows.length)[some].ravel()
+    window = part.window.reshape(-1, rows.length)[some].ravel()
+    raw *= weight[:, None]
+    return replace(
+        part, rows=np.arange(len(weight)), window=window, weight=weight,
+        design=raw[:, 1:], white=raw[:, 0],
+    )  # fmt: skip
+
+
+def _weighed(
+    found: Following, part: Linear, levels: Mapping[int, Array], frequency: Array
+) -> Linear:
+    """A channel's coefficients with another power of the noise."""
+    weight = found.fit.bands.power(levels[part.channel], frequency) ** -0.5
+    ratio = weight / part.weight
+    return replace(
+        part, weight=weight, design=part.design * ratio[:, None],
+        white=part.white * ratio,
+    )  # fmt: skip
+
+
+def _residual(part: Linear, values: Array, best: Set) -> Array:
+    """What is left of whitened coefficients as a set predicts them."""
+    estimate: Array = np.zeros(len(values))
+    np.add.at(estimate, best.state.columns, best.state.estimate)
+    step = (values - estimate)[part.columns]
+    out: Array = part.white + part.design @ step
+    return out
+
+
+def _squares(left: Sequence[Linear], values: Array, best: Set) -> float:
+    """Squares of what was left out, the prediction's uncertainty counted."""
+    state = best.state
+    inner = np.zeros((len(state.columns), len(state.columns)))
+    pull, square = np.zeros(len(state.columns)), 0.0
+    for part in left:
+        place = np.full(len(values), -1, dtype=np.intp)
+        place[part.columns] = np.arange(len(part.columns))
+        here = np.flatnonzero(place[state.columns] >= 0)
+        design = part.design[:, place[state.columns[here]]]
+        white = _residual(part, values, best)
+        inner[np.ix_(here, here)] += design.T @ design
+        pull[here] += design.T @ white
+        square += float(white @ white)
+    return unsure_squares(square, pull, inner, state.inverse)

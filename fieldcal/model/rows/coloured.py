@@ -1,0 +1,149 @@
+"""Noise of rows in motion by frequency, from what is left of them.
+
+Noise is taken as stationary. Each channel has one power P_b a band b of frequencies, so
+that P follows from what is left r of rows after columns were fitted: with n_b
+coefficients of a band, l_b the sum of their leverages and L_b = ln P_b the likeliest
+are those that minimise
+
+    sum_b (n_b - l_b) / 2 [L_b + d_b exp(-L_b)]
+        + sum_b (L_b+1 - L_b)^2 / (2 STEEP^2 (x_b+1 - x_b))
+        + sum_b (L_b - a - S_b)^2 / (2 UNLIKE^2)                                   (1)
+
+with d_b = sum r^2 / (n_b - l_b), x the logarithm of the frequency, S_b the same of all
+channels of the triad together and a by how much this one is louder: spectra are smooth,
+and those of a triad alike, so that few coefficients borrow from their neighbours. With
+s_b^2 the uncertainty of L_b the power is its mean, exp(L_b + s_b^2 / 2). Of the mean of
+the rows, which the bias takes, nothing is left: it counts as half the lowest frequency,
+and L goes on there as steeply as it comes, a walk's slope at most. What correlates with
+the motion and has no column is in r at the frequencies of the motion, so it makes all
+that is told from there as uncertain as it is. Source: restricted likelihood, Patterson
+and Thompson 1971; P. Whittle 1953.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+
+RATIO, FEWEST = 1.25, 5
+"""Of the ends of a band, and coefficients of one at least."""
+
+STEEP = 1.0
+"""Usual change of ln P in a factor e of frequency: flicker makes 1, a walk 2."""
+
+STEEPEST, OVER = 2.0, 1.5
+"""Slope of ln P of a walk, and how far beyond the lowest frequency slopes are told by,
+in ln of it."""
+
+UNLIKE = 0.5
+"""Spread of ln P among the axes of a triad, but for how loud each is: made alike."""
+
+NEWTON = 30
+"""Steps at most; each is damped."""
+
+CLOSEST, SETTLED = 0.1, 1e-6
+"""Least distance of two places that is counted, and largest last step, both ln."""
+
+NONE = 1e-3
+"""Degrees of freedom of a band of which columns take all."""
+
+LEAST = 1e-24
+"""Power below which a channel repeats its reference, in its unit squared."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """Bands of frequencies in which the noise has a power each.
+
+    Attributes
+    ----------
+    edges : (b + 1,) Hz, lowest frequency of each band, and the end
+    place : (b + 1,) ln of half the lowest frequency, and of each band's middle
+
+    """
+
+    edges: Array
+    place: Array
+
+    @classmethod
+    def between(cls, frequency: Array) -> Bands:
+        """Bands of coefficients at frequencies (n,), Hz, some of them 0."""
+        rising = np.sort(frequency[frequency > 0])
+        starts, at = [0], 0
+        while at < len(rising):
+            end = int(np.searchsorted(rising, rising[at] * RATIO, side="right"))
+            end = max(end, at + FEWEST)
+            at = len(rising) if len(rising) - end < FEWEST else end
+            starts.append(at)
+        middle = [float(np.mean(np.log(rising[a:b]))) for a, b in pairwise(starts)]
+        edges = np.append(rising[starts[:-1]], np.inf)
+        return cls(edges, np.array([float(np.log(rising[0] / 2)), *middle]))
+
+    def levels(
+        self, frequency: Array, left: Sequence[Array], leverage: Sequence[Array]
+    ) -> list[Array]:
+        """Ln P at each place of the channels of a triad, (b + 1,) each.
+
+        Parameters
+        ----------
+        frequency : (n,) of the coefficients of a channel, Hz
+        left : (n,) what is left of them, by channel
+        leverage : (n,) of each, by channel
+
+        """
+        moves = np.flatnonzero(frequency > 0)
+        of = np.searchsorted(self.edges, frequency[moves], side="right") - 1
+        of, count = np.maximum(of, 0), len(self.edges) - 1
+        free = np.array([np.bincount(of, 1 - h[moves], count) for h in leverage])
+        free = np.maximum(free, NONE)
+        square = np.array([np.bincount(of, r[moves] ** 2, count) for r in left])
+        raw = np.log(np.maximum(square / free, LEAST))
+        loud = np.average(raw, axis=1, weights=np.minimum(free, FEWEST))
+        even = (square * np.exp(-loud)[:, None]).sum(axis=0) / free.sum(axis=0)
+        apart = np.diff(self.place[1:])
+        both = _smooth(np.log(np.maximum(even, LEAST)), free.sum(axis=0), apart, None)
+        return [
+            self._to_the_mean(_smooth(one, some, apart, both + by))
+            for one, some, by in zip(raw, free, loud, strict=True)
+        ]
+
+    def _to_the_mean(self, level: Array) -> Array:
+        """Levels with that of the mean before them."""
+        near = self.place[1:] < self.place[1] + OVER
+        slope = 0.0
+        if near.sum() > 1:
+            slope = float(np.polyfit(self.place[1:][near], level[near], 1)[0])
+        steep = np.clip(-slope, 0.0, STEEPEST) * (self.place[1] - self.place[0])
+        return np.concatenate([[level[0] + steep], level])
+
+    def power(self, levels: Array, frequency: Array) -> Array:
+        """P at some frequencies, (n,), of ln P at each place."""
+        at = np.log(np.maximum(frequency, np.exp(self.place[0])))
+        out: Array = np.exp(np.interp(at, self.place, levels))
+        return out
+
+
+def _smooth(raw: Array, free: Array, apart: Array, about: Array | None) -> Array:
+    """Ln of the mean power of (1), (b,); `about` are a + S_b, where that is known."""
+    stiff = 1 / (STEEP**2 * np.maximum(apart, CLOSEST))
+    near = 0.0 if about is None else UNLIKE**-2
+    middle = raw if about is None else about
+    level = middle.copy()
+    inner = np.diag(np.append(stiff, 0.0) + np.append(0.0, stiff) + near)
+    inner -= np.diag(stiff, 1) + np.diag(stiff, -1)
+    bend = inner
+    for _ in range(NEWTON):
+        ratio = np.exp(np.clip(raw - level, -20.0, 3.0))
+        slope = free / 2 * (1 - ratio) + inner @ level - near * middle
+        bend = inner + np.diag(free / 2 * np.maximum(ratio, 0.2))
+        step = np.clip(np.linalg.solve(bend, slope), -2.0, 2.0)
+        level = level - step
+        if np.abs(step).max() < SETTLED:
+            break
+    out: Array = level + np.diag(np.linalg.inv(bend)) / 2
+    return out

@@ -1,0 +1,188 @@
+"""Rows in motion, linearised: cosine coefficients, whitened by the noise's spectrum."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import ACC, GYR, Array, Index
+from fieldcal.model.causes.cause import TRIADS
+from fieldcal.model.causes.columns import Course, General, RowView
+from fieldcal.model.causes.followed import MotionDictionary
+from fieldcal.model.evidence.gram import Eliminated
+from fieldcal.model.rows.coloured import Bands
+from fieldcal.model.rows.motion import MotionRows
+from fieldcal.model.state import State
+from fieldcal.model.system.linear_system import SHOWS, System
+from fieldcal.model.system.window_rows import Linear
+
+Parts = dict[int, list[tuple[Index, Array]]]
+"""Columns that touch each channel, with their coefficients."""
+
+
+class MotionSystem(System):
+    """Rows in motion and their dictionary, linearised about states.
+
+    Parameters
+    ----------
+    dictionary : their columns
+    power : (n, 6) of the noise of each coefficient
+
+    """
+
+    def __init__(self, dictionary: MotionDictionary, power: Array) -> None:
+        self.dictionary: MotionDictionary = dictionary
+        self.power = power
+
+    @property
+    def motion(self) -> MotionRows:
+        """The rows as they stand beside their reference now."""
+        return self.dictionary.place.rows
+
+    def apart(self) -> MotionSystem:
+        """The same rows with a dictionary of their own, as it is now."""
+        return MotionSystem(self.dictionary.apart(), self.power)
+
+    def linearised(
+        self, state: State, wanted: NDArray[np.bool_] | None = None
+    ) -> list[Linear]:
+        """Rows of every channel about a state, with all columns or those wanted."""
+        d, rows = self.dictionary, self.motion
+        views = self._views(state)
+        off = self._off(views, state)
+        white = rows.cosines(np.where(rows.used, off, 0.0))
+        parts: dict[int, list[tuple[Index, Array]]] = {
+            c: [] for c in d.observed.tolist()
+        }
+        asked = self._grouped() if wanted is None else wanted
+        for first, end, basis in d.spans():
+            at, kept = np.arange(first, end), asked[first:end]
+            if not kept.any():
+                continue
+            if isinstance(basis, Course):
+                self._courses(parts, at, basis.of(views[0]), kept)
+                continue
+            table = self._table(basis, views)
+            for c, some in parts.items():
+                there = kept & np.any(table[:, c] != 0.0, axis=0)
+                if there.any():
+                    some.append((at[there], rows.cosines(table[:, c, there])))
+        out = [self._channel(c, some, white[:, c]) for c, some in parts.items() if some]
+        if wanted is None:
+            for part in out:
+                size = np.linalg.norm(part.design, axis=0) * d.typical[part.columns]
+                d.shown[part.columns] |= size > SHOWS
+        return out
+
+    def _views(self, state: State) -> list[RowView]:
+        """Rows of the accelerometers, and of the gyroscopes where these are late."""
+        d = self.dictionary
+        inputs = [d.x] if d.later is d.x else [d.x, d.later]
+        return [RowView.of(x, d.since, state) for x in inputs]
+
+    def _off(self, views: Sequence[RowView], state: State) -> Array:
+        """What a state leaves, (n, 6).
+
+        By how much gyroscopes are known to be late the reference was looked up later,
+        so what the state has of that counts beyond it.
+        """
+        rows, since = self.motion, self.dictionary.since
+        out = rows.y - state.output(views[0].x, since)
+        if len(views) > 1:
+            x = views[1].x
+            predicted = state.output(x, since)[:, GYR] + rows.late * x.w_dot
+            out[:, GYR] = rows.y[:, GYR] - predicted
+        return out
+
+    @staticmethod
+    def _table(basis: General, views: Sequence[RowView]) -> Array:
+        """Columns of all channels, those of the gyroscopes as they are late."""
+        table = basis.of(views[0])
+        if len(views) > 1:
+            table = np.concatenate([table[:, ACC], basis.of(views[1])[:, GYR]], axis=1)
+        return table
+
+    def _grouped(self) -> NDArray[np.bool_]:
+        """Columns that some group has."""
+        d = self.dictionary
+        out = np.zeros(d.width, dtype=bool)
+        for group in [*d.always, *(v for c in d.causes for v in c.variants)]:
+            out[group.columns] = True
+        return out
+
+    def _courses(
+        self,
+        parts: Parts,
+        at: Index,
+        table: Array,
+        kept: NDArray[np.bool_],
+    ) -> None:
+        """Columns `at` of a function that is the same on every channel, those kept."""
+        every, width = self.motion.cosines(table), table.shape[1]
+        for c, some in parts.items():
+            own = slice(c * width, (c + 1) * width)
+            if kept[own].any():
+                some.append((at[own][kept[own]], every[:, kept[own]]))
+
+    def _channel(
+        self, c: int, some: Sequence[tuple[Index, Array]], white: Array
+    ) -> Linear:
+        """One channel's coefficients, whitened."""
+        weight = 1 / np.sqrt(self.power[:, c])
+        design = np.hstack([table for _, table in some]) * weight[:, None]
+        columns = np.concatenate([at for at, _ in some])
+        rows = np.arange(len(white))
+        return Linear(
+            int(c), rows, self.motion.part, weight, columns, design, white * weight
+        )
+
+
+def left(part: Linear, values: Array, found: Eliminated) -> tuple[Array, Array]:
+    """What a fit leaves of a channel's coefficients, and their leverages, (n,) each.
+
+    Parameters
+    ----------
+    part : rows of the channel
+    values : (k,) of the dictionary's columns in the state
+    found : the columns that are fitted
+
+    """
+    place = {int(c): i for i, c in enumerate(found.columns)}
+    here = [(j, place[int(c)]) for j, c in enumerate(part.columns) if int(c) in place]
+    mine, theirs = (np.array(some, dtype=np.intp) for some in zip(*here, strict=True))
+    design = part.design[:, mine]
+    step = found.estimate[theirs] - values[part.columns[mine]]
+    leverage = np.einsum("ij,ij->i", design @ found.half[:, theirs].T,
+                         design @ found.half[:, theirs].T)  # fmt: skip
+    return (part.white - design @ step) / part.weight, leverage
+
+
+def noise_levels(
+    bands: Bands,
+    frequency: Array,
+    linear: Sequence[Linear],
+    values: Array,
+    found: Eliminated,
+) -> dict[int, Array]:
+    """Ln of the noise's power at the places of bands, by channel.
+
+    It is that of what a fit leaves.
+
+    Parameters
+    ----------
+    bands, frequency : of the coefficients, (n,) Hz
+    linear : rows of each channel
+    values : (k,) of the dictionary's columns in the state
+    found : the columns that are fitted
+
+    """
+    out: dict[int, Array] = {}
+    for _, channels in TRIADS:
+        triad = [part for part in linear if part.channel in channels]
+        if triad:
+            told = [left(part, values, found) for part in triad]
+            levels = bands.levels(frequency, *map(list, zip(*told, strict=True)))
+            out |= {part.channel: one for part, one in zip(triad, levels, strict=True)}
+    return out

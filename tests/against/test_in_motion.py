@@ -1,0 +1,155 @@
+"""Recordings in motion, held against what follows the motion."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from benchmarks.in_motion.driven import Drive, coloured, recorded
+from benchmarks.in_motion.pairs import ABOUT, KINDS, WHITE, block_of, compared, pulls
+from fieldcal.against import Match
+from fieldcal.against.motion import compared_in_motion
+from fieldcal.cli import main
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, Block
+
+HEAD = "t (s),ax (m/s^2),ay (m/s^2),az (m/s^2),gx (rad/s),gy (rad/s),gz (rad/s)"
+NAMES = ("recording", "simulator")
+NOISE = {"noise": {"white": WHITE, "markov": WHITE / 2, "tau": 2.0}}
+DRIVE = Drive(3)
+CALIBRATION = {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
+
+
+@pytest.fixture(scope="module")
+def true() -> Block:
+    return block_of(recorded(DRIVE, {}, 80.0, 25.0))
+
+
+def held(device: Mapping[str, Any], true: Block, seconds: float = 60.0) -> Match:
+    real = block_of(recorded(DRIVE, {"start": 5.0, **device}, seconds, 25.0))
+    return compared_in_motion((real, ABOUT), true, NAMES)
+
+
+def number(found: Match, name: str, parameter: str) -> tuple[float, float]:
+    (one,) = (d for d in found.differences if d.id == name)
+    off = one.parameters[parameter].difference
+    return float(off.value), float(off.sigma or np.nan)
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("kind", [KINDS.index("cubic")])
+def test_what_was_drawn_comes_back_within_its_uncertainty(kind: int) -> None:
+    one, found = compared(kind, 7_100)
+    effects = {d.id for d in found.differences} - CALIBRATION
+    assert effects == ({one.kind} if one.kind else set())
+    off = np.array(pulls(one, found))
+    assert len(off) >= 6 and np.abs(off).max() < 4.5
+    assert np.sqrt(np.mean(off**2)) < 1.8
+    assert 0.85 < found.after.chi2_per_dof < 1.15 < found.before.chi2_per_dof
+
+
+def test_clock_and_axes_are_told_with_their_uncertainty(true: Block) -> None:
+    turn = Rotation.from_rotvec([0.3, -0.2, 1.4])
+    device = {"clock": (2.5, 8e-5), "turn": turn.as_matrix(), **NOISE}
+    where = held(device, true).aligned
+    assert where is not None
+    # start + (t - delay) (1 + rate) by the simulator's clock
+    at = where.at_s
+    expected = {
+        "delay": (where.delay, at - (5.0 + (at - 2.5) * (1 + 8e-5))),
+        "drift": (where.drift, 80.0),
+    }
+    for axis, angle in zip("xyz", np.rad2deg(turn.as_rotvec()), strict=True):
+        expected[axis] = (where.turn[axis], float(angle))
+    for name, (told, wanted) in expected.items():
+        assert abs(float(told.value) - wanted) < 4 * (told.sigma or 0), name
+    assert (where.delay.sigma or 1) < 1e-4 and (where.drift.sigma or 9) < 2.0
+    assert where.compared_s > 50
+
+
+def test_several_at_once_with_late_gyroscopes_off_the_centre(true: Block) -> None:
+    device = {"arm": (0.2, -0.15, 0.1), "late": 0.02, "g": 2e-4 * np.eye(3), **NOISE}
+    found = held(device, true)
+    assert {d.id for d in found.differences} - CALIBRATION == {
+        "lever_arm", "time_delay", "g_sensitivity",
+    }  # fmt: skip
+    for name, parameter, wanted in (
+        ("lever_arm", "x", 0.2),
+        ("lever_arm", "y", -0.15),
+        ("time_delay", "seconds", 0.02),
+        ("g_sensitivity", "g22", 2e-4),
+    ):
+        value, sigma = number(found, name, parameter)
+        assert abs(value - wanted) < 4.5 * sigma < 0.2 * abs(wanted), parameter
+    assert found.verdict == "left_out"
+    (arm,) = (d for d in found.differences if d.id == "lever_arm")
+    assert {"ax", "ay", "az"} <= {m.channel for m in arm.where}
+
+
+def test_nothing_is_said_of_what_is_alike() -> None:
+    table = recorded(DRIVE, {}, 40.0, 25.0)
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        real, sim = table.copy(), table.copy()
+        real[:, 1:] += coloured(rng, len(table), 0.04, NOISE["noise"])
+        sim[:, 1:] += coloured(rng, len(table), 0.04, NOISE["noise"])
+        found = compared_in_motion((block_of(real), ABOUT), block_of(sim), NAMES)
+        assert found.verdict == "consistent" and not found.differences
+        assert found.before.chi2_per_dof == pytest.approx(1.0, abs=0.1)
+
+
+def test_motions_with_nothing_in_common_are_refused(true: Block) -> None:
+    other = block_of(recorded(Drive(11), {}, 60.0, 25.0))
+    with pytest.raises(InputError, match="recording and simulator show no common"):
+        compared_in_motion((other, ABOUT), true, NAMES)
+
+
+def test_a_motion_that_repeats_itself_is_refused() -> None:
+    once = recorded(DRIVE, {}, 40.0, 25.0)
+    twice = np.vstack([once, once + [40.0, *[0.0] * 6]])
+    real = once.copy()
+    real[:, 1:] += coloured(np.random.default_rng(1), len(real), 0.04, {"white": 0.1})
+    with pytest.raises(InputError, match="repeats itself: shifted by"):
+        compared_in_motion((block_of(real), ABOUT), block_of(twice), NAMES)
+
+
+def test_a_recording_beside_itself_is_alike(true: Block) -> None:
+    assert compared_in_motion((true, ABOUT), true, NAMES).verdict == "consistent"
+
+
+def test_too_little_in_common_is_refused(true: Block) -> None:
+    with pytest.raises(InputError, match="at least 20 s in one piece are needed"):
+        held(NOISE, true, seconds=15.0)
+
+
+def written(path: Path, table: Array) -> str:
+    np.savetxt(path, table, fmt="%.9g", delimiter=",", header=HEAD, comments="")
+    return str(path)
+
+
+def test_files_are_compared_by_their_motion(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    device = {"start": 5.0, "bias": np.repeat([0.05, 0.0], 3), "arm": (0.2, 0, 0)}
+    real = written(tmp_path / "real.csv", recorded(DRIVE, device | NOISE, 40.0, 25.0))
+    sim = written(tmp_path / "sim.csv", recorded(DRIVE, {}, 50.0, 25.0))
+    folder = tmp_path / "session"
+    assert main(["import", real, "--acc-unit", "m/s^2", "-o", str(folder)]) == 0
+    call = ["diagnose", str(folder), "--against", sim, "--patch", "json"]
+    assert main(call) == 1
+    said = capsys.readouterr().out
+    assert "lever arm" in said and "of common motion" in said
+    content = json.loads((folder / "against.json").read_text())
+    assert content["alignment"]["delay"]["value"] == pytest.approx(-5.0, abs=1e-3)
+    patch = json.loads((folder / "patch.json").read_text())
+    assert patch["effects"]["lever_arm"]["x"] == pytest.approx(0.2, abs=0.002)
+    assert main(["diagnose", str(folder), "--against", "sim {patch} {out}"]) == 2
+    assert "a command is run again for recordings of positions" in (
+        capsys.readouterr().err
+    )

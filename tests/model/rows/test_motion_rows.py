@@ -1,0 +1,113 @@
+"""Rows in motion: cosine coefficients, reference and alignment, by slow sums."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.motion import (
+    Alignment,
+    MotionRows,
+    Reference,
+    frequencies,
+    rows_in_motion,
+)
+
+LENGTH, COUNT = 6, 4
+STILL = Alignment(0.0, 0.0, 0.0)
+
+
+def reference(hz: float = 50.0, seconds: float = 40.0) -> Reference:
+    t = np.arange(0.0, seconds, 1 / hz)
+    return Reference(Block.of(t, course(t)[:, :3], course(t)[:, 3:]))
+
+
+def course(t: Array) -> Array:
+    return np.stack([np.sin((0.7 + 0.1 * c) * t + c) for c in range(6)], axis=1)
+
+
+def rows(alignment: Alignment = STILL, per_row: int = 2) -> MotionRows:
+    t = np.arange(5.0, 30.0, 0.02)
+    block = Block.of(t, course(t)[:, :3], course(t)[:, 3:])
+    return rows_in_motion(block, reference(), alignment, per_row, 2.0, 1.0)
+
+
+def cosines(values: Array) -> Array:
+    """Equation (2) as it is written."""
+    n = len(values)
+    j = np.arange(n) + 0.5
+    table = np.array([np.cos(np.pi * k * j / n) for k in range(n)]) * np.sqrt(2 / n)
+    table[0] /= np.sqrt(2)
+    out: Array = table @ values
+    return out
+
+
+def test_coefficients_are_the_sums_that_are_written() -> None:
+    there = rows()
+    values = np.random.default_rng(1).standard_normal((len(there), 3))
+    apart = values.reshape(-1, there.length, 3)
+    expected = np.stack([cosines(one) for one in apart])
+    expected[:, 0] = cosines(expected[:, 0])
+    found = there.cosines(values)
+    np.testing.assert_allclose(found, expected.reshape(values.shape), atol=1e-12)
+    assert (found**2).sum() == pytest.approx((values**2).sum())
+
+
+def test_coefficients_of_some_stretches_are_those_of_their_rows() -> None:
+    there = rows()
+    values = np.random.default_rng(2).standard_normal((len(there), 2))
+    some = np.array([0, 3, 4])
+    kept = values.reshape(-1, there.length, 2)[some]
+    expected = np.stack([cosines(one) for one in kept])
+    expected[:, 0] = cosines(expected[:, 0])
+    found = there.of_stretches(there.cosines(values), some)
+    np.testing.assert_allclose(found, expected.reshape(found.shape), atol=1e-12)
+
+
+def test_a_cosine_lies_at_its_frequency() -> None:
+    step, k = 0.1, 4
+    hz = frequencies(COUNT * LENGTH, LENGTH, step)
+    t = (np.arange(LENGTH) + 0.5) * step
+    share = np.abs(cosines(np.cos(2 * np.pi * hz[k] * t)[:, None]))[:, 0]
+    assert int(np.argmax(share)) == k and np.delete(share, k).max() < 1e-12
+    slow = hz[::LENGTH]
+    np.testing.assert_allclose(slow, np.arange(COUNT) / (2 * COUNT * LENGTH * step))
+
+
+def test_the_motion_is_that_of_the_reference_where_the_recording_stands() -> None:
+    turn = Rotation.from_rotvec([0.2, 0.5, -1.0]).as_matrix()
+    there = rows(Alignment(0.3, 1e-3, 12.0, turn))
+    s = there.t - 0.3 + 1e-3 * (there.t - 12.0)
+    every = course(s.ravel()).reshape(*s.shape, 6).mean(axis=1)
+    found = there.motion()
+    np.testing.assert_allclose(found[:, :3], every[:, :3] @ turn.T, atol=1e-6)
+    np.testing.assert_allclose(found[:, 3:], every[:, 3:] @ turn.T, atol=1e-6)
+    step = 1e-4
+    change = (there.motion(0, -step) - there.motion(0, step)) / (2 * step)
+    np.testing.assert_allclose(there.motion(1), change / (1 + 1e-3), atol=2e-3)
+
+
+def test_rows_end_at_gaps_of_recording_and_reference() -> None:
+    t = np.arange(0.0, 30.0, 0.02)
+    whole = Block.of(t, course(t)[:, :3], course(t)[:, 3:])
+    holey = Block(*(v[(t < 10) | (t > 11)] for v in
+                    (whole.t, whole.acc, whole.gyr, whole.temperature, whole.seq,
+                     whole.t_host)))  # fmt: skip
+    for block, beside in ((holey, whole), (whole, holey)):
+        there = rows_in_motion(block, Reference(beside), STILL, 1, 2.0, 1.0)
+        inside = there.t.ravel()
+        assert not ((inside > 10.01) & (inside < 10.99)).any()
+        stretches = inside.reshape(-1, there.length)
+        assert (np.ptp(stretches, axis=1) < 2.0).all()
+        assert inside.min() > 1.0 and inside.max() < 29.0
+
+
+def test_a_channel_that_the_reference_lacks_is_none_of_its_own() -> None:
+    t = np.arange(0.0, 20.0, 0.02)
+    acc = course(t)[:, :3].copy()
+    acc[:, 1] = np.nan
+    found = Reference(Block.of(t, acc))
+    assert found.observed.tolist() == [True, False, True, False, False, False]
+    assert not found.at(t[50:60])[:, 1].any()

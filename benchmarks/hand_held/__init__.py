@@ -103,13 +103,20 @@ def pulls(told: dict[str, Any], device: Device) -> Array:
     }  # fmt: skip
     if device.walk or device.warmth.any():
         del truth["acc_bias"], truth["gyr_bias"]
-    out = [
-        (np.array(told[n]["value"], float) - v) / np.array(told[n]["sigma"], float)
-        for n, v in truth.items()
-        if n in told
-    ]
-    every: Array = np.concatenate([np.zeros(0), *out])
-    return every[np.isfinite(every)]
+    axes = {
+        "cross_coupling": ["k12", "k13", "k23"],
+        "gyro_cross_coupling": ["s12", "s13", "s21", "s23", "s31", "s32"],
+    }
+    out = []
+    for name, values in truth.items():
+        if name in told:
+            one, every = told[name], axes.get(name, [])
+            # of some axes turns like these tell nothing: those are not listed
+            at = [every.index(n) for n in one.get("names", every)] or slice(None)
+            off = np.array(one["value"], float) - values[at]
+            out.append(off / np.array(one["sigma"], float))
+    pulled: Array = np.concatenate([np.zeros(0), *out])
+    return pulled[np.isfinite(pulled)]
 
 
 def _upper(mixed: Array) -> tuple[Array, Array]:

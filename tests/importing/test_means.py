@@ -133,6 +133,29 @@ def test_a_position_that_was_moved_is_named_and_costs_the_others_nothing(
     assert max(found["parameters"]["acc_bias"]["sigma"]) < 5e-4
 
 
+@pytest.mark.parametrize("seed", [30])
+def test_a_position_that_was_moved_hides_no_effect(
+    seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neither the effect nor the position explains much while the other is there."""
+    table = means(seed, 40, 0.02)[:, :3]
+    table += np.random.default_rng(seed).normal(0, 0.01, table.shape)
+    table[12, 2] += 0.8
+    out, _ = session(tmp_path, table, "ax,ay,az")
+    capsys.readouterr()
+    assert main(["diagnose", str(out), "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert [e["id"] for e in said["effects"]] == ["cross_coupling"]
+    assert main(["solve", str(out), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert "cross_coupling" in " ".join(found["warnings"])
+    parameters = found["parameters"]["acc_bias"]
+    assert (
+        np.abs(parameters["value"] - BIAS) < 4 * np.array(parameters["sigma"])
+    ).all()
+    assert max(parameters["sigma"]) < 0.006
+
+
 def test_a_mean_its_scatter_and_what_it_ought_to_be_stand_beside_each_other(
     tmp_path: Path,
 ) -> None:

@@ -154,7 +154,7 @@ class Search(Offers):
         Each with all its parameters as well: beside the other it may need them. Pairs
         that are worth less than the least may be left out.
         """
-        known = [o for o in table.offers if o.member[0].kind != "unknown"][:PROMISING]
+        known = [o for o in table.offers if _pairable(o)][:PROMISING]
         every = [*known, *(_widened(o) for o in known)]
         new = [a is not b for a, b in zip(known, every[len(known) :], strict=True)]
         wanted, more = [], {}
@@ -173,6 +173,16 @@ class Search(Offers):
         """Chance of two more causes beside those of a set, ln."""
         both = [*there.members, one.member, two.member]
         return self.chance(both) - self.chance(there.members)
+
+
+def _pairable(offer: Offer) -> bool:
+    """Whether an offer may be one of a pair: an effect, or a window off by itself.
+
+    One window that is far off hides every effect, and what the effects leave hides
+    that it is one window alone.
+    """
+    cause, group = offer.member
+    return cause.kind != "unknown" or len(group.columns) == 1
 
 
 def _widened(offer: Offer) -> Offer:

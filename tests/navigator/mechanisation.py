@@ -34,12 +34,18 @@ def place(latitude: float, height: float) -> Array:
     return np.array([x, 0.0, (n * (1 - E2) + height) * np.sin(latitude)])
 
 
+def _skew(v: Array) -> Array:
+    """Matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
+    x, y, z = np.moveaxis(v, -1, 0)
+    o = np.zeros_like(x)
+    rows = [np.stack(row, axis=-1) for row in ((o, -z, y), (z, o, -x), (-y, x, o))]
+    return np.asarray(np.stack(rows, axis=-2))
+
+
 def _rotation(v: Array) -> Array:
-    angle = float(np.linalg.norm(v))
-    if angle < 1e-15:
-        return np.eye(3)
-    x, y, z = v / angle
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) that are not zero."""
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    k = _skew(v) / angle
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k)
 
 
@@ -68,17 +74,19 @@ def navigated(
     earth = np.array([0.0, 0.0, OMEGA])
     velocities, ways = np.empty_like(forces), np.empty_like(forces)
     radius = float(np.linalg.norm(start))
-    for k, (w, f) in enumerate(zip(rates, forces, strict=True)):
-        middle = c @ _rotation(w * dt / 2)
-        c = _rotation(-earth * dt) @ c @ _rotation(w * dt)
+    half_turns, turns = _rotation(rates * dt / 2), _rotation(rates * dt)
+    half_back, back = _rotation(-earth * dt / 2), _rotation(-earth * dt)
+    coriolis = 2 * _skew(earth)
+    for k, f in enumerate(forces):
+        middle = half_back @ c @ half_turns[k]
+        c = back @ c @ turns[k]
         way = r - start
         up = -home[:, 1]
         # plumb line follows the place; gravity as of a sphere about it
         plumb = up + (way - up * (up @ way)) / radius
         plumb /= np.linalg.norm(plumb)
         pull = -gravity * (1 - 2 * (up @ way) / radius) * plumb
-        v = v + (_rotation(-earth * dt / 2) @ middle @ f + pull
-                 - 2 * np.cross(earth, v)) * dt  # fmt: skip
+        v = v + (middle @ f + pull - coriolis @ v) * dt
         r = r + v * dt
         velocities[k], ways[k] = home.T @ v, home.T @ (r - start)
     return velocities, ways

@@ -28,6 +28,22 @@ def test_turns_are_right_handed_rotations_about_z_then_x(a: float, b: float) -> 
     np.testing.assert_allclose(frames.turn(a, b), turned(a, b), atol=1e-12)
 
 
+def test_angles_are_read_back_from_three_turns_also_where_beta_is_a_right_angle() -> (
+    None
+):
+    for alpha, beta, gamma in itertools.product((-3.0, 0.0, 0.7), (-1.2, 0.4), (2, -1)):
+        back = frames.turns_of(frames.turn(alpha, beta, gamma))
+        np.testing.assert_allclose(back, [alpha, beta, gamma], atol=1e-12)
+    for alpha, beta in itertools.product((-2.5, 0.3, 2.0), (-np.pi / 2, np.pi / 2)):
+        back = frames.turns_of(frames.turn(alpha, beta))
+        np.testing.assert_allclose(back, [alpha, beta, 0.0], atol=1e-12)
+        # the third turn is about the same axis, and goes into the first
+        one = frames.turn(alpha, beta, 0.4)
+        again = frames.turns_of(one)
+        assert again[2] == 0.0
+        np.testing.assert_allclose(frames.turn(*again), one, atol=1e-12)
+
+
 def test_many_turns_at_once_are_the_single_ones() -> None:
     alpha, beta = [[0], [1], [-2]], [0, 2]
     every = frames.turn(alpha, beta)

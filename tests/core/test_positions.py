@@ -14,6 +14,7 @@ from fieldcal.core.positions import (
     Position,
     angles,
     forces,
+    ladder,
     rates,
 )
 
@@ -67,6 +68,23 @@ def test_forces_are_gravity_seen_from_the_turned_device() -> None:
         seen = Rotation.from_euler("x", -position.degrees[1], degrees=True).apply(seen)
         np.testing.assert_allclose(force, seen, atol=1e-12)
     assert np.isnan(found[-1]).all()
+
+
+def test_forces_are_those_after_a_third_turn_as_well() -> None:
+    """About the y that both have turned: gravity goes from z to x."""
+    gamma = np.pi / 3
+    turned = Position("on its edge", 0.2, 0.7, gamma=gamma)
+    two, three = forces([Position("before", 0.2, 0.7), turned], 9.8)
+    expected = Rotation.from_euler("y", -gamma).apply(two)
+    np.testing.assert_allclose(three, expected, atol=1e-12)
+
+
+def test_a_ladder_goes_to_either_side_and_has_home() -> None:
+    had = [Position.deg(20, 0), Position.deg(-20.0000001, 2.5), UNKNOWN]
+    found, sides = ladder(had), (-20.0, 0.0, 20.0)
+    assert sorted(found) == [(a, b) for a in sides for b in (-2.5, 0.0, 2.5)]
+    assert found[0] == (0.0, 0.0) and {a for a, _ in found[:3]} == {0.0}
+    assert ladder([UNKNOWN]) == [] == ladder([])
 
 
 def test_the_sets_are_those_of_the_paper_and_a_ladder() -> None:

@@ -91,10 +91,10 @@ def test_garbage_between_samples_costs_none(
     stream = FEW[name]
     pairs = zip(junk, stream.pieces, strict=True)
     dirty = b"".join(noise + piece for noise, piece in pairs)
-    pad = bytes(3000)
     step = data.draw(st.integers(1, 300))
     clean = fed(decoder(name, stream), [b"".join(stream.pieces)])
-    assert_same(fed(decoder(name, stream), cut(dirty + pad, step)), clean)
+    # what garbage made a frame of may be as long as frames can be: pad to its end
+    assert_same(fed(decoder(name, stream), [*cut(dirty, step), bytes(3000)]), clean)
 
 
 @every_format

@@ -15,3 +15,10 @@ def test_a_running_engine_is_within_and_a_walk_is_not() -> None:
     limits = StillnessLimits()
     assert (limits.noise[:3] > 0.2).all() and (limits.noise[:3] < 1.0).all()
     assert (limits.drift < limits.noise).all() and (limits.drift > 0).all()
+
+
+def test_on_a_base_that_sways_what_it_turns_by_is_no_drift() -> None:
+    still, swaying = StillnessLimits(), StillnessLimits.swaying()
+    np.testing.assert_array_equal(swaying.noise, still.noise)
+    np.testing.assert_array_equal(swaying.drift, 2 * still.noise)
+    assert swaying.settled == 16.0

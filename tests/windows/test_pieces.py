@@ -97,7 +97,7 @@ def test_what_is_too_short_to_be_judged_is_not_kept() -> None:
     fed(pieces, rest(rng, 10.0, 8.0, np.zeros(6)))
     found = pieces.average()
     assert found is not None and found.start == pytest.approx(10.0)
-    assert not pieces.without
+    assert not pieces.without and pieces.dropped == 0.0
 
 
 def test_what_is_no_window_together_is_given_up_and_ends() -> None:

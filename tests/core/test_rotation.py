@@ -1,0 +1,29 @@
+"""Rotation matrices against rotations built another way, and by their series."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from fieldcal.core.rotation import cross_matrix, exponential
+
+VECTORS = np.random.default_rng(3).standard_normal((2, 4, 3))
+
+
+def test_the_cross_matrix_is_the_cross_product() -> None:
+    others = np.random.default_rng(4).standard_normal((2, 4, 3))
+    found = (cross_matrix(VECTORS) @ others[..., None])[..., 0]
+    np.testing.assert_allclose(found, np.cross(VECTORS, others), atol=1e-15)
+    one = cross_matrix(np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_array_equal(one, [[0, -3, 2], [3, 0, -1], [-2, 1, 0]])
+
+
+def test_rotations_are_those_of_their_vectors_however_small() -> None:
+    for size in (0.0, 1e-12, 1e-4, 0.3, np.pi, 7.0):
+        vectors = size * VECTORS.reshape(-1, 3)
+        expected = Rotation.from_rotvec(vectors).as_matrix()
+        np.testing.assert_allclose(exponential(vectors), expected, atol=1e-14)
+    one = VECTORS[0, 0]
+    np.testing.assert_allclose(exponential(one), expm(cross_matrix(one)), atol=1e-14)
+    np.testing.assert_array_equal(exponential(np.zeros(3)), np.eye(3))

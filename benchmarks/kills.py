@@ -24,7 +24,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.commands.table import concealed_values
 from fieldcal.core.positions import FIVE
 from fieldcal.run.movers import VirtualMover
-from fieldcal.session.folder import read_marks
+from fieldcal.session.marks import read_marks
 
 KILLED, PULLED = 200, 100
 SECONDS = 8.0

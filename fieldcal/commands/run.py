@@ -228,7 +228,7 @@ def _broken_off(
     args: argparse.Namespace, task: Task, folder: Path, error: BaseException
 ) -> None:
     """Say what is kept, if anything was begun."""
-    from fieldcal.session.folder import MARKS
+    from fieldcal.session.marks import MARKS
 
     if not os.path.exists(folder / MARKS):  # False where nobody may look
         return
@@ -298,7 +298,7 @@ def _take_besides(
     recorder: Any, task: Task, known: int, again: Sequence[int], taken: dict[int, Any]
 ) -> None:
     """Note the positions that a remedy adds, and those that it takes once more."""
-    from fieldcal.session.folder import ADDED
+    from fieldcal.session.marks import ADDED
 
     for number in again:
         recorder.mark("repeated", position=number)

@@ -97,7 +97,7 @@ def write_junit(
     from fieldcal.core.positions import Position
     from fieldcal.run import junit
     from fieldcal.session.description import with_more
-    from fieldcal.session.folder import ADDED, MARKS, read_marks
+    from fieldcal.session.marks import ADDED, MARKS, read_marks
 
     marks = list(read_marks(folder / MARKS))
     about = task.about

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.version import __version__
-from fieldcal.session.folder import DESCRIPTION, MARKS
+from fieldcal.session.folder import DESCRIPTION
+from fieldcal.session.marks import MARKS
 
 
 def sessions_in(folders: Iterable[Path]) -> list[Path]:

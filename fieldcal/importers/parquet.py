@@ -18,7 +18,7 @@ from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.gzip_stream import on_disk
 from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import ROWS
-from fieldcal.session.arrow_stream import numbers
+from fieldcal.session.arrow_columns import numbers
 
 WHAT = "Parquet and Arrow"
 

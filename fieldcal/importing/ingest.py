@@ -21,8 +21,9 @@ from fieldcal.importing.spool import SpooledRows
 from fieldcal.importing.stream_facts import StreamFacts
 from fieldcal.importing.validation import RowValidator, SampleWriter, digest
 from fieldcal.session.clock import ClockStep, SteadyClock
-from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line
+from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
+from fieldcal.session.marks import MARKS, mark_line
 from fieldcal.windows.cells import Cells
 from fieldcal.windows.jumps import Jumps
 from fieldcal.windows.spikes import without_spikes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fieldcal.core.samples import Array
-from fieldcal.session.arrow_stream import numbers
+from fieldcal.session.arrow_columns import numbers
 
 MISSING = ("", "null", "NULL", "None", "NA", "N/A", "n/a", "#N/A", "NaN", "nan", "-")
 """What stands in a cell that holds no value."""

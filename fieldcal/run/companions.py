@@ -27,7 +27,8 @@ from fieldcal.core.errors import FieldcalError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
 from fieldcal.run.link_marks import LinkMarks
-from fieldcal.session.folder import ADDED, DESCRIPTION
+from fieldcal.session.folder import DESCRIPTION
+from fieldcal.session.marks import ADDED
 from fieldcal.session.recorder import Recorder
 
 BATCHES = 1 << 17

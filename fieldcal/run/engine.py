@@ -35,7 +35,7 @@ from fieldcal.run.waiting import PositionWait, force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.run.window_taking import WindowTaking
 from fieldcal.session.description import Description
-from fieldcal.session.folder import ADDED
+from fieldcal.session.marks import ADDED
 from fieldcal.windows import Average
 
 R = TypeVar("R")

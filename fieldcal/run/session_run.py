@@ -41,7 +41,8 @@ from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, Task
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import with_more
-from fieldcal.session.folder import ADDED, RESULT, Session
+from fieldcal.session.folder import RESULT, Session
+from fieldcal.session.marks import ADDED
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average, average
 

@@ -1,21 +1,16 @@
 """Samples as an Arrow IPC stream in which every batch carries its own checksum.
 
-Any Arrow reader opens the file; the checksum stands in the batch's own metadata:
-``crc32`` of its columns, one after the other, and its ``number`` and first ``row``.
-Reading takes what is whole and says what is not: a batch that was cut off, changed,
-lost or doubled. Behind a damaged place it goes on at the next batch that is whole.
+`arrow_encoder` writes it. Reading takes what is whole and says what is not: a batch
+that was cut off, changed, lost or doubled. Behind a damaged place it goes on at the
+next batch that is whole.
 """
 
 from __future__ import annotations
 
-import io
-import zlib
 from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from fieldcal.core.samples import Array
+from fieldcal.session.arrow_encoder import checksum
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -28,77 +23,6 @@ OURS = {"crc32", "number", "row"}
 
 END = MARKER + b"\0\0\0\0"
 """What a stream that was closed in order ends with."""
-
-
-class ArrowEncoder:
-    """Makes the bytes of a stream, a batch at a time.
-
-    Parameters
-    ----------
-    schema : columns of every batch
-    number, row : batches and rows that are there already, in a stream that goes on
-
-    """
-
-    def __init__(self, schema: pa.Schema, number: int = 0, row: int = 0) -> None:
-        import pyarrow as pa
-
-        self._sink = io.BytesIO()
-        self._stream = pa.ipc.new_stream(self._sink, schema)
-        self._number, self._row = number, row
-        self._there = schema.serialize().to_pybytes() if number else b""
-
-    def batch(self, batch: pa.RecordBatch) -> bytes:
-        """Bytes of the next batch, with those of the stream's head before the first."""
-        said = {
-            "crc32": f"{checksum(batch, self._number, self._row):08x}",
-            "number": str(self._number),
-            "row": str(self._row),
-        }
-        self._stream.write_batch(batch, custom_metadata=said)
-        self._number += 1
-        self._row += batch.num_rows
-        return self._taken()
-
-    def end(self) -> bytes:
-        """Bytes that end the stream."""
-        self._stream.close()
-        return self._taken()
-
-    def _taken(self) -> bytes:
-        data = self._sink.getvalue().removeprefix(self._there)
-        self._there = b""
-        self._sink.seek(0)
-        self._sink.truncate()
-        return data
-
-
-def checksum(batch: pa.RecordBatch, number: int, row: int) -> int:
-    """Checksum of a batch's numbers and of its place."""
-    crc = zlib.crc32(b"%d %d" % (number, row))
-    for name, column in zip(batch.schema.names, batch.columns, strict=True):
-        known = column.type == "double"
-        values = numbers(column) if known else column.to_numpy(zero_copy_only=False)
-        values = np.ascontiguousarray(values)
-        crc = zlib.crc32(values.data, zlib.crc32(name.encode(), crc))
-    return crc
-
-
-def numbers(column: pa.Array | pa.ChunkedArray) -> Array:
-    """Values of a column of float64; nan where there is none.
-
-    Arrow's own way would load all of pandas, where it is installed, to see whether what
-    it is asked for is one of pandas' kinds.
-    """
-    chunks = getattr(column, "chunks", [column])
-    parts = [_numbers(chunk) for chunk in chunks if len(chunk)]
-    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0), *parts])
-
-
-def _numbers(chunk: pa.Array) -> Array:
-    whole = chunk.fill_null(np.nan) if chunk.null_count else chunk
-    first, last = whole.offset, whole.offset + len(whole)
-    return np.frombuffer(whole.buffers()[1], dtype=float)[first:last]
 
 
 class StreamContent(NamedTuple):

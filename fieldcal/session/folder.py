@@ -2,7 +2,7 @@
 
     session.toml    what was known and planned          (`description`)
     samples.<ext>   the raw samples                     (`sample_files`, `recorder`)
-    marks.jsonl     what happened, as it happened
+    marks.jsonl     what happened, as it happened       (`marks`)
     result.json     calibration, by solve
 
 session.toml is never rewritten: windows of a live session stand in marks.jsonl, and
@@ -15,7 +15,6 @@ import contextlib
 import json
 import os
 import tempfile
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,7 +23,6 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.core.documents import load_json
 from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, too_quick
@@ -32,14 +30,11 @@ from fieldcal.session import description, sample_files
 from fieldcal.session.clock import SteadyClock, steadied
 from fieldcal.session.description import Description
 from fieldcal.session.installed import in_one_calibration, stretches
+from fieldcal.session.marks import ADDED, MARKS, read_marks
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 DESCRIPTION = "session.toml"
-MARKS = "marks.jsonl"
 RESULT = "result.json"
-
-ADDED = "added"
-"""Mark of a position that was added to the planned ones, with its angles."""
 
 
 @dataclass
@@ -225,77 +220,6 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
         elif mark.get("event") == "repeated" and isinstance(i, int):
             windows[i : i + 1] = [None]
     return replace(about, windows=tuple(windows))
-
-
-def mark_line(mark: Mapping[str, Any]) -> str:
-    r"""Return a mark as a line of marks.jsonl, with its checksum.
-
-    >>> mark_line({"event": "told"})
-    '{"event": "told", "crc32": "1a049d94"}\n'
-
-    Numbers that are none are null, so that each line is JSON.
-    """
-    text = json.dumps(_valid(mark), allow_nan=False)
-    return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'
-
-
-def _valid(value: Any) -> Any:
-    """Content that JSON has: a number that is none is null."""
-    if isinstance(value, Mapping):
-        return {key: _valid(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_valid(each) for each in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
-
-
-def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:
-    """Marks of a file with a correct checksum; none without a file.
-
-    A line that was changed is left out, and so is a last one that was cut off.
-
-    Parameters
-    ----------
-    path : marks.jsonl
-    says : where what was left out is said, one sentence each
-
-    Raises
-    ------
-    SessionError
-        If the file cannot be read.
-
-    """
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be read: {error}") from error
-    for number, line in enumerate(lines, start=1):
-        if not line.strip():
-            continue
-        mark = _mark(line)
-        if mark is not None:
-            yield mark
-        elif says is not None:
-            what = "was cut off" if number == len(lines) else "is damaged"
-            says.append(f"{path.name}: line {number} {what} and left out")
-
-
-def _mark(line: str) -> dict[str, Any] | None:
-    """Return a mark of a line; None if it is none, or not as it was written."""
-    try:
-        mark = load_json(line)
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(mark, dict):
-        return None
-    told = mark.pop("crc32", None)
-    text = line.rpartition(', "crc32": ')[0] + "}"
-    if told is not None and told != f"{zlib.crc32(text.encode()):08x}":
-        return None
-    return mark
 
 
 def write_whole(path: Path, content: str | bytes) -> Path:

@@ -14,7 +14,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.session import description, sample_files
-from fieldcal.session.folder import DESCRIPTION, MARKS, RESULT, read_marks
+from fieldcal.session.folder import DESCRIPTION, RESULT
+from fieldcal.session.marks import MARKS, read_marks
 from fieldcal.session.schemas import validator
 
 DIAGNOSIS = "diagnosis.json"

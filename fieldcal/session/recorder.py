@@ -24,8 +24,9 @@ import numpy as np
 
 from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.samples import Block, concat
-from fieldcal.session.folder import DESCRIPTION, MARKS, mark_line, write_whole
+from fieldcal.session.folder import DESCRIPTION, write_whole
 from fieldcal.session.lock import SessionLock
+from fieldcal.session.marks import MARKS, mark_line
 from fieldcal.session.sample_files import read, schema, to_batch
 
 FLUSH = 0.2
@@ -140,7 +141,7 @@ class Recorder:
     def _begin(self, about: Mapping[str, Any]) -> None:
         import tomlkit
 
-        from fieldcal.session.arrow_stream import ArrowEncoder
+        from fieldcal.session.arrow_encoder import ArrowEncoder
 
         names = (DESCRIPTION, SAMPLES, MARKS)
         if any((self.folder / name).exists() for name in names):
@@ -159,7 +160,8 @@ class Recorder:
 
     def _resume(self) -> None:
         """Cut off an incomplete batch and append after it."""
-        from fieldcal.session.arrow_stream import ArrowEncoder, decode, whole
+        from fieldcal.session.arrow_encoder import ArrowEncoder
+        from fieldcal.session.arrow_stream import decode, whole
 
         path = self.folder / SAMPLES
         data = path.read_bytes() if path.exists() else b""

@@ -16,7 +16,8 @@ import numpy as np
 
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Array, Block
-from fieldcal.session.arrow_stream import decode, in_order, numbers
+from fieldcal.session.arrow_columns import numbers
+from fieldcal.session.arrow_stream import decode, in_order
 from fieldcal.session.text_files import COLUMNS, read_text, rows_of_text
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from small_files import SMALL
 
 from fieldcal.cli import main
 from fieldcal.commands.import_recording import folders_of
-from fieldcal.session.folder import mark_line
+from fieldcal.session.marks import mark_line
 
 NAMES = "t,ax,ay,az,gx,gy,gz"
 

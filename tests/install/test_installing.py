@@ -22,7 +22,7 @@ from fieldcal.cli import main
 from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.mavlink_imu import MavlinkImu
 from fieldcal.drivers.mavlink_installed import Installed
-from fieldcal.session.folder import mark_line
+from fieldcal.session.marks import mark_line
 
 HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
 

@@ -21,8 +21,8 @@ from fieldcal.core.samples import Block
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.drivers.mavlink_watch import STABLE, InstalledWatch
-from fieldcal.session.folder import read_marks
 from fieldcal.session.installed import NOTHING, in_one_calibration
+from fieldcal.session.marks import read_marks
 
 TURNED = {"alpha_deg": 45, "beta_deg": 5}
 

@@ -17,7 +17,8 @@ from fieldcal.drivers.driver import host_clock
 from fieldcal.history.store import History
 from fieldcal.run.companions import Times
 from fieldcal.run.movers import VirtualMover
-from fieldcal.session.folder import Session, read_marks
+from fieldcal.session.folder import Session
+from fieldcal.session.marks import read_marks
 
 LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
 BIASES = ["0.2,-0.3,0.1", "-0.1,0.4,0.2", "0.3,0.1,-0.2"]

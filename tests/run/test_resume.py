@@ -19,7 +19,8 @@ from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
 from fieldcal.run.session_run import positions_left_out, recorded_averages, resume
 from fieldcal.session import description
-from fieldcal.session.folder import MARKS, Session
+from fieldcal.session.folder import Session
+from fieldcal.session.marks import MARKS
 from fieldcal.session.recorder import SAMPLES, Recorder
 
 TABLES = {

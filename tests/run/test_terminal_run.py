@@ -16,7 +16,7 @@ import pytest
 from processes import HANGS, steady
 
 from fieldcal.run.movers import VirtualMover
-from fieldcal.session.folder import read_marks
+from fieldcal.session.marks import read_marks
 
 SPEED = 16.0
 SIM = ["--serial", "witmotion", "--speed", str(SPEED), "--seed", "4"]

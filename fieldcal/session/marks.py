@@ -1,0 +1,94 @@
+"""marks.jsonl: what happened while a session was recorded, a line each.
+
+Every line carries the checksum of its own text, so that one that was cut off or changed
+is left out and said, and those about it count.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.documents import load_json
+from fieldcal.core.errors import SessionError
+
+MARKS = "marks.jsonl"
+
+ADDED = "added"
+"""Mark of a position that was added to the planned ones, with its angles."""
+
+
+def mark_line(mark: Mapping[str, Any]) -> str:
+    r"""Return a mark as a line of marks.jsonl, with its checksum.
+
+    >>> mark_line({"event": "told"})
+    '{"event": "told", "crc32": "1a049d94"}\n'
+
+    Numbers that are none are null, so that each line is JSON.
+    """
+    text = json.dumps(_valid(mark), allow_nan=False)
+    return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'
+
+
+def _valid(value: Any) -> Any:
+    """Content that JSON has: a number that is none is null."""
+    if isinstance(value, Mapping):
+        return {key: _valid(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_valid(each) for each in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:
+    """Marks of a file with a correct checksum; none without a file.
+
+    A line that was changed is left out, and so is a last one that was cut off.
+
+    Parameters
+    ----------
+    path : marks.jsonl
+    says : where what was left out is said, one sentence each
+
+    Raises
+    ------
+    SessionError
+        If the file cannot be read.
+
+    """
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be read: {error}") from error
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        mark = _mark(line)
+        if mark is not None:
+            yield mark
+        elif says is not None:
+            what = "was cut off" if number == len(lines) else "is damaged"
+            says.append(f"{path.name}: line {number} {what} and left out")
+
+
+def _mark(line: str) -> dict[str, Any] | None:
+    """Return a mark of a line; None if it is none, or not as it was written."""
+    try:
+        mark = load_json(line)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(mark, dict):
+        return None
+    told = mark.pop("crc32", None)
+    text = line.rpartition(', "crc32": ')[0] + "}"
+    if told is not None and told != f"{zlib.crc32(text.encode()):08x}":
+        return None
+    return mark

@@ -11,7 +11,7 @@ from thermal_devices import SIGMA, Warming, drawn, exact, session
 from fieldcal.calibration import limits
 from fieldcal.core.errors import InputError
 from fieldcal.thermal import ThermalPoint, point, thermal_model
-from fieldcal.thermal.fit import GroupData, fitted
+from fieldcal.thermal.group_fit import GroupData, fitted
 
 BOUNDS = limits.read("tactical")
 SEVEN = (1.0, 8.0, 17.0, 25.0, 33.0, 42.0, 49.0)

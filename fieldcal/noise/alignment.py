@@ -22,7 +22,7 @@ NO_NORTH = np.pi / 3**0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Alignment:
+class GyrocompassHeading:
     """Heading by gyrocompassing.
 
     Attributes
@@ -46,7 +46,9 @@ class Alignment:
         return float(self.seconds[i]), float(self.sigma[i]), float(spread)
 
 
-def alignment(gyroscopes: list[Averaging], latitude: float) -> Alignment | None:
+def alignment(
+    gyroscopes: list[Averaging], latitude: float
+) -> GyrocompassHeading | None:
     """Heading from gyroscopes at rest at a latitude, rad, (1); None if they find none.
 
     Near a pole nothing of the Earth's rate is level, and north is not found at all.
@@ -58,4 +60,4 @@ def alignment(gyroscopes: list[Averaging], latitude: float) -> Alignment | None:
     )
     if not sigma.min() < NO_NORTH:
         return None
-    return Alignment(gyroscopes[0].seconds, sigma, low, high)
+    return GyrocompassHeading(gyroscopes[0].seconds, sigma, low, high)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.noise.alignment import Alignment
+from fieldcal.noise.alignment import GyrocompassHeading
 from fieldcal.noise.averaging import Averaging
 from fieldcal.noise.estimate import ChannelEstimate, NoiseModel, Size
 from fieldcal.noise.filters import FilterNoise, kalibr, of_program, ros
@@ -40,7 +40,7 @@ class NoiseResult:
     model: NoiseModel
     recalibrate: Mapping[str, Recalibration]
     since: str
-    alignment: Alignment | None
+    alignment: GyrocompassHeading | None
 
     @property
     def programs(self) -> dict[str, FilterNoise]:

@@ -34,7 +34,7 @@ DEVIATION = 1.4826
 """Standard deviation in a median of absolute values."""
 
 
-class Change(NamedTuple):
+class JumpRows(NamedTuple):
     """Rows where (1) holds, one after another.
 
     Attributes
@@ -57,7 +57,7 @@ class Jumps:
         self._held = concat([])
         self._rows = 0
         self._size = np.full(3, np.nan)
-        self._changes: list[Change] = []
+        self._changes: list[JumpRows] = []
         self._begin = self._end = (np.nan, np.full(3, np.nan))
 
     def add(self, block: Block) -> None:
@@ -80,14 +80,14 @@ class Jumps:
         far: NDArray[np.bool_] = np.any(np.abs(after - before) > self._size, axis=1)
         at = np.flatnonzero(far)  # (1)
         row = at + HALF + self._rows - len(block)
-        self._changes.append(Change(row, block.t[at + HALF], before[at], after[at]))
+        self._changes.append(JumpRows(row, block.t[at + HALF], before[at], after[at]))
 
     @property
     def positions(self) -> list[tuple[float, float]]:
         """Start and end of each position, s; none if the rows do not rest and jump."""
         if not self._changes:
             return []
-        some = Change(*map(np.concatenate, zip(*self._changes, strict=True)))
+        some = JumpRows(*map(np.concatenate, zip(*self._changes, strict=True)))
         if not len(some.row):
             return []
         parts = np.flatnonzero(np.diff(some.row) > 1) + 1

@@ -59,12 +59,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _compared(args: argparse.Namespace, session: Session) -> Compared:
     """Compare by positions, or by the motion where there are too few to tell."""
+    from fieldcal.against.motion.held import holds_positions
     from fieldcal.against.rounds import is_command
     from fieldcal.against.side import side
-    from fieldcal.model.causes.cause import FEW
 
-    held = sum(w is not None for w in session.about.windows)
-    if args.motion or held < FEW:
+    if args.motion or not holds_positions(session.block, session.about):
         return _in_motion(args, session)
     real = side(str(args.session), session.block, session.about)
     compared = _rounds if is_command(args.against) else _once

@@ -10,7 +10,7 @@ from fieldcal.against.wording import lines
 from fieldcal.calibration.wording import position_numbers, pretty
 from fieldcal.commands.diagnosis_view import STYLES
 from fieldcal.diagnosis.findings.agreement import UNITS
-from fieldcal.diagnosis.wording.lines import format_probability
+from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
 from fieldcal.report.against import VERDICTS
 
 
@@ -104,6 +104,9 @@ def _recordings(found: Match) -> object:
         steps = [getattr(one, name) for one in both]
         shown = [f"{s:.3g}" if s == s else "none" for s in steps]
         table.add_row(f"step, {pretty(unit)}", *shown)
+    for name, axes in found.real.calibration.items() if found.aligned else ():
+        for axis, told in axes.items():
+            table.add_row(f"{name} {axis}", pretty_quantity(told), "reference")
     for channel in found.real.noise:
         cells = []
         for one in both:

@@ -8,6 +8,7 @@ the simulator has itself that is the difference, with the opposite sign.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -31,7 +32,7 @@ from fieldcal.core.samples import CHANNELS, UNITS, Array, Block, Index
 from fieldcal.diagnosis.findings.calibrated import GROUPS
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.effects import catalogue
-from fieldcal.model import thresholds
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.followed import TURN
 from fieldcal.model.evidence.gram import Eliminated
@@ -65,15 +66,14 @@ def compared_in_motion(
     found = follow(block, about, Reference(sim), aligned(block, sim, names))
     standing = found.posterior.standing()
     wide, _ = found.inferred.search.opened(found.set)
-    rows = found.set.state
-    state = Eliminated.of(rows.rows, rows.columns, wide)
-    differences = tuple(
-        sorted(
-            [*_effects(found, standing, state), *_calibration(found, state),
-             *_axes(found, state)],
-            key=lambda d: -d.probability,
-        )
-    )  # fmt: skip
+    state = _sized(found, wide)
+    free = _sized(found, _freed(found, wide))
+    every = (
+        *_effects(found, standing, state),
+        *_calibration(found, free),
+        *_axes(found, state),
+    )
+    differences = tuple(sorted(every, key=lambda d: -d.probability))
     verdict = verdict_of(differences)
     shown = proof(found)
     predicted = shown.before, shown.after
@@ -85,12 +85,28 @@ def compared_in_motion(
         differences,
         (),
         *predicted,
-        _facts(block, found),
-        _facts(sim, None),
+        _facts_of_the_device(block, found, free),
+        _facts(sim),
         tuple(_warnings(found, names)),
         f"{says} {aligned_as(where)}",
         where,
     )
+
+
+def _sized(found: Following, sizes: Array) -> Eliminated:
+    """The set of causes with other sizes."""
+    before = found.set.state
+    return Eliminated.of(before.rows, before.columns, sizes)
+
+
+def _freed(found: Following, sizes: Array) -> Array:
+    """Sizes with those of bias and scale factor as of what is to be found."""
+    wide, first = sizes.copy(), 0
+    for group in found.dictionary.always:
+        some = slice(first, first := first + len(group.columns))
+        if group.fixed is None:
+            wide[some] = group.sizes(priors.FREE)
+    return wide
 
 
 def _probability(found: Following, differences: Sequence[Difference]) -> float:
@@ -172,34 +188,54 @@ def _where(found: Following, one: Standing, state: Eliminated) -> Iterator[Misma
 
 def _calibration(found: Following, state: Eliminated) -> Iterator[Difference]:
     """Bias and scale factor of both triads against what the reference says."""
-    d, nominal = found.dictionary, found.fit.nominal
-    for name, unit in GROUPS.items():
+    for name, group, known in _groups(found, state):
+        value, covariance, _ = _estimates(state, group.columns)
+        inner = np.ix_(known, known)
+        probability = differs(value[known], covariance[inner], group.typical[known])
+        if probability >= thresholds.NAMED:
+            told = _told(found, state, name, group, known)
+            nominal = 1.0 if name.endswith("scale") else 0.0
+            pairs = {
+                axis: Pair.of(q, Quantity(nominal, 0.0, q.unit))
+                for axis, q in told.items()
+            }
+            yield Difference(name, "resized", probability, pairs)
+
+
+def _groups(found: Following, state: Eliminated) -> Iterator[tuple[str, Group, Index]]:
+    """Groups of the calibration, each with which of its columns are determined."""
+    for name in GROUPS:
         part, _, cause = name.partition("_")
-        group = next((g for g in d.always if g.cause == cause and g.part == part), None)
+        always = found.dictionary.always
+        group = next((g for g in always if g.cause == cause and g.part == part), None)
         if group is None:
             continue
-        axes = group.columns - (d.bias if cause == "bias" else d.scale)
-        base = nominal.bias if cause == "bias" else nominal.scale
-        value, covariance, before = _estimates(state, group.columns)
+        _, covariance, before = _estimates(state, group.columns)
         sigma = np.sqrt(np.diag(covariance))
-        known = np.flatnonzero(
-            (sigma < DETERMINED[name]) & (sigma**2 < thresholds.DETERMINED * before**2)
+        free = (sigma < DETERMINED[name]) & (
+            sigma**2 < thresholds.DETERMINED * before**2
         )
-        if not len(known):
-            continue
-        probability = differs(
-            value[known], covariance[np.ix_(known, known)], group.typical[known]
+        if free.any():
+            yield name, group, np.flatnonzero(free)
+
+
+def _told(
+    found: Following, state: Eliminated, name: str, group: Group, known: Index
+) -> dict[str, Quantity]:
+    """Values of a group of the calibration by axis."""
+    d, nominal = found.dictionary, found.fit.nominal
+    bias = group.cause == "bias"
+    axes = group.columns - (d.bias if bias else d.scale)
+    base = nominal.bias if bias else nominal.scale
+    value, covariance, _ = _estimates(state, group.columns)
+    return {
+        "xyz"[int(axes[i]) % 3]: Quantity(
+            float(base[axes[i]] + value[i]),
+            float(np.sqrt(covariance[i, i])),
+            GROUPS[name],
         )
-        if probability < thresholds.NAMED:
-            continue
-        pairs = {
-            "xyz"[int(axes[i]) % 3]: Pair.of(
-                Quantity(float(base[axes[i]] + value[i]), float(sigma[i]), unit),
-                Quantity(float(base[axes[i]]), 0.0, unit),
-            )
-            for i in known
-        }
-        yield Difference(name, "resized", probability, pairs)
+        for i in known
+    }
 
 
 def _turn(found: Following, state: Eliminated) -> tuple[Array, Array]:
@@ -241,28 +277,33 @@ def _aligned(found: Following, state: Eliminated) -> Aligned:
     )
 
 
-def _facts(block: Block, found: Following | None) -> Facts:
-    """What a recording is made of; of the device the noise of its samples as well."""
-    steps = [
-        float(np.nan_to_num(grids_of(block)[c : c + 3]).max()) or np.nan for c in (0, 3)
-    ]
-    noise: dict[str, Quantity] = {}
-    if found is not None:
-        per_row = found.rows.t.shape[1]
-        for c, levels in found.fit.levels.items():
-            level = float(np.sqrt(np.exp(levels[-1]) * per_row))
-            count = np.sum(found.rows.frequency >= found.fit.bands.edges[-2])
-            noise[CHANNELS[c]] = Quantity(
-                level, level * float(np.sqrt(0.5 / count)), UNITS[c]
-            )
+def _facts(block: Block) -> Facts:
+    """What a recording is made of."""
+    grids = np.nan_to_num(grids_of(block))
+    steps = [float(grids[c : c + 3].max()) or np.nan for c in (0, 3)]
     return Facts(
         rate_hz=1 / float(np.median(np.diff(block.t))),
         step_acc=steps[0],
         step_gyr=steps[1],
         start_s=float(block.t[0]),
         start_c=Thermometer.of(block).start_c,
-        noise=noise,
+        noise={},
     )
+
+
+def _facts_of_the_device(block: Block, found: Following, state: Eliminated) -> Facts:
+    """The same with the noise of its samples, and its calibration."""
+    per_row, bands = found.rows.t.shape[1], found.fit.bands
+    part = float(np.sqrt(0.5 / np.sum(found.rows.frequency >= bands.edges[-2])))
+    noise: dict[str, Quantity] = {}
+    for c, levels in found.fit.levels.items():
+        level = float(np.sqrt(np.exp(levels[-1]) * per_row))
+        noise[CHANNELS[c]] = Quantity(level, level * part, UNITS[c])
+    calibration = {
+        name: _told(found, state, name, group, known)
+        for name, group, known in _groups(found, state)
+    }
+    return replace(_facts(block), noise=noise, calibration=calibration)
 
 
 def _warnings(found: Following, names: tuple[str, str]) -> Iterator[str]:

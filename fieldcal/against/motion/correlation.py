@@ -10,9 +10,10 @@ however the axes lie. The shift of the largest -sum_j ln(1 - R_j^2) is the delay
 of parts of the recording tell the drift; and the turn between the axes is the one that
 brings the channels of the reference nearest to the triads (Wahba's problem),
 
-    R = argmax tr(R^T B),    B = sum of c_j e_j^T over both triads, weighed          (2)
+    R = argmax tr(R^T B),    B = sum of W c_j e_j^T over both triads                 (2)
 
-Source: multiple correlation; F. Markley 1988 for (2).
+with W one over the variance of what the reference does not make of each output. Source:
+multiple correlation; F. Markley 1988 for (2).
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from scipy.special import chdtri
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, GYR, Array, Block
 from fieldcal.model.rows.motion import Alignment
+
+TRIADS = (ACC, GYR)
 
 GRID_HZ = 25.0
 """Samples a second that are correlated: bodies move more slowly than half of it."""
@@ -48,6 +51,13 @@ ALIKE = 1.02
 LEAST = 0.05
 """Part of what a channel moves by at the shift that shows most of it, which another
 shift must show to be believed."""
+
+EXACT, TINY = 1e-6, 1e-12
+"""Part of its variance, and m^2/s^4 or rad^2/s^2, that a channel is off by at least."""
+
+PIECE_S, HALF = 10.0, 0.5
+"""Length of the pieces whose spectra are compared, s, and share of a channel's power
+from which the reference counts as saying what the device goes through."""
 
 FAR_S = 2.0
 """From where on a shift is another one, s."""
@@ -91,7 +101,22 @@ class Grid:
         return cls(float(t[0]), out * there[:, None], mean, there.astype(float))
 
 
-def aligned(real: Block, sim: Block, names: tuple[str, str]) -> Alignment:
+@dataclass(frozen=True, slots=True)
+class CommonMotion:
+    """What two recordings have in common.
+
+    Attributes
+    ----------
+    alignment : where they stand beside each other
+    hz : (6,) frequency up to which the reference says what each output goes through
+
+    """
+
+    alignment: Alignment
+    hz: Array
+
+
+def aligned(real: Block, sim: Block, names: tuple[str, str]) -> CommonMotion:
     """Find where a recording stands beside a reference, to some hundredths of a second.
 
     Parameters
@@ -130,10 +155,16 @@ def aligned(real: Block, sim: Block, names: tuple[str, str]) -> Alignment:
         drift, delay = -slope, level + one.start - two.start
     else:
         drift = 0.0
-    return Alignment(
-        float(delay), float(drift), middle,
-        _rotation(one, two, int(round(lags[best] * GRID_HZ))),
-    )  # fmt: skip
+    x, z = _overlap(one, two, int(round(lags[best] * GRID_HZ)))
+    turn = _rotation(one, two, x, z)
+    unseen = np.zeros(6)
+    upright = turn.T @ one.mean[ACC]
+    unseen[int(np.argmax(np.abs(upright)))] = upright[np.argmax(np.abs(upright))]
+    unseen[two.six.any(axis=0)] = 0.0
+    where = Alignment(float(delay), float(drift), middle, turn, unseen)
+    return CommonMotion(
+        where, np.repeat([_common_hz(x[:, p], z[:, p]) for p in TRIADS], 3)
+    )
 
 
 def _scores(one: Grid, two: Grid) -> tuple[Array, Array]:
@@ -145,7 +176,7 @@ def _scores(one: Grid, two: Grid) -> tuple[Array, Array]:
     size = int(2 ** np.ceil(np.log2(n + m)))
     overlap = _correlated(one.there[:, None], two.there[:, None], size)[:, 0, 0]
     scores: list[Array] = []
-    for part in (ACC, GYR):
+    for part in TRIADS:
         x, z = one.six[:, part], two.six[:, part]
         seen = np.flatnonzero(z.any(axis=0))
         inverse = np.linalg.pinv(x.T @ x, rcond=1e-9)
@@ -171,7 +202,7 @@ def _counting(one: Grid, two: Grid) -> Array:
     """
     size = 2 * max(len(one.six), len(two.six))
     out: list[Array] = []
-    for part in (ACC, GYR):
+    for part in TRIADS:
         mine, theirs = (_with_itself(g.six[:, part], size) for g in (one, two))
         alike = np.abs(theirs @ mine.T).max(axis=1, initial=1.0)
         out.append(min(len(one.six), len(two.six)) / alike)
@@ -220,7 +251,7 @@ def _by_parts(one: Grid, two: Grid, lag: int) -> tuple[Array, Array]:
 def _explained(x: Array, z: Array) -> float:
     """How well one explains the other at no shift, by (1)."""
     total = 0.0
-    for part in (ACC, GYR):
+    for part in TRIADS:
         mine, theirs = x[:, part], z[:, part]
         size = (theirs**2).sum(axis=0)
         seen = size > 0
@@ -231,16 +262,53 @@ def _explained(x: Array, z: Array) -> float:
     return total
 
 
-def _rotation(one: Grid, two: Grid, lag: int) -> Array:
-    """The turn between the axes of both at a shift, (2)."""
+def _overlap(one: Grid, two: Grid, lag: int) -> tuple[Array, Array]:
+    """Both at a shift, where there are both, (n, 6) each."""
     begin, stop = max(0, -lag), min(len(two.six), len(one.six) - lag)
-    x, z = one.six[begin + lag : stop + lag], two.six[begin:stop]
+    return one.six[begin + lag : stop + lag], two.six[begin:stop]
+
+
+def _common_hz(x: Array, z: Array) -> float:
+    """Frequency up to which a triad makes the channels that the reference has, Hz.
+
+    With S the spectra over pieces of both, the share of z_j at a frequency that the
+    triad makes is s_j^H S_xx^-1 s_j / S_jj, less what three inputs make by chance. A
+    body that pitches on its springs, say, is no longer what its wheels say: counted up
+    are the shares above one half, and the frequency is where that is most.
+    """
+    seen = z[:, z.any(axis=0)]
+    if not seen.size:
+        return np.inf
+    length = int(PIECE_S * GRID_HZ)
+    starts = range(0, max(len(x) - length, 0) + 1, length // 2)
+    window = np.hanning(length)[:, None]
+    parts = [np.fft.rfft(window * np.hstack([x, seen])[i : i + length], axis=0)
+             for i in starts]  # fmt: skip
+    spectra = np.einsum("pfi,pfj->fij", np.conj(parts), np.array(parts))
+    inner, cross = spectra[:, :3, :3], spectra[:, :3, 3:]
+    inner = inner + EXACT * np.eye(3) * np.trace(inner, axis1=1, axis2=2)[:, None, None]
+    made = np.einsum("fij,fij->fj", cross.conj(), np.linalg.solve(inner, cross)).real
+    own = np.einsum("fii->fi", spectra[:, 3:, 3:]).real
+    alone = np.clip(1 - made / np.maximum(own, TINY), 0.0, 1.0)
+    many = max(len(parts) * 2 / 3, 5.0)  # pieces overlap by half
+    share = 1 - alone * (many - 1) / (many - 4)
+    rise = np.cumsum(share[1:].min(axis=1) - HALF)
+    hz = np.fft.rfftfreq(length, 1 / GRID_HZ)[1:]
+    top = int(np.argmax(rise))
+    return float(hz[top]) if top < len(hz) - 1 else np.inf
+
+
+def _rotation(one: Grid, two: Grid, x: Array, z: Array) -> Array:
+    """The turn between the axes of both, (2), of what overlaps of them."""
     b = np.zeros((3, 3))
-    for part in (ACC, GYR):
-        left = x[:, part].var() or 1.0
-        b += x[:, part].T @ z[:, part] / left
-    if two.six[:, ACC].any(axis=0).all():  # it says where the force points as well
-        b += len(x) * np.outer(one.mean[ACC], two.mean[ACC]) / 1.0
+    for part in TRIADS:
+        seen = z[:, part][:, z[:, part].any(axis=0)]
+        rest = x[:, part] - seen @ np.linalg.lstsq(seen, x[:, part], rcond=None)[0]
+        weight = 1 / np.maximum(rest.var(axis=0), EXACT * x[:, part].var() + TINY)
+        b += weight[:, None] * (x[:, part].T @ z[:, part])
+        if part is ACC and z[:, ACC].any(axis=0).all():  # where the force points
+            mean = np.outer(one.mean[ACC], two.mean[ACC])
+            b += len(x) * weight[:, None] * mean
     left_, _, right = np.linalg.svd(b)
     sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(left_ @ right))])
     out: Array = left_ @ sign @ right

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.against.motion.correlation import CommonMotion
 from fieldcal.core.errors import InputError
 from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array, Block
@@ -53,6 +54,9 @@ FEWEST_S = 20.0
 
 SETTLED, AGAIN = 12, 3
 """Linearisations of one set at most, and searches."""
+
+NOTHING = 1e-12
+"""Weight of coefficients of which the reference says nothing."""
 
 FINEST = 1e-6
 """Part of what an output is that nothing is known better than."""
@@ -95,7 +99,7 @@ class Following:
 
 
 def follow(
-    block: Block, about: Description, reference: Reference, start: Alignment
+    block: Block, about: Description, reference: Reference, start: CommonMotion
 ) -> Following:
     """Fit a recording to the motion of a reference.
 
@@ -103,7 +107,7 @@ def follow(
     ----------
     block, about : the recording
     reference : of the motion
-    start : where the two stand beside each other, roughly
+    start : where the two stand beside each other, roughly, and what they share
 
     Raises
     ------
@@ -111,11 +115,11 @@ def follow(
         If both cover too little of the same motion.
 
     """
-    rows = _rows(block, reference, start)
+    rows = _rows(block, reference, start.alignment)
     nominal = _nominal(about, int(rows.part[-1]) + 1)
     dictionary = MotionDictionary(rows, np.abs(nominal.scale))
     system = MotionSystem(dictionary, _flat(rows, nominal))
-    fit = MotionFit(system, nominal, Bands.between(rows.frequency))
+    fit = MotionFit(system, nominal, Bands.between(rows.frequency), start.hz)
     fit.settle(())
     found = fit.searched(())
     for _ in range(AGAIN if found.best.members else 0):
@@ -180,6 +184,7 @@ class MotionFit:
     system : rows at the alignment, and the power of their noise
     nominal : the state that a simulation starts from
     bands : of the noise
+    hz : (6,) frequency up to which the reference is one
 
     Attributes
     ----------
@@ -187,8 +192,10 @@ class MotionFit:
 
     """
 
-    def __init__(self, system: MotionSystem, nominal: State, bands: Bands) -> None:
-        self.system, self.nominal, self.bands = system, nominal, bands
+    def __init__(
+        self, system: MotionSystem, nominal: State, bands: Bands, hz: Array
+    ) -> None:
+        self.system, self.nominal, self.bands, self.hz = system, nominal, bands, hz
         self.levels: dict[int, Array] = {}
         self._finest = FINEST**2 * np.mean(np.nan_to_num(system.motion.y) ** 2, axis=0)
 
@@ -218,12 +225,20 @@ class MotionFit:
                 self.bands, frequency, linear, values, found.state
             )
             for c, level in self.levels.items():
-                power = self.bands.power(level, frequency)
-                self.system.power[:, c] = np.maximum(power, self._finest[c])
+                self.system.power[:, c] = self.power(c, level, frequency)
             change = np.abs(np.log(self.system.power / before)).max()
             moved = self._realigned(found, state)
             if moved < STAYS and change < STEADY:
                 break
+
+    def power(self, c: int, level: Array, frequency: Array) -> Array:
+        """Power of the noise of one channel's coefficients, (n,).
+
+        What is quicker than the reference tells has none to speak of left to say.
+        """
+        power: Array = np.maximum(self.bands.power(level, frequency), self._finest[c])
+        power[frequency > self.hz[c]] /= NOTHING
+        return power
 
     def _realigned(self, found: Set, there: State) -> float:
         """Move the rows to the alignment that a fit has; how far, in its sigmas."""
@@ -235,11 +250,21 @@ class MotionFit:
             delay=now.delay + float(clock[0]),
             drift=now.drift + float(clock[1]),
             rotation=exponential(turn) @ now.rotation,
+            unseen=now.unseen + self._unseen(found),
         )
         late = sum(t.effect.late(t.values.tolist()) for t in there.terms)
         d.moved(replace(self.rows, alignment=alignment, late=late))
         sigma = np.sqrt(np.concatenate([np.diag(clock_cov), np.diag(turn_cov)]))
         return float(np.abs(np.concatenate([clock, turn]) / sigma).max())
+
+    def _unseen(self, found: Set) -> Array:
+        """What a fit adds to gravity along an axis that the reference lacks."""
+        d = self.system.dictionary
+        out: Array = np.zeros(6)
+        if len(d.lost):
+            out[d.lost], _ = told(found, d.unseen, len(d.lost))
+        out[self.rows.alignment.unseen == 0] = 0.0
+        return out
 
 
 def told(found: Set, first: int, count: int) -> tuple[Array, Array]:

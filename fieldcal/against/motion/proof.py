@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.against.motion.following import Following
 from fieldcal.against.prediction import unsure_squares
@@ -61,11 +62,13 @@ def _before(found: Following) -> SimulatorPrediction:
     places = np.zeros((d.places, 2))
     bare = State(nominal.bias, nominal.scale, places, np.zeros(3))
     linear = system.linearised(bare, nothing)
-    squares = sum(float(part.white @ part.white) for part in linear)
-    off = _Sizes()
+    squares, count, off = 0.0, 0, _Sizes()
     for part in linear:
-        off.add(part, part.white)
-    return off.prediction(squares, sum(len(part.white) for part in linear))
+        told = found.rows.frequency <= found.fit.hz[part.channel]
+        off.add(part, part.white, told)
+        squares += float(part.white @ part.white)
+        count += int(told.sum())
+    return off.prediction(squares, count)
 
 
 def _after(found: Following) -> SimulatorPrediction:
@@ -75,7 +78,7 @@ def _after(found: Following) -> SimulatorPrediction:
     d, values = system.dictionary, inferred.inference.padded(inferred.values)
     wanted = inferred.inference.wanted([m for s in sets for m in s.members])
     linear = system.linearised(inferred.state, wanted | (values != 0))
-    rows, fold = found.rows, _folds(found)
+    rows, fold, hz = found.rows, _folds(found), found.fit.hz
     squares, count, off = 0.0, 0, _Sizes()
     for i in np.unique(fold):
         kept, gone = np.flatnonzero(fold != i), np.flatnonzero(fold == i)
@@ -91,8 +94,8 @@ def _after(found: Following) -> SimulatorPrediction:
         left = [_weighed(found, part, levels, frequency) for part in left]
         squares += _squares(left, values, best)
         for part in left:
-            off.add(part, _residual(part, values, best))
-            count += len(part.white)
+            off.add(part, _residual(part, values, best), frequency <= hz[part.channel])
+            count += int((frequency <= hz[part.channel]).sum())
     return off.prediction(squares, count)
 
 
@@ -102,10 +105,10 @@ class _Sizes:
     def __init__(self) -> None:
         self.square, self.count = np.zeros(2), np.zeros(2)
 
-    def add(self, part: Linear, white: Array) -> None:
-        """Add coefficients of a channel; their squares are those of its rows."""
+    def add(self, part: Linear, white: Array, told: NDArray[np.bool_]) -> None:
+        """Add coefficients of a channel that are told: their squares are its rows'."""
         triad = part.channel // 3
-        self.square[triad] += float(np.sum((white / part.weight) ** 2))
+        self.square[triad] += float(np.sum((white / part.weight)[told] ** 2))
         self.count[triad] += len(white)
 
     def prediction(self, squares: float, count: int) -> SimulatorPrediction:
@@ -142,7 +145,8 @@ def _weighed(
     found: Following, part: Linear, levels: Mapping[int, Array], frequency: Array
 ) -> Linear:
     """A channel's coefficients with another power of the noise."""
-    weight = found.fit.bands.power(levels[part.channel], frequency) ** -0.5
+    c = part.channel
+    weight = found.fit.power(c, levels[c], frequency) ** -0.5
     ratio = weight / part.weight
     return replace(
         part, weight=weight, design=part.design * ratio[:, None],

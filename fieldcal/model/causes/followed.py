@@ -29,8 +29,9 @@ DELAY_S, DRIFT = 1e-2, 1e-4
 TURN = 0.1
 """Typical turn between two axes that are taken for the same, rad."""
 
-UNSEEN = np.repeat([10.0, 0.1], 3)
-"""What a channel may have that the reference says nothing of, m/s^2 and rad/s."""
+UPRIGHT, UNSEEN = 10.0, np.repeat([0.5, 0.01], 3)
+"""What a channel may have that the reference says nothing of, m/s^2 and rad/s: gravity
+along the axis that stands upright, and three degrees of it along those that lie."""
 
 
 class Place:
@@ -66,7 +67,9 @@ class MotionDictionary(Dictionary):
     ----------
     place : where the recording stands beside its reference
     later : the inputs of the gyroscopes, where these are known to be late
-    clock, turn : first column of delay and drift, and of the turn about three axes
+    lost : channels that the reference lacks
+    clock, turn, unseen : first column of delay and drift, of the turn about three axes,
+        and of what is constant in the lost channels
 
     """
 
@@ -87,7 +90,7 @@ class MotionDictionary(Dictionary):
         """Bias and scale factor, and where the two stand beside each other."""
         yield from super()._calibration()
         place, free = self.place, priors.FREE
-        lost = np.flatnonzero(~place.rows.reference.observed)
+        self.lost = lost = np.flatnonzero(~place.rows.reference.observed)
 
         def clock(view: RowView) -> Array:
             change = place.change
@@ -119,8 +122,11 @@ class MotionDictionary(Dictionary):
         at = self.turn + np.arange(3)
         yield Group("turn", "", at, np.full(3, TURN), fixed=free)
         if len(lost):
-            at = self.add(General("unseen", unseen), len(lost)) + np.arange(len(lost))
-            yield Group("unseen", "", at, UNSEEN[lost], fixed=1.0)
+            self.unseen = self.add(General("unseen", unseen), len(lost))
+            at = self.unseen + np.arange(len(lost))
+            wide = UNSEEN.copy()
+            wide[np.flatnonzero(place.rows.alignment.unseen)] = UPRIGHT
+            yield Group("unseen", "", at, wide[lost], fixed=1.0)
 
     def _causes(self) -> Iterator[Cause]:
         """Effects that do not move positions, and functions without physics."""

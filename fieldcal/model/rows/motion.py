@@ -51,6 +51,7 @@ class Alignment:
     drift : by how much the reference's clock is the quicker one, 1
     middle : s of the recording's clock
     rotation : (3, 3) R, device = R reference
+    unseen : (6,) gravity along an upright axis that the reference lacks, m/s^2
 
     """
 
@@ -58,6 +59,7 @@ class Alignment:
     drift: float
     middle: float
     rotation: Array = field(default_factory=lambda: np.eye(3))
+    unseen: Array = field(default_factory=lambda: np.zeros(6))
 
     def reference_time(self, t: Array) -> Array:
         """Instants of the recording by the reference's clock, s."""
@@ -185,6 +187,8 @@ class MotionRows:
         s = self.alignment.reference_time(self.t.ravel() - late)
         every = self.reference.at(s, order).reshape(*self.t.shape, 6)
         means, turn = every.mean(axis=1), self.alignment.rotation.T
+        if order == 0:
+            means += self.alignment.unseen
         return np.hstack([means[:, ACC] @ turn, means[:, GYR] @ turn])  # (1)
 
     def experience(self, late: float = 0.0) -> Experience:

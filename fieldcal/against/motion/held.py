@@ -1,0 +1,30 @@
+"""Whether a recording holds positions, or moves: which of the two tells more.
+
+A car on an even road is as calm as a device at rest, and shows one position however
+often. Where angles, or rates of a table, are stated the device was held in them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.causes.cause import FEW
+from fieldcal.session.description import Description
+
+APART = np.cos(np.deg2rad(10.0))
+"""Cosine of the angle between forces from which two positions are two."""
+
+
+def holds_positions(block: Block, about: Description) -> bool:
+    """Whether a recording holds as many positions as can be told apart by."""
+    windows = [w for w in about.windows if w is not None]
+    if any(p.alpha is not None or p.rate or p.speed for p in about.positions):
+        return len(windows) >= FEW
+    seen: list[Array] = []
+    for start, end in windows:
+        force = np.nanmean(block.between(start, end).acc, axis=0)
+        up = force / max(float(np.linalg.norm(force)), 1e-12)
+        if all(up @ other < APART for other in seen):
+            seen.append(up)
+    return len(seen) >= FEW

@@ -1,6 +1,6 @@
 """Recordings in motion, held against a simulator that follows the motion.
 
-    python -m benchmarks in_motion [PAIRS] [--seed=N]
+    python -m benchmarks in_motion [PAIRS] [--seed=N] [--lag=S]
 
 A motion program of its own draws bodies that are swung, and IMUs on them with clocks,
 axes, biases and scale factors of their own, noise of every colour, and in turn nothing
@@ -25,13 +25,15 @@ USUAL, SEED = 40, 5_000
 def main() -> None:
     """Print what became of the recordings."""
     count, seed = how_many(USUAL), int(option("seed", str(SEED)))
+    lag = float(option("lag", "0"))
     off: list[float] = []
     ahead, named, false, seconds = [], 0, 0, 0.0
     for number in range(count):
         start = time.process_time()
-        one, found = compared(number, seed)
+        one, found = compared(number, seed, lag)
         seconds += time.process_time() - start
         usual = {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
+        usual |= {"time_delay"} if lag and one.kind != "time_delay" else set()
         effects = {d.id for d in found.differences} - usual
         named += one.kind in effects
         false += bool(effects - {one.kind})

@@ -1,8 +1,9 @@
 """A recording in motion, held against a simulator or sensor that follows the motion.
 
-`correlation` finds where the two stand beside each other, `following` fits them by the
-one model, `proof` predicts stretches that were left out, and `comparison` says what
-differs.
+`correlation` finds where the two stand beside each other, `coherence` up to which
+frequency, and `following` fits them by the one model. `shown_effects`,
+`free_calibration` and `placed` say what differs, `proof` predicts stretches that were
+left out, and `comparison` puts it together. `held` says which recordings move.
 """
 
 from fieldcal.against.motion.comparison import compared_in_motion

@@ -24,6 +24,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.special import chdtri
 
+from fieldcal.against.motion.coherence import common_hz
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, GYR, Array, Block
 from fieldcal.model.rows.motion import Alignment
@@ -54,10 +55,6 @@ shift must show to be believed."""
 
 EXACT, TINY = 1e-6, 1e-12
 """Part of its variance, and m^2/s^4 or rad^2/s^2, that a channel is off by at least."""
-
-PIECE_S, HALF = 10.0, 0.5
-"""Length of the pieces whose spectra are compared, s, and share of a channel's power
-from which the reference counts as saying what the device goes through."""
 
 FAR_S = 2.0
 """From where on a shift is another one, s."""
@@ -163,7 +160,7 @@ def aligned(real: Block, sim: Block, names: tuple[str, str]) -> CommonMotion:
     unseen[two.six.any(axis=0)] = 0.0
     where = Alignment(float(delay), float(drift), middle, turn, unseen)
     return CommonMotion(
-        where, np.repeat([_common_hz(x[:, p], z[:, p]) for p in TRIADS], 3)
+        where, np.repeat([common_hz(x[:, p], z[:, p], GRID_HZ) for p in TRIADS], 3)
     )
 
 
@@ -266,36 +263,6 @@ def _overlap(one: Grid, two: Grid, lag: int) -> tuple[Array, Array]:
     """Both at a shift, where there are both, (n, 6) each."""
     begin, stop = max(0, -lag), min(len(two.six), len(one.six) - lag)
     return one.six[begin + lag : stop + lag], two.six[begin:stop]
-
-
-def _common_hz(x: Array, z: Array) -> float:
-    """Frequency up to which a triad makes the channels that the reference has, Hz.
-
-    With S the spectra over pieces of both, the share of z_j at a frequency that the
-    triad makes is s_j^H S_xx^-1 s_j / S_jj, less what three inputs make by chance. A
-    body that pitches on its springs, say, is no longer what its wheels say: counted up
-    are the shares above one half, and the frequency is where that is most.
-    """
-    seen = z[:, z.any(axis=0)]
-    if not seen.size:
-        return np.inf
-    length = int(PIECE_S * GRID_HZ)
-    starts = range(0, max(len(x) - length, 0) + 1, length // 2)
-    window = np.hanning(length)[:, None]
-    parts = [np.fft.rfft(window * np.hstack([x, seen])[i : i + length], axis=0)
-             for i in starts]  # fmt: skip
-    spectra = np.einsum("pfi,pfj->fij", np.conj(parts), np.array(parts))
-    inner, cross = spectra[:, :3, :3], spectra[:, :3, 3:]
-    inner = inner + EXACT * np.eye(3) * np.trace(inner, axis1=1, axis2=2)[:, None, None]
-    made = np.einsum("fij,fij->fj", cross.conj(), np.linalg.solve(inner, cross)).real
-    own = np.einsum("fii->fi", spectra[:, 3:, 3:]).real
-    alone = np.clip(1 - made / np.maximum(own, TINY), 0.0, 1.0)
-    many = max(len(parts) * 2 / 3, 5.0)  # pieces overlap by half
-    share = 1 - alone * (many - 1) / (many - 4)
-    rise = np.cumsum(share[1:].min(axis=1) - HALF)
-    hz = np.fft.rfftfreq(length, 1 / GRID_HZ)[1:]
-    top = int(np.argmax(rise))
-    return float(hz[top]) if top < len(hz) - 1 else np.inf
 
 
 def _rotation(one: Grid, two: Grid, x: Array, z: Array) -> Array:

@@ -16,8 +16,9 @@ import numpy as np
 from fieldcal.against.motion.correlation import CommonMotion
 from fieldcal.core.errors import InputError
 from fieldcal.core.rotation import exponential
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import Array, Block, Index
 from fieldcal.model.causes.followed import MotionDictionary
+from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Posterior
@@ -273,3 +274,9 @@ def told(found: Set, first: int, count: int) -> tuple[Array, Array]:
     at = [int(np.flatnonzero(state.columns == c)[0])
           for c in range(first, first + count)]  # fmt: skip
     return state.estimate[at], state.inverse[np.ix_(at, at)]
+
+
+def estimates(state: Eliminated, columns: Index) -> tuple[Array, Array, Array]:
+    """Values, covariance and sizes before the rows, of some columns."""
+    at = np.array([int(np.flatnonzero(state.columns == c)[-1]) for c in columns])
+    return state.estimate[at], state.inverse[np.ix_(at, at)], state.sizes[at]

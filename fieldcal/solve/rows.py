@@ -65,11 +65,16 @@ def of_means(observations: Observations) -> Recorded:
 
 
 def without_angles(rows: Rows, nominal: Nominal) -> Rows:
-    """Rows of which nobody says how the device lay: the force is along what is read."""
-    nowhere = np.full(len(rows.x), np.nan)
+    """Rows of which nobody says how the device lay: the force is along what is read.
+
+    Where a table turns, or the accelerometers say nothing, it stays as it is.
+    """
+    x, nowhere = rows.x, np.full(len(rows.x), np.nan)
     apart = (rows.y[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
-    f = free_force(rows.x.gravity, rows.x.position, apart)
-    return replace(rows, x=replace(rows.x, alpha=nowhere, beta=nowhere, f=f))
+    still = np.isfinite(apart).all(axis=1) & ~x.rate.any(axis=1)
+    read = free_force(x.gravity, x.position, np.where(still[:, None], apart, x.f))
+    f = np.where(still[:, None], read, x.f)
+    return replace(rows, x=replace(x, alpha=nowhere, beta=nowhere, f=f))
 
 
 def variances(observations: Observations) -> Array:

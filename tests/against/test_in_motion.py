@@ -128,6 +128,49 @@ def test_too_little_in_common_is_refused(true: Block) -> None:
         held(NOISE, true, seconds=15.0)
 
 
+@pytest.mark.parametrize(
+    ("real", "sim", "says"),
+    [
+        (slice(3, 6), slice(0, 0), []),
+        (slice(0, 0), slice(0, 3), ["simulator: has no accelerometers"]),
+    ],
+)
+def test_one_triad_is_compared_where_the_other_is_not_there(
+    real: slice, sim: slice, says: list[str], true: Block
+) -> None:
+    device = {"start": 5.0, "matrix_gyr": 1.01 * np.eye(3), **NOISE}
+    one, two = (
+        without(block, some)
+        for block, some in (
+            (block_of(recorded(DRIVE, device, 60.0, 25.0)), real),
+            (true, sim),
+        )
+    )
+    found = compared_in_motion((one, ABOUT), two, NAMES)
+    scaled = set() if real.stop else {"gyr_scale"}
+    assert {d.id for d in found.differences} == scaled
+    assert all(any(w.startswith(s) for w in found.warnings) for s in says)
+    assert 0.9 < found.after.chi2_per_dof < 1.1
+
+
+def test_different_triads_are_refused(true: Block) -> None:
+    acc, gyr = without(true, slice(3, 6)), without(true, slice(0, 3))
+    with pytest.raises(InputError, match="no moving triad in common"):
+        compared_in_motion((acc, ABOUT), gyr, NAMES)
+
+
+def test_a_recording_of_a_moment_is_refused(true: Block) -> None:
+    with pytest.raises(InputError, match="no common motion|at least 20 s"):
+        compared_in_motion((true[:10], ABOUT), true, NAMES)
+
+
+def without(block: Block, channels: slice) -> Block:
+    """Samples that lack some channels."""
+    six = block.six
+    six[:, channels] = np.nan
+    return Block.of(block.t, six[:, :3], six[:, 3:])
+
+
 def written(path: Path, table: Array) -> str:
     np.savetxt(path, table, fmt="%.9g", delimiter=",", header=HEAD, comments="")
     return str(path)

@@ -36,10 +36,10 @@ def common_hz(x: Array, z: Array, rate_hz: float) -> float:
 
     """
     seen = z[:, z.any(axis=0)]
-    if not seen.size:
+    if not seen.size or not x.any():
         return np.inf
-    length = int(PIECE_S * rate_hz)
-    starts = range(0, max(len(x) - length, 0) + 1, length // 2)
+    length = min(int(PIECE_S * rate_hz), len(x))
+    starts = range(0, len(x) - length + 1, length // 2)
     window = np.hanning(length)[:, None]
     parts = [np.fft.rfft(window * np.hstack([x, seen])[i : i + length], axis=0)
              for i in starts]  # fmt: skip

@@ -21,7 +21,7 @@ from fieldcal.against.motion.shown_effects import effects
 from fieldcal.against.motion.wording import aligned_as
 from fieldcal.against.result import Difference, Facts, Match, verdict_of
 from fieldcal.against.wording import paragraph
-from fieldcal.core.samples import CHANNELS, UNITS, Array, Block
+from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Block
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.rows.motion import Reference
@@ -117,10 +117,13 @@ def _facts_of_the_device(block: Block, found: Following, state: Eliminated) -> F
 
 def _warnings(found: Following, names: tuple[str, str]) -> Iterator[str]:
     """What limits the comparison."""
-    lost = np.flatnonzero(~found.rows.reference.observed)
-    if len(lost):
-        channels = ", ".join(CHANNELS[c] for c in lost)
+    reference = found.rows.reference
+    if len(reference.lost):
+        channels = ", ".join(CHANNELS[c] for c in reference.lost)
         yield (
             f"{names[1]}: says nothing of {channels}, which are taken as constant:"
             " what moves there counts as noise"
         )
+    for name, triad in (("accelerometers", ACC), ("gyroscopes", GYR)):
+        if not reference.observed[triad].any():
+            yield f"{names[1]}: has no {name}, so they are not compared"

@@ -128,6 +128,11 @@ def aligned(real: Block, sim: Block, names: tuple[str, str]) -> CommonMotion:
 
     """
     one, two = Grid.of(real), Grid.of(sim)
+    if not any(_shared(one, two)):
+        raise InputError(
+            f"{names[0]} and {names[1]} have no moving triad in common: compare"
+            " accelerometers with accelerometers or gyroscopes with gyroscopes"
+        )
     lags, told = _scores(one, two)
     score = told.sum(axis=1)
     best = int(np.argmax(score))
@@ -164,6 +169,11 @@ def aligned(real: Block, sim: Block, names: tuple[str, str]) -> CommonMotion:
     )
 
 
+def _shared(one: Grid, two: Grid) -> list[bool]:
+    """Whether both have something of each triad."""
+    return [bool(one.six[:, p].any() and two.six[:, p].any()) for p in TRIADS]
+
+
 def _scores(one: Grid, two: Grid) -> tuple[Array, Array]:
     """Shifts (l,) s, and how well each explains channels of the reference, (1).
 
@@ -173,7 +183,9 @@ def _scores(one: Grid, two: Grid) -> tuple[Array, Array]:
     size = int(2 ** np.ceil(np.log2(n + m)))
     overlap = _correlated(one.there[:, None], two.there[:, None], size)[:, 0, 0]
     scores: list[Array] = []
-    for part in TRIADS:
+    for part, shared in zip(TRIADS, _shared(one, two), strict=True):
+        if not shared:
+            continue
         x, z = one.six[:, part], two.six[:, part]
         seen = np.flatnonzero(z.any(axis=0))
         inverse = np.linalg.pinv(x.T @ x, rcond=1e-9)
@@ -199,7 +211,9 @@ def _counting(one: Grid, two: Grid) -> Array:
     """
     size = 2 * max(len(one.six), len(two.six))
     out: list[Array] = []
-    for part in TRIADS:
+    for part, shared in zip(TRIADS, _shared(one, two), strict=True):
+        if not shared:
+            continue
         mine, theirs = (_with_itself(g.six[:, part], size) for g in (one, two))
         alike = np.abs(theirs @ mine.T).max(axis=1, initial=1.0)
         out.append(min(len(one.six), len(two.six)) / alike)
@@ -270,6 +284,8 @@ def _rotation(one: Grid, two: Grid, x: Array, z: Array) -> Array:
     b = np.zeros((3, 3))
     for part in TRIADS:
         seen = z[:, part][:, z[:, part].any(axis=0)]
+        if not seen.size or not x[:, part].any():
+            continue
         rest = x[:, part] - seen @ np.linalg.lstsq(seen, x[:, part], rcond=None)[0]
         weight = 1 / np.maximum(rest.var(axis=0), EXACT * x[:, part].var() + TINY)
         b += weight[:, None] * (x[:, part].T @ z[:, part])

@@ -90,7 +90,7 @@ class MotionDictionary(Dictionary):
         """Bias and scale factor, and where the two stand beside each other."""
         yield from super()._calibration()
         place, free = self.place, priors.FREE
-        self.lost = lost = np.flatnonzero(~place.rows.reference.observed)
+        self.lost = lost = place.rows.reference.lost
 
         def clock(view: RowView) -> Array:
             change = place.change

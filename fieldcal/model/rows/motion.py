@@ -93,6 +93,12 @@ class Reference:
             for known in [np.isfinite(six[:, c])]
         ]
 
+    @property
+    def lost(self) -> Index:
+        """Channels that it lacks of triads of which it has some."""
+        some = np.repeat(self.observed.reshape(2, 3).any(axis=1), 3)
+        return np.flatnonzero(some & ~self.observed)
+
     def at(self, s: Array, order: int = 0) -> Array:
         """The six channels, or a derivative, at instants of its clock, (n, 6)."""
         out = np.zeros((len(s), 6))
@@ -230,7 +236,7 @@ def rows_in_motion(
 
     Parameters
     ----------
-    block : the recording
+    block : the recording; a triad that the reference lacks altogether is left aside
     reference, alignment : of the motion
     per_row : samples of a row
     stretch_s : about how long a stretch is, s
@@ -238,6 +244,7 @@ def rows_in_motion(
 
     """
     six = block.six
+    six[:, np.repeat(~reference.observed.reshape(2, 3).any(axis=1), 3)] = np.nan
     measured = np.isfinite(six).sum(axis=0) >= FEWEST
     good = np.isfinite(six[:, measured]).all(axis=1)
     good &= reference.covers(alignment.reference_time(block.t), margin)

@@ -10,8 +10,7 @@ from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from fieldcal.commands.import_columns import add_columns, said_of_columns
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from fieldcal.importing.recording import (
         ImuStream,
         MeanScatter,
-        ReadOptions,
         Recording,
     )
 
@@ -77,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="FILEs are of one IMU, one after another, such as one a position",
     )
     add("--options", default="", metavar="QUERY", help="as in a device's address")
-    _add_columns(parser)
+    add_columns(parser)
     add(
         "--still",
         type=float,
@@ -94,39 +92,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_site(parser)
 
 
-def _add_columns(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument_group(
-        "files that do not say what is in them"
-    ).add_argument
-    add(
-        "--columns",
-        action="append",
-        default=[],
-        help="what each column is, separated by commas: t, ax ay az, gx gy gz,"
-        " temperature, seq, t_host, or _ to skip one; t=NAME,ax=NAME where they have"
-        " names; with --join once for each FILE",
-    )
-    add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
-    add("--separator", help="between columns (default: found)")
-    add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
-    add("--acc-unit", default="", help="m/s^2, mm/s^2, cm/s^2, g, mg, ug, V, count")
-    add(
-        "--gyr-unit",
-        default="",
-        help="rad/s, mrad/s, deg/s, mdeg/s, udeg/s, deg/h, V, count",
-    )
-    add(
-        "--time-unit",
-        default="",
-        help="s, ms, us, ns, min, d, hhmmss …",
-    )
-    add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
-    add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
-    add("--temp-unit", default="", help="degC, cdegC, K, count, none")
-    add("--temp-lsb", type=float, default=1.0, metavar="N", help="counts in 1 K")
-    add("--temp-zero", type=float, default=0.0, metavar="C", help="deg C at count 0")
-
-
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.importers import open_recording
@@ -135,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     if len(args.columns) not in (0, 1, len(args.files)):
         raise InputError("give --columns once, or once for each file")
     opened: list[Recording] = [
-        open_recording(path, _wanted(args, i), args.format, args.repair)
+        open_recording(path, said_of_columns(args, i), args.format, args.repair)
         for i, path in enumerate(args.files)
     ]
     if args.join and args.in_order:
@@ -163,6 +128,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _say_one_each(files: Sequence[Path], rests: Sequence[Array]) -> None:
     """Say that files, each of one rest, look like the positions of one IMU."""
+    import numpy as np
+
     from fieldcal.importing.gravity_size import are_means
 
     if len(files) > 1 and all(len(one) == 1 for one in rests):
@@ -207,28 +174,6 @@ def _bring_all(
     if len(names) > 1:
         _say_instances(folder, rests, float(args.gravity or G0))
     return list(rests.values())
-
-
-def _wanted(args: argparse.Namespace, i: int) -> ReadOptions:
-    from fieldcal.importing.recording import ReadOptions
-
-    given = args.columns[min(i, len(args.columns) - 1)] if args.columns else ""
-    columns = tuple(name.strip() for name in given.split(",")) if given else ()
-    return ReadOptions(
-        columns,
-        args.rate,
-        args.separator,
-        args.skip,
-        args.acc_unit,
-        args.gyr_unit,
-        args.time_unit,
-        args.acc_lsb,
-        args.gyr_lsb,
-        args.options,
-        args.temp_unit,
-        args.temp_lsb,
-        args.temp_zero,
-    )
 
 
 def _list(opened: list[Recording]) -> int:

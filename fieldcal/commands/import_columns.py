@@ -1,0 +1,66 @@
+"""Options of `fieldcal import` by which the user says what a file does not."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fieldcal.importing.recording import ReadOptions
+
+
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    """Declare them."""
+    add = parser.add_argument_group(
+        "files that do not say what is in them"
+    ).add_argument
+    add(
+        "--columns",
+        action="append",
+        default=[],
+        help="what each column is, separated by commas: t, ax ay az, gx gy gz,"
+        " temperature, seq, t_host, or _ to skip one; t=NAME,ax=NAME where they have"
+        " names; with --join once for each FILE",
+    )
+    add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
+    add("--separator", help="between columns (default: found)")
+    add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
+    add("--acc-unit", default="", help="m/s^2, mm/s^2, cm/s^2, g, mg, ug, V, count")
+    add(
+        "--gyr-unit",
+        default="",
+        help="rad/s, mrad/s, deg/s, mdeg/s, udeg/s, deg/h, V, count",
+    )
+    add(
+        "--time-unit",
+        default="",
+        help="s, ms, us, ns, min, d, hhmmss …",
+    )
+    add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
+    add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
+    add("--temp-unit", default="", help="degC, cdegC, K, count, none")
+    add("--temp-lsb", type=float, default=1.0, metavar="N", help="counts in 1 K")
+    add("--temp-zero", type=float, default=0.0, metavar="C", help="deg C at count 0")
+
+
+def said_of_columns(args: argparse.Namespace, i: int) -> ReadOptions:
+    """What is said of the file of that number."""
+    from fieldcal.importing.recording import ReadOptions
+
+    given = args.columns[min(i, len(args.columns) - 1)] if args.columns else ""
+    columns = tuple(name.strip() for name in given.split(",")) if given else ()
+    return ReadOptions(
+        columns,
+        args.rate,
+        args.separator,
+        args.skip,
+        args.acc_unit,
+        args.gyr_unit,
+        args.time_unit,
+        args.acc_lsb,
+        args.gyr_lsb,
+        args.options,
+        args.temp_unit,
+        args.temp_lsb,
+        args.temp_zero,
+    )

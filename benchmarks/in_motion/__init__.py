@@ -7,7 +7,9 @@ axes, biases and scale factors of their own, noise of every colour, and in turn 
 else, a lever arm, g-sensitivity, late gyroscopes, and a cubic term: 40 recordings of a
 minute at 25 Hz, or as many as are asked for. Printed is how often that is named and
 something false is said, how numbers scatter in their own standard deviations, and how
-stretches that were left out are predicted.
+stretches that were left out are predicted. `--lag` puts a
+first-order low-pass of that time constant on the gyroscopes besides. The catalogue has
+none, so they are found late, and whatever else is said of it is false.
 """
 
 from __future__ import annotations

@@ -69,6 +69,8 @@ def drawn(number: int, seed: int, lag: float = 0.0) -> Drawn:
     if kind:
         values, names = _effect(kind, device, rng)
         truth |= {(kind, n): float(v) for n, v in zip(names, values, strict=True)}
+    if kind == "time_delay":
+        truth[kind, "seconds"] += lag  # that it makes, to first order
     return Drawn(kind, device, truth)
 
 

@@ -86,7 +86,15 @@ def _in_motion(args: argparse.Namespace, session: Session) -> Compared:
     found = compared_in_motion(
         (session.block, session.about), read.block, (str(args.session), args.against)
     )
-    return found, patched(found) if args.patch else None, list(read.says)
+    said = list(read.says)
+    if not args.patch:
+        return found, None, said
+    if any(d.id == "misalignment" for d in found.differences):
+        said.append(
+            f"{args.patch} has nothing for misalignment: the patch is in the axes of"
+            " the recording, so turn those of the simulator first"
+        )
+    return found, patched(found), said
 
 
 def _once(args: argparse.Namespace, session: Session, real: Side) -> Compared:

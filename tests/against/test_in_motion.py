@@ -179,15 +179,18 @@ def written(path: Path, table: Array) -> str:
 def test_files_are_compared_by_their_motion(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    device = {"start": 5.0, "bias": np.repeat([0.05, 0.0], 3), "arm": (0.2, 0, 0)}
+    device: dict[str, Any] = {"start": 5.0, "bias": np.repeat([0.05, 0.0], 3)}
+    device["arm"] = (0.2, 0.0, 0.0)
+    device["turn"] = Rotation.from_rotvec([0.0, 0.0, 0.02]).as_matrix()
     real = written(tmp_path / "real.csv", recorded(DRIVE, device | NOISE, 40.0, 25.0))
     sim = written(tmp_path / "sim.csv", recorded(DRIVE, {}, 50.0, 25.0))
     folder = tmp_path / "session"
     assert main(["import", real, "--acc-unit", "m/s^2", "-o", str(folder)]) == 0
     call = ["diagnose", str(folder), "--against", sim, "--patch", "json"]
     assert main(call) == 1
-    said = capsys.readouterr().out
-    assert "lever arm" in said and "of common motion" in said
+    told = capsys.readouterr()
+    assert "lever arm" in told.out and "of common motion" in told.out
+    assert "json has nothing for misalignment" in told.err
     content = json.loads((folder / "against.json").read_text())
     assert content["alignment"]["delay"]["value"] == pytest.approx(-5.0, abs=1e-3)
     patch = json.loads((folder / "patch.json").read_text())

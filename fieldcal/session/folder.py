@@ -181,7 +181,7 @@ def _unconfirmed(raw: Mapping[str, Any]) -> list[str]:
     """What an import guessed, until the user takes it out of [guessed]."""
     return [
         f"{what.replace('_', ' ')} was taken as {why}: confirm it by deleting {what}"
-        f" under [guessed] in {DESCRIPTION}, or import again with its unit"
+        f" under [guessed] in {DESCRIPTION}, or import again and say what it is"
         for what, why in raw.get("guessed", {}).items()
     ]
 

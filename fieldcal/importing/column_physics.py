@@ -202,8 +202,9 @@ def _is_direction(values: Array) -> bool:
     """Whether rows (n, 3) are as long as each other: calculated, not measured."""
     if are_means(values):
         return False
-    length = np.linalg.norm(values[np.isfinite(values).all(axis=1)], axis=1)
-    moves = np.nanmax(np.ptp(values, axis=0)) > NOISY * np.median(length)
+    whole = values[np.isfinite(values).all(axis=1)]
+    length = np.linalg.norm(whole, axis=1)
+    moves = len(whole) and np.ptp(whole, axis=0).max() > NOISY * np.median(length)
     return bool(moves and np.ptp(length) < EXACT * np.median(length))
 
 

@@ -235,8 +235,11 @@ def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
         (lines(T * 1e3, np.round(A * 16384 / G), np.round(DEG * 131.072),
                np.full(len(T), -3900.0), head=f"time_ms,{SIX},temp"), "--temp-lsb 340"),
         (lines(T, W, UP), "say what its columns are"),
+        (lines(T, W, UP).replace("\n", "\nturn it over\n", 9),
+         "say what its columns are"),
     ],
-    ids=["rows that are counted", "a thermometer's counts", "a direction"],
+    ids=["rows that are counted", "a thermometer's counts", "a direction",
+         "a direction, and what was said between"],
 )  # fmt: skip
 def test_what_would_be_wrong_in_silence_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str

@@ -95,7 +95,7 @@ def _device(rng: np.random.Generator) -> Device:
     """An uncalibrated one of consumer grade; one of three warms, one of three walks."""
     kind = int(rng.integers(3))
     warmth = rng.normal(0.0, np.repeat([4e-3, 8e-4], 3)) * (kind == 1)
-    walk = float(10 ** rng.uniform(-4.7, -3.7)) * (kind == 2)
+    walk = float(10 ** rng.uniform(-5.0, -4.0)) * (kind == 2)
     return Device(
         rng.normal(0.0, [0.15, 0.15, 0.25]),
         rng.normal(0.0, 0.03, 3),

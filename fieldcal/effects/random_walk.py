@@ -4,9 +4,9 @@
 
 B independent unit Brownian motions; q m/s^2/sqrt(s) and rad/s/sqrt(s). No equation for
 the outputs, but a covariance: q^2 times the time two instants have in common. It
-widens the intervals. Noise parameters that users of MEMS publish for estimators say
-1e-5 to 2e-4 rad/s/sqrt(s), and 1e-4 to 3e-3 m/s^2/sqrt(s): what is usual is their upper
-half. Source: IEEE Std 952, rate random walk, Allan slope +1/2.
+widens the intervals. Allan deviations of MEMS that users publish with Kalibr say 1e-5 to
+3e-5 rad/s/sqrt(s), one of eight 2e-4. Source: IEEE Std 952, rate random walk, Allan slope
++1/2.
 
 >>> RandomWalk().unit("ax")
 'm/s^2/sqrt(s)'
@@ -21,7 +21,7 @@ class RandomWalk(Scatter):
     """Random walk of the biases."""
 
     kind = "sensor"
-    params = six("m/s^2/sqrt(s)", 1e-3, "rad/s/sqrt(s)", 1e-4)
+    params = six("m/s^2/sqrt(s)", 3e-4, "rad/s/sqrt(s)", 3e-5)
     covariate = "scatter between windows beyond white noise"
     seen_in = "time"
     decided_by = "one position held for an hour, and its Allan deviation"

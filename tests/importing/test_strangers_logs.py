@@ -20,6 +20,7 @@ from small_files import write_workbook
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
 from fieldcal.importing.cell_forms import HexCells, ListCells
+from fieldcal.importing.column_physics import _is_direction
 from fieldcal.importing.columns import wrapped
 from fieldcal.importing.line_forms import EchoedMessages
 from fieldcal.importing.recording import ReadOptions
@@ -235,11 +236,8 @@ def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
         (lines(T * 1e3, np.round(A * 16384 / G), np.round(DEG * 131.072),
                np.full(len(T), -3900.0), head=f"time_ms,{SIX},temp"), "--temp-lsb 340"),
         (lines(T, W, UP), "say what its columns are"),
-        (lines(T, W, UP).replace("\n", "\nturn it over\n", 9),
-         "say what its columns are"),
     ],
-    ids=["rows that are counted", "a thermometer's counts", "a direction",
-         "a direction, and what was said between"],
+    ids=["rows that are counted", "a thermometer's counts", "a direction"],
 )  # fmt: skip
 def test_what_would_be_wrong_in_silence_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str
@@ -248,6 +246,14 @@ def test_what_would_be_wrong_in_silence_is_asked(
     path.write_text(text + "\n")
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
     assert question in capsys.readouterr().err
+
+
+def test_a_direction_is_one_though_a_row_is_not_whole() -> None:
+    bad = UP.copy()
+    bad[7, 1] = np.nan
+    with warnings.catch_warnings(action="error"):
+        assert _is_direction(UP) and _is_direction(bad)
+        assert not _is_direction(A) and not _is_direction(np.full((9, 3), np.nan))
 
 
 def test_a_workbook_is_read(tmp_path: Path) -> None:

@@ -4,9 +4,9 @@
 
 B independent unit Brownian motions; q m/s^2/sqrt(s) and rad/s/sqrt(s). No equation for
 the outputs, but a covariance: q^2 times the time two instants have in common. It
-widens the intervals. Allan deviations of MEMS that users publish with Kalibr say 1e-5 to
-3e-5 rad/s/sqrt(s), one of eight 2e-4. Source: IEEE Std 952, rate random walk, Allan slope
-+1/2.
+widens the intervals. Allan deviations of MEMS that users publish with Kalibr say 1e-5
+to 3e-5 rad/s/sqrt(s), one of eight 2e-4. Source: IEEE Std 952, rate random walk, Allan
+slope +1/2.
 
 >>> RandomWalk().unit("ax")
 'm/s^2/sqrt(s)'

@@ -94,7 +94,7 @@ def directions(table: Array) -> list[Three]:
     """Columns side by side that are a direction: calculated, such as of gravity."""
     free = [i for i in range(table.shape[1]) if _moves(table[:, i])]
     beside = [(a, a + 1, a + 2) for a in free if {a + 1, a + 2} <= set(free)]
-    return [three for three in beside if _is_direction(table[:, list(three)])]
+    return [three for three in beside if is_direction(table[:, list(three)])]
 
 
 def unnamed(table: Array, names: Sequence[str], known: Collection[int]) -> list[Three]:
@@ -198,7 +198,7 @@ def _scattered(values: Array, size: float) -> bool:
     return bool(np.nanmedian(differ, axis=0).max() > NOISY * size)
 
 
-def _is_direction(values: Array) -> bool:
+def is_direction(values: Array) -> bool:
     """Whether rows (n, 3) are as long as each other: calculated, not measured."""
     if are_means(values):
         return False
@@ -238,7 +238,7 @@ def _gravity(table: Array, three: Three, step: float = 0.0) -> Gravity | None:
     """
     values = table[:, list(three)]
     found = gravity_in(values)
-    if found is None or _scattered(values, found.size) or _is_direction(values):
+    if found is None or _scattered(values, found.size) or is_direction(values):
         return None
     within = ACC_OUT[not found.round]
     scales = gains(step, "m/s^2", G0) if step else ACC_SCALES

@@ -20,7 +20,7 @@ from small_files import write_workbook
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
 from fieldcal.importing.cell_forms import HexCells, ListCells
-from fieldcal.importing.column_physics import _is_direction
+from fieldcal.importing.column_physics import is_direction
 from fieldcal.importing.columns import wrapped
 from fieldcal.importing.line_forms import EchoedMessages
 from fieldcal.importing.recording import ReadOptions
@@ -252,8 +252,8 @@ def test_a_direction_is_one_though_a_row_is_not_whole() -> None:
     bad = UP.copy()
     bad[7, 1] = np.nan
     with warnings.catch_warnings(action="error"):
-        assert _is_direction(UP) and _is_direction(bad)
-        assert not _is_direction(A) and not _is_direction(np.full((9, 3), np.nan))
+        assert is_direction(UP) and is_direction(bad)
+        assert not is_direction(A) and not is_direction(np.full((9, 3), np.nan))
 
 
 def test_a_workbook_is_read(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from time import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,11 +24,16 @@ from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
-from fieldcal.windows.cells import Cells
+from fieldcal.windows.cells import Cells, CellTable
 from fieldcal.windows.jumps import Jumps
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.stretch_ends import reasons
-from fieldcal.windows.stretches import still_stretches_of_file, summary, why_none
+from fieldcal.windows.stretches import (
+    Between,
+    still_stretches_of_file,
+    summary,
+    why_none,
+)
 
 ONLY_RESTS = (
     "it has no times and turns within no row, so only its rests were recorded, and each"
@@ -153,46 +158,76 @@ def _fill(
                     jumps.add(good)
                 rows.add(summary(cells.take_complete()))
                 written.add(good)
-        if not facts.rows:
-            raise InputError(f"{recording.path}: has no row that can be used")
-        if not facts.measured:
-            raise InputError(
-                f"{recording.path}: has no number of an accelerometer or gyroscope in"
-                f" {facts.rows} rows; name its columns with --columns"
-            )
-        if said := too_quick(facts.rate_hz):
-            raise InputError(f"{recording.path}: {said}")
+        _refuse_useless(recording, facts)
         facts.left_out = judge.left_out
         written.close()
-        rest = cells.table
-        rows.add(summary(rest))
-        held = jumps.positions if still < np.inf else []
-        stretches = held or still_stretches_of_file(
-            rows, rest.origin, written.between, still
-        )
-        why = "" if stretches or still == np.inf else why_none(rows, rest.origin)
-        ends = reasons(rows, rest.origin, stretches)
-        rests = np.array([_mean_of(written.between(*span)) for span in stretches])
-    if held:
-        recording.says.append(f"{ONLY_RESTS}: it jumps {len(held) - 1} times")
-    repairs = [*recording.mended, *judge.mended]
+        found = _rests(jumps, rows, cells.table, written.between, still)
+    stretches, repairs = found.stretches, [*recording.mended, *judge.mended]
     positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
     # an empty list would be in the way of the tables that the user adds
     tables = {"position": positions} if positions and "position" not in about else {}
     text = tomlkit.dumps({**about, **tables})
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
+    recording.says += [found.how] if found.how else []
     recording.says += [step.sentence() for step in clock.steps]
     marks = _marks(recording, stream, facts, repairs, clock.steps)
     marks += "".join(
         mark_line(
             {"event": "still", "start_s": s, "end_s": e, "began": began, "ended": ended}
         )
-        for (s, e), (began, ended) in zip(stretches, ends, strict=True)
+        for (s, e), (began, ended) in zip(stretches, found.ends, strict=True)
     )
     (part / MARKS).write_text(marks, "utf-8")
-    none = [f"no still stretch was found: {why}"] if why else []
-    says = [*repairs, *recording.says, *none]
-    return facts, stretches, says, rests.reshape(-1, 3)
+    says = [*repairs, *recording.says, *([found.none] if found.none else [])]
+    return facts, stretches, says, found.means
+
+
+def _refuse_useless(recording: Recording, facts: StreamFacts) -> None:
+    """Raise InputError if nothing can come of these rows."""
+    if not facts.rows:
+        raise InputError(f"{recording.path}: has no row that can be used")
+    if not facts.measured:
+        raise InputError(
+            f"{recording.path}: has no number of an accelerometer or gyroscope in"
+            f" {facts.rows} rows; name its columns with --columns"
+        )
+    if said := too_quick(facts.rate_hz):
+        raise InputError(f"{recording.path}: {said}")
+
+
+class _Rests(NamedTuple):
+    """Where the device rested.
+
+    Attributes
+    ----------
+    stretches : start and end of each, s
+    ends : why each began and ended
+    means : (m, 3) of the accelerometers in them, m/s^2
+    how, none : how they were found if not as rests, and why there are none; or nothing
+
+    """
+
+    stretches: list[tuple[float, float]]
+    ends: list[tuple[str, str]]
+    means: Array
+    how: str
+    none: str
+
+
+def _rests(
+    jumps: Jumps, rows: SpooledRows, rest: CellTable, between: Between, still: float
+) -> _Rests:
+    """Where the device rested for so long, s; `rest` are the cells not in rows yet."""
+    rows.add(summary(rest))
+    if still == np.inf:  # of means
+        return _Rests([], [], np.empty((0, 3)), "", "")
+    held = jumps.positions
+    found = held or still_stretches_of_file(rows, rest.origin, between, still)
+    how = f"{ONLY_RESTS}: it jumps {len(held) - 1} times" if held else ""
+    why = "" if found else why_none(rows, rest.origin)
+    means = np.array([_mean_of(between(*span)) for span in found]).reshape(-1, 3)
+    none = f"no still stretch was found: {why}" if why else ""
+    return _Rests(found, reasons(rows, rest.origin, found), means, how, none)
 
 
 def _mean_of(blocks: Iterable[Block]) -> Array:

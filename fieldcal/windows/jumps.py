@@ -62,15 +62,13 @@ class Jumps:
 
     def add(self, block: Block) -> None:
         """Take in the block that follows."""
-        if not len(block):
-            return
-        if np.isnan(self._size).any():
-            self._size = FAR * _noise(block.acc)
         self._rows += len(block)
         block = concat([self._held, block])
         self._held = block[max(len(block) - 2 * HALF + 1, 0) :]
-        if len(block) < 2 * HALF:
+        if len(block) < 2 * HALF or not np.isfinite(block.acc).any(axis=0).all():
             return
+        if np.isnan(self._size).any():
+            self._size = FAR * _noise(block.acc)
         view = np.lib.stride_tricks.sliding_window_view(block.acc, HALF, axis=0)
         middle = np.median(view, axis=-1)
         if np.isnan(self._begin[0]):
@@ -117,8 +115,10 @@ class Jumps:
 
 def _noise(acc: Array) -> Array:
     """Standard deviation of a row by those beside it, (3,); of coarse ones a step."""
-    step = np.abs(np.diff(acc, axis=0))
-    usual = DEVIATION * np.nanmedian(step, axis=0) / np.sqrt(2)
-    least = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
+    step = np.abs(np.diff(acc[np.isfinite(acc).all(axis=1)], axis=0))
+    if not len(step):
+        return np.full(3, np.nan)
+    usual = DEVIATION * np.median(step, axis=0) / np.sqrt(2)
+    least = np.where(step > 0, step, np.inf).min(axis=0)
     noise: Array = np.maximum(usual, np.where(np.isfinite(least), least, 0.0))
     return noise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,17 @@ def test_what_was_recorded_while_it_turned_is_no_such_recording() -> None:
     # a coarse output flips between two steps
     coarse = np.round((noise + [0.1, 0.2, G]) / 0.04) * 0.04
     assert found(coarse) == []
+
+
+def test_rows_that_are_missing_are_no_jumps() -> None:
+    acc = rests(6, [50, 70, 40, 60])
+    holed = acc.copy()
+    holed[60:63, 1] = np.nan
+    with warnings.catch_warnings(action="error"):
+        for cut in (1, 7, 10**9):
+            assert found(np.full((90, 3), np.nan), cut) == []
+            assert len(found(holed, cut)) == 4
+            assert found(acc[:1], cut) == []
 
 
 def test_a_log_of_rests_without_times_needs_no_more_than_its_rate(

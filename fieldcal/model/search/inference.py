@@ -18,7 +18,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportion import in_proportion
-from fieldcal.model.search.selection import SETTLED, Search, strange
+from fieldcal.model.search.selection import SETTLED, Search
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import whole
 from fieldcal.model.system.turn_rows import TurnRows, Turns
@@ -75,7 +75,8 @@ class Inference(GaussNewton):
 
         A function that no effect makes bends the state to itself, and about that state
         the effects that are there look worse than they are. Where it is in the best
-        set, effects are sought by themselves as well, and it in what they leave.
+        set, effects are sought by themselves as well, and it in what they leave. One
+        window that is off by itself bends nothing but itself.
 
         Parameters
         ----------
@@ -84,7 +85,7 @@ class Inference(GaussNewton):
 
         """
         found = self._searched(begin)
-        if not strange(found.best):
+        if not _bent(found.best):
             return found
         other = self._apart().effects_first()
         return other if other.about_itself > found.about_itself else found
@@ -286,3 +287,8 @@ class Inference(GaussNewton):
         for one in new:
             self.turned = [t.copied(group.columns, one.columns) for t in self.turned]
         return cause, new
+
+
+def _bent(one: Set) -> bool:
+    """Whether a set has a function of rows that no effect makes."""
+    return any(c.kind == "unknown" and len(g.columns) > 1 for c, g in one.members)

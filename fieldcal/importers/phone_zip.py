@@ -71,12 +71,8 @@ class PhoneArchive(Recording):
                 time_unit=self.wanted.time_unit,
             )  # fmt: skip
             flows.append(one.blocks("0"))
-        while True:
-            acc, gyr = ([*(next(flow, None) for flow in flows), None])[:2]
-            if acc is None and gyr is None:
-                break
-            yield pair.feed(acc, gyr)
-        yield pair.rest()
+        acc, gyr = [*flows, iter(())][:2]
+        yield from pair.through(acc, gyr)
 
     def _opened(self) -> tuple[TextColumns, ...]:
         """The texts of accelerometer and gyroscope, as they are in it."""

@@ -7,6 +7,9 @@ interpolated. What comes out does not depend on how the samples were cut into bl
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from itertools import zip_longest
+
 import numpy as np
 
 from fieldcal.core.samples import Array, Block, Index, concat
@@ -48,6 +51,12 @@ class AlignedPair:
             late = int(np.searchsorted(gyr_all.t, gyr_all.t[-1] - PATIENCE))
             self._gyr = [gyr_all[late:]]
         return out
+
+    def through(self, acc: Iterable[Block], gyr: Iterable[Block]) -> Iterator[Block]:
+        """All samples of two flows, which end when they end."""
+        for two in zip_longest(acc, gyr):
+            yield self.feed(*two)
+        yield self.rest()
 
     def rest(self) -> Block:
         """Return the last samples."""

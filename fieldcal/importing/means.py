@@ -23,6 +23,7 @@ from fieldcal.core.samples import Array, concat
 from fieldcal.importing.heading_words import SCATTER, axis_alone, meaning, words_of
 from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import MeanScatter, Recording
+from fieldcal.windows.spikes import DEVIATION
 
 COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
 """Names of a column that holds how many samples a mean is of."""
@@ -32,9 +33,6 @@ COUPLED, PLAIN = 9, 6
 
 REPEATS = 5
 """Times that the scatter is measured and the fit repeated with it."""
-
-NORMAL = 1.4826
-"""Standard deviation over the median of absolute values, of normal noise."""
 
 OUT = 6.0
 """Standard deviations beyond which a mean is none of the same scatter (2e-9)."""
@@ -166,7 +164,7 @@ def _agreeing(acc: Array, free: int, gravity: float) -> NDArray[np.bool_]:
             _misfit, x, args=(acc, gravity), loss="cauchy", f_scale=size or 1.0
         ).x
         left = np.abs(_misfit(x, acc, gravity))
-        size = NORMAL * few * float(np.median(left))
+        size = DEVIATION * few * float(np.median(left))
     all_of_them = np.ones(len(acc), dtype=bool)
     near = left <= OUT * size
     for _ in range(REPEATS):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Any, Self
 
@@ -180,8 +179,7 @@ class MergedFiles(SeveralFiles):
         pair, begin = AlignedPair(), np.nan
         flows = [_by_the_clock(p).blocks(_name(p)) for p in (acc, gyr)]
         together = False
-        for a, g in chain(zip_longest(*flows), [(None, None)]):
-            block = pair.rest() if a is g is None else pair.feed(a, g)
+        for block in pair.through(*flows):
             begin = float(block.t[0]) if np.isnan(begin) and len(block) else begin
             together = together or bool(np.isfinite(block.gyr).any())
             yield replace(block, t=block.t - begin)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, concat
+from fieldcal.windows.spikes import DEVIATION
 
 HALF = 5
 """Rows of a median in (1)."""
@@ -29,9 +30,6 @@ FEWEST_ROWS, FEWEST = 20, 3
 
 MOSTLY = 0.95
 """Part of the changes that are jumps, and of the positions that rest: a hand errs."""
-
-DEVIATION = 1.4826
-"""Standard deviation in a median of absolute values."""
 
 
 class JumpRows(NamedTuple):

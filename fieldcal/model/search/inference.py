@@ -18,7 +18,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportion import in_proportion
-from fieldcal.model.search.selection import SETTLED, Search
+from fieldcal.model.search.selection import SETTLED, Search, is_function
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import whole
 from fieldcal.model.system.turn_rows import TurnRows, Turns
@@ -85,7 +85,7 @@ class Inference(GaussNewton):
 
         """
         found = self._searched(begin)
-        if not _bent(found.best):
+        if not any(map(is_function, found.best.members)):
             return found
         other = self._apart().effects_first()
         return other if other.about_itself > found.about_itself else found
@@ -287,8 +287,3 @@ class Inference(GaussNewton):
         for one in new:
             self.turned = [t.copied(group.columns, one.columns) for t in self.turned]
         return cause, new
-
-
-def _bent(one: Set) -> bool:
-    """Whether a set has a function of rows that no effect makes."""
-    return any(c.kind == "unknown" and len(g.columns) > 1 for c, g in one.members)

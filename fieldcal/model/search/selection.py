@@ -110,8 +110,8 @@ class Search(Offers):
         A function of many columns does for what several effects make together, of which
         none alone is worth as much: that of the most columns, when nothing else helps.
         """
-        width = [len(g.columns) * (c.kind == "unknown") for c, g in there.members]
-        if max(width, default=0) <= 1:
+        width = [len(g.columns) * is_function((c, g)) for c, g in there.members]
+        if not any(width):
             return there
         less = self.without(there, int(np.argmax(width)))
         two = self._paired(less, there.score)
@@ -154,7 +154,7 @@ class Search(Offers):
         Each with all its parameters as well: beside the other it may need them. Pairs
         that are worth less than the least may be left out.
         """
-        known = [o for o in table.offers if _pairable(o)][:PROMISING]
+        known = [o for o in table.offers if not is_function(o.member)][:PROMISING]
         every = [*known, *(_widened(o) for o in known)]
         new = [a is not b for a, b in zip(known, every[len(known) :], strict=True)]
         wanted, more = [], {}
@@ -175,16 +175,6 @@ class Search(Offers):
         return self.chance(both) - self.chance(there.members)
 
 
-def _pairable(offer: Offer) -> bool:
-    """Whether an offer may be one of a pair: an effect, or a window off by itself.
-
-    One window that is far off hides every effect, and what the effects leave hides
-    that it is one window alone.
-    """
-    cause, group = offer.member
-    return cause.kind != "unknown" or len(group.columns) == 1
-
-
 def _widened(offer: Offer) -> Offer:
     """An offer with all the parameters that its cause has."""
     cause, group = offer.member
@@ -197,6 +187,16 @@ def _whole(cause: Cause, group: Group) -> Group:
     whole = cause.variants[0]
     part = not group.shape and set(group.params) < set(whole.params)
     return whole if part else group
+
+
+def is_function(member: Member) -> bool:
+    """Whether a member is a function of the rows that no effect makes.
+
+    One window off by itself is none: it does for nothing but itself. Far off it hides
+    every effect, and what the effects leave hides that it is one window alone.
+    """
+    cause, group = member
+    return cause.kind == "unknown" and len(group.columns) > 1
 
 
 def strange(one: Set) -> bool:

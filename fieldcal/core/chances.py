@@ -1,4 +1,4 @@
-"""Chances of a sum of squares, for whole degrees of freedom.
+"""Chances of a sum of squares, for whole degrees of freedom, and of a median.
 
     Q(chi2, 2 m) = e^-x sum_{i=0}^{m-1} x^i / i!                                    (1)
     Q(chi2, 2 m + 1) = erfc(sqrt x) + e^-x sum_{i=1}^{m} x^(i-1/2) / Gamma(i + 1/2)  (2)
@@ -13,6 +13,9 @@ from __future__ import annotations
 from math import erfc, isinf, lgamma, log, sqrt
 
 import numpy as np
+
+DEVIATION = 1.4826
+"""Standard deviation in a median of absolute deviations, of what is normal."""
 
 
 def chi2_tail(chi2: float, dof: int) -> float:

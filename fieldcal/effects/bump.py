@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import CHANNELS, Array, runs
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.recording import CheckedSamples, Fault, medians
@@ -98,7 +99,7 @@ def usual(z: Array) -> Array:
     array([4.45])
     """
     some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
-    spread: Array = 1.4826 * np.median(some, axis=1)
+    spread: Array = DEVIATION * np.median(some, axis=1)
     return np.maximum(spread, 1.0)
 
 

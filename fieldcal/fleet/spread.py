@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array
 
 WIDER = 6.0
@@ -91,7 +92,7 @@ class UnitSpread:
 
 def spread(x: Array, sigma: Array) -> UnitSpread:
     """The spread of values (n,) whose uncertainties are (n,); n is two or more."""
-    scale = 1.4826 * float(np.median(np.abs(x - np.median(x))))
+    scale = DEVIATION * float(np.median(np.abs(x - np.median(x))))
     scale = scale or float(np.std(x)) or float(np.median(sigma))
     tried = np.concatenate([[0.0], np.geomspace(1e-2, 10.0, GRID) * scale])
     variance = tried[:, None] ** 2 + sigma**2

@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, concat
 from fieldcal.importing.heading_words import SCATTER, axis_alone, meaning, words_of
 from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import MeanScatter, Recording
-from fieldcal.windows.spikes import DEVIATION
 
 COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
 """Names of a column that holds how many samples a mean is of."""

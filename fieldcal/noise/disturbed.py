@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array, Index
 from fieldcal.noise.likelihood import Flags
 
@@ -91,7 +92,7 @@ def _z(values: Array) -> Array:
 
 def _scale(values: Array) -> Array:
     """Robust standard deviation of each column about 0; inf where most are alike."""
-    usual = 1.4826 * np.median(np.abs(values), axis=0)
+    usual = DEVIATION * np.median(np.abs(values), axis=0)
     scale: Array = np.where(usual > 0, usual, np.inf)
     return scale
 

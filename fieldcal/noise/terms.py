@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array
 from fieldcal.noise.likelihood import TIMED, Flags, NoiseFit, Powers, fit
 from fieldcal.noise.spectrum import CosineSpectrum
@@ -220,7 +221,7 @@ def _without_filter(spectrum: CosineSpectrum, powers: Powers) -> Powers:
 def _without_lines(spectrum: CosineSpectrum, powers: Powers, rich: NoiseFit) -> Powers:
     """Bins above 1 Hz in which something hums, left to themselves."""
     excess = _excess(powers, rich)
-    usual = 1.4826 * np.median(np.abs(excess[~powers.free]))
+    usual = DEVIATION * np.median(np.abs(excess[~powers.free]))
     odd = (excess > 6 * max(1.0, usual)) & (spectrum.frequency > FILTERED_HZ)
     return replace(powers, free=powers.free | odd)
 

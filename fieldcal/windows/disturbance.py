@@ -22,8 +22,9 @@ from typing import Literal
 
 import numpy as np
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array
-from fieldcal.windows.quiet import NORMAL, QuietNoise, running
+from fieldcal.windows.quiet import QuietNoise, running
 
 Kind = Literal["push", "step", "shake"]
 
@@ -90,7 +91,7 @@ def shakes(short: Array, number: Array, least: Array) -> list[Statistic]:
     root = np.cbrt(short)
     most = np.maximum(np.median(number, axis=0), 1.0)
     centred = np.sqrt(np.minimum(1.0, number / most)) * (root - np.median(root, axis=0))
-    usual = _HEAVY * np.median(np.abs(centred), axis=0) / NORMAL
+    usual = _HEAVY * DEVIATION * np.median(np.abs(centred), axis=0)
     spread = _no_less(usual, np.cbrt(least**2))
     noise = np.sqrt(np.median(short, axis=0))
     levels = zip(

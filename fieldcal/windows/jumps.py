@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.windows.spikes import DEVIATION
 
 HALF = 5
 """Rows of a median in (1)."""

@@ -2,7 +2,7 @@
 
     y_i                                    means of cells, i = 1 .. m
     u_k,i = mean of 2^k cells from cell i  running mean of level k
-    a_k   = median |u_k,i+2^k - u_k,i| / (0.6745 sqrt(2))                        (1)
+    a_k   = 1.4826 median |u_k,i+2^k - u_k,i| / sqrt(2)                           (1)
     a_k^2 = A / 2^k + B                    beyond the longest level measured     (2)
     s_k^2 = sum over j >= k of a_j^2 / 2                                         (3)
 
@@ -19,14 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array
 from fieldcal.windows.cells import CELL
 
 LEVELS = 8
 """Durations: 0.1 s to 12.8 s, each twice the one before."""
-
-NORMAL = 0.6745
-"""Median of |x| for a normal x of unit variance."""
 
 KNEE = 0.05
 """Flicker that any device may have though a window is too short to show it, Hz."""
@@ -75,7 +73,7 @@ def quiet(means: Array, before: QuietNoise | None = None) -> QuietNoise:
         if k and len(u) < _ENOUGH * 2**k:
             break
         steps = np.abs(u[2**k :] - u[: -(2**k)])
-        measured.append(np.median(steps, axis=0) / (NORMAL * np.sqrt(2)))  # (1)
+        measured.append(DEVIATION * np.median(steps, axis=0) / np.sqrt(2))  # (1)
     known = np.array(measured)
     white, flat = _white_and_flat(known)
     tau = 2.0 ** np.arange(len(known), len(levels))[:, None]

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array, Block
 
 WILD = 12.0
@@ -19,9 +20,6 @@ WILD = 12.0
 
 BACK = 0.3
 """Part of the jump that samples before and after it differ by at most."""
-
-DEVIATION = 1.4826
-"""Standard deviation in a median of absolute values."""
 
 
 def without_spikes(block: Block) -> Block:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.special import gammaincc
+from scipy.stats import norm
 
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.chances import DEVIATION, chi2_tail
 
 
 @pytest.mark.parametrize("dof", [1, 2, 3, 4, 5, 10, 33, 100, 1001, 20000])
@@ -19,3 +20,7 @@ def test_the_tail_is_that_of_the_incomplete_gamma_function(dof: int) -> None:
 def test_what_has_no_end_has_no_chance() -> None:
     assert chi2_tail(np.inf, 3) == 0.0
     assert np.isnan(chi2_tail(np.nan, 4))
+
+
+def test_a_median_of_deviations_is_that_of_a_normal_spread() -> None:
+    assert DEVIATION == pytest.approx(1 / norm.ppf(0.75), rel=1e-4)

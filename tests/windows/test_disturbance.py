@@ -58,7 +58,7 @@ def test_a_shake_is_an_excess_of_the_noise_from_sample_to_sample() -> None:
     assert [t.cells for t in tests] == [1, 2, 4, 8]
     root = q ** (1 / 3) - np.median(q ** (1 / 3), axis=0)
     root[10] *= np.sqrt(1 / 3)
-    spread = 1.3 * np.median(abs(root), axis=0) / 0.6745
+    spread = 1.3 * 1.4826 * np.median(abs(root), axis=0)
     for test in tests:
         long = test.cells
         assert test.kind == "shake" and len(test.z) == M - long + 1

@@ -45,7 +45,7 @@ def slow(means: Array) -> Array:
         if k and len(u) < 16 * width:
             break
         steps = np.abs(u[width:] - u[:-width])
-        known.append(np.median(steps) / (0.6745 * np.sqrt(2)))
+        known.append(1.4826 * np.median(steps) / np.sqrt(2))
     variance = np.square(known)
     tau = 2.0 ** np.arange(len(levels))
     use = slice(min(2, max(0, len(known) - 2)), len(known))

@@ -13,6 +13,7 @@ from math import comb
 
 import numpy as np
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array, Block
 
 VALUES_S = (12.0, 8.0, 5.0, 3.0)
@@ -31,9 +32,6 @@ PLAIN = 0.05
 
 ALIKE = 1.5
 """Noise of the shorter span's rate that a longer one's may differ by; more is flat."""
-
-MEDIAN = 0.6745
-"""Of the absolute value of what is normal."""
 
 LEAST = 1e-9
 """Of a fit's own information, added where too few means lie in a span."""
@@ -134,7 +132,7 @@ def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:
             error = noise * float(np.sqrt(12 * step / (2 * half) ** 3))
             allowed = ALIKE * error if error < PLAIN * float(np.std(slope)) else 0.0
             continue
-        if float(np.median(np.abs(slope - measure))) / MEDIAN > allowed:
+        if DEVIATION * float(np.median(np.abs(slope - measure))) > allowed:
             break
         best = slope
     return best

@@ -57,6 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the virtual device with everything that was found, for fieldcal sim"
         " --profile FILE, and replay the session on it",
     )
+    _add_against(parser)
+
+
+def _add_against(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of a comparison with a simulator."""
+    add = parser.add_argument
     add(
         "--against",
         metavar="SIM",

@@ -58,6 +58,11 @@ class Fit:
     left_out: float
     rows: Array
 
+    @property
+    def contradicts(self) -> bool:
+        """Whether the scatter is so large that the model is at fault, not the noise."""
+        return self.dof > 0 and not self.chi2 / self.dof < thresholds.WRONG_MODEL
+
 
 def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -> Fit:
     """How well the means of a triad agree, by the columns of the estimate."""

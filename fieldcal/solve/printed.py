@@ -27,6 +27,10 @@ from fieldcal.solve.result import UNITS
 
 METHODS = ("two_position", "five_position")
 
+TWO = "as printed: the sign of (5) makes the scale factor of z negative"
+FIVE = "as printed: (23) is inverted, (22), (30), (34) lose the sign"
+"""Said of the misprints of each method."""
+
 
 def solve(observations: Observations, asked: Asked) -> Calibration:
     """Everything that the print gives.
@@ -34,40 +38,18 @@ def solve(observations: Observations, asked: Asked) -> Calibration:
     Raises
     ------
     InputError
-        If the method is none that is printed.
+        If no formula is printed for the method, or for one of the positions.
 
     """
-    if asked.method not in ("auto", *METHODS):
-        raise InputError(
-            f"the paper prints no {asked.method} method: as printed are two_position"
-            " and five_position"
-        )
-    if third := [p.name for p in observations.positions if p.gamma]:
-        raise InputError(
-            f"the paper prints formulas for two angles, and {third[0]} has three: leave"
-            " out --as-printed"
-        )
-    if spun := [p.name for p in observations.positions if p.speed]:
-        raise InputError(
-            f"the paper prints formulas for known rates, and {spun[0]} turns about an"
-            " axis that nobody knows: leave out --as-printed"
-        )
+    _refuse(observations, asked)
+    parts, sentences, method = [], [], asked.method
     still = np.flatnonzero(~observations.rotating)
-    parts, sentences = [], []
-    method = asked.method
     if len(still) and observations.has_acc:
         two = len(still) == 2 if method == "auto" else method == "two_position"
         method = "two_position" if two else "five_position"
-        if two:
-            parts.append(two_position(observations[still], as_printed=True))
-            sentences.append(
-                "as printed: the sign of (5) makes the scale factor of z negative"
-            )
-        else:
-            parts.append(five_position(observations[still], as_printed=True))
-            sentences.append(
-                "as printed: (23) is inverted, (22), (30), (34) lose the sign"
-            )
+        formulas, misprints = (two_position, TWO) if two else (five_position, FIVE)
+        parts.append(formulas(observations[still], as_printed=True))
+        sentences.append(misprints)
     if observations.has_gyr:
         parts.append(_gyroscopes(observations))
     if not parts:
@@ -89,6 +71,25 @@ def solve(observations: Observations, asked: Asked) -> Calibration:
         rms=float("nan"),
         warnings=tuple(sentences),
     )
+
+
+def _refuse(observations: Observations, asked: Asked) -> None:
+    """Refuse what the paper prints no formula for."""
+    if asked.method not in ("auto", *METHODS):
+        raise InputError(
+            f"the paper prints no {asked.method} method: as printed are two_position"
+            " and five_position"
+        )
+    if third := [p.name for p in observations.positions if p.gamma]:
+        raise InputError(
+            f"the paper prints formulas for two angles, and {third[0]} has three: leave"
+            " out --as-printed"
+        )
+    if spun := [p.name for p in observations.positions if p.speed]:
+        raise InputError(
+            f"the paper prints formulas for known rates, and {spun[0]} turns about an"
+            " axis that nobody knows: leave out --as-printed"
+        )
 
 
 def _gyroscopes(observations: Observations) -> Closed:

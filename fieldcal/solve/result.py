@@ -57,12 +57,9 @@ def calibration(
         is determined.
 
     """
-    names, values, covariance = found.names, found.values, found.covariance
-    there = words.carried(
-        found.sure, found.causes, found.names, found.moved, found.ended_s
-    )
+    names, sigma = found.names, np.sqrt(np.diag(found.covariance))
     sentences = [
-        there,
+        words.carried(found.sure, found.causes, names, found.moved, found.ended_s),
         told.sentence if told else "",
         *_open(method, observations, found),
         *notes,
@@ -72,33 +69,26 @@ def calibration(
         raise NotObservable(
             "these positions determine nothing: " + "; ".join(filter(None, sentences))
         )
-    sigma = np.sqrt(np.diag(covariance))
     odd = [
-        *senseless(names, values, sigma, observations.nominal),
+        *senseless(names, found.values, sigma, observations.nominal),
         *_contradicted(found, observations),
         *_elsewhere(found, observations),
     ]
-    acc = found.acc if any(map(_is_acc, names)) else found.gyr
-    good = not odd and (acc.dof <= 0 or acc.chi2 / acc.dof < thresholds.WRONG_MODEL)
-    doubt = DoubtfulPosition.of(observations, found.bad)
-    sentences += [
-        *_few(method, found),
-        doubt.sentence if doubt else "",
-        *_scattered(found),
-    ]
+    sentences += _doubts(method, observations, found)
+    fit = found.acc if any(map(_is_acc, names)) else found.gyr
+    info = _info(method, observations, asked, found)
     return Calibration(
         method=method,
         names=names,
-        values=values,
-        covariance=covariance,
+        values=found.values,
+        covariance=found.covariance,
         units=tuple(UNITS[group_of(n)] for n in names),
-        chi2=acc.chi2,
-        dof=acc.dof,
+        chi2=fit.chi2,
+        dof=fit.dof,
         rms=found.acc.rms,
         warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
-        good=good,
-        info=_info(method, observations, asked, found)
-        | ({"borrowed": told.to_json()} if told else {}),
+        good=not odd and not fit.contradicts,
+        info=info | ({"borrowed": told.to_json()} if told else {}),
     )
 
 
@@ -193,6 +183,13 @@ def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
         f"{words.join(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
         f" add positions with gravity half way between {words.join(pairs)}"
     )
+
+
+def _doubts(method: Method, observations: Observations, found: Estimated) -> list[str]:
+    """What of the windows' agreement the user must know."""
+    doubt = DoubtfulPosition.of(observations, found.bad)
+    few, scattered = _few(method, found), _scattered(found)
+    return [*few, doubt.sentence if doubt else "", *scattered]
 
 
 def _few(method: Method, found: Estimated) -> list[str]:

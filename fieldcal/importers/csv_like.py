@@ -238,7 +238,7 @@ class TextColumns(ColumnRecording):
         if table is not None and table.headings:
             self.says.append(f"lines of names between its rows: {table.headings}")
         if table is None or not table.seen:
-            number, line = list(enumerate(first_lines[:2], 1))[-1]
+            number, line = list(enumerate(first_lines[:2] or [""], 1))[-1]
             raise InputError(
                 f"{self.path}: no line has numbers in the columns {','.join(names)};"
                 f" line {number} is {line[:60]!r}: name each column in its order, _ for"

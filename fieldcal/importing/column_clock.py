@@ -20,11 +20,13 @@ from fieldcal.importing.column_times import (
     coarse_question,
     counted_question,
     counts_rows,
+    goes_on,
     is_clock_number,
     rates_of_turns,
     split_seconds,
 )
 from fieldcal.importing.gravity_size import are_means
+from fieldcal.importing.heading_words import meaning
 from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
 from fieldcal.importing.row_times import FRACTIONS
@@ -202,6 +204,33 @@ class ColumnClock:
         if found:
             self._of.guessed["counts"] = "of 16 bits with a sign: 65535 is -1"
         return replace(wanted, unsigned=frozenset(found))
+
+
+def with_times(way: Heading, table: Array) -> Heading:
+    """A heading in which only what numbers show to be times is named as one.
+
+    Of several columns that are named as times, one may hold a date, count rows, or be
+    too coarse.
+
+    Parameters
+    ----------
+    way : what stands above the columns
+    table : (n, k) numbers of the first rows; nan where a cell is none
+
+    """
+    said = [meaning(column.name, column.unit) for column in way.columns]
+    named = [i for i, one in enumerate(said) if one is not None and one.kind == "t"]
+    if len(named) < 2 or table.shape[1] != len(way.columns):
+        return way
+    fit = [i for i in named if goes_on(table[:, i])]
+    for lacks in (counts_rows, lambda t: coarse_clock(t) is not None):
+        fit = [i for i in fit if not lacks(table[:, i])] or fit
+    if not fit:
+        return way
+    names = [*way.columns]
+    for i in {*named} - {*fit}:
+        names[i] = names[i]._replace(name="")
+    return Heading(names, way.skip)
 
 
 def numbers_of(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:

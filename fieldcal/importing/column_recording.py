@@ -18,6 +18,7 @@ from fieldcal.importing.column_clock import (
     Heading,
     ask_rate,
     numbers_of,
+    with_times,
 )
 from fieldcal.importing.gravity_size import are_means
 from fieldcal.importing.heading_words import meaning
@@ -113,7 +114,8 @@ class ColumnRecording(Recording):
     def _found(self) -> dict[str, ReadOptions]:
         if self.wanted.columns:
             return {"0": self.wanted}
-        ways = [(headings.read(*way), way) for way in self.heading()]
+        table = self.beginning()
+        ways = [(headings.read(*with_times(way, table)), way) for way in self.heading()]
         named = max((found for found, _ in ways), key=_worth, default=())
         way = next((w for found, w in ways if found and found is named), None)
         if len(named) < 2 and not _whole(named):

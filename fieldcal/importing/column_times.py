@@ -24,6 +24,9 @@ SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
 LATER = 0.999
 """Share of rows that are later than the row before, of a clock: one may be damaged."""
 
+SET_BACK = 0.01
+"""Share of steps back, of a clock that is set now and then; a fraction has more."""
+
 FRACTION_NAMES = tuple(sorted(FRACTIONS, key=lambda name: -FRACTIONS[name]))
 """Columns of fractions of a second, the coarsest first."""
 
@@ -126,6 +129,13 @@ def counts_rows(t: Array) -> bool:
     """Whether times (n,) are the numbers of the rows."""
     steps = np.diff(t[np.isfinite(t)])
     return len(steps) > FEWEST and float((steps == 1).mean()) > LATER
+
+
+def goes_on(t: Array) -> bool:
+    """Whether times (n,) are numbers that grow, and seldom are set back."""
+    steps = np.diff(t[np.isfinite(t)])
+    back = len(steps) < len(t) / 2 or float((steps < 0).mean()) > SET_BACK
+    return not back and bool((steps > 0).any())
 
 
 def rates_of_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:

@@ -43,6 +43,9 @@ _PHRASES = (
 )
 _TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "sensortime",
           "zeit", "tiempo", "temps", "tempo", "tijd", "时间", "sow", "tow")  # fmt: skip
+_SINCE = ("elapsed", "epoch", "uptime", "since", "start", "boot")
+"""Words of a time where a unit of time stands beside them."""
+
 _STEPS = (("dt",), ("delta", "t"), ("delta", "time"), ("time", "delta"), ("deltat",),
           ("time", "step"), ("sample", "interval"))  # fmt: skip
 """Names of the time that passed since the row before."""
@@ -245,8 +248,9 @@ def _time(words: list[str], unit: str | None) -> Meaning | None:
         said = said or (unit_in(inner[-1]) if inner else None)
         label = tuple(w for w in rest if w not in inner)
         return Meaning("t", "", said if unit is None or said else unit, label)
-    if inner and rest == [*inner, "elapsed"]:
-        return Meaning("t", "", unit_in(inner[-1]), ("elapsed",))
+    since = said or (unit_in(inner[-1]) if inner else None)
+    if since and set(rest) - set(inner) and set(rest) <= {*inner, *_SINCE}:
+        return Meaning("t", "", since, tuple(w for w in rest if w not in inner))
     return None
 
 

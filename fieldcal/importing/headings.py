@@ -121,7 +121,7 @@ def read(columns: Sequence[Column], skip: str = "") -> tuple[HeadingMatch, ...]:
         for i, column in enumerate(columns)
         if "," not in column.place
         and (said := meaning(column.name, column.unit)) is not None
-        and not set(said.label) & set(NOT_SAMPLES)
+        and (said.kind == "t" or not set(said.label) & set(NOT_SAMPLES))
     ]
     named = _with_gravity(_with_temperature(columns, _measured(named)))
     acc, gyr = _triads(named, "a"), _triads(named, "g")

@@ -15,6 +15,9 @@ _CHECKED = re.compile(r"\s*[$!]?([^*]*)\*([0-9A-Fa-f]{2})\s*")
 _ENTRY = re.compile(r"(\s*)(?:- )?([A-Za-z_]\w*):\s*(\S*)\s*")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
+END_MARK = ";"
+"""At the end of a line, as programs in C end theirs."""
+
 END = "---"
 """Line between two messages."""
 
@@ -44,6 +47,28 @@ def _bare(line: str) -> str | None:
     if said is None or reduce(xor, said[1].encode(), 0) != int(said[2], 16):
         return None
     return said[1]
+
+
+class EndedLines(TextForm):
+    """Lines ``12,0.1,0.2,9.8;`` that end with a mark which parts no columns."""
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
+        """The form, if most lines have it."""
+        return None if separator == END_MARK else cls() if most(lines, _ends) else None
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+        def one(line: str) -> str:
+            return line.rstrip().removesuffix(END_MARK) if _ends(line) else line
+
+        return lambda lines: [one(line) for line in lines]
+
+
+def _ends(line: str) -> bool:
+    """Whether a line has the mark at its end and nowhere else."""
+    return line.rstrip().find(END_MARK) == len(line.rstrip()) - 1
 
 
 class EchoedMessages(TextForm):

@@ -100,7 +100,8 @@ def rotated(x: Experience, small_rotation: Array) -> Experience:
     where a table turns about an axis that nobody knows across its rate.
     """
     small = small_rotation[np.maximum(x.position, 0)] * (x.position >= 0)[:, None]
-    free = ~x.oriented
+    # without accelerometers nobody knows where up was
+    free = ~x.oriented & (np.linalg.norm(x.f, axis=1) > 0)
     x = x.turned(alpha=x.alpha + small[:, 0], beta=x.beta + small[:, 1])
     if free.any():
         f = x.f.copy()

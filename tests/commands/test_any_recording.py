@@ -113,6 +113,25 @@ def test_without_accelerometers_gyroscopes_are_judged(
     assert set(said["calibration"]) == {"gyr_bias"}
 
 
+def test_gyroscopes_alone_are_solved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(5)
+    t, bias = np.arange(6000) / 50, np.array([0.01, -0.02, 0.005])
+    rates = bias + rng.normal(0, 2e-3, (len(t), 3))
+    # two turns between three rests
+    rates[2000:2100] += [0.5, 0.2, 0.0]
+    rates[4000:4100] += [0.0, -0.4, 0.3]
+    np.savetxt(tmp_path / "log.csv", np.c_[t, rates], delimiter=",", comments="",
+               header="time (s),gx (rad/s),gy (rad/s),gz (rad/s)")  # fmt: skip
+    assert main(["import", str(tmp_path / "log.csv"), "-o", str(tmp_path / "s")]) == 0
+    capsys.readouterr()
+    assert main(["solve", str(tmp_path / "s"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["parameters"]["gyr_bias"]
+    pulls = (np.array(found["value"]) - bias) / found["sigma"]
+    assert (np.abs(pulls) < 4).all() and max(found["sigma"]) < 1e-4
+
+
 def test_windows_of_a_rate_table(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -182,6 +182,28 @@ FORMS: dict[str, Writer] = {
         head="时间,设备名称,加速度X(g),加速度Y(g),加速度Z(g),角速度X(°/s),角速度Y(°/s),"
         "角速度Z(°/s)",
     ),
+    "a time of day, and one with its date": lambda: lines(
+        ["0x50"] * len(T), clock("%H:%M:%S.%f"), clock("%Y-%m-%d %H:%M:%S.%f"),
+        A / G, DEG, sep="\t",
+        head="address\tTime(s)\tChipTime\tax(g)\tay(g)\taz(g)\twx(deg/s)\twy(deg/s)"
+        "\twz(deg/s)",
+    ),
+    "a time that nobody reads beside others": lambda: lines(
+        np.round((UNIX + T) * 1e3), clock("%Y-%m-%dT%H.%M.%S.%f"), T, A / G, DEG,
+        head=f"epoch (ms),time (02:00),elapsed (s),{SIX}",
+    ),
+    "a time that counts rows beside another": lambda: lines(
+        np.round(T * 1e3), np.arange(float(len(T))), A / G, DEG,
+        head=f"HostTimestamp (ms),NodeTimestamp,{SIX}",
+    ),
+    "ticks and an offset": lambda: lines(
+        np.round(4.5e6 * T) + 917, T, A / G, DEG,
+        head="Clock:Tick#,Clock:offsetTime,IMU(0):accelX,IMU(0):accelY,IMU(0):accelZ,"
+        "IMU(0):gyroX,IMU(0):gyroY,IMU(0):gyroZ",
+    ),
+    "lines that end as a program's": lambda: each(
+        "33,Up,{:.0f},{:.8g},{:.8g},{:.8g},{:.8g},{:.8g},{:.8g};", T * 1e9, A, W
+    ),
     "names in Spanish": lambda: lines(
         T, A / G, DEG, head="Tiempo (s),Aceleración X (g),Aceleración Y (g),"
         "Aceleración Z (g),Giroscopio X (°/s),Giroscopio Y (°/s),Giroscopio Z (°/s)",

@@ -7,6 +7,7 @@ commands at the same device times give the same samples.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -212,10 +213,17 @@ class Sensing:
         """Outputs of the sensors without noise and signal chain, (6, n)."""
         late = abs(self._lag)
         vibration = self.body.vibration(true)
-        now = self._outputs(true, vibration)
+
+        def at_once(t: Array) -> Array:
+            return self._outputs(t, vibration)
+
+        outputs = at_once
+        for one in self.profile.effects:
+            outputs = partial(one.followed, outputs)
+        now = outputs(true)
         if not late:
             return now
-        before = self._outputs(true - late, vibration)
+        before = outputs(true - late)
         first, last = (now, before) if self._lag > 0 else (before, now)
         return np.concatenate([first[:3], last[3:]])
 

@@ -82,6 +82,7 @@ class Example:
     vibration : rms in every third position, m/s^2; None: none
     turntable : whether it is turned at constant rates instead of held
     host_clock : whether the samples come with the times at which the host got them
+    in_motion : whether only a reference that follows the motion shows it
     unmended : why no position is predicted better once it is known; empty if one is
 
     """
@@ -92,6 +93,7 @@ class Example:
     vibration: float | None = None
     turntable: bool = False
     host_clock: bool = False
+    in_motion: bool = False
     unmended: str = ""
 
 
@@ -192,6 +194,13 @@ class SimulatedEffect:
     def lag(self) -> float:
         """Seconds by which it makes the gyroscopes late."""
         return 0.0
+
+    def followed(self, outputs: Callable[[Array], Array], t: Array) -> Array:
+        """What the sensors put out at t (n,) s, (6, n), without noise.
+
+        `outputs` are those of sensors that follow at once, at any instants.
+        """
+        return outputs(t)
 
     def pace(self) -> float:
         """Seconds of the device's clock in a true second."""

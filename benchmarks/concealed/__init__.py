@@ -23,6 +23,7 @@ from benchmarks.concealed.sessions import Session, plain
 from benchmarks.concealed.tables import printed
 from fieldcal.diagnosis import diagnose
 from fieldcal.effects import catalogue
+from fieldcal.sim_device.effects import kind
 
 Draw = Callable[[np.random.Generator], Session]
 
@@ -61,7 +62,7 @@ def kinds() -> Mapping[str, tuple[Draw, int]]:
         out[f"outside: {name}"] = (_outside(name), 3)
     out["three"] = (lambda rng: others.several(rng, _sigmas(rng), 3), 9)
     for name in catalogue():
-        if name not in out:
+        if name not in out and not kind(name).EXAMPLE.in_motion:
             out[name] = (lambda rng, n=name: others.example(n, rng), 3)  # type: ignore[misc]
     out["pier"] = (others.pier, 3)
     out["under way"] = (others.under_way, 3)

@@ -4,12 +4,12 @@
 
 A motion program of its own draws bodies that are swung, and IMUs on them with clocks,
 axes, biases and scale factors of their own, noise of every colour, and in turn nothing
-else, a lever arm, g-sensitivity, late gyroscopes, and a cubic term: 40 recordings of a
+else, a lever arm, g-sensitivity, late gyroscopes, a cubic term, and a low-pass of first
+order on one triad or both: 40 recordings of a
 minute at 25 Hz, or as many as are asked for. Printed is how often that is named and
 something false is said, how numbers scatter in their own standard deviations, and how
-stretches that were left out are predicted. `--lag` puts a
-first-order low-pass of that time constant on the gyroscopes besides. The catalogue has
-none, so they are found late, and whatever else is said of it is false.
+stretches that were left out are predicted. `--lag` puts a low-pass of that time
+constant on the gyroscopes of all others besides.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def main() -> None:
         one, found = compared(number, seed, lag)
         seconds += time.process_time() - start
         usual = {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
-        usual |= {"time_delay"} if lag and one.kind != "time_delay" else set()
+        usual |= {"bandwidth"} if lag and one.kind != "bandwidth" else set()
         effects = {d.id for d in found.differences} - usual
         named += one.kind in effects
         false += bool(effects - {one.kind})

@@ -63,11 +63,14 @@ class Drive:
 
 
 def low_passed(drive: Drive, t: Any, arm: Any, tau: float, gyro: bool) -> Any:
-    """A channel triad after a first-order low-pass, by a fine sum over its past."""
-    past = np.arange(0.5, 60.0) / 60.0
-    ages = -tau * np.log(1 - past)  # of equal weight
-    seen = [drive.rate(t - a) if gyro else drive.force(t - a, arm) for a in ages]
-    return sum(seen) / len(ages)
+    """A channel triad after a first-order low-pass: Simpson's rule over its past."""
+    ages = np.linspace(0.0, 16.0, 65)
+    weights = np.exp(-ages) * np.where(np.arange(65) % 2, 4.0, 2.0)
+    weights[[0, -1]] /= 2.0
+    seen = (drive.rate(t - tau * a) if gyro else drive.force(t - tau * a, arm)
+            for a in ages)  # fmt: skip
+    total = sum(w * one for w, one in zip(weights, seen, strict=True))
+    return total / weights.sum()
 
 
 def coloured(rng: Any, n: int, step: float, noise: Mapping[str, Any]) -> Any:

@@ -17,7 +17,7 @@ from fieldcal.session import description
 
 SECONDS, HZ = 60.0, 25.0
 WHITE = np.repeat([0.02, 1e-3], 3)
-KINDS = ("", "lever_arm", "g_sensitivity", "time_delay", "cubic")
+KINDS = ("", "lever_arm", "g_sensitivity", "time_delay", "cubic", "bandwidth")
 ABOUT = description.parse({"format": 1})
 
 
@@ -39,7 +39,7 @@ class Drawn:
 
 
 def drawn(number: int, seed: int, lag: float = 0.0) -> Drawn:
-    """Draw the device with a number; `lag` is the gyroscopes' time constant, s."""
+    """Draw the device with a number; `lag` is a time constant of the gyroscopes, s."""
     rng = np.random.default_rng(seed + number)
     kind = KINDS[number % len(KINDS)]
     bias = rng.normal(0, 1, 6) * np.repeat([0.1, 2e-3], 3)
@@ -69,8 +69,8 @@ def drawn(number: int, seed: int, lag: float = 0.0) -> Drawn:
     if kind:
         values, names = _effect(kind, device, rng)
         truth |= {(kind, n): float(v) for n, v in zip(names, values, strict=True)}
-    if kind == "time_delay":
-        truth[kind, "seconds"] += lag  # that it makes, to first order
+    if lag and kind != "bandwidth":
+        truth["bandwidth", "gyr"] = lag
     return Drawn(kind, device, truth)
 
 
@@ -85,6 +85,11 @@ def _effect(
     if kind == "time_delay":
         device["late"] = float(rng.normal(0, 0.02))
         return np.array([device["late"]]), ["seconds"]
+    if kind == "bandwidth":
+        taus = rng.uniform(0.008, 0.03, 2)
+        taus[rng.integers(2)] *= rng.integers(2)
+        device["lag"] = tuple(taus.tolist())
+        return taus, ["acc", "gyr"]
     size = 0.1 if kind == "lever_arm" else 3e-5
     values = rng.normal(0, size, 3)
     device["arm" if kind == "lever_arm" else "cubic"] = values

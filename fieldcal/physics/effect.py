@@ -109,6 +109,10 @@ class Effect(ABC):
         """Seconds by which it makes the gyroscopes late."""
         return 0.0
 
+    def time_constants(self, values: Values) -> tuple[float, float]:
+        """Those that it gives accelerometers and gyroscopes, s."""
+        return 0.0, 0.0
+
     @property
     def id(self) -> str:
         """Name in the catalogue, which is the file's."""

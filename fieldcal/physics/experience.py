@@ -35,6 +35,8 @@ class Experience:
     f : (n, 3) m/s^2, specific force in device axes
     w : (n, 3) rad/s, angular rate in device axes
     w_dot : (n, 3) rad/s^2, angular acceleration in device axes
+    slope : (n, 6) m/s^3 and rad/s^2, by how much less f and w are followed for each
+        second of a time constant; 0 where that is not known
     t : (n,) s, device time
     lasts : (n,) s, what each row is a mean over; 0 for samples
     since_start : (n,) s since the session's start
@@ -62,6 +64,7 @@ class Experience:
     f: Array
     w: Array
     w_dot: Array
+    slope: Array
     t: Array
     lasts: Array
     since_start: Array
@@ -101,6 +104,7 @@ class Experience:
             "f": np.full((n, 3), np.nan),
             "w": known.get("rate", np.zeros((n, 3))) @ known.get("mounting", np.eye(3)),
             "w_dot": np.zeros((n, 3)),
+            "slope": np.zeros((n, 6)),
             "t": np.arange(n, dtype=float),
             "lasts": np.zeros(n),
             "since_start": np.arange(n, dtype=float),

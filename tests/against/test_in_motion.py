@@ -18,6 +18,10 @@ from fieldcal.against.motion import compared_in_motion
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
+from fieldcal.sim_device.effects import catalogue, kind
+from fieldcal.sim_device.profile_file import from_tables
+from fieldcal.sim_device.replay import HeldWindow, simulate
+from fieldcal.sim_device.vocabulary import effect
 
 HEAD = "t (s),ax (m/s^2),ay (m/s^2),az (m/s^2),gx (rad/s),gy (rad/s),gz (rad/s)"
 NAMES = ("recording", "simulator")
@@ -90,6 +94,78 @@ def test_several_at_once_with_late_gyroscopes_off_the_centre(true: Block) -> Non
     assert found.verdict == "left_out"
     (arm,) = (d for d in found.differences if d.id == "lever_arm")
     assert {"ax", "ay", "az"} <= {m.channel for m in arm.where}
+
+
+@pytest.mark.statistical
+def test_time_constants_come_back_within_their_uncertainty() -> None:
+    which, off = KINDS.index("bandwidth"), []
+    for one, found in (compared(which, 7_300 + 50 * k) for k in range(2)):
+        told = {d.id for d in found.differences} - CALIBRATION
+        assert told == {"bandwidth"}
+        off += [
+            (float(pair.difference.value) - one.truth[d.id, name])
+            / (pair.difference.sigma or np.nan)
+            for d in found.differences
+            for name, pair in d.parameters.items()
+            if d.id == "bandwidth"
+        ]
+    assert len(off) >= 2 and np.abs(off).max() < 4
+
+
+def test_a_time_constant_is_told_beside_a_delay_and_a_delay_is_none(
+    true: Block,
+) -> None:
+    both = held({"late": 0.02, "lag": (0.0, 0.015), **NOISE}, true)
+    assert {d.id for d in both.differences} - CALIBRATION == {
+        "time_delay", "bandwidth",
+    }  # fmt: skip
+    late, late_sigma = number(both, "time_delay", "seconds")
+    tau, tau_sigma = number(both, "bandwidth", "gyr")
+    assert abs(late - 0.02) < 4 * late_sigma and abs(tau - 0.015) < 4 * tau_sigma
+    (one,) = (d for d in both.differences if d.id == "bandwidth")
+    acc = one.parameters.get("acc")
+    shared = float(acc.difference.value) if acc else 0.0
+    assert abs(late + tau - shared - 0.035) < 5e-5, "low frequencies show the sum"
+    alone = held({"late": 0.02, **NOISE}, true)
+    assert {d.id for d in alone.differences} - CALIBRATION == {"time_delay"}
+    assert number(alone, "time_delay", "seconds")[1] < 1e-4
+
+
+def test_one_filter_of_both_triads_is_a_time_constant_of_both(true: Block) -> None:
+    found = held({"lag": (0.004, 0.004), **NOISE}, true)
+    assert {d.id for d in found.differences} - CALIBRATION == {"bandwidth"}
+    for name in ("acc", "gyr"):
+        tau, sigma = number(found, "bandwidth", name)
+        assert abs(tau - 0.004) < 4 * sigma < 0.003
+
+
+def test_the_low_pass_of_a_simulator_is_a_time_constant_below_nothing() -> None:
+    slow = block_of(recorded(DRIVE, {"lag": (0.02, 0.02)}, 80.0, 25.0))
+    found = held(NOISE, slow)
+    assert {d.id for d in found.differences} - CALIBRATION == {"bandwidth"}
+    for name in ("acc", "gyr"):
+        tau, sigma = number(found, "bandwidth", name)
+        assert abs(tau + 0.02) < 4 * sigma < 0.008
+
+
+def test_what_only_motion_shows_is_named_of_the_virtual_device() -> None:
+    angles = ((0, 0), (90, 40), (-60, 0), (30, -70), (0, 80), (-90, -30)) * 2
+    windows = [
+        HeldWindow(np.deg2rad(a), np.deg2rad(b), 2.0 + 3 * i, 3.0 + 3 * i)
+        for i, (a, b) in enumerate(angles)
+    ]
+    plain = from_tables({"sampling": {"rate_hz": 50.0}, "motion": {"turn_s": 1.0}})
+    names = [name for name in catalogue() if kind(name).EXAMPLE.in_motion]
+    assert names
+    for name in names:
+        given = kind(name).EXAMPLE.given
+        real = simulate(plain.having(effect(name, given)), windows, seed=3)
+        sim = simulate(plain, windows, seed=4, noise=False)
+        found = compared_in_motion((real, ABOUT), sim, NAMES)
+        assert {d.id for d in found.differences} - CALIBRATION == {name}
+        for part, value in given.items():
+            told, sigma = number(found, name, part)
+            assert abs(told - value) < 4 * sigma < 0.5 * value
 
 
 def test_nothing_is_said_of_what_is_alike() -> None:

@@ -27,6 +27,7 @@ def experience() -> Experience:
         9.81,
         rate=rng.standard_normal((ROWS, 3)),
         w_dot=rng.standard_normal((ROWS, 3)),
+        slope=rng.standard_normal((ROWS, 6)),
         since_turn=rng.uniform(0, 30, ROWS),
         warming=rng.standard_normal(ROWS),
         heating=rng.standard_normal(ROWS),

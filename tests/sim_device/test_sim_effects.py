@@ -254,6 +254,30 @@ def test_gyroscopes_that_are_late_show_what_was() -> None:
     np.testing.assert_allclose(early.acc[2:], plain.acc[:-2], atol=1e-14)
 
 
+def test_sensors_of_little_bandwidth_show_an_exponential_mean_of_what_was() -> None:
+    step, moving = 1e-3, []
+    sampling = {"sampling": {"rate_hz": 1 / step}}
+    quiet = {**sampling, "noise": {"acc": 0.0, "gyr": 0.0}}
+    for given in ({"acc": 0.03, "gyr": 0.08}, {"gyr": 0.08}, {"acc": 0.0}):
+        device = VirtualDevice(from_tables(quiet).having(effect("bandwidth", given)))
+        device.take(500)
+        device.turn(1.0, 0.4, 0.8)
+        moving.append(device.take(1500))
+    both, gyr, plain = moving
+    np.testing.assert_array_equal(gyr.acc, plain.acc)
+    np.testing.assert_array_equal(gyr.gyr, both.gyr)
+    for shown, true, tau in (
+        (both.acc, plain.acc, 0.03),
+        (both.gyr, plain.gyr, 0.08),
+    ):
+        # trapezoid of tau dy/dt + y = u, begun at rest
+        keep, mean = (2 * tau - step) / (2 * tau + step), (true[1:] + true[:-1]) / 2
+        expected = true[:1].repeat(len(true), axis=0)
+        for i, u in enumerate(mean):
+            expected[i + 1] = keep * expected[i] + (1 - keep) * u
+        np.testing.assert_allclose(shown, expected, atol=2e-4 * float(np.ptp(true)))
+
+
 def test_vibration_is_rectified_by_its_variance() -> None:
     def shaken(x: float) -> Array:
         effect = parse(f"vibration_rectification:x={x},level=0.5")

@@ -24,7 +24,7 @@ from fieldcal.against.wording import paragraph
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Block
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.rows.motion import Reference
+from fieldcal.model.rows.reference import Reference
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description

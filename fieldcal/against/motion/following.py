@@ -23,12 +23,8 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.rows.coloured import Bands
-from fieldcal.model.rows.motion import (
-    Alignment,
-    MotionRows,
-    Reference,
-    rows_in_motion,
-)
+from fieldcal.model.rows.motion import Alignment, MotionRows, rows_in_motion
+from fieldcal.model.rows.reference import LEAST, Reference, Response
 from fieldcal.model.search.inference import Inference, Inferred
 from fieldcal.model.state import State
 from fieldcal.model.system.motion_rows import MotionSystem, noise_levels
@@ -121,7 +117,7 @@ def follow(
     dictionary = MotionDictionary(rows, np.abs(nominal.scale))
     system = MotionSystem(dictionary, _flat(rows, nominal))
     fit = MotionFit(system, nominal, Bands.between(rows.frequency), start.hz)
-    fit.settle(())
+    fit.settle(_delays(dictionary))
     found = fit.searched(())
     for _ in range(AGAIN if found.best.members else 0):
         before, members = found.best.keys, found.best.members
@@ -160,6 +156,16 @@ def _rate(reference: Reference) -> float:
     return float(np.clip(OFTEN * hz, SLOWEST_HZ, QUICKEST_HZ))
 
 
+def _delays(dictionary: MotionDictionary) -> tuple[Member, ...]:
+    """Causes that make the gyroscopes late; once they are looked up, all is linear."""
+    return tuple(
+        (cause, group)
+        for cause in dictionary.causes
+        for group in cause.variants[:1]
+        if group.effect is not None and group.effect.late(np.ones(len(group.params)))
+    )
+
+
 def _nominal(about: Description, places: int) -> State:
     nominal = about.nominal
     return State(
@@ -172,7 +178,7 @@ def _nominal(about: Description, places: int) -> State:
 
 def _flat(rows: MotionRows, nominal: State) -> Array:
     """White noise as large as all that differs, to begin with."""
-    off = rows.y - nominal.bias - nominal.scale * rows.motion()
+    off = rows.y - nominal.bias - nominal.scale * rows.motion(rows.acc)
     power = np.nanvar(np.where(rows.used, off, 0.0), axis=0)
     return np.tile(np.maximum(power, 1e-12), (len(rows), 1))
 
@@ -242,7 +248,10 @@ class MotionFit:
         return power
 
     def _realigned(self, found: Set, there: State) -> float:
-        """Move the rows to the alignment that a fit has; how far, in its sigmas."""
+        """Move the rows to the alignment that a fit has; how far, in its sigmas.
+
+        Time constants count in parts of the least that shows.
+        """
         d, now = self.system.dictionary, self.rows.alignment
         clock, clock_cov = told(found, d.clock, 2)
         turn, turn_cov = told(found, d.turn, 3)
@@ -253,10 +262,23 @@ class MotionFit:
             rotation=exponential(turn) @ now.rotation,
             unseen=now.unseen + self._unseen(found),
         )
-        late = sum(t.effect.late(t.values.tolist()) for t in there.terms)
-        d.moved(replace(self.rows, alignment=alignment, late=late))
+        before = self.rows
+        acc, gyr = self._responses(there)
+        d.moved(replace(before, alignment=alignment, acc=acc, gyr=gyr))
         sigma = np.sqrt(np.concatenate([np.diag(clock_cov), np.diag(turn_cov)]))
-        return float(np.abs(np.concatenate([clock, turn]) / sigma).max())
+        moved = float(np.abs(np.concatenate([clock, turn]) / sigma).max())
+        followed = max(abs(acc.tau - before.acc.tau), abs(gyr.tau - before.gyr.tau))
+        return max(moved, followed / LEAST)
+
+    def _responses(self, there: State) -> tuple[Response, Response]:
+        """How a state has the triads follow the motion; one and the same if alike."""
+        late = sum(t.effect.late(t.values.tolist()) for t in there.terms)
+        each = [t.effect.time_constants(t.values.tolist()) for t in there.terms]
+        acc, gyr = np.sum(each, axis=0).tolist() if each else (0.0, 0.0)
+        first = self.rows.acc.towards(self.rows.reference, 0.0, acc)
+        if not late and acc == gyr:
+            return first, first
+        return first, self.rows.gyr.towards(self.rows.reference, late, gyr)
 
     def _unseen(self, found: Set) -> Array:
         """What a fit adds to gravity along an axis that the reference lacks."""

@@ -50,9 +50,8 @@ class Place:
     def moved(self, rows: MotionRows) -> None:
         """Take the same rows at another alignment."""
         self.rows = rows
-        self.change = rows.motion(1, rows.late)
-        if rows.late:
-            self.change[:, ACC] = rows.motion(1)[:, ACC]
+        self.change = rows.motion(rows.gyr, 1)
+        self.change[:, ACC] = rows.motion(rows.acc, 1)[:, ACC]
 
 
 class MotionDictionary(Dictionary):
@@ -66,7 +65,7 @@ class MotionDictionary(Dictionary):
     Attributes
     ----------
     place : where the recording stands beside its reference
-    later : the inputs of the gyroscopes, where these are known to be late
+    later : the inputs of the gyroscopes, where these are known to follow otherwise
     lost : channels that the reference lacks
     clock, turn, unseen : first column of delay and drift, of the turn about three axes,
         and of what is constant in the lost channels
@@ -75,7 +74,7 @@ class MotionDictionary(Dictionary):
 
     def __init__(self, rows: MotionRows, unit: Array) -> None:
         self.place = Place(rows)
-        self.later = x = rows.experience()
+        self.later = x = rows.experience(rows.acc)
         since = np.full((1, len(x)), np.inf)
         common = np.zeros((len(np.unique(x.position)), 6))
         super().__init__(x, rows.used, since, common, unit, False, Wander.none())
@@ -83,8 +82,9 @@ class MotionDictionary(Dictionary):
     def moved(self, rows: MotionRows) -> None:
         """Take the same rows at another alignment; causes stay as they are."""
         self.place.moved(rows)
-        self.x = rows.experience()
-        self.later = rows.experience(rows.late) if rows.late else self.x
+        self.x = self.later = rows.experience(rows.acc)
+        if rows.gyr is not rows.acc:
+            self.later = rows.experience(rows.gyr)
 
     def _calibration(self) -> Iterator[Group]:
         """Bias and scale factor, and where the two stand beside each other."""

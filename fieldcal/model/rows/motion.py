@@ -25,20 +25,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct, idct
-from scipy.interpolate import CubicSpline
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index
+from fieldcal.model.rows.reference import FEWEST, GAP, Reference, Response
 from fieldcal.physics.experience import Experience
 
-GAP = 3.5
-"""Intervals between samples from which there is a gap."""
+TRIADS = (ACC, GYR)
 
 PARTS = 8
 """Parts of a recording, of whole stretches, that something may happen to."""
-
-FEWEST = 8
-"""Samples of a channel from which a reference has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,52 +63,6 @@ class Alignment:
         return out
 
 
-class Reference:
-    """What a reference says between its samples, by cubic splines.
-
-    Parameters
-    ----------
-    block : its samples; a channel that it has not is taken as 0
-
-    Attributes
-    ----------
-    observed : (6,) channels that it has
-    start, end : s of its clock
-
-    """
-
-    def __init__(self, block: Block) -> None:
-        six = block.six
-        self.observed = np.isfinite(six).sum(axis=0) >= FEWEST
-        whole = np.isfinite(six[:, self.observed]).any(axis=1)
-        self.t, self.step = block.t[whole], float(np.median(np.diff(block.t[whole])))
-        self.start, self.end = float(self.t[0]), float(self.t[-1])
-        self._splines = [
-            (c, CubicSpline(block.t[known], six[known, c]))
-            for c in np.flatnonzero(self.observed)
-            for known in [np.isfinite(six[:, c])]
-        ]
-
-    @property
-    def lost(self) -> Index:
-        """Channels that it lacks of triads of which it has some."""
-        some = np.repeat(self.observed.reshape(2, 3).any(axis=1), 3)
-        return np.flatnonzero(some & ~self.observed)
-
-    def at(self, s: Array, order: int = 0) -> Array:
-        """The six channels, or a derivative, at instants of its clock, (n, 6)."""
-        out = np.zeros((len(s), 6))
-        for c, spline in self._splines:
-            out[:, c] = spline(s, order)
-        return out
-
-    def covers(self, s: Array, margin: float) -> NDArray[np.bool_]:
-        """Instants about which it has samples, and so far beyond, s."""
-        inside = (s > self.start + margin) & (s < self.end - margin)
-        after = np.clip(np.searchsorted(self.t, s), 1, len(self.t) - 1)
-        return inside & (self.t[after] - self.t[after - 1] < GAP * self.step)
-
-
 @dataclass(frozen=True, slots=True)
 class MotionRows:
     """Rows of a recording beside a reference.
@@ -126,7 +76,7 @@ class MotionRows:
     step : s from row to row
     reference : of the motion
     alignment : beside it
-    late : s by which the gyroscopes are later than the accelerometers, as it is known
+    acc, gyr : what each triad makes of the motion, as far as that is known
 
     """
 
@@ -137,7 +87,8 @@ class MotionRows:
     step: float
     reference: Reference
     alignment: Alignment
-    late: float = 0.0
+    acc: Response
+    gyr: Response
 
     def __len__(self) -> int:
         return len(self.y)
@@ -185,26 +136,22 @@ class MotionRows:
         out[:, 0] = dct(means[some], axis=0, norm="ortho")
         return out.reshape(-1, coefficients.shape[1])
 
-    def motion(self, order: int = 0, late: float = 0.0) -> Array:
-        """What the device went through by the reference, or a derivative, (n, 6).
-
-        `late` is by how many s that was earlier.
-        """
-        s = self.alignment.reference_time(self.t.ravel() - late)
-        every = self.reference.at(s, order).reshape(*self.t.shape, 6)
-        means, turn = every.mean(axis=1), self.alignment.rotation.T
+    def motion(self, response: Response, order: int = 0) -> Array:
+        """What a triad took the motion for, or a derivative, (n, 6)."""
+        values = self._of(response.sensed, response.late, order)
         if order == 0:
-            means += self.alignment.unseen
-        return np.hstack([means[:, ACC] @ turn, means[:, GYR] @ turn])  # (1)
+            values += np.hstack([self.alignment.unseen[p] @ self._turn for p in TRIADS])
+        return values
 
-    def experience(self, late: float = 0.0) -> Experience:
+    def experience(self, response: Response) -> Experience:
         """The same as the inputs of effects."""
-        v, n, t = self.motion(0, late), len(self), self.middles
+        v, n, t = self.motion(response), len(self), self.middles
         warming = self.temperature - self.temperature[0]
         unknown = np.full(n, np.nan)
         return Experience(
             alpha=unknown, beta=unknown, gamma=np.zeros(n),
-            f=v[:, ACC], w=v[:, GYR], w_dot=self.motion(1, late)[:, GYR],
+            f=v[:, ACC], w=v[:, GYR], w_dot=self.motion(response, 1)[:, GYR],
+            slope=self._of(response.slower, response.late, 1),
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
             since_turn=np.full(n, np.inf), warming=warming,
             heating=np.gradient(warming, t), variance=np.zeros((n, 3)),
@@ -213,6 +160,16 @@ class MotionRows:
             base_rate=np.zeros(3), mounting=np.eye(3), latitude=np.nan,
             gravity_sigma=0.0, attitude_sigma=unknown, transport=np.zeros(3),
         )  # fmt: skip
+
+    @property
+    def _turn(self) -> Array:
+        return self.alignment.rotation.T
+
+    def _of(self, reference: Reference, late: float, order: int) -> Array:
+        """Means over the rows of a reference as it was, in device axes, (n, 6)."""
+        s = self.alignment.reference_time(self.t.ravel() - late)
+        means = reference.at(s, order).reshape(*self.t.shape, 6).mean(axis=1)
+        return np.hstack([means[:, p] @ self._turn for p in TRIADS])  # (1)
 
 
 def frequencies(count: int, length: int, step: float) -> Array:
@@ -258,7 +215,8 @@ def rows_in_motion(
     ]
     at = np.concatenate(stretches).reshape(-1, per_row)
     temperature = block.temperature[at].mean(axis=1)
+    ideal = Response.of(reference)
     return MotionRows(
         block.t[at], six[at].mean(axis=1), temperature, length,
-        step * per_row, reference, alignment,
+        step * per_row, reference, alignment, ideal, ideal,
     )  # fmt: skip

@@ -77,7 +77,7 @@ class MotionSystem(System):
         return out
 
     def _views(self, state: State) -> list[RowView]:
-        """Rows of the accelerometers, and of the gyroscopes where these are late."""
+        """Rows of the accelerometers, and of gyroscopes that follow otherwise."""
         d = self.dictionary
         inputs = [d.x] if d.later is d.x else [d.x, d.later]
         return [RowView.of(x, d.since, state) for x in inputs]
@@ -85,15 +85,19 @@ class MotionSystem(System):
     def _off(self, views: Sequence[RowView], state: State) -> Array:
         """What a state leaves, (n, 6).
 
-        By how much gyroscopes are known to be late the reference was looked up later,
-        so what the state has of that counts beyond it.
+        The reference was looked up as the sensors are known to follow it, so what the
+        state has of that counts beyond it.
         """
         rows, since = self.motion, self.dictionary.since
-        out = rows.y - state.output(views[0].x, since)
+        acc, gyr = views[0].x, views[-1].x
+        out = rows.y - state.output(acc, since)
         if len(views) > 1:
-            x = views[1].x
-            predicted = state.output(x, since)[:, GYR] + rows.late * x.w_dot
-            out[:, GYR] = rows.y[:, GYR] - predicted
+            out[:, GYR] = rows.y[:, GYR] - state.output(gyr, since)[:, GYR]
+        change = self.dictionary.place.change
+        for triad, x, known in ((ACC, acc, rows.acc), (GYR, gyr, rows.gyr)):
+            out[:, triad] -= (
+                known.late * change[:, triad] + known.tau * x.slope[:, triad]
+            )
         return out
 
     @staticmethod

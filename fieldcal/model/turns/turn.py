@@ -240,9 +240,10 @@ def only(x: Experience, rows: Sequence[int]) -> Experience:
     """Some rows."""
     per_row = {
         name: getattr(x, name)[list(rows)]
-        for name in ("alpha", "beta", "f", "w", "w_dot", "t", "lasts", "since_start",
-                     "since_turn", "warming", "heating", "variance", "position", "rate",
-                     "speed", "speed_sigma", "gamma", "attitude_sigma")
+        for name in ("alpha", "beta", "f", "w", "w_dot", "slope", "t", "lasts",
+                     "since_start", "since_turn", "warming", "heating", "variance",
+                     "position", "rate", "speed", "speed_sigma", "gamma",
+                     "attitude_sigma")
     }  # fmt: skip
     return replace(x, **per_row)
 

@@ -10,10 +10,10 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.motion import (
     Alignment,
     MotionRows,
-    Reference,
     frequencies,
     rows_in_motion,
 )
+from fieldcal.model.rows.reference import Reference, Response
 
 LENGTH, COUNT = 6, 4
 STILL = Alignment(0.0, 0.0, 0.0)
@@ -81,12 +81,16 @@ def test_the_motion_is_that_of_the_reference_where_the_recording_stands() -> Non
     there = rows(Alignment(0.3, 1e-3, 12.0, turn))
     s = there.t - 0.3 + 1e-3 * (there.t - 12.0)
     every = course(s.ravel()).reshape(*s.shape, 6).mean(axis=1)
-    found = there.motion()
+    found = there.motion(there.acc)
     np.testing.assert_allclose(found[:, :3], every[:, :3] @ turn.T, atol=1e-6)
     np.testing.assert_allclose(found[:, 3:], every[:, 3:] @ turn.T, atol=1e-6)
     step = 1e-4
-    change = (there.motion(0, -step) - there.motion(0, step)) / (2 * step)
-    np.testing.assert_allclose(there.motion(1), change / (1 + 1e-3), atol=2e-3)
+    early, late = (
+        there.motion(Response.of(there.reference, by)) for by in (-step, step)
+    )
+    change = (early - late) / (2 * step)
+    slope = there.motion(there.acc, 1)
+    np.testing.assert_allclose(slope, change / (1 + 1e-3), atol=2e-3)
 
 
 def test_rows_end_at_gaps_of_recording_and_reference() -> None:

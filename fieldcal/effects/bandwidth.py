@@ -1,0 +1,54 @@
+"""The sensors follow with a time constant: a low-pass of first order.
+
+    U + tau_a dU/dt = f,    W + tau_g dW/dt = w
+
+U, W outputs, f specific force and w angular rate, device axes; tau in s, of the
+accelerometers and of the gyroscopes, and the bandwidth is 1 / (2 pi tau), Hz. By
+tau the output is late as well, and only what goes as tau^2 tells it from a delay: the
+quicker the motion, the better. If negative, the simulator has the low-pass. Seen only
+where a reference follows the motion. Source: digital low-pass of the MPU-6000, register
+map RM-MPU-6000A, CONFIG: 5 to 260 Hz.
+
+>>> import numpy as np
+>>> x = Experience.at_rest(np.zeros(1), np.zeros(1), 9.8, slope=np.full((1, 6), 3.0))
+>>> Bandwidth().design(x)[0, [0, 5]] + 0.0
+array([[-3.,  0.],
+       [ 0., -3.]])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.core.samples import ACC, GYR, Array
+from fieldcal.physics.effect import NO_SHAPE, Param, Sensor, Values
+from fieldcal.physics.experience import Experience
+
+
+class Bandwidth(Sensor):
+    """Time constants of the accelerometers and of the gyroscopes."""
+
+    params = (Param("acc", "s", 0.03), Param("gyr", "s", 0.03))
+    covariate = "how fast specific force and rate change"
+    decided_by = "a quicker motion"
+    cure = (
+        "Give the simulator's sensors a low-pass of these time constants, or the"
+        " device a filter with more bandwidth."
+    )
+    source = "register map RM-MPU-6000A: 5 to 260 Hz, 32 to 0.6 ms"
+
+    def applies(self, x: Experience) -> bool:
+        """Where it is known how specific force and rate change."""
+        return bool(x.slope.any())
+
+    def time_constants(self, values: Values) -> tuple[float, float]:
+        """It is just those."""
+        return float(values[0]), float(values[1])
+
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """Minus the slope, each triad by its own."""
+        out = np.zeros((len(x), 6, 2))
+        out[:, ACC, 0], out[:, GYR, 1] = -x.slope[:, ACC], -x.slope[:, GYR]
+        return out

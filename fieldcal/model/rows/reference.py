@@ -1,0 +1,157 @@
+"""A reference of a device's motion between its samples, and what a triad makes of it.
+
+A sensor that is late by d and follows with a time constant tau puts out, of u,
+
+    y(t) = int_0^inf u(t - d - tau a) exp(-a) da,                tau >= 0         (1)
+    y(t) = u(t - d) - tau u'(t - d),                             tau < 0          (2)
+
+a low-pass of first order, and what one in the reference has taken away. The integral is
+Gauss and Laguerre's sum, exact for polynomials of degree 2 NODES - 1. With the
+operator D = d/dt, (1) has the derivative
+
+    dy / dtau = -D (1 + |tau| D)^-1 y                                             (3)
+
+which for tau = 0 is that of a delay. Where |tau| is less than `LEAST`, that stands for
+it in (3): t of the two is the difference from the one to the other. What tells a time
+constant from a delay goes as its square, so a step by (3) to tau' makes
+
+    tau |tau| + (|tau| + t) (tau' - tau)                                          (4)
+
+of it. s, m/s^2, rad/s, axes of the reference. Source: first-order lag; Abramowitz and
+Stegun 25.4.45.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from fieldcal.core.samples import Array, Block, Index
+
+GAP = 3.5
+"""Intervals between samples from which there is a gap."""
+
+FEWEST = 8
+"""Samples of a channel from which a reference has it."""
+
+NODES = 5
+"""Of the sum in place of (1)."""
+
+LEAST = 2e-3
+"""Time constant that hardly a motion of a body tells from a delay, s."""
+
+
+class Reference:
+    """What a reference says between its samples, by cubic splines.
+
+    Parameters
+    ----------
+    block : its samples; a channel that it has not is taken as 0
+
+    Attributes
+    ----------
+    observed : (6,) channels that it has
+    start, end : s of its clock
+    splines : of the channels that it has, with their numbers
+
+    """
+
+    def __init__(self, block: Block) -> None:
+        six = block.six
+        self.observed = np.isfinite(six).sum(axis=0) >= FEWEST
+        whole = np.isfinite(six[:, self.observed]).any(axis=1)
+        self.t, self.step = block.t[whole], float(np.median(np.diff(block.t[whole])))
+        self.start, self.end = float(self.t[0]), float(self.t[-1])
+        self.splines = [
+            (c, CubicSpline(block.t[known], six[known, c]))
+            for c in np.flatnonzero(self.observed)
+            for known in [np.isfinite(six[:, c])]
+        ]
+
+    @property
+    def lost(self) -> Index:
+        """Channels that it lacks of triads of which it has some."""
+        some = np.repeat(self.observed.reshape(2, 3).any(axis=1), 3)
+        return np.flatnonzero(some & ~self.observed)
+
+    def at(self, s: Array, order: int = 0) -> Array:
+        """The six channels, or a derivative, at instants of its clock, (n, 6)."""
+        out = np.zeros((len(s), 6))
+        for c, spline in self.splines:
+            out[:, c] = spline(s, order)
+        return out
+
+    def followed(self, tau: float) -> Self:
+        """What a sensor with a time constant makes of it, s, (1) and (2)."""
+        if tau == 0:
+            return self
+        out = copy(self)
+        out.splines = [
+            (c, CubicSpline(spline.x, _lagging(spline, tau)))
+            for c, spline in self.splines
+        ]
+        return out
+
+    def covers(self, s: Array, margin: float) -> NDArray[np.bool_]:
+        """Instants about which it has samples, and so far beyond, s."""
+        inside = (s > self.start + margin) & (s < self.end - margin)
+        after = np.clip(np.searchsorted(self.t, s), 1, len(self.t) - 1)
+        return inside & (self.t[after] - self.t[after - 1] < GAP * self.step)
+
+
+def _lagging(spline: CubicSpline, tau: float) -> Array:
+    """Values at the knots of a spline as a sensor follows it."""
+    t = spline.x
+    if tau < 0:
+        early: Array = spline(t) - tau * spline(t, 1)  # (2)
+        return early
+    ages, weights = np.polynomial.laguerre.laggauss(NODES)
+    past = np.maximum(t[:, None] - tau * ages, t[0])
+    late: Array = spline(past) @ weights  # (1)
+    return late
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What the sensors of a triad make of the motion.
+
+    Attributes
+    ----------
+    late : s by which they are late
+    tau : time constant with which they follow, s
+    sensed : the motion so followed
+    slower : that once more, as the slope (3) is of
+
+    """
+
+    late: float
+    tau: float
+    sensed: Reference
+    slower: Reference
+
+    @classmethod
+    def of(cls, reference: Reference, late: float = 0.0, tau: float = 0.0) -> Self:
+        """Of sensors that follow a reference."""
+        sensed = reference.followed(tau)
+        return cls(late, tau, sensed, sensed.followed(max(abs(tau), LEAST)))  # (3)
+
+    def towards(self, reference: Reference, late: float, tau: float) -> Self:
+        """What a step of (3) from here to a delay and a time constant, s, comes to.
+
+        The time constant is the one of (4), or none; of what that is less, the sensors
+        are the later.
+        """
+        now, there = self.tau, 0.0
+        if tau:
+            square = now * abs(now)
+            square += (abs(now) + max(abs(now), LEAST)) * (tau - now)  # (4)
+            there = float(np.sign(square) * np.sqrt(abs(square)))
+        late += tau - there
+        if there == now:
+            return replace(self, late=late)
+        return self.of(reference, late, there)

@@ -1,0 +1,58 @@
+"""What a triad makes of a motion, against recursions and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.reference import LEAST, Reference, Response
+
+W = np.array([0.7, 1.9, 4.1, 6.3, 9.0, 11.0])
+T: Array = np.arange(0.0, 12.0, 0.01)
+INSIDE = np.arange(3.0, 9.0, 0.0173)
+
+
+def waves(t: Array, late: Array | float = 0.0, gain: Array | float = 1.0) -> Array:
+    out: Array = gain * np.sin(W * (t[:, None] - late) + np.arange(6))
+    return out
+
+
+REFERENCE = Reference(Block.of(T, waves(T)[:, :3], waves(T)[:, 3:]))
+
+
+@pytest.mark.parametrize("tau", [1e-3, 0.02, 0.05])
+def test_a_wave_comes_out_smaller_and_later_after_a_low_pass(tau: float) -> None:
+    expected = waves(INSIDE, np.arctan(W * tau) / W, np.hypot(1, W * tau) ** -1)
+    found = REFERENCE.followed(tau).at(INSIDE)
+    np.testing.assert_allclose(found, expected, atol=6e-5)
+
+
+def test_what_a_low_pass_took_is_given_back() -> None:
+    back = REFERENCE.followed(0.03).followed(-0.03)
+    np.testing.assert_allclose(back.at(INSIDE), waves(INSIDE), atol=3e-4)
+    assert REFERENCE.followed(0.0) is REFERENCE
+    np.testing.assert_allclose(REFERENCE.at(INSIDE), waves(INSIDE), atol=1e-5)
+
+
+@pytest.mark.parametrize("tau", [-0.04, -0.005, 0.004, 0.03])
+def test_the_slope_is_what_an_output_loses_with_its_time_constant(tau: float) -> None:
+    step = 1e-4
+    up, down = (REFERENCE.followed(tau + s).at(INSIDE) for s in (step, -step))
+    found = Response.of(REFERENCE, 0.0, tau).slower.at(INSIDE, 1)
+    np.testing.assert_allclose(found, (down - up) / (2 * step), atol=0.05)
+    assert np.abs(found).max() > 5
+
+
+def test_without_a_time_constant_the_slope_is_that_to_the_least() -> None:
+    found = Response.of(REFERENCE).slower.at(INSIDE, 1)
+    expected = (waves(INSIDE) - REFERENCE.followed(LEAST).at(INSIDE)) / LEAST
+    np.testing.assert_allclose(found, expected, atol=0.02)
+
+
+def test_before_its_first_sample_a_reference_is_as_at_it() -> None:
+    even = np.arange(0.0, 4.0, 0.01)
+    rising = np.repeat(even[:, None], 6, axis=1)
+    found = Reference(Block.of(even, rising[:, :3], rising[:, 3:])).followed(0.2)
+    expected = even - 0.2 * (1 - np.exp(-even / 0.2))  # of a ramp that begins at 0
+    np.testing.assert_allclose(found.at(even)[:, 0], expected, atol=0.02)

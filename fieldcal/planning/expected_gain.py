@@ -212,7 +212,7 @@ class ExpectedGain:
     def _common(self) -> tuple[Index, Array]:
         """Columns with sizes that every explanation has, angles among them."""
         d = self.dictionary
-        at = [(d.small_rotation + 2 * d.held[:, None] + [0, 1]).ravel()]
+        at = [d.rotations_of(d.held)]
         wide = [np.full(len(at[0]), max(self.angles, 1e-9))]
         for cause in d.causes:
             if cause.name in COMMON:

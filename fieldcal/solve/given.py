@@ -213,7 +213,7 @@ class Given(Dictionary):
         if not oriented:
             return
         size = sigma / np.sqrt(2.0)
-        own = (self.small_rotation + 2 * np.array(oriented)[:, None] + [0, 1]).ravel()
+        own = self.rotations_of(oriented)
         wide = np.full(len(own), size)
         yield _given(Group("angle_setting", "own", own, wide, fixed=1.0, in_state=True))
         shared = repeated(self.x, oriented)

@@ -89,12 +89,13 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
         key = frozenset(group for _, group in kept)
         total[key] = total.get(key, 0.0) + one.probability
     likely = {k: p for k, p in total.items() if p >= LEAST * sum(total.values())}
-    wanted = {g: own[g] for key in likely for g in key}
+    # in the order in which they came: that of a set is another one in every run
+    wanted = {g: c for g, c in own.items() if any(g in key for key in likely)}
     here = {g: m for g, m in _moved(d, wanted)}
     also = list(_elsewhere(d, [c for c, _ in here.values()]))
     out: dict[frozenset[Group], Shown] = {}
     for key, p in likely.items():
-        members = tuple(here[g] for g in key if g in here)
+        members = tuple(m for g, m in here.items() if g in key)
         same = frozenset(g for _, g in members)
         before = out[same].probability if same in out else 0.0
         maybe = tuple(m for m in also if m[0].name in {c.name for c, _ in members})

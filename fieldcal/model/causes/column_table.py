@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes import columns, smooth
@@ -92,6 +92,17 @@ class ColumnTable:
         """Columns of what each window of a channel is off by, (p,)."""
         count = len(self.held)
         at: Index = self.windows + channel * count + np.arange(count)
+        return at
+
+    @property
+    def rotations(self) -> slice:
+        """Columns of the small rotations of all positions."""
+        return slice(self.small_rotation, self.small_rotation + 2 * self.places)
+
+    def rotations_of(self, positions: ArrayLike) -> Index:
+        """Columns of the small rotations of some positions, two of each, (2 m,)."""
+        first = 2 * np.atleast_1d(positions)[:, None]
+        at: Index = (self.small_rotation + first + [0, 1]).ravel()
         return at
 
     def _inside(self, x: Experience) -> Array:

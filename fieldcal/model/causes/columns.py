@@ -254,37 +254,36 @@ def attitude(view: RowView) -> Array:
 
 def attitude_sides(plain: Experience, state: State) -> Iterator[Pair]:
     """The same of one position after the other, where turns meet them."""
-    here, known = state.experienced(plain), state.attitude
     places = len(state.small_rotation)
-    if not known.any():
-        known = np.zeros((places, 3))
-    for p in range(places):
-        for i in range(3):
-            if p not in plain.position:
-                yield here, here, SMALL
-                continue
-            ends = []
-            for sign in (1.0, -1.0):
-                there = known.copy()
-                there[p, i] += sign * SMALL
-                ends.append(replace(state, attitude=there).experienced(plain))
-            yield ends[0], ends[1], SMALL
+    known = state.attitude if state.attitude.any() else np.zeros((places, 3))
+
+    def changed(off: Array) -> State:
+        return replace(state, attitude=known + off)
+
+    yield from _one_by_one(plain, state, np.zeros((places, 3)), changed)
 
 
 def small_rotation_sides(plain: Experience, state: State) -> Iterator[Pair]:
     """Two small turns of each position, rad, those of a position together."""
+
+    def changed(off: Array) -> State:
+        return replace(state, small_rotation=state.small_rotation + off)
+
+    yield from _one_by_one(plain, state, np.zeros_like(state.small_rotation), changed)
+
+
+def _one_by_one(
+    plain: Experience, state: State, none: Array, changed: Callable[[Array], State]
+) -> Iterator[Pair]:
+    """One angle of one position after the other, `none` (p, k) being all of them."""
     here = state.experienced(plain)
-    for p in range(len(state.small_rotation)):
-        for joint in range(2):
-            if p not in plain.position:
-                yield here, here, SMALL
-                continue
-            ends = []
-            for sign in (1.0, -1.0):
-                small = state.small_rotation.copy()
-                small[p, joint] += sign * SMALL
-                ends.append(replace(state, small_rotation=small).experienced(plain))
-            yield ends[0], ends[1], SMALL
+    for p, i in np.ndindex(none.shape):
+        if p not in plain.position:
+            yield here, here, SMALL
+            continue
+        off = none.copy()
+        off[p, i] = SMALL
+        yield changed(off).experienced(plain), changed(-off).experienced(plain), SMALL
 
 
 def small_rotation(view: RowView) -> Array:

@@ -26,7 +26,7 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
     if len(oriented) == len(table.held) > 3:
         size = np.full(2, np.deg2rad(priors.MISSET_DEG))
         groups = tuple(
-            Group("misset", "", table.small_rotation + 2 * p + np.arange(2), size,
+            Group("misset", "", table.rotations_of(p), size,
                   position=int(p), in_state=True)
             for p in oriented
         )  # fmt: skip
@@ -38,7 +38,7 @@ def _of_scatter(table: ColumnTable, effect: Scatter) -> Iterator[Cause]:
     if not {p.name for p in effect.params} <= set(CHANNELS):  # of the positions' angles
         if len(table.held) < 3 or not table.x.oriented.all():
             return
-        at = (table.small_rotation + 2 * table.held[:, None] + [0, 1]).ravel()
+        at = table.rotations_of(table.held)
         size = np.full(len(at), np.deg2rad(effect.params[0].typical))
         group = Group(effect.id, "", at, size, effect, in_state=True)
         yield Cause(effect.id, "", effect.chance(table.x), (group,), "random")

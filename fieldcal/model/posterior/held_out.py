@@ -71,10 +71,8 @@ class HeldOut:
             )
             step = self.fitted.values - whole(chosen.state, d) + _wander(chosen, d)
             places = d.held[np.isin(d.held, d.x.position[left])]
-            for p in places if len(d.held) >= FEW else ():
-                step[
-                    d.small_rotation + 2 * int(p) : d.small_rotation + 2 * int(p) + 2
-                ] = 0.0
+            if len(d.held) >= FEW:
+                step[d.rotations_of(places)] = 0.0
             rows = [_rows(p, left[p.rows]) for p in self.linear]
             _predict(out, rows, step, chosen, d)
         return out
@@ -84,17 +82,10 @@ class HeldOut:
 
         With its sizes as the others show them, and but for a constant of the rows.
         """
-        d, total = self.dictionary, 0.0
-        every = gram(self.linear, d, self.fitted.values, (), self.columns)
-        for i in np.unique(self.fold):
-            if not self.fold.max() or (search := self._without(int(i))) is None:
-                return float("nan")
-            rest = search.evaluated(one.members, one.sizes)
-            tau = priors.SIZES[list(rest.sizes.instability)] * search.unstable
-            there = rest.state
-            whole = Eliminated.of(every.weighed(tau), there.columns, there.sizes)
-            total += whole.score - there.score
-        return total
+        parts = list(self._parts(one))
+        return (
+            sum(whole.score - rest.score for whole, rest in parts) if parts else np.nan
+        )
 
     def squares(self, one: Set) -> tuple[float, int]:
         """Whitened squares of each part as the others predict it, and their number.
@@ -105,17 +96,26 @@ class HeldOut:
 
         with u the estimate and b = Phi^T R^-1 (y - h); (nan, 0) where none can be.
         """
-        d, total = self.dictionary, 0.0
-        every = gram(self.linear, d, self.fitted.values, (), self.columns)
-        for i in np.unique(self.fold):
-            if not self.fold.max() or (search := self._without(int(i))) is None:
-                return float("nan"), 0
-            rest = search.evaluated(one.members, one.sizes)
-            tau = priors.SIZES[list(rest.sizes.instability)] * search.unstable
-            there = rest.state
-            whole = Eliminated.of(every.weighed(tau), there.columns, there.sizes)
-            total += _left(whole) - _left(there)
+        parts = list(self._parts(one))
+        if not parts:
+            return float("nan"), 0
+        total = sum(_left(whole) - _left(rest) for whole, rest in parts)
         return total, sum(len(part.white) for part in self.linear)
+
+    def _parts(self, one: Set) -> Iterator[tuple[Eliminated, Eliminated]]:
+        """A set in all rows and without each part, with its sizes as these show them.
+
+        Nothing where a part has no others.
+        """
+        every = gram(self.linear, self.dictionary, self.fitted.values, (), self.columns)
+        searches = [self._without(int(i)) for i in np.unique(self.fold)]
+        if not self.fold.max() or None in searches:
+            return
+        for search in filter(None, searches):
+            found = search.evaluated(one.members, one.sizes)
+            tau = priors.SIZES[list(found.sizes.instability)] * search.unstable
+            rest = found.state
+            yield Eliminated.of(every.weighed(tau), rest.columns, rest.sizes), rest
 
     def _without(self, i: int) -> Search | None:
         """What the rows say without a part; None where a channel has no others."""
@@ -188,7 +188,7 @@ def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
     out = np.zeros(d.width, dtype=bool)
     for one in sets:
         out[one.state.columns] = True
-    out[d.small_rotation : d.small_rotation + 2 * d.places] = True
+    out[d.rotations] = True
     return out
 
 
@@ -248,14 +248,10 @@ def _own(chosen: Set, d: Dictionary) -> Array:
     """Sizes of the turns of each position, by column."""
     out = np.zeros(d.width)
     np.add.at(out, chosen.state.columns, chosen.state.sizes**2)
-    for p, free in zip(d.held, d.free, strict=True):
-        if free:
-            out[d.small_rotation + 2 * int(p) : d.small_rotation + 2 * int(p) + 2] += (
-                1.0
-            )
-    only = np.zeros(d.width, dtype=bool)
-    only[d.small_rotation : d.small_rotation + 2 * d.places] = True
-    return np.sqrt(np.where(only, out, 0.0))
+    out[d.rotations_of(d.held[d.free])] += 1.0
+    only = np.zeros(d.width)
+    only[d.rotations] = np.sqrt(out[d.rotations])
+    return only
 
 
 def _angles(
@@ -263,4 +259,4 @@ def _angles(
 ) -> Iterator[tuple[int, NDArray[np.intp]]]:
     """Windows left out by their number, with the columns of their turns."""
     for j in np.unique(np.concatenate([p.window for p in left])).tolist():
-        yield j, d.small_rotation + 2 * int(d.held[j]) + np.arange(2)
+        yield j, d.rotations_of(d.held[j])

@@ -59,7 +59,7 @@ class GaussNewton:
         for group in [*d.always, *(g for _, g in members)]:
             wanted[group.columns] = True
         if d.free.any():
-            wanted[d.small_rotation : d.small_rotation + 2 * d.places] = True
+            wanted[d.rotations] = True
         return wanted
 
     def gram(self, state: State, values: Array, known: Set | None) -> Gram:
@@ -127,12 +127,9 @@ class GaussNewton:
         kept = np.zeros(d.width, dtype=bool)
         kept[self._nonlinear(found.members)] = True
         if d.free.any():
-            kept[d.small_rotation : d.small_rotation + 2 * d.places] = True
+            kept[d.rotations] = True
         values = np.where(kept, whole(found.state, d), 0.0)
         nominal = self.nominal
-        small_rotation = values[
-            d.small_rotation : d.small_rotation + 2 * d.places
-        ].reshape(-1, 2)
         terms = [Term(t.effect, t.values, t.shape, t.origin) for t in nominal.terms]
         for _, group in found.members:
             if group.effect is None or not isinstance(group.effect, Motion | Sensor):
@@ -143,7 +140,7 @@ class GaussNewton:
         state = State(
             nominal.bias + values[d.bias : d.bias + 6],
             nominal.scale + values[d.scale : d.scale + 6],
-            small_rotation,
+            values[d.rotations].reshape(-1, 2),
             values[d.earth : d.earth + 3] if d.earth >= 0 else np.zeros(3),
             tuple(terms),
             *self._attitude(values),

@@ -105,6 +105,5 @@ def whole(state: Eliminated, dictionary: Dictionary) -> Array:
         for j, p in enumerate(dictionary.held):
             if dictionary.free[j]:
                 pull = state.rows.gram.loose[j].T @ state.rows.root[j].T @ left[j]
-                first = dictionary.small_rotation + 2 * int(p)
-                out[first : first + 2] += priors.SMALL_ROTATION * pull
+                out[dictionary.rotations_of(p)] += priors.SMALL_ROTATION * pull
     return out

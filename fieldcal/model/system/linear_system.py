@@ -147,7 +147,7 @@ def gram(
     if dictionary.known is not None:
         total.append(_add_known(out, dictionary.known))
     for j in np.flatnonzero(dictionary.free):
-        at = index[dictionary.small_rotation + 2 * int(held[j]) + np.arange(2)]
+        at = index[dictionary.rotations_of(held[j])]
         out.loose[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
     return replace(out, square=sum(t[0] for t in total), count=sum(t[1] for t in total))
 

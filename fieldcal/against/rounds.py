@@ -17,15 +17,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fieldcal.against import patches
-from fieldcal.against.comparison import matched
-from fieldcal.against.opening import opened
 from fieldcal.against.result import Match
 from fieldcal.against.sensor_model import SensorModel, patched
-from fieldcal.against.side import Side, side
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Block
 from fieldcal.core.shown import shown
-from fieldcal.session.description import Description
+
+Compare = Callable[[Path], tuple[Match, list[str]]]
+"""What a file of a simulator differs in, and what the user must know of it."""
 
 PATCH, OUT = "{patch}", "{out}"
 
@@ -57,8 +55,8 @@ def is_command(text: str) -> bool:
 
 def rounds(
     command: str,
-    real: Side,
-    about: Description,
+    compare: Compare,
+    rate_hz: float,
     form: str,
     most: int,
     tell: Callable[[int, SimulatorRun], None],
@@ -70,7 +68,8 @@ def rounds(
     Parameters
     ----------
     command : with {out} in it, and {patch}
-    real, about : what it is to be like
+    compare : holds the recording against a file that the simulator wrote
+    rate_hz : samples a second of the recording
     form : of the patch, in `patches.formats`
     most : patches
     tell : is called after each run with its number, from 0
@@ -88,10 +87,9 @@ def rounds(
             f"{command}: has no {PATCH}, in the place of which the patch's file stands"
         )
     done: list[SimulatorRun] = []
-    model = SensorModel(rate_hz=real.rate_hz)
+    model = SensorModel(rate_hz=rate_hz)
     for number in range(most + 1):
-        block, placed, said = _run(command, real, about, form, model)
-        found = matched(real, side(command, block, placed, real))
+        found, said = _run(command, compare, form, model)
         after = patched(found, model)
         left = {one.id for one in found.differences}
         last = not left & set(patches.patch_format(form).HOLDS)
@@ -104,9 +102,9 @@ def rounds(
 
 
 def _run(
-    command: str, real: Side, about: Description, form: str, model: SensorModel
-) -> tuple[Block, Description, list[str]]:
-    """What the simulator makes with a patch."""
+    command: str, compare: Compare, form: str, model: SensorModel
+) -> tuple[Match, list[str]]:
+    """How what the simulator makes with a patch compares, and what is said of it."""
     with TemporaryDirectory() as folder:
         ending = patches.patch_format(form).ENDING
         patch, out = Path(folder) / f"patch{ending}", Path(folder) / "out"
@@ -118,7 +116,7 @@ def _run(
                 f"{command}: ended well and wrote nothing to {OUT}: let it write its"
                 " recording to the file that stands there"
             )
-        return opened(out, (real.block, about))
+        return compare(out)
 
 
 def _words(command: str) -> list[str]:

@@ -6,16 +6,14 @@ import argparse
 import json
 import sys
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.core.errors import InputError
-
 if TYPE_CHECKING:
     from fieldcal.against import Match
-    from fieldcal.against.rounds import SimulatorRun
+    from fieldcal.against.rounds import Compare, SimulatorRun
     from fieldcal.against.sensor_model import SensorModel
-    from fieldcal.against.side import Side
     from fieldcal.session.folder import Session
 
     Compared = tuple[Match, SensorModel | None, list[str]]
@@ -58,65 +56,59 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _compared(args: argparse.Namespace, session: Session) -> Compared:
-    """Compare by positions, or by the motion where there are too few to tell."""
+    """Compare with a file, or with what a command writes from round to round."""
+    import numpy as np
+
+    from fieldcal.against.rounds import is_command, rounds
+    from fieldcal.against.sensor_model import patched
+
+    compare = _comparing(args, session)
+    if not is_command(args.against):
+        found, said = compare(Path(args.against))
+        return found, patched(found) if args.patch else None, said
+    step = float(np.median(np.diff(session.block.t)))
+    form = args.patch or PLAIN
+    done = rounds(args.against, compare, 1 / step, form, args.rounds, _tell)
+    last = done[-1]
+    return last.match, last.patch, list(last.says)
+
+
+def _comparing(args: argparse.Namespace, session: Session) -> Compare:
+    """By positions, or by the motion where there are too few to tell."""
+    from fieldcal.against import matched
     from fieldcal.against.motion.held import holds_positions
-    from fieldcal.against.rounds import is_command
+    from fieldcal.against.opening import opened
     from fieldcal.against.side import side
 
     if args.motion or not holds_positions(session.block, session.about):
-        return _in_motion(args, session)
+        return partial(_in_motion, args, session)
     real = side(str(args.session), session.block, session.about)
-    compared = _rounds if is_command(args.against) else _once
-    return compared(args, session, real)
+
+    def by_positions(path: Path) -> tuple[Match, list[str]]:
+        block, about, said = opened(path, (session.block, session.about))
+        return matched(real, side(args.against, block, about, real)), list(said)
+
+    return by_positions
 
 
-def _in_motion(args: argparse.Namespace, session: Session) -> Compared:
-    """Compare with what follows the motion; the patch that was asked for."""
+def _in_motion(
+    args: argparse.Namespace, session: Session, path: Path
+) -> tuple[Match, list[str]]:
+    """Compare with what follows the motion."""
     from fieldcal.against.motion import compared_in_motion
     from fieldcal.against.opening import read_output
-    from fieldcal.against.rounds import is_command
-    from fieldcal.against.sensor_model import patched
 
-    if is_command(args.against):
-        raise InputError(
-            f"--against {args.against}: a command is run again for recordings of"
-            " positions; run it yourself, and name the file that it writes"
-        )
-    read = read_output(Path(args.against))
+    read = read_output(path)
     found = compared_in_motion(
         (session.block, session.about), read.block, (str(args.session), args.against)
     )
     said = list(read.says)
-    if not args.patch:
-        return found, None, said
-    if any(d.id == "misalignment" for d in found.differences):
+    if args.patch and any(d.id == "misalignment" for d in found.differences):
         said.append(
             f"{args.patch} has nothing for misalignment: the patch is in the axes of"
             " the recording, so turn those of the simulator first"
         )
-    return found, patched(found), said
-
-
-def _once(args: argparse.Namespace, session: Session, real: Side) -> Compared:
-    """Compare with a file or a session; the patch that was asked for."""
-    from fieldcal.against import matched
-    from fieldcal.against.opening import opened
-    from fieldcal.against.sensor_model import patched
-    from fieldcal.against.side import side
-
-    block, about, said = opened(Path(args.against), (session.block, session.about))
-    found = matched(real, side(args.against, block, about, real))
-    return found, patched(found) if args.patch else None, said
-
-
-def _rounds(args: argparse.Namespace, session: Session, real: Side) -> Compared:
-    """Run a command, patch it, and run it again; the last patch that was tried."""
-    from fieldcal.against.rounds import rounds
-
-    form = args.patch or PLAIN
-    done = rounds(args.against, real, session.about, form, args.rounds, _tell)
-    last = done[-1]
-    return last.match, last.patch, list(last.says)
+    return found, said
 
 
 def _tell(number: int, one: SimulatorRun) -> None:

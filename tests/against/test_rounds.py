@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -14,15 +12,14 @@ from session_folders import write_session
 from strapdown import GRAVITY, schedule
 
 from fieldcal.against import rounds as module
+from fieldcal.against.opening import read_output
 from fieldcal.against.result import Difference, Facts, Match, Pair, SimulatorPrediction
 from fieldcal.against.rounds import rounds
 from fieldcal.against.sensor_model import SensorModel, patched
-from fieldcal.against.side import Side
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.result import Quantity
-from fieldcal.session.folder import Session
 
 TESTS = Path(__file__).parent.parent
 DEVICE = {
@@ -55,11 +52,10 @@ def test_sitl_is_patched_until_it_agrees(
     assert not [p for p in folder.iterdir() if p.name.startswith(".patch")]
 
 
-@pytest.fixture
-def real(folder: Path) -> Side:
-    """What a command needs of the recording before it is compared."""
-    block = Session.open(folder).block
-    return cast(Side, SimpleNamespace(rate_hz=50.0, block=block))
+def unread(path: Path) -> tuple[Match, list[str]]:
+    """What a simulator wrote that should not have come to be compared."""
+    read_output(path)
+    raise AssertionError(path)
 
 
 @pytest.mark.parametrize(
@@ -70,13 +66,10 @@ def real(folder: Path) -> Side:
         ("import sys; open(sys.argv[2], 'w').write('a,b\\n')", "out"),
     ],
 )
-def test_what_a_simulator_that_fails_says_is_told(
-    folder: Path, real: Side, code: str, told: str
-) -> None:
-    about = Session.open(folder).about
+def test_what_a_simulator_that_fails_says_is_told(code: str, told: str) -> None:
     command = f'{sys.executable} -c "{code}" {{patch}} {{out}}'
     with pytest.raises(InputError) as error:
-        rounds(command, real, about, "json", 1, lambda *_: None)
+        rounds(command, unread, 50.0, "json", 1, lambda *_: None)
     assert told in str(error.value)
 
 
@@ -88,12 +81,9 @@ def test_what_a_simulator_that_fails_says_is_told(
         ("simulate 'half {patch} {out}", "is no command"),
     ],
 )
-def test_a_command_that_is_none_is_refused(
-    folder: Path, real: Side, command: str, told: str
-) -> None:
-    about = Session.open(folder).about
+def test_a_command_that_is_none_is_refused(command: str, told: str) -> None:
     with pytest.raises(InputError, match=told):
-        rounds(command, real, about, "json", 1, lambda *_: None)
+        rounds(command, unread, 50.0, "json", 1, lambda *_: None)
 
 
 def pair(real: float, sim: float, unit: str) -> Pair:
@@ -112,16 +102,13 @@ def differing(*differences: Difference) -> Match:
 
 
 def test_what_a_format_has_nothing_for_ends_the_rounds(
-    folder: Path, real: Side, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     even = {"z": pair(3e-4, 0.0, "1/(m/s^2)")}
     given = differing(Difference("quadratic", "left_out", 1.0, even))
-    monkeypatch.setattr(module, "_run", lambda *_: (real.block, None, []))
-    monkeypatch.setattr(module, "side", lambda *_: real)
-    monkeypatch.setattr(module, "matched", lambda *_: given)
-    about = Session.open(folder).about
+    monkeypatch.setattr(module, "_run", lambda *_: (given, []))
     for form, runs in (("px4", 1), ("json", 4)):
-        done = rounds("simulate {patch} {out}", real, about, form, 3, lambda *_: None)
+        done = rounds("sim {patch} {out}", unread, 50.0, form, 3, lambda *_: None)
         assert len(done) == runs and done[-1].patch.changed == ("quadratic",)
 
 

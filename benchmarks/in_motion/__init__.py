@@ -1,6 +1,6 @@
 """Recordings in motion, held against a simulator that follows the motion.
 
-    python -m benchmarks in_motion [PAIRS] [--seed=N] [--lag=S]
+    python -m benchmarks in_motion [PAIRS] [--seed=N] [--lag=S] [--jitter=S]
 
 A motion program of its own draws bodies that are swung, and IMUs on them with clocks,
 axes, biases and scale factors of their own, noise of every colour, and in turn nothing
@@ -9,7 +9,8 @@ order on one triad or both: 40 recordings of a
 minute at 25 Hz, or as many as are asked for. Printed is how often that is named and
 something false is said, how numbers scatter in their own standard deviations, and how
 stretches that were left out are predicted. `--lag` puts a low-pass of that time
-constant on the gyroscopes of all others besides.
+constant on the gyroscopes of all others besides, and `--jitter` makes the stamps of
+samples be off by so much, one sigma, which the catalogue lacks.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ USUAL, SEED = 40, 5_000
 def main() -> None:
     """Print what became of the recordings."""
     count, seed = how_many(USUAL), int(option("seed", str(SEED)))
-    lag = float(option("lag", "0"))
+    lag, jitter = float(option("lag", "0")), float(option("jitter", "0"))
     off: list[float] = []
     ahead, named, false, seconds = [], 0, 0, 0.0
     for number in range(count):
         start = time.process_time()
-        one, found = compared(number, seed, lag)
+        one, found = compared(number, seed, lag, jitter)
         seconds += time.process_time() - start
         usual = {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
         usual |= {"bandwidth"} if lag and one.kind != "bandwidth" else set()

@@ -96,7 +96,8 @@ def recorded(
 
     `device` may have "start" (s of the motion), "clock" (delay s and rate), "turn" (R),
     "arm", "bias", "matrix_acc", "matrix_gyr", "g" (3, 3), "late" of the gyroscopes,
-    "lag" (time constants of both triads), "cubic" (3,), "noise" and "seed".
+    "lag" (time constants of both triads), "cubic" (3,), "noise", "jitter" (s by which
+    stamps are off, one sigma) and "seed".
     """
     rng = np.random.default_rng(device.get("seed", 0))
     n = int(seconds * hz)
@@ -117,4 +118,5 @@ def recorded(
     gyr = gyr + f @ np.asarray(device.get("g", np.zeros((3, 3)))).T
     out = np.hstack([acc, gyr]) + device.get("bias", np.zeros(6))
     out = out + coloured(rng, n, 1 / hz, device.get("noise", {}))
+    stamped = stamped + device.get("jitter", 0.0) * rng.standard_normal(n)
     return np.column_stack([stamped, out])

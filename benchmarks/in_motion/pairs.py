@@ -38,8 +38,12 @@ class Drawn:
     truth: dict[tuple[str, str], float]
 
 
-def drawn(number: int, seed: int, lag: float = 0.0) -> Drawn:
-    """Draw the device with a number; `lag` is a time constant of the gyroscopes, s."""
+def drawn(number: int, seed: int, lag: float = 0.0, jitter: float = 0.0) -> Drawn:
+    """Draw the device with a number.
+
+    `lag` is a time constant of the gyroscopes, s, and `jitter` by how much its samples'
+    stamps are off, s, one sigma.
+    """
     rng = np.random.default_rng(seed + number)
     kind = KINDS[number % len(KINDS)]
     bias = rng.normal(0, 1, 6) * np.repeat([0.1, 2e-3], 3)
@@ -59,6 +63,7 @@ def drawn(number: int, seed: int, lag: float = 0.0) -> Drawn:
         "matrix_gyr": np.diag(1 + scale[3:]),
         "start": 10.0,
         "lag": (0.0, lag),
+        "jitter": jitter,
     }
     truth = {
         (f"{part}_{name}", axis): float(values[3 * i + j] + offset)
@@ -101,9 +106,11 @@ def block_of(table: Array) -> Block:
     return Block.of(table[:, 0], table[:, 1:4], table[:, 4:7])
 
 
-def compared(number: int, seed: int, lag: float = 0.0) -> tuple[Drawn, Match]:
+def compared(
+    number: int, seed: int, lag: float = 0.0, jitter: float = 0.0
+) -> tuple[Drawn, Match]:
     """A drawn device held against the motion that it went through."""
-    one, drive = drawn(number, seed, lag), Drive(seed + number)
+    one, drive = drawn(number, seed, lag, jitter), Drive(seed + number)
     real = block_of(recorded(drive, one.device, SECONDS, HZ))
     sim = block_of(recorded(drive, {}, SECONDS + 20, HZ))
     return one, compared_in_motion((real, ABOUT), sim, ("recording", "simulator"))

@@ -193,3 +193,14 @@ def test_the_command_knows_all_formats() -> None:
     diagnose.add_arguments(parser)
     (patch,) = [a for a in parser._actions if a.dest == "patch"]
     assert tuple(patch.choices or ()) == patches.formats()
+
+
+def test_what_the_virtual_device_cannot_have_is_said_and_the_rest_written(
+    tmp_path: Path,
+) -> None:
+    model = SensorModel(effects={"bandwidth": {"acc": -3e-6, "gyr": 0.01}})
+    says = patches.write("toml", model, tmp_path / "patch.toml")
+    assert any("bandwidth acc = -3e-06 is left out" in one for one in says)
+    device = profile_file.read(tmp_path / "patch.toml")
+    (one,) = (e for e in device.effects if e.id == "bandwidth")
+    assert one["gyr"] == 0.01 and one["acc"] == 0.0

@@ -32,11 +32,25 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
     if model.noise:
         tables["noise"] = _noise(model)
     effects = {n: _known(n, v) for n, v in model.effects.items() if n in ids()}
+    says = [one for name, values in effects.items() for one in _beyond(name, values)]
     effects = {n: v for n, v in effects.items() if any(v.values())}
     if effects:
         tables["effects"] = effects
     from_tables(tables)  # what it refuses is not written
-    return tomlkit.dumps(tables), []
+    return tomlkit.dumps(tables), says
+
+
+def _beyond(name: str, values: dict[str, Any]) -> list[str]:
+    """Take out what the virtual device cannot have, and say so."""
+    takes, says = kind(name).NUMBERS, []
+    for part in [p for p in values if p in takes]:
+        if not takes[part].range.holds(float(values[part])):
+            value = float(values.pop(part))
+            says.append(
+                f"toml: {name} {part} = {value:.4g} is left out, as the virtual device"
+                f" has it {takes[part].range.says} only"
+            )
+    return says
 
 
 def _noise(model: SensorModel) -> dict[str, list[float]]:

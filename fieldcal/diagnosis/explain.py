@@ -103,7 +103,7 @@ class Explanation:
     @property
     def shows_earth(self) -> bool:
         """Whether the rows show the Earth's rate at all."""
-        return bool(self.earth > np.log(1000.0))
+        return self.earth > thresholds.SHOWS_EARTH
 
     @property
     def sees_earth(self) -> bool:

@@ -14,7 +14,7 @@ from fieldcal.core.samples import Block
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.findings import found_effects, mismatches
 from fieldcal.diagnosis.findings.agreement import UNITS, Agreement
-from fieldcal.diagnosis.findings.calibrated import ABSURD, calibrated, with_effects
+from fieldcal.diagnosis.findings.calibrated import calibrated, with_effects
 from fieldcal.diagnosis.findings.candidates import candidates
 from fieldcal.diagnosis.findings.curves import curves
 from fieldcal.diagnosis.findings.found_effects import Removed
@@ -241,7 +241,7 @@ def _warnings(explanation: Explanation) -> tuple[str, ...]:
     loose = [
         name
         for name, (_, sigma, size) in numbers.items()
-        if not sigma < ABSURD[group_of(name)] * size
+        if not sigma < thresholds.USEFUL[group_of(name)] * size
     ]
     if loose:
         out.append(f"not determined by these positions: {', '.join(loose)}")

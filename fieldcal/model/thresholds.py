@@ -39,6 +39,9 @@ STANDS_OUT = 3.5
 DECIDES = 5.0
 """Difference in white noise of a window's mean that decides."""
 
+SHOWS_EARTH = 6.9
+"""Rise of ln Z by the Earth's rate from which the rows show it: 1000 to 1."""
+
 SEES_EARTH = 20.0
 """Earth rate over the noise of one window from which tactical gyroscopes see it."""
 
@@ -69,12 +72,14 @@ TURNS_TELL = 5
 """Degrees of freedom of the turns from which their residual says something."""
 
 USEFUL = {
-    "acc_bias": 1.0, "cross_coupling": 0.1, "gyr_scale": 0.1,
-    "gyro_cross_coupling": 0.01, "angle_offset": 3.0, "base_tilt": 3.0,
+    "acc_bias": 1.0, "acc_scale": 0.1, "cross_coupling": 0.1,
+    "gyr_bias": 0.1, "gyr_scale": 0.1, "gyro_cross_coupling": 0.01,
+    "angle_offset": 3.0, "base_tilt": 3.0,
 }  # fmt: skip
-"""Standard uncertainty from which a parameter is worse than a guess: no bias is a tenth
-of gravity, an axis is put in by hand to some hundredths, and an eye sees a tilt of
-three degrees."""
+"""Standard uncertainty from which a parameter is worse than a guess, the same in a
+calibration and in a diagnosis: no bias is a tenth of gravity or 6 deg/s, no scale
+factor a tenth off, an axis is put in by hand to some hundredths, and an eye sees a tilt
+of three degrees."""
 
 USEFUL_TURNED = 0.01
 """The same of the scale factor of gyroscopes where turns give it: makers do better."""

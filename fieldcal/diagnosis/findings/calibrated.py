@@ -6,13 +6,11 @@ import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import CalibrationGroup, Quantity
+from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.reported import reported
 
 GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}
-
-ABSURD = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
-"""Sigma from which a parameter of a group counts as not determined."""
 
 
 def with_effects(explanation: Explanation) -> dict[str, CalibrationGroup]:
@@ -26,7 +24,7 @@ def with_effects(explanation: Explanation) -> dict[str, CalibrationGroup]:
         for i, axis in enumerate("xyz"):
             if f"{group}.{axis}" in found:
                 v, s, size = found[f"{group}.{axis}"]
-                if s < ABSURD[group] * size:
+                if s < thresholds.USEFUL[group] * size:
                     value[i], sigma[i] = v, s
         if np.isfinite(value).any():
             change = value - nominal[group]
@@ -80,7 +78,7 @@ def moved(explanation: Explanation, less: Set) -> dict[str, Quantity]:
     out = {}
     for name, (value, sigma, size) in now.items():
         group = name.partition(".")[0]
-        allowed = ABSURD[group] * size
+        allowed = thresholds.USEFUL[group] * size
         was, sigma_was, _ = before.get(name, (np.nan, np.inf, 1.0))
         if 0 < sigma < allowed and sigma_was < allowed:
             part, unit = gauge.of(group) or (1.0, GROUPS[group])

@@ -212,7 +212,7 @@ def _undecided(explanation: Explanation) -> str:
 def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
     """What else a person should know."""
     out = [_undecided(explanation)] if explanation.undecided else []
-    if explanation.earth > np.log(1000.0) and not explanation.sees_earth:
+    if explanation.shows_earth and not explanation.sees_earth:
         out.append("The gyroscopes show the Earth's rate, which is taken into account.")
     if left:
         out.append(f"The positions leave open: {', '.join(left)}.")

@@ -36,6 +36,10 @@ class Columns:
     small_rotation: int
     known: KnownRows | None = None
 
+    def rotations_of(self, position: int) -> Index:
+        """Columns of the small rotations of a position."""
+        return self.small_rotation + 2 * position + np.arange(2)
+
 
 @dataclass
 class Case:

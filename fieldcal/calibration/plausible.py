@@ -1,9 +1,10 @@
-"""Values that no sensor has in the declared axes and units.
+"""What no sensor shows in the declared axes and units.
 
 A scale factor far from nominal is another unit or full scale, a bias of half a g a
 device or a driver that takes its mean out, a scale factor of the other sign an axis
-that points the other way, a base out of level by tens of degrees another mounting:
-facts that are wrong, however well everything else agrees.
+that points the other way, a base out of level by tens of degrees another mounting,
+turns that lead elsewhere other axes: facts that are wrong, however well everything else
+agrees.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ TILTS, STEEP = ("angle_offset", "base_tilt"), 10.0
 """Groups in degrees that say how a base is tilted, and the tilt from which it is none:
 session.toml takes no larger one for a level either."""
 
+MENTIONED = 3
+"""Turns that are named one by one."""
+
 
 def senseless(
     names: Sequence[str], values: Array, sigma: Array, nominal: Nominal
@@ -43,6 +47,28 @@ def senseless(
         else:
             said += _bias(name, float(value), float(s), usual, nominal)
     return said
+
+
+def elsewhere(turns: Sequence[tuple[str, str]]) -> list[str]:
+    """A sentence about turns that lead elsewhere than from one position to the next.
+
+    Parameters
+    ----------
+    turns : names of the positions that each goes from and to
+
+    """
+    if not turns:
+        return []
+    named = [f"{before} to {behind}" for before, behind in turns[:MENTIONED]]
+    listed = " and ".join(filter(None, (", ".join(named[:-1]), named[-1])))
+    count, more = len(turns), len(turns) - len(named)
+    return [
+        f"in {count} turn{'s' if count > 1 else ''} the gyroscopes lead to another"
+        f" attitude than the accelerometers or the stated angles (from {listed}"
+        f"{f', and {more} more' if more else ''}): an axis, a sign, a unit or an"
+        " angle is another than session.toml says, or the gyroscopes were clipped;"
+        " mend it, or turn more slowly"
+    ]
 
 
 def _tilt(name: str, value: float, sigma: float) -> list[str]:

@@ -19,8 +19,9 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         help="what each column is, separated by commas: t, ax ay az, gx gy gz,"
-        " temperature, seq, t_host, or _ to skip one; t=NAME,ax=NAME where they have"
-        " names; with --join once for each FILE",
+        " temperature, seq, t_host, or _ to skip one; -gx where an axis points the"
+        " other way; t=NAME,ax=NAME where they have names; with --join once for each"
+        " FILE",
     )
     add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
     add("--separator", help="between columns (default: found)")
@@ -48,9 +49,10 @@ def said_of_columns(args: argparse.Namespace, i: int) -> ReadOptions:
     from fieldcal.importing.recording import ReadOptions
 
     given = args.columns[min(i, len(args.columns) - 1)] if args.columns else ""
-    columns = tuple(name.strip() for name in given.split(",")) if given else ()
+    columns = [name.strip() for name in given.split(",")] if given else []
+    other_way = [name.partition("=")[0] for name in columns if name.startswith("-")]
     return ReadOptions(
-        columns,
+        tuple(name.removeprefix("-") for name in columns),
         args.rate,
         args.separator,
         args.skip,
@@ -63,4 +65,5 @@ def said_of_columns(args: argparse.Namespace, i: int) -> ReadOptions:
         args.temp_unit,
         args.temp_lsb,
         args.temp_zero,
+        reversed=frozenset(name.removeprefix("-") for name in other_way),
     )

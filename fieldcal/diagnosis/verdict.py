@@ -9,8 +9,8 @@ import numpy as np
 
 from fieldcal.calibration.names import group_of
 from fieldcal.calibration.parameters import Nominal
-from fieldcal.calibration.plausible import senseless
-from fieldcal.core.samples import Block
+from fieldcal.calibration.plausible import elsewhere, senseless
+from fieldcal.core.samples import CHANNELS, GYR, Block
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.findings import found_effects, mismatches
 from fieldcal.diagnosis.findings.agreement import UNITS, Agreement
@@ -25,7 +25,7 @@ from fieldcal.diagnosis.findings.quality import (
     in_turns,
     parted,
 )
-from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, unknown
+from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed, unknown
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.diagnosis.result import (
     Diagnosis,
@@ -73,11 +73,11 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     # so far positions were counted as they were held, from here on as they are listed
     numbered = explanation.prepared.source.about.numbered
 
-    def listed(one: Mismatch) -> Mismatch:
+    def counted(one: Mismatch) -> Mismatch:
         return replace(one, positions=tuple(sorted(numbered(one.positions))))
 
-    mismatch = tuple(listed(m) for m in _mismatch(block, explanation, lost, strange))
-    strange = [replace(u, mismatch=listed(u.mismatch)) for u in strange]
+    mismatch = tuple(counted(m) for m in _mismatch(block, explanation, lost, strange))
+    strange = [replace(u, mismatch=counted(u.mismatch)) for u in strange]
     quality = _quality(explanation, lost, first, then)
     words = paragraph(
         verdict, effects, mismatch, strange, quality, explanation,
@@ -96,7 +96,7 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
         says=words,
         candidates=candidates(explanation, effects),
         curves=tuple(curves(explanation, mismatch, first, then)),
-        next=tuple(advice(explanation, effects, strange, mismatch)),
+        next=tuple(advice(explanation, effects, strange, mismatch, odd)),
         lines=lines(effects),
     )
 
@@ -159,15 +159,30 @@ def _verdict(
 
 
 def _odd(explanation: Explanation) -> list[str]:
-    """Bias and scale factors that no sensor has: a fact of the recording is wrong."""
+    """Values that no sensor has, and turns that lead elsewhere: some fact is wrong."""
     found = calibrated(explanation, explanation.best.set)
     nominal = explanation.prepared.source.about.nominal
-    return senseless(
+    values = senseless(
         tuple(found),
         np.array([value for value, _, _ in found.values()]),
         np.array([sigma for _, sigma, _ in found.values()]),
         Nominal(**{k: tuple(v.tolist()) for k, v in nominal.items()}),
     )
+    return values + elsewhere(_unexplained_turns(explanation))
+
+
+def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
+    """Turns that lead elsewhere, without those in which samples were found wrong."""
+    source, faults = explanation.prepared.source, explanation.prepared.checked.faults
+    t, windows = source.block.t, spans(source.block, source.about)
+    wrong = [f for _, f in faults if {f.channel, *f.channels} & {"t", *CHANNELS[GYR]}]
+    out = []
+    for p, q in explanation.inferred.contradicted:
+        leaves, arrives = t[windows[p, 1] - 1], t[windows[q, 0]]
+        if not any(f.from_s <= arrives and f.to_s >= leaves for f in wrong):
+            before, behind = source.about.numbered((p, q))
+            out.append((listed([before]), listed([behind])))
+    return out
 
 
 def _is_open(explanation: Explanation, one: Standing) -> bool:

@@ -8,8 +8,9 @@ turns by an angle that the gyroscopes must at least turn through:
 
     r = integral |W - W_rest| dt / angle(f_p, f_q)
 
-which is 1 to about 2, and 57.3 times that where deg/s are taken for rad/s. Source:
-model of this project.
+which is 1 to about 2, and 57.3 times that where deg/s are taken for rad/s; and where
+the axes of the gyroscopes are not those of the accelerometers, gravity does not turn as
+they say (`rate_axes`). Source: model of this project.
 
 >>> import numpy as np
 >>> f = np.array([[0, -9.8, 0], [-6.9, -6.9, 0], [0, -6.9, 6.9]])
@@ -29,6 +30,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import rate_of, unbroken
 from fieldcal.physics.effect import Chain
+from fieldcal.physics.rate_axes import SeenTurn, axes_by_turns
 from fieldcal.physics.recording import CheckedSamples, Fault
 
 BIAS, SCALE, FLOOR = 1.0, 0.1, 0.1
@@ -92,25 +94,35 @@ def _odds(measured: Array, f: Array) -> tuple[float, float]:
     return total - 0.5 * squares, squares
 
 
-def rate_unit(recording: CheckedSamples, held: Sequence[int], f: Array) -> str:
-    """Unit of the gyroscopes, if it is not the declared one; empty if it is.
+def turns_seen(
+    recording: CheckedSamples, held: Sequence[int], f: Array
+) -> list[SeenTurn]:
+    """Turns between windows by number, where the force is f (n, 3).
 
-    Of the turns between windows by number, where the force is f (n, 3); those that are
-    too small, or of which a part was not recorded, say nothing.
+    Those that are too small, or of which a part was not recorded, say nothing.
     """
-    block, ratios = recording.block, []
+    block, out = recording.block, []
     often = rate_of(block)
     for (p, one), (q, two) in pairwise(zip(held, f, strict=True)):
-        cosine = one @ two / np.linalg.norm(one) / np.linalg.norm(two)
-        angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
         gap = slice(recording.windows[p, 1], recording.windows[q, 0])
-        if not angle > LEAST or gap.stop - gap.start < 2:
+        if not angle_between(one, two) > LEAST or gap.stop - gap.start < 2:
             continue
         if not unbroken(block.t, gap.start, gap.stop, often):
             continue
         rest = block.gyr[slice(*recording.windows[p])].mean(axis=0)
-        rate = np.linalg.norm((block.gyr[gap] - rest) / recording.scale[3:], axis=1)
-        ratios.append(float(np.trapezoid(rate, block.t[gap])) / angle)
+        rate = (block.gyr[gap] - rest) / recording.scale[3:]
+        middle = (rate[1:] + rate[:-1]) / 2
+        out.append(SeenTurn(one, two, middle * np.diff(block.t[gap])[:, None]))
+    return out
+
+
+def rate_unit(turns: Sequence[SeenTurn]) -> str:
+    """Unit of the gyroscopes, if it is not the declared one; empty if it is."""
+    ratios = [
+        float(np.linalg.norm(turn.angles, axis=1).sum())
+        / angle_between(turn.before, turn.behind)
+        for turn in turns
+    ]
     ratio = float(np.median(ratios)) if ratios else 0.0
     if not 0.0 < ratio < np.inf:  # gyroscopes that say nothing
         return ""
@@ -120,13 +132,20 @@ def rate_unit(recording: CheckedSamples, held: Sequence[int], f: Array) -> str:
     return ""
 
 
-def _of_rates(recording: CheckedSamples, name: str) -> Fault:
-    """Gyroscopes in another unit."""
+def angle_between(one: Array, two: Array) -> float:
+    """Angle between two vectors (3,), rad."""
+    return float(np.arctan2(np.linalg.norm(np.cross(one, two)), one @ two))
+
+
+def _of_rates(
+    recording: CheckedSamples, undo: Array, values: dict[str, float | str]
+) -> Fault:
+    """Gyroscopes in another unit or other axes, which a matrix (3, 3) puts right."""
     six = recording.block.six
-    six[:, 3:] *= RATES[name]
+    six[:, 3:] = six[:, 3:] @ undo.T
     return Fault(
         channel="gx",
-        values={"unit": name},
+        values=values,
         sigmas={},
         from_s=float(recording.block.t[0]),
         to_s=float(recording.block.t[-1]),
@@ -143,7 +162,11 @@ class Mounting(Chain):
     treatment = "mend"
     place = 1  # a channel with wrong bytes looks like one of another axis
     decided_by = "the drawing on the device, and its data sheet"
-    cure = "Correct [frame] mounting, or the unit, by the drawing on the device."
+    cure = (
+        "Correct [frame] mounting, or the unit, by the drawing on the device; where"
+        " gyr_axes says that gx gy gz lie along other axes than the accelerometers',"
+        " import again with --columns that name them so, such as -gy,gx,gz."
+    )
     source = "model of this project"
 
     def find(self, recording: CheckedSamples) -> list[Fault]:
@@ -160,8 +183,12 @@ class Mounting(Chain):
             return [self._fault(recording, {"unit": unit}, UNITS[unit], np.eye(3))]
         oriented = recording.x.oriented[held]
         force = np.where(oriented[:, None], recording.x.f[held], acc)
-        if rate := rate_unit(recording, held, force):
-            return [_of_rates(recording, rate)]
+        turns = turns_seen(recording, held, force)
+        if rate := rate_unit(turns):
+            return [_of_rates(recording, RATES[rate] * np.eye(3), {"unit": rate})]
+        if (turned := axes_by_turns(turns)) is not None:
+            lies = "".join(self._names(turned.T))
+            return [_of_rates(recording, turned, {"gyr_axes": lies})]
         if oriented.sum() < 2:
             return []
         axes, odds = turned_axes(acc[oriented], recording.x.f[held][oriented])
@@ -182,11 +209,15 @@ class Mounting(Chain):
     @staticmethod
     def _named(recording: CheckedSamples, undo: Array) -> list[str]:
         """The mounting that session.toml should have had."""
-        right = recording.x.mounting @ undo
-        rows = [int(np.argmax(np.abs(r))) for r in right]
+        return Mounting._names(recording.x.mounting @ undo)
+
+    @staticmethod
+    def _names(axes: Array) -> list[str]:
+        """Signed axes by the rows of a matrix (3, 3)."""
+        rows = [int(np.argmax(np.abs(r))) for r in axes]
         return [
             ("-" if r[i] < 0 else "+") + "xyz"[i]
-            for r, i in zip(right, rows, strict=True)
+            for r, i in zip(axes, rows, strict=True)
         ]
 
     @staticmethod

@@ -113,7 +113,8 @@ class ColumnReader:
             for i, column in there:
                 if column is not None:
                     signed = wrapped(column) if kind in wanted.unsigned else column
-                    np.multiply(signed, scale, out=table[i])
+                    sign = -1.0 if kind + "xyz"[i] in wanted.reversed else 1.0
+                    np.multiply(signed, sign * scale, out=table[i])
             return table.T
 
         acc = triad("a", wanted.acc_scale)

@@ -96,6 +96,7 @@ class ReadOptions:
     options : as in a device's address, ``name=value&name=value``
     named : kinds of channel (a, g, t) whose unit the file's headings say
     unsigned : kinds of channel (a, g) in 16 bits of which the sign was not read
+    reversed : channels whose axis points the other way in the file
 
     """
 
@@ -114,6 +115,7 @@ class ReadOptions:
     temp_zero: float = 0.0
     named: frozenset[str] = frozenset()
     unsigned: frozenset[str] = frozenset()
+    reversed: frozenset[str] = frozenset()
 
     @property
     def acc_scale(self) -> float:

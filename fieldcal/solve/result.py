@@ -10,7 +10,7 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.names import AXES, ParameterName, group_of, sensor_of
-from fieldcal.calibration.plausible import senseless
+from fieldcal.calibration.plausible import elsewhere, senseless
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import UNITS as CHANNEL_UNITS
 from fieldcal.model import thresholds
@@ -35,9 +35,6 @@ OF_ACC = frozenset(
 
 OF_TURNS = frozenset({"gyr_scale", "gyro_cross_coupling"})
 """Groups that turns determine."""
-
-MENTIONED = 3
-"""Turns that are named one by one."""
 
 
 def calibration(
@@ -71,7 +68,7 @@ def calibration(
         )
     odd = [
         *senseless(names, found.values, sigma, observations.nominal),
-        *_contradicted(found, observations),
+        *elsewhere(_named(found.contradicted, observations)),
         *_elsewhere(found, observations),
     ]
     sentences += _doubts(method, observations, found)
@@ -235,22 +232,12 @@ def _scattered(found: Estimated) -> list[str]:
     return sentences
 
 
-def _contradicted(found: Estimated, observations: Observations) -> list[str]:
-    """Turns of which the gyroscopes say that they led elsewhere."""
-    if not found.contradicted:
-        return []
-    listed = words.join([
-        f"{observations.positions[p].name} to {observations.positions[q].name}"
-        for p, q in found.contradicted[:MENTIONED]
-    ])  # fmt: skip
-    count, more = len(found.contradicted), len(found.contradicted) - MENTIONED
-    return [
-        f"in {count} turn{'s' if count > 1 else ''} the gyroscopes lead to another"
-        f" attitude than the accelerometers or the stated angles (from {listed}"
-        f"{f', and {more} more' if more > 0 else ''}): an axis, a sign, a unit or an"
-        " angle is another than session.toml says, or the gyroscopes were clipped;"
-        " mend it, or turn more slowly"
-    ]
+def _named(
+    turns: Sequence[tuple[int, int]], observations: Observations
+) -> list[tuple[str, str]]:
+    """Turns by the names of the positions at their ends."""
+    names = [position.name for position in observations.positions]
+    return [(names[before], names[behind]) for before, behind in turns]
 
 
 def _elsewhere(found: Estimated, observations: Observations) -> list[str]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from fieldcal.calibration.parameters import Nominal
-from fieldcal.calibration.plausible import senseless
+from fieldcal.calibration.plausible import elsewhere, senseless
 
 
 @pytest.mark.parametrize(
@@ -22,3 +24,24 @@ def test_a_base_out_of_level_by_tens_of_degrees_is_another_mounting(
     assert bool(said) == odd
     if odd:
         assert "[frame] mounting" in said[0] and name in said[0]
+
+
+def test_turns_that_led_elsewhere_are_named_three_by_three() -> None:
+    """Of four the fourth is counted."""
+    assert elsewhere([]) == []
+    names = [f"position {i}" for i in range(1, 6)]
+    pairs = list(pairwise(names))
+    after = (
+        ": an axis, a sign, a unit or an angle is another than session.toml says, or"
+        " the gyroscopes were clipped; mend it, or turn more slowly"
+    )
+    said = "the gyroscopes lead to another attitude than the accelerometers or the"
+    for count, start, listed in (
+        (1, "in 1 turn ", f"{names[0]} to {names[1]}"),
+        (3, "in 3 turns ", f"{names[0]} to {names[1]}, {names[1]} to {names[2]} and"
+         f" {names[2]} to {names[3]}"),
+        (4, "in 4 turns ", f"{names[0]} to {names[1]}, {names[1]} to {names[2]} and"
+         f" {names[2]} to {names[3]}, and 1 more"),
+    ):  # fmt: skip
+        (text,) = elsewhere(pairs[:count])
+        assert text == f"{start}{said} stated angles (from {listed}){after}"

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from laid_about import turned
 from session_folders import places, recorded, write_session
 
 from fieldcal.cli import main
@@ -410,3 +411,38 @@ def test_a_sensor_that_says_nothing_does_not_cost_the_other(
     assert any(says in warning for warning in found["warnings"])
     assert {name[:3] for name in found["parameters"]} & {"acc", "gyr"} == {left}
     assert main(["report", str(folder)]) == 0
+
+
+@pytest.mark.parametrize(("axes", "columns"), [("+y-x+z", "gy,-gx,gz"), ("-x-y-z", "")])
+def test_gyroscopes_along_other_axes_are_named_and_mended(
+    axes: str, columns: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(8, 50.0, 4.0)
+    own = {"+y-x+z": rows[:, [5, 4, 6]] * [1, -1, 1], "-x-y-z": -rows[:, 4:]}[axes]
+    np.savetxt(tmp_path / "log.csv", np.c_[rows[:, :4], own], delimiter=",",
+               comments="", header="t,ax,ay,az,gx,gy,gz")  # fmt: skip
+    said = ["--acc-unit", "m/s^2", "--gyr-unit", "rad/s", "--latitude", "45"]
+    log, folder = str(tmp_path / "log.csv"), tmp_path / "s"
+    assert main(["import", log, "-o", str(folder), *said]) == 0
+    capsys.readouterr()
+    _, found = diagnosed(folder, capsys)
+    (named,) = [e for e in found["effects"] if e["id"] == "mounting"]
+    assert named["parameters"]["gyr_axes"]["value"] == axes
+    assert main(["solve", str(folder), "--json"]) == 1
+    if columns:
+        named_so = ["--columns", f"t,ax,ay,az,{columns}"]
+        assert main(["import", log, "-o", str(tmp_path / "m"), *said, *named_so]) == 0
+        capsys.readouterr()
+        _, found = diagnosed(tmp_path / "m", capsys)
+        assert "mounting" not in [e["id"] for e in found["effects"]]
+
+
+def test_gyroscopes_along_other_axes_than_the_ladder_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = replace(SAME, effects=(parse("mounting:gyr_axes=-z+y+x"),))
+    block = recorded(other, POSITIONS)
+    code, said = diagnosed(write_session(tmp_path, block, POSITIONS), capsys)
+    named = [e["parameters"] for e in said["effects"] if e["id"] == "mounting"]
+    assert code == 1 and [p["gyr_axes"]["value"] for p in named] == ["-z+y+x"]
+    assert said["twin"]["twin"]["chi2_per_dof"] < 1.5

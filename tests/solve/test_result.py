@@ -34,7 +34,7 @@ def estimated(**known: Any) -> Estimated:
     )
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "missing": (), "given": given, "acc": fit(),
-        "gyr": fit(rms=np.nan), "contradicted": (), "closures": (0.0, 0),
+        "gyr": fit(rms=np.nan), "closures": (0.0, 0),
         "found": SimpleNamespace(scatter=np.array([3, 4, 0, 2, 1, 0, 5.0])),
     }  # fmt: skip
     return cast(Estimated, SimpleNamespace(**(nothing | known)))
@@ -46,28 +46,6 @@ def observed(
     still = [p if p.oriented else FIVE[0] for p in places]
     rates = np.tile(GYR_BIAS, (len(places), 1)) if gyr else None
     return observe(places, outputs(still), gyr=rates, **known)
-
-
-def test_turns_that_led_elsewhere_are_named_three_by_three() -> None:
-    """Of four the fourth is counted."""
-    seen = observed()
-    assert result._contradicted(estimated(), seen) == []
-    names = [p.name for p in FIVE]
-    pairs = tuple((i, i + 1) for i in range(4))
-    after = (
-        ": an axis, a sign, a unit or an angle is another than session.toml says, or"
-        " the gyroscopes were clipped; mend it, or turn more slowly"
-    )
-    said = "the gyroscopes lead to another attitude than the accelerometers or the"
-    for count, start, listed in (
-        (1, "in 1 turn ", f"{names[0]} to {names[1]}"),
-        (3, "in 3 turns ", f"{names[0]} to {names[1]}, {names[1]} to {names[2]} and"
-         f" {names[2]} to {names[3]}"),
-        (4, "in 4 turns ", f"{names[0]} to {names[1]}, {names[1]} to {names[2]} and"
-         f" {names[2]} to {names[3]}, and 1 more"),
-    ):  # fmt: skip
-        (text,) = result._contradicted(estimated(contradicted=pairs[:count]), seen)
-        assert text == f"{start}{said} stated angles (from {listed}){after}"
 
 
 def test_what_nothing_determines_is_an_error_with_the_reason() -> None:

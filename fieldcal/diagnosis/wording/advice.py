@@ -30,8 +30,18 @@ def advice(
     effects: Sequence[FoundEffect],
     unknown: Sequence[Unknown],
     mismatch: Sequence[Mismatch],
+    odd: Sequence[str],
 ) -> Iterator[str]:
-    """Sentences, the most urgent first; `mismatch` names positions as listed."""
+    """Sentences, the most urgent first; `mismatch` names positions as listed.
+
+    `odd` are facts of the recording that cannot be.
+    """
+    if odd:
+        yield (
+            "Mend session.toml by the drawing on the device and its data sheet (axes,"
+            " signs, units, angles), and diagnose it again: what else is left out"
+            " cannot be told before."
+        )
     yield from _look(unknown)
     if explanation.undecided:
         yield (

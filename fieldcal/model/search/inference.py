@@ -47,6 +47,7 @@ class Inferred:
     state : its estimate
     values : (k,) of the dictionary's columns in that state
     turned : rows of the turns about it
+    contradicted : windows between which the gyroscopes lead elsewhere about it
 
     """
 
@@ -56,6 +57,7 @@ class Inferred:
     state: State
     values: Array
     turned: Sequence[TurnRows]
+    contradicted: tuple[tuple[int, int], ...]
 
     @property
     def about_itself(self) -> float:
@@ -150,7 +152,10 @@ class Inference(GaussNewton):
                     continue
             if Search.key(found.members) in seen:
                 break
-        return Inferred(self, search, found, state, self.padded(values), self.turned)
+        astray = self.turns.turning.contradicted if self.turns is not None else ()
+        return Inferred(
+            self, search, found, state, self.padded(values), self.turned, tuple(astray)
+        )
 
     def _from_nothing(
         self, state: State, values: Array, search: Search

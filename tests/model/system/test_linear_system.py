@@ -106,6 +106,7 @@ EXPERIENCES = {
     "on a table": rows(rate=SPUN),
     "seeing the Earth": rows(base_rate=EARTH),
     "of unknown orientation": rows((2, 5)),
+    "followed in motion": rows(slope=RNG.standard_normal((ROWS, 6))),
 }
 COLUMNS = {name: Columns(x) for name, x in EXPERIENCES.items()}
 everywhere = pytest.mark.parametrize("one", COLUMNS.values(), ids=COLUMNS.keys())

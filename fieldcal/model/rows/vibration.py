@@ -96,16 +96,39 @@ def _compared(
     for i, (a, b) in enumerate(windows):
         out[i] = np.concatenate([short_lag(t[a:b]) for t in (block.acc, block.gyr)])
     grain = grain_of(block, windows)  # outputs may stay on one step all through some
-    low = np.fmax(np.sort(out, axis=0)[(len(out) - 1) // 4], grain)  # nan comes last
+    stands = _stands(out, grain)
+    out[stands] = np.nan
+    known = np.maximum(np.isfinite(out).sum(axis=0), 1)
+    first = np.sort(out, axis=0)[(known - 1) // 4, np.arange(6)]  # nan comes last
+    low = np.fmax(first, grain)
     margin = LOUDER / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
     louder = out > low * np.exp(margin)
     loud: NDArray[np.bool_] = np.any(louder, axis=1)
-    noise = noise_of(block, windows if loud.all() else windows[~loud], rate_hz)
+    quiet = ~loud & ~stands.any(axis=1)
+    quiet = quiet if quiet.any() else ~loud if not loud.all() else loud
+    noise = noise_of(block, windows[quiet], rate_hz)
     white, quick = (
         np.where(grain > 0, np.fmax(n, grain), n) for n in (noise.white, noise.quick)
     )
     more = np.maximum(np.where(louder, out**2 - low**2, 0.0), 0.0)
     return ChannelNoise(white, quick), more, loud
+
+
+def _stands(levels: Array, grain: Array) -> NDArray[np.bool_]:
+    """Windows in which an output never changes, though in others noise exceeds a step.
+
+    On its rail or stuck it tells nothing of the noise.
+
+    Parameters
+    ----------
+    levels : (w, 6) deviation of one sample in each window
+    grain : (6,) deviation within a step of the grid that outputs lie on
+
+    """
+    still: NDArray[np.bool_] = levels == 0
+    usual = [np.median(c[c > 0]) if (c > 0).any() else 0.0 for c in levels.T]
+    out: NDArray[np.bool_] = still & (np.array(usual) > grain)
+    return out
 
 
 def without_lines(piece: Array, rate_hz: float) -> Array:

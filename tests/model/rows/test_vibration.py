@@ -97,6 +97,15 @@ def several(*hz: float) -> Array:
     return np.outer(total, [1.0, -2.0, 0.0]) + [5.0, 0.0, -9.0]
 
 
+@pytest.mark.parametrize("standing", [1, 3, 4])
+def test_an_output_on_its_rail_tells_nothing_of_the_noise(standing: int) -> None:
+    six = six_of()
+    six[: standing * N, 0] = 19.6
+    found = shaking(block_of(np.round(six, 5)), WINDOWS, RATE)
+    np.testing.assert_allclose(found.noise, WHITE, rtol=0.1)
+    assert (found.levels[:, 0] > 0.9 * WHITE[0]).all()
+
+
 @pytest.mark.parametrize("hz", [(3.37,), (7.77, 20.01, 33.3), (2.5, 49.0)])
 def test_lines_are_fitted_at_their_frequencies(hz: tuple[float, ...]) -> None:
     noise = 1e-3 * np.random.default_rng(5).standard_normal((1600, 3))

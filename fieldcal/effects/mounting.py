@@ -183,10 +183,11 @@ class Mounting(Chain):
             return [self._fault(recording, {"unit": unit}, UNITS[unit], np.eye(3))]
         oriented = recording.x.oriented[held]
         force = np.where(oriented[:, None], recording.x.f[held], acc)
-        turns = turns_seen(recording, held, force)
-        if rate := rate_unit(turns):
+        if rate := rate_unit(turns_seen(recording, held, force)):
             return [_of_rates(recording, RATES[rate] * np.eye(3), {"unit": rate})]
-        if (turned := axes_by_turns(turns)) is not None:
+        # against what the accelerometers read: both may be mounted otherwise together
+        turned = axes_by_turns(turns_seen(recording, held, acc))
+        if turned is not None:
             lies = "".join(self._names(turned.T))
             return [_of_rates(recording, turned, {"gyr_axes": lies})]
         if oriented.sum() < 2:

@@ -6,7 +6,7 @@ no sample of a turn gets in.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.rests import SPAN, CellRows, at_rest, table_of
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.verdict import judge
+
+FEWEST = 3
+"""Stretches below which rests may all have been too short for the usual margin."""
 
 _CLEARLY = 0.98
 """Ratio of departure to what is allowed that the sums of a recording must keep."""
@@ -63,13 +66,35 @@ def still_stretches_of_file(
     if len(rows) < 2 * SPAN:
         return []
     shortest = max(1.0, min_seconds)
+    runs = at_rest(rows, StillnessLimits().noise)
+    middles = [(r.first + SPAN // 2, r.last - 1 + SPAN // 2) for r in runs]
+    found = _passing_of(rows, origin, between, middles, shortest)
+    if len(found) >= FEWEST or len(runs) < FEWEST:
+        return found
+    # rests may all be short: then all that their spans saw, less a cell at each end
+    ends = [run.last + SPAN - 2 for run in runs]
+    nexts = [*(run.first for run in runs[1:]), len(rows)]
+    whole = [
+        (r.first + 1, min(e, n)) for r, e, n in zip(runs, ends, nexts, strict=True)
+    ]
+    short = _passing_of(rows, origin, between, whole, shortest)
+    return short if len(short) >= FEWEST else found
+
+
+def _passing_of(
+    rows: CellRows,
+    origin: Array,
+    between: Between,
+    stretches: Sequence[tuple[int, int]],
+    shortest: float,
+) -> list[tuple[float, float]]:
+    """What passes of stretches of cells [first, last)."""
     found: list[tuple[float, float]] = []
-    for run in at_rest(rows, StillnessLimits().noise):
-        first, last = run.first + SPAN // 2, run.last - 1 + SPAN // 2
+    for first, last in stretches:
         cells = table_of(rows[first : last + 1], origin)
         if clear := _clear(table_of(rows[first:last], origin), shortest):
             found.append(clear)
-        else:
+        elif len(cells):
             start, end = float(cells.times[0]), float(cells.times[-1])
             found += _passing(between, start, end, shortest)
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import itertools
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -344,6 +345,26 @@ def test_stretches_begin_at_a_sample_and_end_behind_one(long: Block) -> None:
     for start, end in still_stretches(long, 3.0):
         inside = long.between(start, end)
         assert inside.t[0] == start and inside.t[-1] == np.nextafter(end, 0.0)
+
+
+@pytest.mark.parametrize("rest_s", [1.5, 1.8])
+def test_rests_that_are_all_short_are_found_without_the_turns(rest_s: float) -> None:
+    rng = np.random.default_rng(8)
+    rest, turn = int(100 * rest_s), 100
+    ways = rng.normal(0, 1, (13, 3))
+    ways *= 9.81 / np.linalg.norm(ways, axis=1)[:, None]
+    done = (1 - np.cos(np.pi * (np.arange(turn) + 0.5) / turn))[:, None] / 2
+    acc = np.concatenate(
+        [np.r_[np.tile(a, (rest, 1)), a + done * (b - a)] for a, b in pairwise(ways)]
+    )
+    held = np.arange(len(acc)) % (rest + turn) < rest
+    acc += rng.normal(0, 0.02, acc.shape)
+    gyr = rng.normal(0, 0.002, acc.shape) + 0.5 * ~held[:, None]
+    found = still_stretches(Block.of(np.arange(len(acc)) / 100, acc, gyr), 1.0)
+    assert len(found) >= 11
+    for start, end in found:
+        inside = held[round(100 * start) : round(100 * end)]
+        assert len(inside) >= 100 and inside.all()
 
 
 def test_fewer_than_two_seconds_are_no_recording() -> None:

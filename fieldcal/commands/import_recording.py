@@ -254,10 +254,8 @@ def _bring(
             " [nominal] scale factors and the positions into session.toml\n"
         )
     elif not imported.stretches:
-        err(
-            "write the positions into session.toml, or try --still with a shorter"
-            " time\n"
-        )
+        shorter = ", or try --still with a shorter time" if args.still > 1 else ""
+        err(f"write the positions into session.toml{shorter}\n")
     sys.stdout.write(f"{folder}\n")
     return imported
 

@@ -446,3 +446,23 @@ def test_gyroscopes_along_other_axes_than_the_ladder_are_named(
     named = [e["parameters"] for e in said["effects"] if e["id"] == "mounting"]
     assert code == 1 and [p["gyr_axes"]["value"] for p in named] == ["-z+y+x"]
     assert said["twin"]["twin"]["chi2_per_dof"] < 1.5
+
+
+def test_a_hand_that_trembles_about_one_axis_is_no_noisy_sensor(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows, rng = turned(8, 50.0, 6.0), np.random.default_rng(4)
+    angle = np.zeros(len(rows))
+    for i, kick in enumerate(rng.normal(0, 1.5e-3, len(rows) - 1), 1):
+        angle[i] = 0.9 * angle[i - 1] + kick
+    about = np.array([0.1, 1.0, 0.1])
+    rows[:, 1:4] -= np.cross(angle[:, None] * about, rows[:, 1:4])
+    rows[:, 4:] += np.gradient(angle, rows[:, 0])[:, None] * about
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", comments="",
+               header="t,ax,ay,az,gx,gy,gz")  # fmt: skip
+    said = ["--acc-unit", "m/s^2", "--gyr-unit", "rad/s", "--latitude", "45"]
+    log, folder = str(tmp_path / "log.csv"), tmp_path / "s"
+    assert main(["import", log, "-o", str(folder), *said]) == 0
+    capsys.readouterr()
+    _, found = diagnosed(folder, capsys)
+    assert "noise_level" not in [e["id"] for e in found["effects"]]

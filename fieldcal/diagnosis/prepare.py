@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Block
-from fieldcal.diagnosis.signal.chain import Checked, check, checked_again, in_a_hand
+from fieldcal.diagnosis.signal.chain import Checked, check, checked_again
 from fieldcal.diagnosis.signal.line import Remains, Tone
 from fieldcal.diagnosis.signal.spectrum import tones, without
 from fieldcal.effects import catalogue
@@ -98,8 +98,6 @@ def prepare(block: Block, about: Description) -> Prepared:
         source = replace(source, block=without(source.block, source, rows, found))
         rows = _as_shaken(rows_of(source), rows)
         checked = checked_again(checked, source.block, about)
-    if rows.wander:
-        checked = in_a_hand(checked)
     if not rows.used.any():
         raise InputError(
             "nothing in the windows can be used: every output is missing, stuck or"

@@ -2,7 +2,9 @@
 
     sigma_i = ratio x sigma of the other two axes of the triad
 
-Seen at high frequency, where nothing else is. It widens intervals and shifts nothing.
+Seen at high frequency, where nothing else is, and in every window: what a hand or an
+engine shakes about some axis changes from one to the next. It widens intervals and
+shifts nothing.
 Source: model of this project; a triad's axes agree within tens of percent.
 
 >>> import numpy as np
@@ -17,9 +19,18 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
+from fieldcal.windows.noise import short_lag
 
 RATIO = 1.8
 """Ratio from which an axis counts as noisier: out-of-plane axes reach 1.5."""
+
+
+FEWEST = 50
+"""Samples of a window that shows the ratio to a tenth."""
+
+STEADY, HALF = 0.8, (1 + RATIO) / 2
+"""Share of the windows in which the axis must be the noisiest one, and by what ratio
+at least: single windows show it less well."""
 
 
 def louder(noise: Array) -> tuple[int, float]:
@@ -57,7 +68,7 @@ class NoiseLevel(Chain):
             if not noise.all():
                 continue
             worst, ratio = louder(noise)
-            if ratio < RATIO:
+            if ratio < RATIO or not _everywhere(recording, triad, worst):
                 continue
             name = CHANNELS[first + worst]
             sigma = ratio * float(np.sqrt(2.0 / samples))
@@ -73,3 +84,15 @@ class NoiseLevel(Chain):
                 )
             )
         return out
+
+
+def _everywhere(recording: CheckedSamples, triad: slice, worst: int) -> bool:
+    """Whether an axis of a triad is the noisier one in most windows."""
+    found = []
+    for first, last in recording.windows:
+        noise = short_lag(recording.six(first, last)[:, triad])
+        noise = np.maximum(noise, recording.steps[triad])
+        if last - first > FEWEST and np.isfinite(noise).all():
+            axis, ratio = louder(noise)
+            found.append(axis == worst and ratio > HALF)
+    return not found or float(np.mean(found)) >= STEADY

@@ -102,12 +102,6 @@ def checked_again(checked: Checked, block: Block, about: Description) -> Checked
     return replace(checked, faults=tuple(faults))
 
 
-def in_a_hand(checked: Checked) -> Checked:
-    """The same without what a hand feigns: it trembles about some axes more."""
-    faults = tuple((n, f) for n, f in checked.faults if n != "noise_level")
-    return replace(checked, faults=faults)
-
-
 def _treated(treatment: str) -> list[str]:
     """Ids of the effects on samples with one treatment, in their order."""
     chain = [e for e in catalogue().values() if isinstance(e, Chain)]

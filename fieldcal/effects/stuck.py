@@ -67,7 +67,11 @@ class Stuck(Chain):
     treatment = "mask"
     place = 1
     decided_by = "the stretch recorded again"
-    cure = "Restart the device; if it comes back, the sensor is defective."
+    cure = (
+        "Restart the device; if it comes back, the sensor is defective. Gyroscopes that"
+        " follow the turns and stand at rest are held there by the device (a dead band,"
+        " a bias that it tracks): switch that off, it hides their bias."
+    )
     source = "model of this project"
 
     def find(self, recording: CheckedSamples) -> list[Fault]:

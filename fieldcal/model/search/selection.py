@@ -85,15 +85,14 @@ class Search(Offers):
             best = max([best, less, other], key=_score)
         if best is not there:
             return best
-        return self._wider(best)
+        return max(self._instead(best), self._wider(best), key=_score)
 
     def _wider(self, there: Set) -> Set:
         """The best set with all the parameters of one of its causes and one more.
 
         By itself a cause gets the parameters that raise the evidence and stand in for
         others. Beside another cause it may need all of them, and only then does the
-        other one raise the evidence. Where none does, how likely it is on its other
-        axes is in the weights all the same, and so in the uncertainties.
+        other one raise the evidence.
         """
         found = [there]
         for i, (cause, group) in enumerate(there.members):
@@ -104,6 +103,19 @@ class Search(Offers):
                 wide = self.evaluated(tuple(members), there.sizes)
                 found.append(self._followed(wide, there.score))
         return max(found, key=_score)
+
+    def _instead(self, there: Set) -> Set:
+        """The best set with two or three causes in the place of one without physics.
+
+        A function of many columns does for what several effects make together, of which
+        none alone is worth as much: that of the most columns, when nothing else helps.
+        """
+        width = [len(g.columns) * is_function((c, g)) for c, g in there.members]
+        if not any(width):
+            return there
+        less = self.without(there, int(np.argmax(width)))
+        two = self._paired(less, there.score)
+        return max([there, two, self._followed(two, there.score)], key=_score)
 
     def _followed(self, there: Set, level: float, beside: Less | None = None) -> Set:
         """The best set with one more; the set itself if none comes near a level."""

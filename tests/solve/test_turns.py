@@ -250,11 +250,20 @@ def test_without_the_turns_there_is_no_scale_factor(tmp_path: Path) -> None:
     assert "gyr_scale" not in found.groups and "turns" not in found.info
 
 
-def test_gyroscopes_that_turn_the_other_way_are_said_to(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("turns", "sentence"),
+    [(-1, "the mounting (gyr_axes = -x-y-z)"),
+     (1, "in 1 turn the gyroscopes lead to another attitude")],
+)  # fmt: skip
+def test_gyroscopes_that_turn_the_other_way_are_said_to(
+    tmp_path: Path, turns: int, sentence: str
+) -> None:
+    """In all turns it is their mounting, in one nobody knows."""
     block, windows = record(4, many_ways(6, 9), ANYHOW)
-    found = calibrated(tmp_path, replace(block, gyr=-block.gyr), windows)
-    said = [w for w in found.warnings if "gyroscopes lead to another attitude" in w]
-    assert len(said) == 1 and not found.good
+    so_far = block.t < windows[turns][0]
+    gyr = np.where(so_far[:, None], -block.gyr, block.gyr)
+    found = calibrated(tmp_path, replace(block, gyr=gyr), windows)
+    assert len([w for w in found.warnings if sentence in w]) == 1 and not found.good
 
 
 def test_a_turn_with_samples_missing_is_left_out(tmp_path: Path) -> None:

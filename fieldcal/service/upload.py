@@ -82,7 +82,7 @@ def session_members(
     out: dict[str, zipfile.ZipInfo] = {}
     for one in found:
         path = PurePosixPath(one.filename)
-        plain = "\\" not in one.filename and ":" not in one.filename
+        plain = path.name and not {"\\", ":"} & {*one.filename}
         if path.parent != top or path.is_absolute() or ".." in path.parts or not plain:
             raise InputError(
                 f"{one_line(one.filename)}: does not lie beside {DESCRIPTION}: pack the"

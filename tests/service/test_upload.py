@@ -58,7 +58,7 @@ def test_what_is_no_session_is_left_to_import(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name",
     ["../evil", "/etc/evil", "a/../../evil", "x/session.toml/evil", "C:\\evil",
-     "..\\evil", "sub/evil", "c:evil"],
+     "..\\evil", "sub/evil", "c:evil", "."],
 )  # fmt: skip
 def test_names_lead_nowhere_else(tmp_path: Path, name: str) -> None:
     bad = packed(tmp_path / "z", {"session.toml": ABOUT, name: b"x"})

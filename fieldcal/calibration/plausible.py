@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from fieldcal.calibration.names import ParameterName, group_of, sensor_of
 from fieldcal.calibration.parameters import Nominal
 from fieldcal.core.samples import Array
+from fieldcal.core.sentences import join
 
 LEAST, UNSEEN = 0.1, 5.0
 """Share of the nominal scale factor, and standard deviations: less is none."""
@@ -60,11 +61,10 @@ def elsewhere(turns: Sequence[tuple[str, str]]) -> list[str]:
     if not turns:
         return []
     named = [f"{before} to {behind}" for before, behind in turns[:MENTIONED]]
-    listed = " and ".join(filter(None, (", ".join(named[:-1]), named[-1])))
     count, more = len(turns), len(turns) - len(named)
     return [
         f"in {count} turn{'s' if count > 1 else ''} the gyroscopes lead to another"
-        f" attitude than the accelerometers or the stated angles (from {listed}"
+        f" attitude than the accelerometers or the stated angles (from {join(named)}"
         f"{f', and {more} more' if more else ''}): an axis, a sign, a unit or an"
         " angle is another than session.toml says, or the gyroscopes were clipped;"
         " mend it, or turn more slowly"

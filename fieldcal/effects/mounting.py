@@ -15,14 +15,14 @@ they say (`rate_axes`). Source: model of this project.
 >>> import numpy as np
 >>> f = np.array([[0, -9.8, 0], [-6.9, -6.9, 0], [0, -6.9, 6.9]])
 >>> axes, _ = turned_axes(f[:, [1, 0, 2]] * [1, 1, -1], f)
->>> axes
-('+y', '+x', '-z')
+>>> named(axes)
+'+y+x-z'
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import pairwise, permutations, product
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import rate_of, unbroken
 from fieldcal.physics.effect import Chain
-from fieldcal.physics.rate_axes import SeenTurn, axes_by_turns
+from fieldcal.physics.rate_axes import SeenTurn, axes_by_turns, signed_axes
 from fieldcal.physics.recording import CheckedSamples, Fault
 
 BIAS, SCALE, FLOOR = 1.0, 0.1, 0.1
@@ -54,32 +54,17 @@ LEAST = np.deg2rad(10.0)
 """Least turn of the force that tells, rad."""
 
 
-def signed_axes() -> Iterator[tuple[str, ...]]:
-    """All 48 ways to name three signed axes; the declared one first."""
-    for order in permutations("xyz"):
-        for signs in product("+-", repeat=3):
-            yield tuple(s + a for s, a in zip(signs, order, strict=True))
-
-
-def matrix_of(axes: tuple[str, ...]) -> Array:
-    """Signed permutation, outputs = S true, either-handed."""
-    out = np.zeros((3, 3))
-    for row, name in enumerate(axes):
-        out[row, "xyz".index(name[1])] = -1.0 if name[0] == "-" else 1.0
-    return out
-
-
-def turned_axes(measured: Array, f: Array) -> tuple[tuple[str, ...], float]:
-    """Axes under which forces (n, 3) read as measured, and the odds against identity.
+def turned_axes(measured: Array, f: Array) -> tuple[Array, float]:
+    """Axes (3, 3) by which forces (n, 3) read as measured; odds against the identity.
 
     Both in m/s^2, measured with the nominal calibration taken out.
     """
-    declared = ("+x", "+y", "+z")
-    odds = {axes: _odds(measured, f @ matrix_of(axes).T) for axes in signed_axes()}
-    best = max(odds, key=lambda axes: odds[axes][0])
+    every = signed_axes()
+    odds = [_odds(measured, f @ axes.T) for axes in every]
+    best = int(np.argmax([likelihood for likelihood, _ in odds]))
     if odds[best][1] > FITS * measured.size:
-        return declared, 0.0
-    return best, odds[best][0] - odds[declared][0]
+        return every[0], 0.0
+    return every[best], odds[best][0] - odds[0][0]
 
 
 def _odds(measured: Array, f: Array) -> tuple[float, float]:
@@ -130,6 +115,13 @@ def rate_unit(turns: Sequence[SeenTurn]) -> str:
         if abs(np.log(ratio * size / USUAL)) < np.log(AROUND):
             return name
     return ""
+
+
+def named(axes: Array) -> str:
+    """Signed axes by the rows of a matrix (3, 3), such as +x-z+y."""
+    at = np.argmax(np.abs(axes), axis=1).tolist()
+    return "".join("+-"[bool(row[i] < 0)] + "xyz"[i]
+                   for row, i in zip(axes, at, strict=True))  # fmt: skip
 
 
 def angle_between(one: Array, two: Array) -> float:
@@ -188,16 +180,15 @@ class Mounting(Chain):
         # against what the accelerometers read: both may be mounted otherwise together
         turned = axes_by_turns(turns_seen(recording, held, acc))
         if turned is not None:
-            lies = "".join(self._names(turned.T))
-            return [_of_rates(recording, turned, {"gyr_axes": lies})]
+            return [_of_rates(recording, turned, {"gyr_axes": named(turned.T)})]
         if oriented.sum() < 2:
             return []
         axes, odds = turned_axes(acc[oriented], recording.x.f[held][oriented])
         if odds < BETTER:
             return []
-        undo = matrix_of(axes).T
-        named: dict[str, float | str] = {"axes": "".join(self._named(recording, undo))}
-        return [self._fault(recording, named, 1.0, undo)]
+        # the mounting that session.toml should have had
+        right = named(recording.x.mounting @ axes.T)
+        return [self._fault(recording, {"axes": right}, 1.0, axes.T)]
 
     @staticmethod
     def _unit(acc: Array, gravity: float) -> str:
@@ -206,20 +197,6 @@ class Mounting(Chain):
             if name != "deg/s" and abs(length * size / gravity - 1) < NEAR:
                 return name
         return ""
-
-    @staticmethod
-    def _named(recording: CheckedSamples, undo: Array) -> list[str]:
-        """The mounting that session.toml should have had."""
-        return Mounting._names(recording.x.mounting @ undo)
-
-    @staticmethod
-    def _names(axes: Array) -> list[str]:
-        """Signed axes by the rows of a matrix (3, 3)."""
-        rows = [int(np.argmax(np.abs(r))) for r in axes]
-        return [
-            ("-" if r[i] < 0 else "+") + "xyz"[i]
-            for r, i in zip(axes, rows, strict=True)
-        ]
 
     @staticmethod
     def _fault(

@@ -11,9 +11,9 @@ import numpy as np
 from fieldcal.calibration import Method
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.core.sentences import join
 from fieldcal.solve.given import Tilt
 from fieldcal.solve.observations import Observations
-from fieldcal.solve.words import join
 
 METHODS = ("auto", "two_position", "five_position", "least_squares", "joint", "scalar")
 TILTS = ("auto", "none", "angle_offset", "base_tilt")

@@ -21,6 +21,7 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import group_of
+from fieldcal.core.sentences import join
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
@@ -34,7 +35,6 @@ from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import ladder_remedy
 from fieldcal.solve.result import calibration
 from fieldcal.solve.rows import of_means, without_angles
-from fieldcal.solve.words import join
 
 TILTED: tuple[Tilt, ...] = ("angle_offset", "base_tilt")
 

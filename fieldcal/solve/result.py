@@ -13,6 +13,7 @@ from fieldcal.calibration.names import AXES, ParameterName, group_of, sensor_of
 from fieldcal.calibration.plausible import elsewhere, senseless
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import UNITS as CHANNEL_UNITS
+from fieldcal.core.sentences import join
 from fieldcal.model import thresholds
 from fieldcal.solve import words
 from fieldcal.solve.assumed import Asked
@@ -146,7 +147,7 @@ def _turning(
     missing = [*gyr] + ([f"{len(cross)} of 6 gyro_cross_coupling"] if cross else [])
     if not found.given.wanted.turned and not observations.rotating.any():
         return (
-            f"{words.join(missing)} {'are' if missing[1:] else 'is'} left out: the"
+            f"{join(missing)} {'are' if missing[1:] else 'is'} left out: the"
             " Earth's rate gives it only roughly in these windows; average longer, or"
             " integrate turns between the positions"
         )
@@ -158,7 +159,7 @@ def _turning(
             missing, [f"a rate of 20°/s about device axis {a}" for a in about],
             "this schedule",
         )  # fmt: skip
-    level = f"turns about device axis {words.join(about)} while that axis is level"
+    level = f"turns about device axis {join(about)} while that axis is level"
     return words.not_determined(missing, [level], "these turns")
 
 
@@ -177,8 +178,8 @@ def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
     elif found.acc.dof in words.FEW:
         why += f" (and all nine would leave {words.FEW[found.acc.dof]})"
     return (
-        f"{words.join(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
-        f" add positions with gravity half way between {words.join(pairs)}"
+        f"{join(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
+        f" add positions with gravity half way between {join(pairs)}"
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
+from fieldcal.core.sentences import join
 from fieldcal.model import thresholds
 
 NO_DOF = "no degree of freedom: the residual says nothing; add a verification position"
@@ -19,11 +20,6 @@ NO_SCALE = (
 )
 
 FEW = {1: "one degree of freedom", 2: "two degrees of freedom"}
-
-
-def join(words: Sequence[str]) -> str:
-    """Words as a list in a sentence."""
-    return ", ".join(words[:-1]) + " and " + words[-1] if len(words) > 1 else words[0]
 
 
 def not_determined(missing: Sequence[str], remedy: Sequence[str], what: str) -> str:

@@ -101,7 +101,6 @@ def test_an_effect_left_out_is_said_to_be_scatter() -> None:
 
 
 def test_lists_read_as_sentences() -> None:
-    assert words.join(["a"]) == "a" and words.join(["a", "b", "c"]) == "a, b and c"
     assert words.not_determined(["p"], [], "these") == "p is not determined by these"
     assert words.not_determined(["p", "q"], ["r"], "these").endswith(
         "p and q are not determined by these: add r"

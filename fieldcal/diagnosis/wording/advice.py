@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fieldcal.core.positions import ladder
+from fieldcal.core.sentences import join
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
@@ -94,22 +95,13 @@ def _deciding(
                 apart = f"{other} ({place.apart:.0f} σ apart there)"
                 ways.setdefault(place.text, []).append(apart)
         for way, others in ways.items():
-            told = _list(others, "and")
+            told = join(others, "and")
             yield f"{_capital(way)}: it tells {one.id} from {told}."
         if open_:
             yield (
-                f"{one.id} or {_list(open_, 'or')}? {_none_in_reach(explanation)}"
+                f"{one.id} or {join(open_, 'or')}? {_none_in_reach(explanation)}"
                 f"{decided_by(one.id)}."
             )
-
-
-def _list(names: Sequence[str], word: str) -> str:
-    """Names with commas, the last behind a word.
-
-    >>> _list(["a", "b", "c"], "or")
-    'a, b or c'
-    """
-    return f" {word} ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def _capital(text: str) -> str:
@@ -133,7 +125,7 @@ def _look(unknown: Sequence[Unknown]) -> Iterator[str]:
         once = list(dict.fromkeys(names))
         several = len(once) > 1
         yield what + why.format(
-            channels=_list(once, "and"),
+            channels=join(once, "and"),
             follow="follow" if several else "follows",
             be="are" if several else "is",
         )

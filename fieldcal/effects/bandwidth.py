@@ -25,6 +25,7 @@ import numpy as np
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.physics.effect import NO_SHAPE, Param, Sensor, Values
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.lag import Lag
 
 
 class Bandwidth(Sensor):
@@ -43,9 +44,9 @@ class Bandwidth(Sensor):
         """Where it is known how specific force and rate change."""
         return bool(x.slope.any())
 
-    def time_constants(self, values: Values) -> tuple[float, float]:
-        """It is just those."""
-        return float(values[0]), float(values[1])
+    def lag(self, values: Values) -> Lag:
+        """The time constants of both triads."""
+        return Lag(acc=float(values[0]), gyr=float(values[1]))
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Minus the slope, each triad by its own."""

@@ -21,6 +21,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import NO_SHAPE, Param, Sensor, Values
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.lag import Lag
 
 
 class TimeDelay(Sensor):
@@ -32,9 +33,9 @@ class TimeDelay(Sensor):
     cure = "Correct the times in the driver by the delay that was found."
     source = "model of this project; 1 to 50 ms from filters and buffers"
 
-    def late(self, values: Values) -> float:
-        """It is just that."""
-        return float(values[0])
+    def lag(self, values: Values) -> Lag:
+        """The delay of the gyroscopes."""
+        return Lag(delay=float(values[0]))
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Minus the angular acceleration."""

@@ -18,6 +18,7 @@ from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.lag import Lag
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,11 @@ class State:
     earth: Array
     terms: tuple[Term, ...] = ()
     attitude: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def lag(self) -> Lag:
+        """By how much its effects make the sensors lag behind the motion."""
+        return sum((t.effect.lag(t.values) for t in self.terms), Lag())
 
     def experienced(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
         """What small rotations, the Earth's rate and motion effects make of rows."""

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.lag import Lag
 from fieldcal.physics.recording import CheckedSamples, Fault
 from fieldcal.physics.shape import Shape
 
@@ -105,13 +106,9 @@ class Effect(ABC):
         """Probability that a session has it, before its rows are seen."""
         return CHANCE
 
-    def late(self, values: Values) -> float:
-        """Seconds by which it makes the gyroscopes late."""
-        return 0.0
-
-    def time_constants(self, values: Values) -> tuple[float, float]:
-        """Those that it gives accelerometers and gyroscopes, s."""
-        return 0.0, 0.0
+    def lag(self, values: Values) -> Lag:
+        """By how much it makes the sensors lag behind the motion."""
+        return Lag()
 
     @property
     def id(self) -> str:

@@ -14,6 +14,7 @@ from fieldcal.model.causes.columns import RowView, of_effect
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Line, Motion, Sensor
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.lag import Lag
 
 SHAPE = {"tau_s": 7.0, "at_s": 20.0}
 ROWS = 40
@@ -107,6 +108,21 @@ def test_line_responds_in_every_row(effect: Line) -> None:
     response = effect.response(X, 0.5)
     assert response.shape[:2] == (ROWS, 6)
     assert (np.abs(response).max(axis=(1, 2)) > 0).all()
+
+
+def test_what_lags_behind_the_motion_has_the_columns_of_its_lag() -> None:
+    """To first order a lag takes away what the motion changes by meanwhile."""
+    lagging = []
+    for effect in FITTED:
+        for k, one in enumerate(np.eye(len(effect.params))):
+            lag = effect.lag(one)
+            if lag != Lag():
+                lagging.append((effect.id, effect.params[k].name))
+                late = np.hstack([lag.acc * X.slope[:, :3], lag.gyr * X.slope[:, 3:]])
+                late[:, 3:] += lag.delay * X.w_dot
+                np.testing.assert_allclose(columns(effect, X)[:, :, k], -late)
+    assert {EFFECTS[id_].unit(name) for id_, name in lagging} == {"s"}
+    assert len(lagging) >= 3
 
 
 def test_tilt_and_offset_differ_once_both_joints_turn() -> None:

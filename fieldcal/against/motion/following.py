@@ -27,6 +27,7 @@ from fieldcal.model.rows.motion import Alignment, MotionRows, rows_in_motion
 from fieldcal.model.rows.reference import LEAST, Reference, Response
 from fieldcal.model.search.inference import Inference, Inferred
 from fieldcal.model.state import State
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.motion_rows import MotionSystem, noise_levels
 from fieldcal.session.description import Description
 
@@ -162,7 +163,8 @@ def _delays(dictionary: MotionDictionary) -> tuple[Member, ...]:
         (cause, group)
         for cause in dictionary.causes
         for group in cause.variants[:1]
-        if group.effect is not None and group.effect.late(np.ones(len(group.params)))
+        if group.effect is not None
+        and group.effect.lag(np.ones(len(group.params))).delay
     )
 
 
@@ -214,6 +216,7 @@ class MotionFit:
     def searched(self, members: Sequence[Member]) -> Inferred:
         """The best set of causes, beginning with some."""
         found = Inference(self.system, self.nominal).run(members or None)
+        # a search for effects first has columns of its own
         system = found.inference.system
         if isinstance(system, MotionSystem):
             self.system = system
@@ -227,16 +230,19 @@ class MotionFit:
             state, values, found = fit.settled(self.nominal, none, members)
             wanted = fit.wanted(members) | (values != 0)
             linear = self.system.linearised(state, wanted)
-            frequency, before = self.rows.frequency, self.system.power.copy()
-            self.levels = noise_levels(
-                self.bands, frequency, linear, values, found.state
-            )
-            for c, level in self.levels.items():
-                self.system.power[:, c] = self.power(c, level, frequency)
-            change = np.abs(np.log(self.system.power / before)).max()
-            moved = self._realigned(found, state)
-            if moved < STAYS and change < STEADY:
+            rows, power = self.rows, self.system.power.copy()
+            self._weigh(linear, values, found)
+            self._align(found, state)
+            change = np.abs(np.log(self.system.power / power)).max()
+            if self._step(found, rows) < STAYS and change < STEADY:
                 break
+
+    def _weigh(self, linear: Sequence[Linear], values: Array, found: Set) -> None:
+        """Give the rows the noise that a fit leaves."""
+        frequency = self.rows.frequency
+        self.levels = noise_levels(self.bands, frequency, linear, values, found.state)
+        for c, level in self.levels.items():
+            self.system.power[:, c] = self.power(c, level, frequency)
 
     def power(self, c: int, level: Array, frequency: Array) -> Array:
         """Power of the noise of one channel's coefficients, (n,).
@@ -247,38 +253,45 @@ class MotionFit:
         power[frequency > self.hz[c]] /= NOTHING
         return power
 
-    def _realigned(self, found: Set, there: State) -> float:
-        """Move the rows to the alignment that a fit has; how far, in its sigmas.
+    def _align(self, found: Set, there: State) -> None:
+        """Move the rows to the alignment of a fit, and to how its state lags."""
+        acc, gyr = self._responses(there)
+        alignment = self._alignment(found)
+        now = replace(self.rows, alignment=alignment, acc=acc, gyr=gyr)
+        self.system.dictionary.moved(now)
 
-        Time constants count in parts of the least that shows.
-        """
+    def _alignment(self, found: Set) -> Alignment:
+        """The alignment that a fit has."""
         d, now = self.system.dictionary, self.rows.alignment
-        clock, clock_cov = told(found, d.clock, 2)
-        turn, turn_cov = told(found, d.turn, 3)
-        alignment = replace(
+        (delay, drift), _ = told(found, d.clock, 2)
+        turn, _ = told(found, d.turn, 3)
+        return replace(
             now,
-            delay=now.delay + float(clock[0]),
-            drift=now.drift + float(clock[1]),
+            delay=now.delay + float(delay),
+            drift=now.drift + float(drift),
             rotation=exponential(turn) @ now.rotation,
             unseen=now.unseen + self._unseen(found),
         )
-        before = self.rows
-        acc, gyr = self._responses(there)
-        d.moved(replace(before, alignment=alignment, acc=acc, gyr=gyr))
-        sigma = np.sqrt(np.concatenate([np.diag(clock_cov), np.diag(turn_cov)]))
-        moved = float(np.abs(np.concatenate([clock, turn]) / sigma).max())
-        followed = max(abs(acc.tau - before.acc.tau), abs(gyr.tau - before.gyr.tau))
-        return max(moved, followed / LEAST)
+
+    def _step(self, found: Set, before: MotionRows) -> float:
+        """How far a fit has moved the rows, in its sigmas.
+
+        Time constants count in parts of the least that shows.
+        """
+        d, now = self.system.dictionary, self.rows
+        steps = [told(found, d.clock, 2), told(found, d.turn, 3)]
+        moved = [np.abs(step / np.sqrt(np.diag(cov))).max() for step, cov in steps]
+        both = ((now.acc, before.acc), (now.gyr, before.gyr))
+        followed = [abs(one.tau - other.tau) / LEAST for one, other in both]
+        return float(max(moved + followed))
 
     def _responses(self, there: State) -> tuple[Response, Response]:
         """How a state has the triads follow the motion; one and the same if alike."""
-        late = sum(t.effect.late(t.values.tolist()) for t in there.terms)
-        each = [t.effect.time_constants(t.values.tolist()) for t in there.terms]
-        acc, gyr = np.sum(each, axis=0).tolist() if each else (0.0, 0.0)
-        first = self.rows.acc.towards(self.rows.reference, 0.0, acc)
-        if not late and acc == gyr:
+        lag = there.lag
+        first = self.rows.acc.towards(self.rows.reference, 0.0, lag.acc)
+        if not lag.delay and lag.acc == lag.gyr:
             return first, first
-        return first, self.rows.gyr.towards(self.rows.reference, late, gyr)
+        return first, self.rows.gyr.towards(self.rows.reference, lag.delay, lag.gyr)
 
     def _unseen(self, found: Set) -> Array:
         """What a fit adds to gravity along an axis that the reference lacks."""

@@ -174,8 +174,8 @@ class Turning:
         self, state: State, ends: Experience, pair: tuple[int, int], a: int, b: int
     ) -> Turn | None:
         """Follow a turn, rid of what the state has wrong of the gyroscopes."""
-        late = sum(t.effect.late(t.values) for t in state.terms)
-        leg = Leg(self.source, ends, state.bias[3:], state.scale[3:], late, pair, a, b)
+        bias, scale, late = state.bias[3:], state.scale[3:], state.lag.delay
+        leg = Leg(self.source, ends, bias, scale, late, pair, a, b)
         if (steps := divided(leg)) is None:
             return None
         rid: Array = np.zeros((len(steps.edge), 3))
@@ -258,7 +258,7 @@ def moved(x: Experience, state: State) -> Experience:
 
 def wrong(state: State, x: Experience, since: Array) -> Array:
     """What the state has of the gyroscopes beside bias, scale and delay, (n, 3)."""
-    terms = tuple(t for t in state.terms if not t.effect.late(t.values))
+    terms = tuple(t for t in state.terms if not t.effect.lag(t.values).delay)
     off = replace(state, terms=terms).output(x, since)
     out: Array = off[:, 3:] - state.bias[3:] - state.scale[3:] * x.w
     return out

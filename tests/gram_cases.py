@@ -15,9 +15,9 @@ from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
-from fieldcal.model.system.window_rows import Linear
 
 WINDOWS, ROWS, WIDTH, SMALL_ROTATION = 4, 3, 9, 9
 """Columns that a set may have; those of the positions' turns come after them."""

@@ -17,8 +17,9 @@ from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_system import System, gram
-from fieldcal.model.system.window_rows import Linear
+from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.experience import Experience
 
 LADDER = (
@@ -94,7 +95,7 @@ class Session:
         if chance is not None:
             causes = [replace(c, chance=chance) for c in causes]
         flat = np.hstack([x.f, x.w])
-        linear = System(rows_of(x, flat), whole).linearised(nominal())
+        linear = WindowSystem(rows_of(x, flat), whole).linearised(nominal())
         kept = np.unique(
             np.concatenate(
                 [g.columns for g in whole.always]

@@ -28,8 +28,8 @@ from fieldcal.diagnosis.findings.stretch_means import rms
 from fieldcal.model import priors
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.system.fitted import Fitted, whole
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.linear_system import gram
-from fieldcal.model.system.window_rows import Linear
 
 
 def before(found: Decided) -> SimulatorPrediction:

@@ -22,7 +22,7 @@ from fieldcal.model.evidence.sizing import EVEN, Member, Sizes
 from fieldcal.model.posterior.reported import reported
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
-from fieldcal.model.system.window_rows import Linear
+from fieldcal.model.system.linear_rows import Linear
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,8 @@ from fieldcal.model.search.inference import Inference, Inferred
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import Fitted
-from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.turn_rows import Turns
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import Turning
 from fieldcal.session.description import Description
 
@@ -132,7 +132,9 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
     posterior = Posterior(
         found.search, found.best, lambda there: inference.beside(found, there)
     )
-    return Explanation(prepared, found, best, base_of(inference), posterior)
+    return Explanation(
+        prepared, found, best, base_of(inference, prepared.rows), posterior
+    )
 
 
 def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference:
@@ -154,7 +156,7 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
     rough |= "sway" in prepared.checked.ids
     turning = Turning(source, rows, dictionary.since)
     turns = Turns(turning, dictionary, not rough) if turned else None
-    return Inference(System(rows, dictionary), nominal, turns)
+    return Inference(WindowSystem(rows, dictionary), nominal, turns)
 
 
 def nominal_of(about: Description, places: int, prepared: Prepared) -> State:
@@ -191,13 +193,13 @@ def origins(source: RowSource, rows: Rows) -> Array:
     return np.array([x.t - at[x.position] for at in instants])
 
 
-def base_of(whole: Inference) -> Fitted:
+def base_of(whole: Inference, rows: Rows) -> Fitted:
     """Bias and scale factor alone, refitted to the windows."""
     d = whole.dictionary.plain()
-    inference = Inference(System(whole.system.rows, d), whole.nominal)
+    inference = Inference(WindowSystem(rows, d), whole.nominal)
     start: Array = np.zeros(d.width)
     state, values, _ = inference.settled(inference.nominal, start, ())
     wanted = inference.wanted(())
     linear = inference.system.linearised(state, wanted)
     found = Search(d, inference.gram_of(linear, values, wanted)).evaluated(())
-    return Fitted(inference.system.rows, d, linear, values, found)
+    return Fitted(rows, d, linear, values, found)

@@ -18,8 +18,8 @@ from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_system import System
 from fieldcal.model.system.turn_rows import TurnRows, Turns
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve.averaging import mixed
 from fieldcal.solve.given import Given
 from fieldcal.solve.observations import Mask
@@ -58,7 +58,9 @@ def without_bad_windows(
     """The fit of the windows that agree, while those left out are few."""
 
     def inference(left: Mask) -> Inference:
-        return Inference(System(_without(rows, given, left), given), nominal, turns)
+        return Inference(
+            WindowSystem(_without(rows, given, left), given), nominal, turns
+        )
 
     bad, score = np.zeros(len(given.held), dtype=bool), np.nan
     # one bad window of six can be told from scatter, two of six cannot

@@ -27,7 +27,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import Fitted
-from fieldcal.model.system.linear_system import System
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.experience import Experience
 
 STANDS = 3.0
@@ -69,7 +69,7 @@ def without(explanation: Explanation, fitted: Fitted) -> State:
 def _given(explanation: Explanation, fitted: Fitted, rate: Array) -> State:
     """What was fitted, given the rate of the base, (3,) rad/s (1)."""
     nominal = explanation.inferred.inference.nominal
-    inference = Inference(System(fitted.rows, fitted.dictionary), nominal)
+    inference = Inference(WindowSystem(fitted.rows, fitted.dictionary), nominal)
     found, at = fitted.set.state, _columns(fitted)
     if len(at):
         shared = found.inverse[:, at]

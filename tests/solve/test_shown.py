@@ -17,7 +17,7 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_system import System
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve import Observations
 from fieldcal.solve.estimation import Estimated, Recorded, estimated
 from fieldcal.solve.given import Given, Wanted
@@ -200,7 +200,7 @@ def test_a_cause_is_on_every_axis_that_it_may_be_on() -> None:
     recorded = recording(1e-4)
     shown = [Shown((member("bias_drift", (0,)),), 1.0)]
     d = Given(recorded.rows, np.ones(6), recorded.since, False, Wanted(), shown)
-    gram = Inference(System(recorded.rows, d), NOMINAL).gram(
+    gram = Inference(WindowSystem(recorded.rows, d), NOMINAL).gram(
         NOMINAL, np.zeros(d.width), None
     )
     found = variants(Search(d, gram), d.asked, d.explanations[0])

@@ -23,9 +23,9 @@ from fieldcal.model.posterior.held_out import in_question
 from fieldcal.model.rows.motion import MotionRows, frequencies
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.motion_rows import noise_levels
-from fieldcal.model.system.window_rows import Linear
 
 FOLDS = 6
 """Parts that a recording is left out in, each of stretches on end."""

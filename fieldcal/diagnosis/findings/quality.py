@@ -96,7 +96,7 @@ def raw(block: Block, explanation: Explanation) -> Fitted:
     # a device that was touched is not held by hand for that: rows of the same kind
     one_each = len(prepared.rows.x) == len(explanation.dictionary.held)
     rows = (rows_of if one_each else reduce)(source)
-    return base_of(inference_of(source, rows, prepared))
+    return base_of(inference_of(source, rows, prepared), rows)
 
 
 def parted(one: Agreement, other: Agreement) -> int:

@@ -21,9 +21,9 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import Fitted, whole
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
-from fieldcal.model.system.window_rows import Linear
 
 FOLDS = 12
 """Parts left out at most, one position or several far apart in each."""

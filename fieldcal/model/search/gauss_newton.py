@@ -18,9 +18,9 @@ from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.fitted import whole
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.linear_system import System, gram
 from fieldcal.model.system.turn_rows import TurnRows, Turns
-from fieldcal.model.system.window_rows import Linear
 from fieldcal.physics.effect import Motion, Sensor
 
 NEWTON = 6

@@ -13,7 +13,7 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.system.window_rows import Linear
+from fieldcal.model.system.linear_rows import Linear
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,10 @@ channel by channel.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,93 +20,39 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE
-from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.evidence.gram import Gram
-from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.turn_rows import TurnRows
-from fieldcal.model.system.window_rows import Linear
 
-NOTHING, SHOWS = 1e-6, 1.0
-"""What a column of typical size makes in windows that show it: more than so many m/s^2
-on an accelerometer, standard deviations on a gyroscope, which sees the Earth turn."""
+SHOWS = 1.0
+"""How far a column of typical size stands out of the noise of all rows together, in
+standard deviations, where they show it."""
 
 
-class System:
+class System(ABC):
     """Rows and a dictionary, linearised about states.
 
     Parameters
     ----------
-    rows : of the windows
-    dictionary : their columns
+    dictionary : columns of the rows
 
     """
 
-    def __init__(self, rows: Rows, dictionary: Dictionary) -> None:
-        self.rows, self.dictionary = rows, dictionary
+    def __init__(self, dictionary: Dictionary) -> None:
+        self.dictionary = dictionary
 
-    def apart(self) -> System:
+    @abstractmethod
+    def apart(self) -> Self:
         """The same rows with a dictionary of their own, as it is now."""
-        return System(self.rows, self.dictionary.apart())
 
+    @abstractmethod
     def linearised(
         self, state: State, wanted: NDArray[np.bool_] | None = None
     ) -> list[Linear]:
         """Rows of every channel about a state, with all columns or those wanted."""
-        rows, used = self.rows, self.rows.used
-        view = RowView.of(rows.x, self.dictionary.since, state)
-        off = rows.y - state.output(view.x, self.dictionary.since)
-        parts: list[list[tuple[Index, Array]]] = [[] for _ in range(6)]
-        for first, end, basis in self.dictionary.spans():
-            at = np.arange(first, end)
-            kept = np.ones(len(at), bool) if wanted is None else wanted[at]
-            if not kept.any():
-                continue
-            table = basis.of(view)
-            if isinstance(basis, Course):
-                self._course(parts, at, table, kept)
-                continue
-            for c in self.dictionary.observed:
-                there = kept & np.any(table[used[:, c], c] != 0.0, axis=0)
-                if there.any():
-                    parts[c].append((at[there], table[:, c, there]))
-        out = []
-        for c in self.dictionary.observed:
-            use = np.flatnonzero(used[:, c])
-            left = self.dictionary.wander.left(rows.length[use], int(c))
-            weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
-            design = np.hstack([table[use] for _, table in parts[c]]) * weight[:, None]
-            columns = np.concatenate([at for at, _ in parts[c]])
-            window = np.searchsorted(self.dictionary.held, rows.x.position[use])
-            if wanted is None:
-                table = np.abs(design) * self.dictionary.typical[columns]
-                if c < 3:
-                    there = (table / weight[:, None]).max(axis=0) > NOTHING
-                else:
-                    there = np.linalg.norm(table, axis=0) > SHOWS
-                self.dictionary.shown[columns] |= there
-            out.append(
-                Linear(
-                    int(c), use, window, weight, columns, design, off[use, c] * weight
-                )
-            )
-        return out
-
-    def _course(
-        self,
-        parts: list[list[tuple[Index, Array]]],
-        at: Index,
-        table: Array,
-        kept: NDArray[np.bool_],
-    ) -> None:
-        """Columns `at` of a function that is the same on every channel, those kept."""
-        width = table.shape[1]
-        for c in self.dictionary.observed:
-            own = slice(c * width, (c + 1) * width)
-            if kept[own].any():
-                parts[c].append((at[own][kept[own]], table[:, kept[own]]))
 
 
 def gram(

@@ -15,8 +15,8 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.rows.coloured import Bands
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.model.state import State
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.linear_system import SHOWS, System
-from fieldcal.model.system.window_rows import Linear
 
 Parts = dict[int, list[tuple[Index, Array]]]
 """Columns that touch each channel, with their coefficients."""
@@ -33,6 +33,7 @@ class MotionSystem(System):
     """
 
     def __init__(self, dictionary: MotionDictionary, power: Array) -> None:
+        super().__init__(dictionary)
         self.dictionary: MotionDictionary = dictionary
         self.power = power
 

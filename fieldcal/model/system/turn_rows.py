@@ -22,8 +22,8 @@ from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State, Term
+from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.way_rows import BUILT_UP, WayRows, on_the_way, settling
-from fieldcal.model.system.window_rows import Linear
 from fieldcal.model.turns.attitude import between, geometry
 from fieldcal.model.turns.turn import Turn, Turning, moved, only
 from fieldcal.physics.experience import Experience

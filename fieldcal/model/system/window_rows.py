@@ -1,32 +1,117 @@
-"""Rows of the windows, linearised."""
+"""Rows of the windows and their dictionary: means at rest, linearised."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model.causes.columns import Course, RowView
+from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.rows.reduce import Rows
+from fieldcal.model.state import State
+from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_system import SHOWS, System
+
+NOTHING = 1e-6
+"""What a column of typical size makes on an accelerometer in windows that show it, at
+least, m/s^2."""
+
+Parts = list[tuple[Index, Array]]
+"""Columns that touch a channel, with their values in all rows, (n, k)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Linear:
-    """Rows of one channel, whitened.
+class WindowSystem(System):
+    """Rows of the windows and a dictionary, linearised about states.
 
-    Attributes
+    Parameters
     ----------
-    channel : index in `samples.CHANNELS`
-    rows : (r,) which rows
-    window : (r,) number of the window of each row
-    weight : (r,) what whitens
-    columns : (k,) of the dictionary that touch it
-    design : (r, k)
-    white : (r,) y - h(state)
+    rows : of the windows
+    dictionary : their columns
 
     """
 
-    channel: int
-    rows: Index
-    window: Index
-    weight: Array
-    columns: Index
-    design: Array
-    white: Array
+    def __init__(self, rows: Rows, dictionary: Dictionary) -> None:
+        super().__init__(dictionary)
+        self.rows = rows
+
+    def apart(self) -> Self:
+        """The same rows with a dictionary of their own, as it is now."""
+        return type(self)(self.rows, self.dictionary.apart())
+
+    def linearised(
+        self, state: State, wanted: NDArray[np.bool_] | None = None
+    ) -> list[Linear]:
+        """Rows of every channel about a state, with all columns or those wanted."""
+        d = self.dictionary
+        view = RowView.of(self.rows.x, d.since, state)
+        off = self.rows.y - state.output(view.x, d.since)
+        asked = np.ones(d.width, bool) if wanted is None else wanted
+        parts = self._parts(view, asked)
+        out = [self._channel(c, parts[c], off[:, c]) for c in d.observed.tolist()]
+        if wanted is None:
+            for part in out:
+                d.shown[part.columns] |= self._shows(part)
+        return out
+
+    def _parts(self, view: RowView, wanted: NDArray[np.bool_]) -> list[Parts]:
+        """Columns of each channel that are wanted and touch it."""
+        parts: list[Parts] = [[] for _ in range(6)]
+        for first, end, basis in self.dictionary.spans():
+            at, kept = np.arange(first, end), wanted[first:end]
+            if not kept.any():
+                continue
+            table = basis.of(view)
+            if isinstance(basis, Course):
+                self._course(parts, at, table, kept)
+                continue
+            for c in self.dictionary.observed:
+                used = self.rows.used[:, c]
+                there = kept & np.any(table[used, c] != 0.0, axis=0)
+                if there.any():
+                    parts[c].append((at[there], table[:, c, there]))
+        return parts
+
+    def _course(
+        self,
+        parts: list[Parts],
+        at: Index,
+        table: Array,
+        kept: NDArray[np.bool_],
+    ) -> None:
+        """Columns `at` of a function that is the same on every channel, those kept."""
+        width = table.shape[1]
+        for c in self.dictionary.observed:
+            own = slice(c * width, (c + 1) * width)
+            if kept[own].any():
+                parts[c].append((at[own][kept[own]], table[:, kept[own]]))
+
+    def _channel(
+        self, c: int, parts: Sequence[tuple[Index, Array]], off: Array
+    ) -> Linear:
+        """One channel's rows, whitened."""
+        rows, d = self.rows, self.dictionary
+        use = np.flatnonzero(rows.used[:, c])
+        left = d.wander.left(rows.length[use], c)
+        weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
+        design = np.hstack([table[use] for _, table in parts]) * weight[:, None]
+        columns = np.concatenate([at for at, _ in parts])
+        window = np.searchsorted(d.held, rows.x.position[use])
+        return Linear(c, use, window, weight, columns, design, off[use] * weight)
+
+    def _shows(self, part: Linear) -> NDArray[np.bool_]:
+        """Whether each column of a channel shows at its typical size, (k,).
+
+        A gyroscope sees the Earth turn, so there it has to stand out of the noise.
+        """
+        table = np.abs(part.design) * self.dictionary.typical[part.columns]
+        if part.channel < 3:
+            there: NDArray[np.bool_] = (table / part.weight[:, None]).max(
+                axis=0
+            ) > NOTHING
+            return there
+        stands_out: NDArray[np.bool_] = np.linalg.norm(table, axis=0) > SHOWS
+        return stands_out

@@ -17,7 +17,7 @@ from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.wander import Wander
-from fieldcal.model.system.linear_system import System
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import only
 from fieldcal.physics.experience import Experience
 
@@ -336,7 +336,7 @@ def test_chances_are_shared_among_variants_and_follow_changes() -> None:
 def test_the_first_linearisation_tells_which_columns_windows_show() -> None:
     x = ladder()
     d = dictionary(x)
-    System(rows_of(x, np.hstack([x.f, x.w])), d).linearised(nominal())
+    WindowSystem(rows_of(x, np.hstack([x.f, x.w])), d).linearised(nominal())
     assert d.shown[d.bias : d.bias + 6].all()
     assert d.shown[d.scale : d.scale + 3].all()
     assert not d.shown[d.scale + 3 : d.scale + 6].any(), "windows do not turn"

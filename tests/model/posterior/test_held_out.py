@@ -18,7 +18,8 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.posterior.held_out import HeldOut, folds, held_out
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import Fitted, whole
-from fieldcal.model.system.linear_system import System, gram
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.window_rows import WindowSystem
 
 ROWS = 3 * len(LADDER)
 
@@ -83,7 +84,7 @@ def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Ref
     values[d.small_rotation : d.small_rotation + 2 * d.places] = rng.normal(
         0, 1e-3, 2 * d.places
     )
-    linear = System(rows, d).linearised(state)
+    linear = WindowSystem(rows, d).linearised(state)
     search = Search(d, gram(linear, d, values))
     fitted = Fitted(rows, d, linear, values, search.evaluated(tuple(members)))
     table = np.zeros((ROWS, 6, d.width))
@@ -191,7 +192,7 @@ def test_sets_are_chosen_again() -> None:
     away.small_rotation[4] = 0.02, 0.03
     y = away.output(away.experienced(x), d.since)
     rows = rows_of(x, y + rng.normal(0, 3e-4, y.shape))
-    linear = System(rows, d).linearised(state)
+    linear = WindowSystem(rows, d).linearised(state)
     search = Search(d, gram(linear, d, np.zeros(d.width)))
     misset = next(c for c in d.causes if c.key == "misset")
     sets = [search.evaluated(m) for m in ((), ((misset, misset.variants[4]),))]

@@ -12,7 +12,8 @@ from fieldcal.model.evidence.sizing import alike
 from fieldcal.model.posterior.mixture import DEVICES, UNSTEADY, Mixing
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
-from fieldcal.model.system.linear_system import System, gram
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.window_rows import WindowSystem
 
 X = ladder()
 D = dictionary(X)
@@ -22,7 +23,9 @@ ROWS = 3
 
 def mixing(off: Array, given: bool = True) -> Mixing:
     """Hypotheses about rows that are off by something."""
-    linear = System(rows_of(X, np.hstack([X.f, X.w]) + off), D).linearised(nominal())
+    linear = WindowSystem(rows_of(X, np.hstack([X.f, X.w]) + off), D).linearised(
+        nominal()
+    )
     search = Search(D, gram(linear, D, np.zeros(D.width)))
     return Mixing(D, search.gram, search.evaluated(()), search.unstable, given)
 

@@ -15,7 +15,7 @@ from fieldcal.model.posterior.mixture import Mixing, Mixture
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_system import System
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve.given import Given, Wanted, seen_by
 from fieldcal.solve.rows import of_means
 
@@ -45,7 +45,9 @@ def case(off: Array, places: tuple[Position, ...] = PLACES) -> Case:
     rows = seen_by(recorded.rows, np.zeros(3))
     d = Given(rows, np.ones(6), recorded.since, False, Wanted())
     nominal = State(np.zeros(6), np.ones(6), np.zeros((len(places), 2)), np.zeros(3))
-    gram = Inference(System(rows, d), nominal).gram(nominal, np.zeros(d.width), None)
+    gram = Inference(WindowSystem(rows, d), nominal).gram(
+        nominal, np.zeros(d.width), None
+    )
     search = Search(d, gram)
     there = search.evaluated(())
     found = Mixing(d, gram, there, search.unstable).run()

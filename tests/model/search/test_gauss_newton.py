@@ -18,7 +18,7 @@ from fieldcal.model.search import selection
 from fieldcal.model.search.inference import Inference, Inferred
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State, Term
-from fieldcal.model.system.linear_system import System
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.shape import FINEST
 
 X = ladder(6)
@@ -38,7 +38,7 @@ def inference_of(state: State, seed: int = 2) -> Inference:
     d = dictionary(X)
     y = state.output(state.experienced(X), d.since)
     y += SD * np.random.default_rng(seed).standard_normal(y.shape)
-    return Inference(System(rows_of(X, y), d), nominal())
+    return Inference(WindowSystem(rows_of(X, y), d), nominal())
 
 
 SETTLING = Term(
@@ -53,8 +53,9 @@ def settling() -> Inferred:
 
 def chi2(found: Inferred) -> float:
     """Weighted squares of what the state leaves, over the rows."""
-    inference = found.inference
-    rows, d = inference.system.rows, inference.dictionary
+    system = found.inference.system
+    assert isinstance(system, WindowSystem)
+    rows, d = system.rows, system.dictionary
     off = rows.y - found.state.output(found.state.experienced(X), d.since)
     return float(np.mean((off / SD) ** 2))
 
@@ -161,7 +162,7 @@ def test_wanted_are_columns_of_the_set_and_what_is_always_there() -> None:
     groups = [*d.always, *(g for _, g in found.best.members)]
     expected = sorted({int(c) for g in groups for c in g.columns})
     assert np.flatnonzero(wanted).tolist() == expected
-    free = Inference(System(rows_of(X, X.f @ np.zeros((3, 6))),
+    free = Inference(WindowSystem(rows_of(X, X.f @ np.zeros((3, 6))),
                             dictionary(ladder(6, (2,)))), nominal())  # fmt: skip
     own = free.dictionary
     some = free.wanted(())
@@ -171,7 +172,7 @@ def test_wanted_are_columns_of_the_set_and_what_is_always_there() -> None:
 def test_the_top_of_a_parabola_is_where_it_is() -> None:
     """Three scores a ratio apart, and how sharp it is."""
     d = dictionary(X)
-    inference = Inference(System(rows_of(X, np.zeros((len(X), 6))), d), nominal())
+    inference = Inference(WindowSystem(rows_of(X, np.zeros((len(X), 6))), d), nominal())
     cause = next(c for c in d.causes if c.key == "settling:acc")
     here = cause.variants[4]
     at, sharp = here.shape["tau_s"], 40.0

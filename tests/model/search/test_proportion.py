@@ -10,14 +10,15 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.search.proportion import in_proportion
 from fieldcal.model.search.selection import Search
-from fieldcal.model.system.linear_system import System, gram
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.window_rows import WindowSystem
 
 X = ladder()
 
 
 def searched(off: Array, d: Dictionary) -> Search:
     y = np.hstack([X.f, X.w]) + off
-    linear = System(rows_of(X, y), d).linearised(nominal())
+    linear = WindowSystem(rows_of(X, y), d).linearised(nominal())
     return Search(d, gram(linear, d, np.zeros(d.width)))
 
 
@@ -65,7 +66,7 @@ def test_columns_are_the_derivatives_of_the_product() -> None:
     acc, gyr = in_proportion(d, [searched(off, d).evaluated(())])
     d.joined([acc, gyr])
     group = acc.variants[0]
-    linear = System(rows_of(X, np.hstack([X.f, X.w])), d).linearised(nominal())
+    linear = WindowSystem(rows_of(X, np.hstack([X.f, X.w])), d).linearised(nominal())
     design = np.zeros((len(X), 3, len(group.columns)))
     for part in linear[:3]:
         whole = np.zeros((len(X), d.width))

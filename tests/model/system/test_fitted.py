@@ -10,7 +10,8 @@ from small_sessions import SD, dictionary, ladder, nominal, rows_of
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import Fitted
-from fieldcal.model.system.linear_system import System, gram
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.window_rows import WindowSystem
 
 X = ladder()
 
@@ -24,7 +25,7 @@ def fitted() -> Fitted:
     rows.sd[:] *= rng.uniform(0.5, 2.0, rows.sd.shape)
     values = np.zeros(d.width)
     values[d.bias : d.bias + 3] = 0.01
-    linear = System(rows, d).linearised(nominal())
+    linear = WindowSystem(rows, d).linearised(nominal())
     search = Search(d, gram(linear, d, values))
     walk = next(c for c in d.causes if c.key == "random_walk:gyr")
     there = search.evaluated(((walk, walk.variants[0]),))

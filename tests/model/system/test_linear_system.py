@@ -16,7 +16,8 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.state import State, Term
-from fieldcal.model.system.linear_system import System, gram
+from fieldcal.model.system.linear_system import gram
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.physics.experience import Experience
 
@@ -85,7 +86,7 @@ class Columns:
         self.dictionary = dictionary(x)
         state = away(x)
         self.state = replace(state, terms=(*state.terms, *more))
-        system = System(rows_of(x, np.zeros((len(x), 6))), self.dictionary)
+        system = WindowSystem(rows_of(x, np.zeros((len(x), 6))), self.dictionary)
         self.table = np.zeros((len(x), 6, self.dictionary.width))
         for part in system.linearised(self.state):
             seen = part.design / part.weight[:, None]
@@ -188,7 +189,7 @@ def test_of_some_columns_the_rest_is_left_out() -> None:
     d, wanted = one.dictionary, np.zeros(one.dictionary.width, dtype=bool)
     wanted[np.random.default_rng(0).permutation(d.width)[:100]] = True
     y = np.zeros((ROWS, 6))
-    for part in System(rows_of(d.x, y), d).linearised(one.state, wanted):
+    for part in WindowSystem(rows_of(d.x, y), d).linearised(one.state, wanted):
         assert wanted[part.columns].all()
         seen = one.table[part.rows[:, None], part.channel, part.columns]
         np.testing.assert_array_equal(part.design, seen * part.weight[:, None])
@@ -203,7 +204,7 @@ def test_residuals_are_what_is_recorded_less_what_the_state_predicts(
 ) -> None:
     d = one.dictionary
     y = np.random.default_rng(5).standard_normal((len(d.x), 6))
-    linear = System(rows_of(d.x, y), d).linearised(one.state)
+    linear = WindowSystem(rows_of(d.x, y), d).linearised(one.state)
     assert [p.channel for p in linear] == list(range(6))
     off = y - output(d, one.state)
     for part in linear:
@@ -219,7 +220,7 @@ def test_a_row_that_is_not_used_says_nothing() -> None:
     y = np.where(d.used, 0.0, np.nan)
     recorded = rows_of(x, y)
     recorded.sd[3, 1] = np.nan
-    linear = System(recorded, d).linearised(away(x))
+    linear = WindowSystem(recorded, d).linearised(away(x))
     assert 3 not in linear[1].rows and len(linear[1].white) == ROWS - 1
     assert len(linear[0].white) == ROWS
 
@@ -237,7 +238,7 @@ def test_the_gram_matrix_is_that_of_the_rows(free: tuple[int, ...]) -> None:
     values = np.zeros(d.width)
     values[some[::7]] = rng.standard_normal(len(some[::7])) * 1e-3
     recorded = rows_of(d.x, y)
-    linear = System(recorded, d).linearised(one.state)
+    linear = WindowSystem(recorded, d).linearised(one.state)
     found = gram(linear, d, values, (), some).weighed(TAU)
     at, channel = (i.ravel() for i in np.indices((ROWS, 6)))
     design = one.table.reshape(ROWS * 6, -1)

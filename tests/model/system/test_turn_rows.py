@@ -16,8 +16,9 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import Term
 from fieldcal.model.system import turn_rows, way_rows
-from fieldcal.model.system.linear_system import System, gram
+from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.effect import Motion
 
 EFFECTS = catalogue()
@@ -46,7 +47,7 @@ def test_columns_and_variances_of_the_means_of_windows() -> None:
     d = dictionary(X, common=2e-3)
     rows = rows_of(X, np.zeros((len(X), 6)))
     rows.sd[:] = SD * RNG.uniform(0.5, 2.0, (len(X), 6))
-    linear = System(rows, d).linearised(nominal())
+    linear = WindowSystem(rows, d).linearised(nominal())
     means, spread = turn_rows._means(linear, d), turn_rows._spread(linear, d)
     for p in range(9):
         at = X.position == p
@@ -82,7 +83,7 @@ def test_a_way_that_a_hand_shook_says_nothing(size: float, kept: bool) -> None:
 
 def test_what_no_physics_makes_of_accelerometers_at_rest_is_strange() -> None:
     d = dictionary(X)
-    linear = System(rows_of(X, np.hstack([X.f, X.w])), d).linearised(nominal())
+    linear = WindowSystem(rows_of(X, np.hstack([X.f, X.w])), d).linearised(nominal())
     search = Search(d, gram(linear, d, np.zeros(d.width)))
     causes = {c.key: c for c in d.causes}
 

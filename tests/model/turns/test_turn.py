@@ -23,6 +23,7 @@ from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.model.system.way_rows import WayRows
+from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.session.description import parse
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
@@ -250,6 +251,7 @@ def test_turns_are_foretold_from_windows_and_the_other_turns() -> None:
     """With the scale factors in the set: without them a closure is far off."""
     one = ride("gyro_scale")
     inference, d = one.inference, one.inference.dictionary
+    assert isinstance(inference.system, WindowSystem)
     linear = inference.system.linearised(inference.nominal)
     at_rest = np.zeros(d.width)
     rows = gram(linear, d, at_rest, one.turns)

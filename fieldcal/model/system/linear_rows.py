@@ -1,0 +1,32 @@
+"""Rows of one channel, linearised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fieldcal.core.samples import Array, Index
+
+
+@dataclass(frozen=True, slots=True)
+class Linear:
+    """Rows of one channel, whitened.
+
+    Attributes
+    ----------
+    channel : index in `samples.CHANNELS`
+    rows : (r,) which rows
+    window : (r,) number of the window of each row
+    weight : (r,) what whitens
+    columns : (k,) of the dictionary that touch it
+    design : (r, k)
+    white : (r,) y - h(state)
+
+    """
+
+    channel: int
+    rows: Index
+    window: Index
+    weight: Array
+    columns: Index
+    design: Array
+    white: Array

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldcal.against.motion.correlation import aligned
+from fieldcal.against.motion.alignment import aligned
 from fieldcal.against.motion.held import holds_positions
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.against.motion.correlation import aligned
+from fieldcal.against.motion.alignment import aligned
 from fieldcal.against.motion.following import Following, follow
 from fieldcal.against.motion.free_calibration import calibration, differing, freed
 from fieldcal.against.motion.placed import placed, turned

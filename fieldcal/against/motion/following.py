@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.against.motion.correlation import CommonMotion
+from fieldcal.against.motion.alignment import CommonMotion
 from fieldcal.core.errors import InputError
 from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array, Block, Index

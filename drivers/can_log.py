@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.errors import InputError, RecordingEnded
 from fieldcal.drivers.can_buses import Buses
 from fieldcal.drivers.can_frames import FRAME, Frames, Packed
 from fieldcal.drivers.pace import Pace
@@ -72,7 +72,7 @@ class PlayedCanLog:
 
         Raises
         ------
-        DeviceError
+        RecordingEnded
             At the end of the log.
         InputError
             If frames of another bus turn up that might as well be meant, or none of
@@ -83,9 +83,7 @@ class PlayedCanLog:
             self._piece = next(self._pieces, self._piece)
         if not len(self._piece):
             self._buses.finish()
-            raise DeviceError(
-                f"{self._path} has ended after {self.now - self._first:.3f} s"
-            )
+            raise RecordingEnded(self._path, self.now - self._first)
         until = self._pace.wait(float(self._piece["t"][0]), timeout)
         late = np.flatnonzero(self._piece["t"] > until)
         piece = self._piece[: late[0] if len(late) else None]

@@ -10,7 +10,7 @@ import gzip
 from bisect import bisect_right
 from pathlib import Path
 
-from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.errors import InputError, RecordingEnded
 from fieldcal.drivers.mavlink_frames import HEADS, SECOND, SIGNATURE
 from fieldcal.drivers.pace import Pace
 from fieldcal.drivers.reader import Chunk
@@ -91,13 +91,13 @@ class PlayedMavlinkLog:
 
         Raises
         ------
-        DeviceError
+        RecordingEnded
             At the end of the log.
 
         """
         if self._next >= len(self._chunks):
             seconds = self._chunks[-1].t_host - self._chunks[0].t_host
-            raise DeviceError(f"{self._path} has ended after {seconds:.3f} s")
+            raise RecordingEnded(self._path, seconds)
         end = min(self._next + PIECE, len(self._chunks))
         until = self._pace.wait(self._chunks[self._next].t_host, timeout)
         end = bisect_right(

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.core.errors import InputError, RecordingEnded
 from fieldcal.core.samples import Block, Grain, concat
 from fieldcal.drivers import can_log, mavlink_log
 from fieldcal.drivers.codec import open_codec
@@ -59,7 +59,7 @@ class ReplayImu(Driver):
 
         Raises
         ------
-        DeviceError
+        RecordingEnded
             At the end of the recording.
 
         """
@@ -125,13 +125,13 @@ class _ReplayedSamples(Driver):
 
         Raises
         ------
-        DeviceError
+        RecordingEnded
             At the end of the recording.
 
         """
         t, i = self._block.t, self._next
         if i == len(t):
-            raise DeviceError(f"{self.name} has ended after {t[-1] - t[0]:.3f} s")
+            raise RecordingEnded(self.name, float(t[-1] - t[0]))
         until = min(self._pace.wait(float(t[i]), timeout), t[i] + PIECE)
         if until < t[i]:
             return None

@@ -8,6 +8,7 @@ FieldcalError                2
 +-- DeviceError              3  the link to the device failed
 |    +-- DeviceSilent        3  no sample came in time
 |    +-- LinkLost            3  the link broke during a run
+|    +-- RecordingEnded      3  a recording that is played has no more samples
 |    +-- MoverFailed         3  what turns the device did not do so
 |         +-- MoverGone      3  it may come back
 +-- Moved                    1  the device was not still during a window
@@ -76,6 +77,20 @@ class LinkLost(DeviceError):
     def __init__(self, fault: str) -> None:
         super().__init__(f"{fault}, then start again")
         self.fault = fault
+
+
+class RecordingEnded(DeviceError):
+    """A recording that is played as a device has no more samples.
+
+    Parameters
+    ----------
+    name : of the recording
+    seconds : that it lasted, s
+
+    """
+
+    def __init__(self, name: object, seconds: float) -> None:
+        super().__init__(f"{name} has ended after {seconds:.3f} s")
 
 
 class MoverFailed(DeviceError):

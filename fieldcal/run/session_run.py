@@ -23,6 +23,7 @@ from fieldcal.core.errors import (
     FieldcalError,
     LinkLost,
     MoverFailed,
+    RecordingEnded,
     SessionError,
     Skipped,
     Stopped,
@@ -106,8 +107,8 @@ class SessionRun:
             try:
                 with driver:
                     return self._with(driver)
-            except MoverFailed:
-                raise
+            except (MoverFailed, RecordingEnded):
+                raise  # neither comes back by itself
             except DeviceError as error:
                 if driver.health.samples:
                     self._lost = (monotonic(), error)

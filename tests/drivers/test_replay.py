@@ -130,16 +130,20 @@ def test_a_log_of_an_autopilot_plays_through_the_same_code(shared: Path) -> None
         assert imu.grain.cut and imu.notes["acc_unit"] == "mg"
 
 
-def test_a_recorded_session_is_taken_through_a_procedure_again(tmp_path: Path) -> None:
+def test_a_recorded_session_is_taken_through_a_procedure_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The arrivals in it are of long ago; they are the clock while it plays."""
-    run = ["run", "two_position", "--headless", "--seconds=10", "--level=0.001"]
+    run = ["run", "two_position", "--headless", "--level=0.001"]
     run += ["--angles=0.001", "--latitude=45"]
     virtual = ["--virtual=--can slcan", "--speed", "20", "-o", str(tmp_path / "first")]
-    assert main([*run, *virtual]) == 0
+    assert main([*run, *virtual, "--seconds=12"]) == 0
     url = f"replay:{tmp_path / 'first'}?speed=20"
     with open_driver(url) as imu:
         assert imu.grain.acc == pytest.approx(1e-4)
-    assert main([*run, "--device", url, "-o", str(tmp_path / "second")]) == 0
+    # a rest that is seen a little later leaves less of its window
+    again = [*run, "--device", url, "--seconds=10"]
+    assert main([*again, "-o", str(tmp_path / "second")]) == 0
     first, second = (
         json.loads((tmp_path / name / "result.json").read_text())["parameters"]
         for name in ("first", "second")
@@ -147,3 +151,9 @@ def test_a_recorded_session_is_taken_through_a_procedure_again(tmp_path: Path) -
     for group in ("acc_bias", "acc_scale"):
         off = np.subtract(first[group]["value"], second[group]["value"])
         assert np.all(np.abs(off) < 4 * np.array(first[group]["sigma"]))
+    # a recording that was too short does not come back
+    capsys.readouterr()
+    short = [*run, "--device", url, "--seconds=14"]
+    assert main([*short, "-o", str(tmp_path / "third")]) == 3
+    said = capsys.readouterr().err
+    assert "has ended after" in said and "once it is back" not in said

@@ -148,10 +148,12 @@ class Experience:
 
     @property
     def earth_seen(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Rows of unknown orientation whose gyroscopes show the Earth's rate, (n,)."""
-        seen: np.ndarray[Any, np.dtype[np.bool_]] = (
-            ~self.oriented & ~self.rate.any(axis=1) & self.w.any(axis=1)
-        )
+        """Rows at rest, of unknown orientation, whose gyroscopes show the Earth's rate.
+
+        (n,); on the way between two positions they show that the device is turned.
+        """
+        free = ~self.oriented & ~self.rate.any(axis=1) & (self.position >= 0)
+        seen: np.ndarray[Any, np.dtype[np.bool_]] = free & self.w.any(axis=1)
         return seen
 
     @property

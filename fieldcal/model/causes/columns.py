@@ -228,7 +228,7 @@ def earth_aside(view: RowView) -> Array:
     """
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
-    seen = np.flatnonzero(view.plain.earth_seen & (view.plain.position >= 0))
+    seen = np.flatnonzero(view.plain.earth_seen)
     for k, side in enumerate(across(view.x.w[seen])):
         at = 2 * view.plain.position[seen] + k
         out[seen[:, None], [3, 4, 5], at[:, None]] = view.state.scale[3:] * side

@@ -354,3 +354,14 @@ def test_however_a_device_lies_the_earth_s_upright_rate_is_along_the_force() -> 
     up = x.f[free] / np.linalg.norm(x.f[free], axis=1)[:, None]
     np.testing.assert_allclose(found[free][:, 3:, 3], up)
     np.testing.assert_allclose(found[free][:, 3:, :3], np.tile(np.eye(3), (6, 1, 1)))
+
+
+def test_the_earth_turns_a_device_on_its_way_as_well() -> None:
+    """What gyroscopes show there is no Earth's rate: the device is turned."""
+    x = ladder(free=range(9))
+    way = replace(x, w=np.full((27, 3), 0.4), position=np.full(27, -1))
+    assert not way.earth_seen.any()
+    assert replace(way, position=x.position).earth_seen.all()
+    found = columns.earth_anyhow(RowView.of(way, np.array([x.since_turn]), nominal()))
+    np.testing.assert_allclose(found[:, 3:, :3], np.tile(np.eye(3), (27, 1, 1)))
+    np.testing.assert_allclose(found[:, 3:, 3], x.f / 9.81)

@@ -16,9 +16,7 @@ from fieldcal.diagnosis.findings import found_effects, mismatches
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
-from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.evidence.sizing import likeliest as likeliest_size
 from fieldcal.model.posterior.reported import reported
 from fieldcal.model.search.selection import Search
 from fieldcal.physics.effect import Scatter
@@ -151,7 +149,8 @@ def quantities(there: Widened, member: Member) -> dict[str, Quantity]:
     if group.effect is None:
         return {}
     if isinstance(group.effect, Scatter):
-        return _sizes(there, member)
+        d = there.inference.dictionary
+        return found_effects.sizes_of(there.set, d, group, _size_of(there, member))
     values, covariance = there.estimate(group.columns)
     sigma = np.sqrt(np.diag(covariance))
     before = group.sizes(_size_of(there, member))
@@ -162,7 +161,7 @@ def quantities(there: Widened, member: Member) -> dict[str, Quantity]:
         if s**2 < thresholds.DETERMINED * b**2
     }
     if there.inference.dictionary.free.all():
-        out = found_effects.whatever_turned(there.told_from, group, out)
+        out = found_effects.whatever_turned(group, values, covariance, before, out)
     for shape in group.effect.shapes:
         at = group.shape[shape.name]
         unsure = min(group.unsure, at) if np.isfinite(group.unsure) else None
@@ -173,19 +172,6 @@ def quantities(there: Widened, member: Member) -> dict[str, Quantity]:
 def _size_of(there: Widened, member: Member) -> float:
     at = there.set.members.index(member)
     return float(priors.SIZES[there.set.sizes.members[at]])
-
-
-def _sizes(there: Widened, member: Member) -> dict[str, Quantity]:
-    """Sizes of what is random, with their uncertainty."""
-    group: Group = member[1]
-    state = there.set.state
-    at = np.array([int(np.flatnonzero(state.columns == c)[-1]) for c in group.columns])
-    v, part = likeliest_size(state, at, _size_of(there, member))
-    params = [group.effect.params[c] for c in group.params] if group.effect else []
-    return {
-        p.name: Quantity(v * p.typical, v * p.typical * part, p.unit)
-        for p in params or (group.effect.params if group.effect else ())
-    }
 
 
 def _aliases(source: Side, name: str) -> tuple[str, ...]:

@@ -16,8 +16,10 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import HeldOut, in_question
+from fieldcal.model.posterior.model_average import ModelAverage
 from fieldcal.model.posterior.probabilities import Posterior, Standing
 from fieldcal.model.posterior.reported import reported
+from fieldcal.model.posterior.time_constants import elsewhere
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource
@@ -76,6 +78,12 @@ class Explanation:
     def held_out(self) -> HeldOut:
         """The rows without each of their parts."""
         return HeldOut(self.best, self.in_question)
+
+    @cached_property
+    def average(self) -> ModelAverage:
+        """Numbers over all sets that count."""
+        around = elsewhere(self.inferred)
+        return ModelAverage(self.posterior, around or [self.best.set])
 
     @cached_property
     def standing(self) -> tuple[Standing, ...]:

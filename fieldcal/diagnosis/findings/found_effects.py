@@ -18,13 +18,14 @@ from fieldcal.diagnosis.signal.line import Tone
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import Member, likeliest
+from fieldcal.model.evidence.sizing import Member, likeliest, likeliest_of_axis
 from fieldcal.model.posterior.held_out import turn_residual, turns_held_out
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.system.way_rows import ARRIVAL_S
-from fieldcal.physics.effect import Scatter
+from fieldcal.physics.effect import Param, Scatter
 from fieldcal.physics.recording import Fault
 
 
@@ -115,18 +116,23 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
     if isinstance(effect, Scatter):
         return sizes(explanation, standing)
     out: dict[str, Quantity] = {}
-    for _, group in standing.members:
-        value, sigma, prior = estimates(explanation.best.set, group.columns)
+    for member in standing.members:
+        group = member[1]
+        value, covariance = explanation.average.of_member(member)
+        _, _, prior = estimates(explanation.best.set, group.columns)
         own: dict[str, Quantity] = {}
+        sigma = np.sqrt(np.diag(covariance))
         for j, v, s, wide in zip(group.params, value, sigma, prior, strict=True):
             if s**2 < thresholds.DETERMINED * wide**2:
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
         if explanation.dictionary.free.all():
-            own = whatever_turned(explanation.best.set, group, own)
+            own = whatever_turned(group, value, covariance, prior, own)
         out |= _since_arrival(own, group)
     for shape in effect.shapes:
         known = [m for m in standing.members if shape.name in m[1].shape]
+        if shape.kind == "instant":
+            known = known[:1]  # by all channels already
         found = [shape_of(explanation, m) for m in known]
         weight = np.array([1 / max(error, 1e-12) ** 2 for _, error in found])
         at = float(weight @ [at for at, _ in found] / weight.sum())
@@ -135,12 +141,23 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
 
 
 def whatever_turned(
-    found: Set, group: Group, own: dict[str, Quantity]
+    group: Group,
+    value: Array,
+    covariance: Array,
+    prior: Array,
+    own: dict[str, Quantity],
 ) -> dict[str, Quantity]:
     """Numbers of a device of which nobody knows how it stands.
 
     What a turn of the whole device makes of two parameters is seen by their sum: where
     that is better known than either, it is in the place of both.
+
+    Parameters
+    ----------
+    group : of an effect
+    value, covariance, prior : (k,), (k, k), (k,) of its parameters; their sizes before
+    own : its numbers by name
+
     """
     effect, out = group.effect, dict(own)
     if effect is None:
@@ -149,13 +166,12 @@ def whatever_turned(
     for gone, kept in effect.turned_into.items():
         if not {gone, kept} <= set(names):
             continue
-        at = _places(found, group.columns[[names.index(gone), names.index(kept)]])
-        cov = found.state.inverse[np.ix_(at, at)]
-        before = float((found.state.sizes[at] ** 2).sum())
+        at = [names.index(gone), names.index(kept)]
+        cov, before = covariance[np.ix_(at, at)], float((prior[at] ** 2).sum())
         if cov.sum() < min(np.diag(cov).min(), thresholds.DETERMINED * before):
             out.pop(gone, None)
-            value, sigma = found.state.estimate[at].sum(), np.sqrt(cov.sum())
-            out[kept] = Quantity(float(value), float(sigma), effect.unit(kept))
+            total, sigma = value[at].sum(), np.sqrt(cov.sum())
+            out[kept] = Quantity(float(total), float(sigma), effect.unit(kept))
     return out
 
 
@@ -196,18 +212,37 @@ def _places(found: Set, columns: Index) -> Index:
 
 
 def sizes(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
-    """Sizes of what is random, with their uncertainty from the information on ln v."""
-    best, out = explanation.best.set, {}
-    effect = catalogue()[standing.name]
+    """Sizes of what is random, each with its uncertainty."""
+    best, out = explanation.best.set, dict[str, Quantity]()
     for member in standing.members:
-        group = member[1]
         tried = float(priors.SIZES[best.sizes.members[best.members.index(member)]])
-        v, part = likeliest(best.state, _places(best, group.columns), tried)
-        names = [effect.params[c] for c in group.params] or list(effect.params)
-        for param in names:
-            size = v * param.typical
-            out[param.name] = Quantity(size, size * part, param.unit)
+        out |= sizes_of(best, explanation.dictionary, member[1], tried)
     return out
+
+
+def sizes_of(found: Set, d: Dictionary, group: Group, v: float) -> dict[str, Quantity]:
+    """Sizes of a random group that has the size v in a set, axis by axis.
+
+    Their uncertainty is from the information on ln v.
+    """
+    out = {}
+    whole = likeliest(found.state, _places(found, group.columns), v)
+    for param, at in _scattered(d, group):
+        size, part = whole
+        if len(at) < len(group.columns):
+            size, part = likeliest_of_axis(found.state, _places(found, at), v, whole)
+        size *= param.typical
+        out[param.name] = Quantity(size, size * part, param.unit)
+    return out
+
+
+def _scattered(d: Dictionary, group: Group) -> Iterator[tuple[Param, Index]]:
+    """Parameters of something random, with the columns that each scatters."""
+    params = group.effect.params if group.effect else ()
+    if not group.params:
+        yield from ((one, group.columns) for one in params)
+    for c in group.params:
+        yield params[c], np.intersect1d(group.columns, d.wave(c, d.wander.modes[c]))
 
 
 def _held_out_gain(

@@ -5,7 +5,8 @@ change of each channel, the instant k is where
 
     S(k) = sum_{i<k} z_i^2 + sum_{i>=k} (z_i - A)^2
 
-is least, over the noise; its uncertainty is the spread of exp(-S / 2).
+is least, over the noise; its uncertainty is the spread of exp(-S / 2). Of the means in
+the rows it is calculated first, to see between which samples the instant can be.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import Sensor
 
-ROWS = 2
-"""Rows to either side of the one in which it is sought."""
+POSSIBLE = 25.0
+"""Squares by which S may exceed the least one for an instant to be possible: what is
+five standard deviations off is not."""
 
 
 def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
@@ -28,25 +30,50 @@ def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
     _, group = member
     (at,) = group.shape.values()
     rows, block = explanation.rows, explanation.prepared.source.block
-    near = int(np.searchsorted(rows.x.t, at))
-    low = float(rows.span[max(near - ROWS, 0), 0])
-    high = float(rows.span[min(near + ROWS, len(rows.x.t)) - 1, 1])
+    changes = _changes(explanation, member)
+    plain = _plain(explanation, changes)
+    change: Array = np.sum([c for _, c in changes], axis=0)
+    seen = np.where(rows.used, rows.y - plain, np.nan)
+    low, high = _possible(explanation, _squares(seen, change, rows.sd), at)
     part = slice(*np.searchsorted(block.t, [low, np.nextafter(high, np.inf)]))
     t, six = block.t[part], block.six[part]
-    change, before = _change(explanation, member)
-    plain = _plain(explanation, change, group, t)
+    row = np.clip(np.searchsorted(rows.span[:, 1], t), 0, len(rows.x.t) - 1)
     held = _held(explanation, t)[:, None] & explanation.prepared.source.usable[part]
-    z = np.where(held, six - plain, np.nan)
+    z = np.where(held, six - plain[row], np.nan)
     noise = np.where(rows.noise > 0, rows.noise, np.inf)
-    gained = np.nan_to_num(((z - change) ** 2 - z**2) / noise**2).sum(axis=1)
-    squares = np.concatenate([np.cumsum(gained[::-1])[::-1], [0.0]])
-    edges = np.concatenate([t, [high]])
+    squares, edges = _squares(z, change, noise), np.concatenate([t, [high]])
     weight = np.exp(-0.5 * (squares - squares.min()))
     width = np.gradient(edges)
     weight = weight * width / (weight * width).sum()
     best = float(weight @ edges)
     spread = float(np.sqrt(weight @ (edges - best) ** 2))
-    return best, float(np.hypot(spread, before))
+    sampled = float(np.median(np.diff(block.t[:1000]))) / 2
+    return best, float(np.hypot(spread, sampled))
+
+
+def _squares(z: Array, change: Array, noise: Array) -> Array:
+    """S before each of some instants and after the last, (n + 1,), but for a constant.
+
+    Parameters
+    ----------
+    z : (n, 6) what is seen without the change, nan where nothing is
+    change : (6,)
+    noise : (6,) or (n, 6) standard deviations
+
+    """
+    gained = np.nan_to_num(((z - change) ** 2 - z**2) / noise**2).sum(axis=1)
+    return np.concatenate([np.cumsum(gained[::-1])[::-1], [0.0]])
+
+
+def _possible(
+    explanation: Explanation, squares: Array, at: float
+) -> tuple[float, float]:
+    """Between what instants it can have been, s, by S before each row."""
+    span = explanation.rows.span
+    near = int(np.searchsorted(explanation.rows.x.t, at))
+    some = np.append(np.flatnonzero(squares < squares.min() + POSSIBLE), near)
+    first, last = max(int(some.min()) - 1, 0), min(int(some.max()), len(span) - 1)
+    return float(span[first, 0]), float(span[last, 1])
 
 
 def _held(explanation: Explanation, t: Array) -> NDArray[np.bool_]:
@@ -57,26 +84,25 @@ def _held(explanation: Explanation, t: Array) -> NDArray[np.bool_]:
     return inside
 
 
-def _change(explanation: Explanation, member: Member) -> tuple[Array, float]:
-    """By how much each channel changes, (6,), and half a sample's time, s."""
-    change = np.zeros(6)
-    name = member[0].name
+def _changes(explanation: Explanation, member: Member) -> list[tuple[Group, Array]]:
+    """By how much each channel changes, (6,), as each triad has it."""
+    out: list[tuple[Group, Array]] = []
     estimate = explanation.best.estimate
     for cause, group in explanation.best.set.members:
-        if cause.name == name and group.effect is not None:
+        if cause.name == member[0].name and group.effect is not None:
+            change = np.zeros(6)
             for j, column in zip(group.params, group.columns, strict=True):
                 c = CHANNELS.index(group.effect.params[j].name)
                 change[c] = estimate[column]
-    t = explanation.prepared.source.block.t
-    return change, float(np.median(np.diff(t[:1000]))) / 2
-
-
-def _plain(explanation: Explanation, change: Array, group: Group, t: Array) -> Array:
-    """What the rows' model makes of samples, without the change, (n, 6)."""
-    rows = explanation.rows
-    fitted = rows.y - explanation.best.residual()
-    if isinstance(group.effect, Sensor):
-        fitted = fitted - group.effect.design(rows.x, group.shape) @ change
-    row = np.clip(np.searchsorted(rows.span[:, 1], t), 0, len(rows.x.t) - 1)
-    out: Array = fitted[row]
+            out.append((group, change))
     return out
+
+
+def _plain(explanation: Explanation, changes: list[tuple[Group, Array]]) -> Array:
+    """What the model makes of rows, without the change, (n, 6)."""
+    rows = explanation.rows
+    fitted: Array = rows.y - explanation.best.residual()
+    for group, change in changes:
+        if isinstance(group.effect, Sensor):
+            fitted = fitted - group.effect.design(rows.x, group.shape) @ change
+    return fitted

@@ -96,6 +96,11 @@ class Group:
             g for g in others if (g.params, g.origin, g.position, g.shape.keys()) == own
         ]
 
+    def siblings(self, others: Iterable[Group]) -> list[Group]:
+        """Those of others that are of the same shape, whatever their parameters."""
+        own = (self.origin, self.position, self.shape)
+        return [g for g in others if (g.origin, g.position, g.shape) == own]
+
     def apart(self, other: Group) -> float:
         """How far the shape of one alike is from its own."""
         return max((abs(other.shape[k] - v) / max(abs(v), 1e-9)

@@ -106,6 +106,25 @@ def likeliest(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
     return best, float(np.maximum(2 * (share**2).sum(), PRIOR_INFO) ** -0.5)
 
 
+def likeliest_of_axis(
+    state: Eliminated, at: Index, v: float, triad: tuple[float, float]
+) -> tuple[float, float]:
+    """The same of one axis of a group, whose size is v in a set.
+
+    The axes are alike within `UNLIKE`; `triad` is what was found of all of them.
+    """
+    strength, power = _told(state, at, v)
+    middle, part = triad
+    apart = np.linspace(-4.0, 4.0, FINER)
+    near = middle * np.exp(priors.UNLIKE * apart)
+    top = int(np.argmax(gained(strength, power, near) - 0.5 * apart**2))
+    best = float(near[top])
+    share = best**2 * strength / (1 + best**2 * strength)
+    alike = priors.UNLIKE**-2
+    info = alike + 2 * float((share**2).sum())
+    return best, float(np.hypot(info**-0.5, alike / info * part))
+
+
 ROUNDED = 1e-6
 """Part of F that rounding makes, ln."""
 

@@ -19,6 +19,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import BOTH, Group, triads_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.posterior.mixture import KEPT
 from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.selection import Search
 
@@ -69,6 +70,9 @@ class Posterior:
         self.search, self.best, self._refined = search, best, refined
         self._nearer: list[tuple[Set, Set]] = []
         self.instead = {name: self._instead(name) for name in self.names(best)}
+        for one in list(search.visited.values()) if best.members else ():
+            if one.score > best.score - KEPT:
+                search.vary(one)
 
     @staticmethod
     def names(some: Set) -> tuple[str, ...]:

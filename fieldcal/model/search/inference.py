@@ -197,7 +197,7 @@ class Inference(GaussNewton):
         """The members with their shapes refined between the points of the grid."""
         for i, (_, group) in enumerate(members):
             if len(group.shape) == 1 and group.effect is not None:
-                members = self._refined(state, values, members, i, sizes)
+                members = self.refined(state, values, members, i, sizes)
         return members
 
     def beside(self, found: Inferred, there: Set) -> Set:
@@ -205,21 +205,36 @@ class Inference(GaussNewton):
 
         What that takes of columns is not in the dictionary afterwards.
         """
-        own = Inference(self.system.apart(), self.nominal)
-        own.turned = list(found.turned)
+        own = self.copied(found)
         members, known = there.members, [g for _, g in found.best.members]
         for i, (_, group) in enumerate(members):
             if group.shape and group.effect is not None and group not in known:
-                members = own._refined(
+                members = own.refined(
                     found.state, found.values, members, i, there.sizes
                 )
-        values = own.padded(found.values)
-        wanted = own.wanted(members) | (values != 0)
-        linear = own.system.linearised(found.state, wanted)
-        search = Search(own.dictionary, own.gram_of(linear, values, wanted))
-        return search.evaluated(members, there.sizes)
+        return own.search_among(found, [members]).evaluated(members, there.sizes)
 
-    def _refined(
+    def copied(self, found: Inferred) -> Inference:
+        """The same about what was found, of which columns that are added are its own.
+
+        Turns are as they are about that.
+        """
+        own = Inference(self.system.apart(), self.nominal)
+        own.turned = list(found.turned)
+        return own
+
+    def search_among(
+        self, found: Inferred, sets: Sequence[tuple[Member, ...]]
+    ) -> Search:
+        """What the rows about a state that was found say of some sets."""
+        values = self.padded(found.values)
+        wanted = values != 0
+        for members in sets:
+            wanted = wanted | self.wanted(members)
+        linear = self.system.linearised(found.state, wanted)
+        return Search(self.dictionary, self.gram_of(linear, values, wanted))
+
+    def refined(
         self,
         state: State,
         values: Array,
@@ -238,7 +253,7 @@ class Inference(GaussNewton):
         for ratio in shape.finer:
             here = group
             near = shape.near(self.dictionary.x, group.shape[shape.name], ratio)
-            cause, tried = self._near(cause, group, near)
+            cause, tried = self.near(cause, group, near)
             every = [group, *tried]
             scores = self._scores(state, values, members, i, cause, every, sizes)
             group = every[int(np.argmax(scores))]
@@ -279,12 +294,12 @@ class Inference(GaussNewton):
         bend = max(2 * middle - down - up, 1e-6) / step**2
         moved = float(np.clip((up - down) / (2 * step * bend), -step, step))
         at = here.shape[name] * float(np.exp(moved))
-        cause, (group,) = self._near(cause, best, [at])
+        cause, (group,) = self.near(cause, best, [at])
         known = replace(group, unsure=at / float(np.sqrt(bend)))
         variants = tuple(known if g is group else g for g in cause.variants)
         return self.dictionary.exchanged(cause, variants), known
 
-    def _near(
+    def near(
         self, cause: Cause, group: Group, values: Sequence[float]
     ) -> tuple[Cause, list[Group]]:
         """A cause with more variants; on turns they are as the one they are near."""

@@ -10,8 +10,9 @@ import numpy as np
 
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
+from fieldcal.model.evidence.gram import Eliminated, gains
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.evidence.sizing import DENSITY, Member
 from fieldcal.model.search.offers import Less, Offer, Offers, OfferTable
 from fieldcal.model.search.pairs import Pair, pairs
 
@@ -29,6 +30,9 @@ NEAR = 12.0
 
 PROMISING = 16
 """Causes of which pairs are tried."""
+
+OTHERWISE = 6.0
+"""How far other parameters of a cause may be behind to be looked at, ln."""
 
 SLACK = 3.0
 """Log evidence that a full evaluation may add to the predicted score of an offer."""
@@ -57,6 +61,34 @@ class Search(Offers):
                 break
             best = fewer
         return best
+
+    def vary(self, there: Set) -> None:
+        """Visit the set with other parameters of each of its causes, if they come near.
+
+        Which of its parameters an effect was given is no more certain than that it is
+        there at all.
+        """
+        for i, (cause, group) in enumerate(there.members):
+            if cause.kind != "effect":
+                continue
+            for other in self._varied(there, self.without(there, i), cause, group):
+                members = list(there.members)
+                members[i] = (cause, other)
+                self.evaluated(tuple(members), there.sizes)
+
+    @staticmethod
+    def _varied(there: Set, less: Set, cause: Cause, group: Group) -> Iterator[Group]:
+        """Variants of a cause that are about as likely as one that a set has."""
+        rows, wide = there.state.rows, less.state.sizes
+        rest = Eliminated.of(rows, less.state.columns, wide)
+        worth: dict[Group, float] = {}
+        for one in group.siblings(cause.variants):
+            before = np.diag(rows.matrix(one.columns, one.columns)) * one.typical**2
+            inner, pull = rest.rest(one.columns, one.typical)
+            gain = gains(inner, pull, float(before.max()))
+            worth[one] = float(np.logaddexp.reduce(gain + DENSITY))
+        least = worth[group] - OTHERWISE
+        yield from (g for g, w in worth.items() if g is not group and w > least)
 
     def _of_effects(self, best: Set) -> Set:
         """The best set of effects alone, where that it is no effect is unlikely.

@@ -13,7 +13,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence.gram import Eliminated, gained
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import EVEN, STEP, alike, likeliest
+from fieldcal.model.evidence.sizing import EVEN, STEP, alike, likeliest, likeliest_of_axis
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.offers import FALLING, LEVELS, fallen
 
@@ -67,6 +67,26 @@ def test_a_size_that_rows_say_nothing_of_is_as_uncertain_as_before() -> None:
     one = case(1)
     state = Eliminated.of(one.gram.weighed(TAU), SET, np.full(4, 1e-6))
     assert likeliest(state, np.array([0]), 1e-6)[1] == pytest.approx(0.1**-0.5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_size_of_one_axis_of_several_by_dense_rows(seed: int) -> None:
+    """Of two columns that have one size in a set, each may have more or less of it."""
+    one, v, middle, part = case(seed), 0.8, 1.1, 0.4
+    typical = np.array([0.7, 2.0, 1.0, 0.5])
+    state = Eliminated.of(one.gram.weighed(TAU), SET, typical * [1.0, v, v, 1.0])
+    best, unsure = likeliest_of_axis(state, np.array([2]), v, (middle, part))
+    apart = np.linspace(-4.0, 4.0, 129)
+    near = middle * np.exp(apart * priors.UNLIKE)
+    score = [one.dense.evidence(SET, typical * [1.0, v, u, 1.0]) for u in near]
+    assert best == pytest.approx(near[int(np.argmax(score - apart**2 / 2))])
+    column = one.dense.design[:, SET[2]]
+    rest = one.dense.total(SET[[0, 1, 3]], typical[[0, 1, 3]] * [1.0, v, 1.0])
+    strength = column @ np.linalg.solve(rest, column)
+    share = best**2 * strength / (1 + best**2 * strength)
+    before = priors.UNLIKE**-2
+    info = before + 2 * share**2
+    assert unsure == pytest.approx(np.sqrt(1 / info + (before * part / info) ** 2))
 
 
 def test_gains_at_sizes_by_hand() -> None:

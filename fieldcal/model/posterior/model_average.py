@@ -1,0 +1,99 @@
+"""Numbers averaged over the sets that were visited: what was chosen is not certain.
+
+An effect with all of its parameters or with some, or another effect in its place: each
+set s has numbers of its own, and is as likely as its weight w_s,
+
+    mean = sum_s w_s mean_s
+    cov = sum_s w_s [cov_s + (mean_s - mean) (mean_s - mean)^T]                     (1)
+
+A parameter that a set has not is 0 there. Source: J. Hoeting and others, Bayesian model
+averaging: a tutorial, 1999, (1) to (3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.posterior.mixture import KEPT
+from fieldcal.model.posterior.probabilities import Posterior
+from fieldcal.model.posterior.reported import reported
+
+Places = Callable[[Set], Sequence[Index]]
+"""Where each of some quantities stands in the state of a set; what is there several
+times is their sum, what is nowhere is 0."""
+
+
+class ModelAverage:
+    """Averages over the sets of a posterior.
+
+    Parameters
+    ----------
+    posterior : sets and their probabilities
+    best : sets that the best of them stands for, each as likely as the others, as
+        numbers are taken from them
+
+    """
+
+    def __init__(self, posterior: Posterior, best: Sequence[Set]) -> None:
+        self.posterior, self.best = posterior, best
+
+    @cached_property
+    def sets(self) -> list[tuple[Set, float]]:
+        """Sets that count, as numbers are taken from them, and their weights."""
+        every = self.posterior.at_points
+        least = np.exp(-KEPT) * max(w for _, w in every)
+        near = [(s, w) for s, w in every if w > least]
+        return [
+            (one, w / len(of)) for s, w in near for of in (self._of(s),) for one in of
+        ]
+
+    def _of(self, one: Set) -> Sequence[Set]:
+        if one is self.posterior.best:
+            return self.best
+        return [reported(self.posterior.search, one)]
+
+    def of_member(self, member: Member) -> tuple[Array, Array]:
+        """Mean (k,) and covariance (k, k) of a member's parameters, if it is there."""
+        cause, group = member
+        there = [(s, w) for s, w in self.sets if cause.key in s.keys]
+
+        def places(one: Set) -> list[Index]:
+            (own,) = (g for c, g in one.members if c.key == cause.key)
+            at = dict(zip(own.params or own.columns, own.columns, strict=True))
+            wanted = [at.get(p, -1) for p in group.params or group.columns]
+            return [np.flatnonzero(one.state.columns == c)[-1:] for c in wanted]
+
+        return averaged(there, places)
+
+
+def of_columns(
+    sets: Sequence[tuple[Set, float]], columns: Index
+) -> tuple[Array, Array]:
+    """Mean (k,) and covariance (k, k) of columns over weighed sets."""
+    return averaged(
+        sets, lambda s: [np.flatnonzero(s.state.columns == c) for c in columns]
+    )
+
+
+def averaged(sets: Sequence[tuple[Set, float]], places: Places) -> tuple[Array, Array]:
+    """Mean (k,) and covariance (k, k) of quantities over weighed sets, (1)."""
+    means, covs = [], []
+    for one, _ in sets:
+        at = places(one)
+        pick = np.zeros((len(at), len(one.state.columns)))
+        for row, some in zip(pick, at, strict=True):
+            row[some] = 1.0
+        means.append(pick @ one.state.estimate)
+        covs.append(pick @ one.state.inverse @ pick.T)
+    weight = np.array([w for _, w in sets])
+    weight /= weight.sum()
+    mean: Array = weight @ np.array(means)
+    off = np.array(means) - mean
+    cov = np.einsum("s,sij->ij", weight, np.array(covs))
+    return mean, cov + (weight[:, None] * off).T @ off  # (1)

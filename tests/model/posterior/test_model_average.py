@@ -1,0 +1,148 @@
+"""Numbers over all sets that count: by drawing, and as near as they say."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from small_sessions import Session, ladder
+
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.posterior.mixture import KEPT
+from fieldcal.model.posterior.model_average import ModelAverage, averaged, of_columns
+from fieldcal.model.posterior.probabilities import Posterior
+from fieldcal.model.posterior.reported import reported
+from fieldcal.model.search.selection import Search
+
+SESSION = Session.of(ladder(), ("quadratic", "scale_asymmetry"), 1.0)
+QUADRATIC, ASYMMETRY = SESSION.dictionary.causes
+BIAS = SESSION.dictionary.always[0].columns
+DENSITY = priors.density()
+
+
+def search_of(value: Array, seed: int) -> Search:
+    """Over rows that some values of the quadratic factors made."""
+    columns = QUADRATIC.variants[0].columns
+    off = SESSION.noise(np.random.default_rng(seed))
+    return SESSION.search(off + SESSION.design[:, :, columns] @ value)
+
+
+def average_of(search: Search) -> tuple[ModelAverage, Set]:
+    best = search.run()
+    return ModelAverage(Posterior(search, best), [reported(search, best)]), best
+
+
+def test_averages_are_those_of_draws_from_the_sets() -> None:
+    """A quantity that a set has twice is the sum there, one that it lacks is 0."""
+    search, rng = search_of(np.array([3e-5, 0.0, 1e-5]), 1), np.random.default_rng(2)
+    one = search.evaluated(((QUADRATIC, QUADRATIC.variants[0]),))
+    two = search.evaluated(((ASYMMETRY, ASYMMETRY.variants[0]),))
+    sets = [(one, 0.3), (two, 0.1)]
+    first, last = one.state.columns[0], one.state.columns[-1]
+    mean, cov = averaged(
+        sets,
+        lambda s: [np.flatnonzero(np.isin(s.state.columns, [first, last])),
+                   np.flatnonzero(s.state.columns == last)],
+    )  # fmt: skip
+    drawn = []
+    for there, count in ((one, 90_000), (two, 30_000)):
+        state = there.state
+        full = rng.standard_normal((count, len(state.columns))) @ state.half
+        full += state.estimate
+        has = [full[:, state.columns == c].sum(axis=1) for c in (first, last)]
+        drawn.append(np.column_stack([has[0] + has[1], has[1]]))
+    every = np.concatenate(drawn)
+    sd = every.std(axis=0)
+    np.testing.assert_allclose((mean - every.mean(axis=0)) / sd, 0.0, atol=0.02)
+    np.testing.assert_allclose(cov / np.outer(sd, sd), np.cov(every.T, ddof=0)
+                               / np.outer(sd, sd), atol=0.03)  # fmt: skip
+
+
+def test_what_a_set_was_not_given_makes_its_numbers_uncertain() -> None:
+    """Of the three quadratic factors one is small: the bias beside it is uncertain."""
+    average, best = average_of(search_of(np.array([6e-5, 2e-6, -6e-5]), 5))
+    ((_, group),) = best.members
+    assert 1 not in group.params
+    own = of_columns([(average.best[0], 1.0)], BIAS)[1]
+    whole = of_columns(average.sets, BIAS)[1]
+    assert whole[1, 1] > 2.0 * own[1, 1]
+
+
+def test_numbers_of_a_member_are_those_of_the_sets_that_have_it() -> None:
+    search = search_of(np.array([3e-5, 2e-5, -3e-5]), 7)
+    average, best = average_of(search)
+    ((cause, group),) = best.members
+    there = [(s, w) for s, w in average.sets if cause.key in s.keys]
+    mean, cov = average.of_member((cause, group))
+    total = sum(w for _, w in there)
+    by_hand = np.zeros(len(group.params))
+    for one, w in there:
+        (own,) = (g for c, g in one.members if c is cause)
+        for i, param in enumerate(group.params):
+            if param in own.params:
+                at = one.state.columns == own.columns[own.params.index(param)]
+                by_hand[i] += w / total * one.state.estimate[at].sum()
+    np.testing.assert_allclose(mean, by_hand)
+    assert (np.diag(cov) > 0).all()
+
+
+def test_only_sets_count_that_are_likely_beside_the_best() -> None:
+    search = search_of(np.array([1e-4, 1e-4, -1e-4]), 9)
+    average, _ = average_of(search)
+    top = max(w for _, w in average.posterior.at_points)
+    weights = [w for _, w in average.sets]
+    assert min(weights) > np.exp(-KEPT) * top
+    kept = [w for _, w in average.posterior.at_points if w > np.exp(-KEPT) * top]
+    assert sorted(weights) == sorted(kept)
+
+
+@cache
+def pulls() -> tuple[Array, Array]:
+    """Of the biases by the average and by the best set alone, (n, 3).
+
+    Values are drawn from the prior: all of the parameters, or some, of one effect, at
+    sizes at which it shows.
+    """
+    rng = np.random.default_rng(21)
+    mean: list[Array] = []
+    alone: list[Array] = []
+    shown = priors.SIZES[(priors.SIZES > 0.02) & (priors.SIZES < 0.3)]
+    design, noise = SESSION.design, SESSION.dictionary.always
+    for _ in range(40):
+        cause = (QUADRATIC, ASYMMETRY)[int(rng.integers(2))]
+        group = cause.variants[int(rng.integers(len(cause.variants)))]
+        off = SESSION.noise(rng)
+        size = group.sizes(float(rng.choice(shown)))
+        off += design[:, :, group.columns] @ (size * rng.standard_normal(len(size)))
+        true = 0.1 * noise[0].typical * rng.standard_normal(3)
+        off += design[:, :, BIAS] @ true
+        average, best = average_of(SESSION.search(off))
+        for out, sets in ((mean, average.sets), (alone, [(average.best[0], 1.0)])):
+            value, cov = of_columns(sets, BIAS)
+            out.append((value - true) / np.sqrt(np.diag(cov)))
+    return np.array(mean), np.array(alone)
+
+
+def test_biases_are_as_near_as_they_say_whatever_was_chosen() -> None:
+    mean, alone = pulls()
+    inside = float(np.mean(np.abs(mean) < 1.96))
+    assert 0.90 < inside < 0.99
+    assert np.mean(np.abs(alone) < 1.96) < inside - 0.03, "the best set alone is not"
+
+
+@pytest.mark.parametrize("times", [1.0, 2.0])
+def test_variants_that_come_near_are_visited(times: float) -> None:
+    """Of the same cause, and no others."""
+    search = search_of(np.array([3e-5, 4e-6, -3e-5]) * times, 5)
+    best = search.run()
+    before = set(search.visited)
+    search.vary(best)
+    ((cause, _),) = best.members
+    new = [s for key, s in search.visited.items() if key not in before]
+    assert {c for s in new for c, _ in s.members} <= {cause}
+    every = [search.evaluated(((cause, v),)) for v in cause.variants]
+    near = {search.key(s.members) for s in every if s.score > best.score - 2.0}
+    assert near <= before | {search.key(s.members) for s in new}

@@ -13,7 +13,13 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence.gram import Eliminated, gained
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import EVEN, STEP, alike, likeliest, likeliest_of_axis
+from fieldcal.model.evidence.sizing import (
+    EVEN,
+    STEP,
+    alike,
+    likeliest,
+    likeliest_of_axis,
+)
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.offers import FALLING, LEVELS, fallen
 

@@ -102,11 +102,15 @@ def concealed_values(truth: Mapping[str, Any]) -> dict[str, float]:
 
 def _fit(calibration: Calibration) -> str:
     method = f"method: {calibration.method}"
+    gyroscopes = calibration.info.get("gyroscopes")
     if not math.isfinite(calibration.chi2):
         return method
-    rms = f"{calibration.rms:.2g} m/s²"
-    if not math.isfinite(calibration.rms):
-        rms = f"{calibration.info['gyroscopes']['rms']:.2g} rad/s"
+    if math.isfinite(calibration.rms):
+        rms = f"{calibration.rms:.2g} m/s²"
+    elif gyroscopes:
+        rms = f"{gyroscopes['rms']:.2g} rad/s"
+    else:  # a closed form leaves none
+        return method
     return (
         f"{method}; χ² = {calibration.chi2:.1f} with {calibration.dof} degrees of"
         f" freedom; rms residual {rms}"

@@ -38,6 +38,9 @@ def coupled() -> Block:
     return recorded(COUPLED, POSITIONS)
 
 
+thorough = pytest.mark.thorough
+
+
 def diagnosed(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> tuple[int, dict[str, Any]]:
@@ -84,11 +87,11 @@ def holed(block: Block) -> Block:
     "made",
     [
         lambda b: replace(b, temperature=unknown(b.temperature)),
-        lambda b: replace(b, gyr=unknown(b.gyr)),
-        lambda b: replace(b, gyr=0 * b.gyr),
+        pytest.param(lambda b: replace(b, gyr=unknown(b.gyr)), marks=thorough),
+        pytest.param(lambda b: replace(b, gyr=0 * b.gyr), marks=thorough),
         lambda b: replace(b, gyr=b.gyr * [1.0, np.nan, 1.0]),
-        bursty,
-        shaken,
+        pytest.param(bursty, marks=thorough),
+        pytest.param(shaken, marks=thorough),
         holed,
     ],
     ids=["no temperature", "no gyroscopes", "gyroscopes off", "one gyroscope missing",
@@ -163,6 +166,7 @@ def on_a_table(rates: tuple[float, ...] = (0.0, 60.0, -60.0, 120.0)) -> list[Tab
     return [p | {"rate_deg_s": w} for p, w in zip(positions, turned, strict=True)]
 
 
+@thorough
 def test_a_table_shows_the_lever_arm(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -221,6 +225,7 @@ def test_the_length_of_the_force_foretells_positions_not_seen(
     assert after < 0.2 * before
 
 
+@thorough
 def test_what_settles_shows_whatever_the_orientations(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -299,7 +304,7 @@ def test_a_recording_of_windows_alone_has_lost_nothing(
     assert [e["id"] for e in said["effects"]] == ["cross_coupling"]
 
 
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("known", [pytest.param(True, marks=thorough), False])
 def test_one_long_static_recording(
     known: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -322,7 +327,7 @@ def test_one_long_static_recording(
     ("beta", "scale", "found"),
     [
         (0.6, (1.0030, 1.0033, 0.996), []),
-        (5.0, (1.0030, 1.0030, 0.996), []),
+        pytest.param(5.0, (1.0030, 1.0030, 0.996), [], marks=thorough),
         (5.0, (1.0030, 1.0030, 1.0030), ["gravity_error"]),
     ],
     ids=["the third hardly known", "the third another", "all three"],
@@ -393,7 +398,12 @@ def test_what_cannot_be_diagnosed_is_one_sentence(
             "gyroscopes are not used: gx gy gz",
             "acc",
         ),
-        (lambda b: replace(b, gyr=b.gyr * [1, np.nan, 1]), "not used: gy", "acc"),
+        pytest.param(
+            lambda b: replace(b, gyr=b.gyr * [1, np.nan, 1]),
+            "not used: gy",
+            "acc",
+            marks=thorough,
+        ),
         (lambda b: replace(b, acc=b.acc * [np.nan, 1, 1]), "not used: ax", "gyr"),
     ],
 )
@@ -413,7 +423,10 @@ def test_a_sensor_that_says_nothing_does_not_cost_the_other(
     assert main(["report", str(folder)]) == 0
 
 
-@pytest.mark.parametrize(("axes", "columns"), [("+y-x+z", "gy,-gx,gz"), ("-x-y-z", "")])
+@pytest.mark.parametrize(
+    ("axes", "columns"),
+    [("+y-x+z", "gy,-gx,gz"), pytest.param("-x-y-z", "", marks=thorough)],
+)
 def test_gyroscopes_along_other_axes_are_named_and_mended(
     axes: str, columns: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

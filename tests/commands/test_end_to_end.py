@@ -75,7 +75,7 @@ def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
     done = run(
         *("two_position", "--headless", f"--virtual={shlex.join(steady(tmp_path))}"),
         *("--no-report", "-o", str(tmp_path / "s"), "--level=0.001", "--angles=0.001"),
-        *("--speed", "60", "--json"),
+        *("--speed", "60", "--seconds", "15", "--json"),
     )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -92,7 +92,8 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     virtual = shlex.join(["--base-tilt=0.5,-0.3", *steady(tmp_path)])
     done = run(
         *("two_position", "--headless", f"--virtual={virtual}", "--json"),
-        *("--speed", "60", "--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"),
+        *("--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"),
+        *("--speed", "60", "--seconds", "30"),
     )
     assert done.returncode == 1, done.stderr
     told = [json.loads(line) for line in done.stderr.splitlines()]

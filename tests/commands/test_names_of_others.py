@@ -82,7 +82,9 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_session(folder, block, where, device=device)
 
 
-@pytest.mark.parametrize("command", ["solve", "diagnose", "verify"])
+@pytest.mark.parametrize(
+    "command", [pytest.param("solve", marks=pytest.mark.thorough), "diagnose", "verify"]
+)
 def test_names_of_positions(session: Path, said: Said, command: str) -> None:
     both = said(command, str(session))
     assert "left\\x1b[2J\\x0averdict" in both or "left" not in both

@@ -140,7 +140,7 @@ def test_five_mpu9150_agree_with_the_peer_s_published_table(
     [
         ("p10", "two_position", None),
         ("p09", "joint", "angle_offset"),
-        ("p01", "joint", None),
+        pytest.param("p01", "joint", None, marks=pytest.mark.thorough),
         pytest.param("p03", "joint", "angle_offset", marks=pytest.mark.thorough),
         ("p04", "joint", "base_tilt"),
     ],

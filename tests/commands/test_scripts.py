@@ -21,9 +21,10 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_reader_that_goes_changes_no_exit_code(session: Path) -> None:
-    whole = subprocess.run([*FIELDCAL, "solve", str(session)], capture_output=True)
+    call = [*FIELDCAL, "solve", str(session), "--as-printed"]
+    whole = subprocess.run(call, capture_output=True)
     with subprocess.Popen(
-        [*FIELDCAL, "solve", str(session)],
+        call,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     ) as solving:
@@ -31,7 +32,8 @@ def test_a_reader_that_goes_changes_no_exit_code(session: Path) -> None:
         solving.stdout.close()  # as head -0 does
         said = solving.stderr.read().decode()
         code = solving.wait()
-    assert code == whole.returncode and "BrokenPipe" not in said
+    assert code == whole.returncode == 0 and "BrokenPipe" not in said
+    assert b"method: five_position" in whole.stdout and not whole.stderr
 
 
 @pytest.mark.parametrize("command", ["solve", "diagnose"])

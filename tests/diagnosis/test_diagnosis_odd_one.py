@@ -92,6 +92,7 @@ def test_angles_that_were_set_otherwise_are_said(
             assert f"{joint} had been" not in said.says
 
 
+@pytest.mark.thorough
 def test_an_effect_besides_has_its_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,6 +103,7 @@ def test_an_effect_besides_has_its_numbers(
     assert "Position 4 is off by itself, as if α had been off by 0.49" in said.says
 
 
+@pytest.mark.thorough
 def test_a_step_behind_the_first_position_is_one(tmp_path: Path) -> None:
     """Turns that end where they are said to end tell it from an angle."""
     said = diagnosed(tmp_path / "s", TACTICAL, step, gyro_coupling)

@@ -105,6 +105,7 @@ def test_six_faces_are_not_square(
     assert replay["twin"] < 1.8 * after
 
 
+@pytest.mark.thorough
 def test_the_bias_of_six_faces_is_the_peer_s(
     shared: Path, faces: Callable[[Callable[[], Held]], dict[str, Any]]
 ) -> None:
@@ -120,7 +121,11 @@ def test_the_bias_of_six_faces_is_the_peer_s(
 
 
 @pytest.mark.parametrize(
-    ("message", "left_out"), [("RAW_IMU.0", ["quantisation"]), ("HIGHRES_IMU.0", [])]
+    ("message", "left_out"),
+    [
+        ("RAW_IMU.0", ["quantisation"]),
+        pytest.param("HIGHRES_IMU.0", [], marks=pytest.mark.thorough),
+    ],
 )
 def test_whole_milligravities_are_coarse_steps_and_no_bumps(
     message: str,
@@ -203,6 +208,7 @@ def test_a_minute_with_broken_stamps_shows_nothing_more(tmp_path: Path) -> None:
     assert "degrees of freedom" in " ".join(said["warnings"])
 
 
+@pytest.mark.thorough
 def test_ten_short_intervals_are_not_fitted_with_more(tmp_path: Path) -> None:
     """Nine parameters would "fit" them; none of the accelerometers' is believed."""
     counts, intervals = hand_held()

@@ -61,7 +61,7 @@ class Run:
     should happen has happened, on a machine however slow.
     """
 
-    def __init__(self, folder: Path, link: str) -> None:
+    def __init__(self, folder: Path, link: str, seconds: float = 10.0) -> None:
         self.folder = folder / "session"
         name, _, conceals = link.partition(" ")
         options = f"{LINKS[name].format(folder)} --speed 20 {conceals}".split()
@@ -69,7 +69,7 @@ class Run:
         self._device = VirtualMover(options, once=False)
         self.truth = self._device.truth
         self._process = subprocess.Popen(
-            [*TWO_POSITION, "--seconds=10", "--latitude=50.45", "--json"]
+            [*TWO_POSITION, f"--seconds={seconds}", "--latitude=50.45", "--json"]
             + ["--device", address(options, self._device.port), "-o", str(self.folder)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -179,7 +179,7 @@ def test_a_link_that_stumbles_costs_nothing_but_time(
 
 
 def test_a_link_that_loses_all_the_time_is_marked_now_and_then(tmp_path: Path) -> None:
-    with Run(tmp_path, "serial --with dropped:fraction=0.05") as run:
+    with Run(tmp_path, "serial --with dropped:fraction=0.05", 4.0) as run:
         code, result, said = run.end()
     assert code == 1 and "samples missing" in result["decision"]["reasons"][0], said
     marks, block = run.marks("link"), Session.open(run.folder).block

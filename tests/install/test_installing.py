@@ -45,7 +45,11 @@ PX4 = ("CAL_ACC0_{}OFF", "CAL_ACC0_{}SCALE", "CAL_GYRO0_{}OFF")
     ("has", "names"),
     [
         (HAS, ARDUPILOT),
-        ("autopilot=px4&CAL_ACC0_XOFF=0.5&CAL_ACC0_YSCALE=1.02", PX4),
+        pytest.param(
+            "autopilot=px4&CAL_ACC0_XOFF=0.5&CAL_ACC0_YSCALE=1.02",
+            PX4,
+            marks=pytest.mark.thorough,
+        ),
     ],
 )
 def test_what_to_install_is_the_truth_whatever_was_installed(

@@ -172,7 +172,7 @@ def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None
 
 
 @pytest.mark.parametrize("name, given", [
-    ("quadratic", {"x": 1e-3}),
+    pytest.param("quadratic", {"x": 1e-3}, marks=pytest.mark.thorough),
     ("settling", {"gx": 3e-3, "gy": -2e-3, "gz": 2e-3, "tau_s": 3.0}),
 ])  # fmt: skip
 def test_a_search_that_begins_with_what_was_found_before_finds_the_same(

@@ -34,7 +34,7 @@ def led(
     run = [*RUN, "--headless", "--json", *options]
     if "--resume" not in options:
         run += ["two_position", "--level=0.001", "--angles=0.001"]
-        run += ["--seconds=30", "--latitude=50.45"]
+        run += ["--seconds=12", "--latitude=50.45"]
     for url in urls:
         run += ["--device", url]
     said = []

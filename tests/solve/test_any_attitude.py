@@ -81,7 +81,7 @@ def test_all_forms_of_an_attitude_are_the_same() -> None:
         np.testing.assert_allclose(one.covariance, found[0].covariance, atol=1e-14)
 
 
-@pytest.mark.parametrize("error", [0.2, 3.0])
+@pytest.mark.parametrize("error", [pytest.param(0.2, marks=pytest.mark.thorough), 3.0])
 def test_intervals_hold_however_well_attitudes_are_measured(error: float) -> None:
     """At 3 degrees what is not linear in an attitude is 1 cm/s^2, 100 sigma."""
     every = [solved("quaternion", seed, error) for seed in range(4)]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from closed_circle import a_third
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from observed import BIAS, COUPLING, SCALE, G, observe, outputs, practice
@@ -139,16 +140,15 @@ def bumped(size: float) -> Disturb:
     return disturb
 
 
-@pytest.mark.parametrize("places", [SIX, NINE])
 @pytest.mark.parametrize(
-    "size",
-    [
-        3.0,
-        pytest.param(5.0, marks=pytest.mark.thorough),
-        10.0,
-        pytest.param(100.0, marks=pytest.mark.thorough),
-        3000.0,
-    ],
+    ("places", "size"),
+    a_third(
+        [
+            (some, size)
+            for size in (3.0, 5.0, 10.0, 100.0, 3000.0)
+            for some in (SIX, NINE)
+        ]
+    ),
 )
 def test_one_bad_position_is_doubted_and_never_spoils_the_interval(
     places: tuple[Position, ...], size: float

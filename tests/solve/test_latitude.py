@@ -83,7 +83,9 @@ def test_another_latitude_is_told_and_named(there: float, said: float) -> None:
     assert not found.good
 
 
-@pytest.mark.parametrize("latitude", [-70.0, 0.0, 50.0])
+@pytest.mark.parametrize(
+    "latitude", [-70.0, pytest.param(0.0, marks=pytest.mark.thorough), 50.0]
+)
 def test_the_right_one_is_never_doubted(latitude: float) -> None:
     for seed in range(8):
         found = solved(LEANING, latitude, latitude, seed=seed)

@@ -57,7 +57,8 @@ def quick(
 
 
 @pytest.mark.parametrize(
-    ("rate", "seconds", "cutoff"), [(100.0, 0.05, 20.0), (50.0, 0.08, 20.0)]
+    ("rate", "seconds", "cutoff"),
+    [(100.0, 0.05, 20.0), pytest.param(50.0, 0.08, 20.0, marks=pytest.mark.thorough)],
 )
 def test_a_scale_by_turns_of_a_few_samples_is_within_its_uncertainty(
     tmp_path: Path, rate: float, seconds: float, cutoff: float

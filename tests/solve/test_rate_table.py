@@ -89,7 +89,12 @@ def pulls(found: Calibration) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("noise", "grade"), [(2e-3, "tactical"), (1e-4, "tactical"), (1e-5, "navigation")]
+    ("noise", "grade"),
+    [
+        (2e-3, "tactical"),
+        pytest.param(1e-4, "tactical", marks=pytest.mark.thorough),
+        (1e-5, "navigation"),
+    ],
 )
 def test_axes_that_lie_level_count_and_the_earth_is_taken_out(
     noise: float, grade: str, tmp_path: Path

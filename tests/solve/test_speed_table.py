@@ -77,7 +77,7 @@ def solved(session: Session) -> Calibration:
     return solve(seen)
 
 
-@pytest.mark.parametrize("rests", [0, 3])
+@pytest.mark.parametrize("rests", [pytest.param(0, marks=pytest.mark.thorough), 3])
 def test_the_length_of_a_rate_gives_bias_and_scale_factor(
     tmp_path: Path, rests: int
 ) -> None:

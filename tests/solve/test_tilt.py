@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from closed_circle import a_third
 from observed import GYR_BIAS, OMEGA, carried, observe, outputs
 
 from fieldcal.core.positions import FIVE, Position
@@ -56,8 +57,10 @@ def navigation(
     )
 
 
-@pytest.mark.parametrize("tilt", TILTS)
-@pytest.mark.parametrize("places", [FIVE, NINE], ids=["five", "nine"])
+@pytest.mark.parametrize(
+    ("places", "tilt"),
+    a_third([(places, tilt) for places in (FIVE, NINE) for tilt in TILTS]),
+)
 def test_navigation_gyroscopes_on_a_tilted_base(
     places: Sequence[Position], tilt: str
 ) -> None:

@@ -63,7 +63,7 @@ def later(block: Block, seconds: float) -> Block:
         pytest.param("settling:ax=0.05,az=-0.04,tau_s=5", marks=pytest.mark.thorough),
         pytest.param("settling:ax=0.05,gx=0.003,tau_s=5", marks=pytest.mark.thorough),
         "mounting:axes=+y-x+z",
-        "stuck:channel=gy,from_s=40,to_s=43",
+        pytest.param("stuck:channel=gy,from_s=40,to_s=43", marks=pytest.mark.thorough),
     ],
 )
 def test_the_replay_with_what_was_found_agrees_with_the_recording(
@@ -102,6 +102,7 @@ def test_a_position_set_otherwise_is_replayed_where_it_was(
     assert replays["refitted"]["chi2_per_dof"] > 10.0
 
 
+@pytest.mark.thorough
 def test_windows_that_were_calm_are_calm_in_the_replay(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -253,6 +254,7 @@ def test_what_shows_in_turns_is_measured_on_the_way(
     assert "instead of" in said["says"]
 
 
+@pytest.mark.thorough
 def test_a_twin_without_what_turns_show_is_as_far_off_as_before(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -304,6 +306,7 @@ def test_positions_without_angles_are_replayed_where_they_were(
     assert said["twin"]["refitted"]["chi2_per_dof"] > 2
 
 
+@pytest.mark.thorough
 def test_positions_without_angles_on_a_tilted_base_are_replayed_where_they_were(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -340,6 +343,7 @@ def test_the_circle_closes(
         assert np.abs(apart / sigma).max() < 4.5, group
 
 
+@pytest.mark.thorough
 def test_temperature_and_warm_up_go_into_the_twin(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,7 +16,9 @@ FADING = {
 }
 
 
-@pytest.mark.parametrize("name", FADING)
+@pytest.mark.parametrize(
+    "name", ["settling", pytest.param("warm_up", marks=pytest.mark.thorough)]
+)
 def test_the_way_is_left_with_its_noise_beside_what_fades(name: str) -> None:
     """A time constant between the points of the grid; chi2 over several sessions."""
     square, freedom = 0.0, 0

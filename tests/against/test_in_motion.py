@@ -133,6 +133,7 @@ def test_a_time_constant_is_told_beside_a_delay_and_a_delay_is_none(
     assert number(alone, "time_delay", "seconds")[1] < 1e-4
 
 
+@pytest.mark.thorough
 def test_one_filter_of_both_triads_is_a_time_constant_of_both(true: Block) -> None:
     found = held({"lag": (0.004, 0.004), **NOISE}, true, seconds=40.0)
     assert {d.id for d in found.differences} - CALIBRATION == {"bandwidth"}

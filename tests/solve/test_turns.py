@@ -200,7 +200,7 @@ def pulls_of(found: Calibration) -> Array:
 def seeds() -> list[Calibration]:
     found = []
     with TemporaryDirectory() as folder:
-        for seed in range(10):
+        for seed in range(6):
             block, windows = record(seed, many_ways(seed, 9), ANYHOW)
             there = Path(folder) / str(seed)
             found.append(calibrated(there, block, windows, whole_way=False))
@@ -245,7 +245,7 @@ def test_the_turns_of_the_paper_s_own_procedure(
 
 
 def test_without_the_turns_there_is_no_scale_factor(tmp_path: Path) -> None:
-    block, windows = record(4, many_ways(6, 9), ANYHOW)
+    block, windows = record(4, many_ways(6, 6), ANYHOW)
     found = calibrated(tmp_path, block, windows, turns="no")
     assert "gyr_scale" not in found.groups and "turns" not in found.info
 
@@ -259,7 +259,7 @@ def test_gyroscopes_that_turn_the_other_way_are_said_to(
     tmp_path: Path, turns: int, sentence: str
 ) -> None:
     """In all turns it is their mounting, in one nobody knows."""
-    block, windows = record(4, many_ways(6, 9), ANYHOW)
+    block, windows = record(4, many_ways(6, 6), ANYHOW)
     so_far = block.t < windows[turns][0]
     gyr = np.where(so_far[:, None], -block.gyr, block.gyr)
     found = calibrated(tmp_path, replace(block, gyr=gyr), windows)
@@ -267,7 +267,7 @@ def test_gyroscopes_that_turn_the_other_way_are_said_to(
 
 
 def test_a_turn_with_samples_missing_is_left_out(tmp_path: Path) -> None:
-    block, windows = record(4, many_ways(6, 9), ANYHOW)
+    block, windows = record(4, many_ways(6, 6), ANYHOW)
     middle = (windows[0][1] + windows[1][0]) / 2
     keep = (block.t < middle - 0.3) | (block.t > middle + 0.3)
     holed = Block.of(block.t[keep], block.acc[keep], block.gyr[keep])

@@ -54,6 +54,7 @@ def test_the_state_stays_where_the_set_does() -> None:
     assert own.step(best, inferred.values, moved) < STAYED
 
 
+@pytest.mark.thorough
 def test_sizes_do_not_hang_on_where_they_begin() -> None:
     """Of |f| each axis alone may do without its scatter, all three together not."""
     found = explained(88_001_001)

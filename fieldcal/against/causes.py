@@ -19,7 +19,7 @@ from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.reported import reported
 from fieldcal.model.search.selection import Search
-from fieldcal.physics.effect import Scatter
+from fieldcal.physics.effect import CHANCE, Scatter
 
 DIRECTION: dict[Relation, Direction] = {
     "real": "left_out", "simulator": "added", "other": "resized",
@@ -66,7 +66,7 @@ def _relation(pairing: Pairing, key: str) -> tuple[Relation, float]:
     if pairs := pairing.with_shape_of(key):
         told = [(a.told(key), b.told(key)) for a, b in pairs]
         alike = max(both(a, b) for a, b in told if a is not None and b is not None)
-    chance = member[0].chance if member is not None else priors.PRESENT
+    chance = member[0].chance if member is not None else CHANCE
     found = weighed(one, two, chance, alike)
     differ = apart(found)
     if differ < thresholds.NAMED:

@@ -14,6 +14,7 @@ from fieldcal.diagnosis.signal.chain import Checked, check, checked_again
 from fieldcal.diagnosis.signal.line import Remains, Tone
 from fieldcal.diagnosis.signal.spectrum import tones, without
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.hand_tremor import rows_of
@@ -30,9 +31,6 @@ from fieldcal.session.description import Description
 
 SHORTEST = 20
 """Samples of a window from which it can be used."""
-
-TURNED = np.deg2rad(10.0)
-"""Angle from which a device was not held where it was, rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +192,8 @@ def _refuse_turning(rows: Rows, about: Description) -> None:
     leant = np.linalg.norm(acc - np.nanmedian(acc, axis=0), axis=1) / about.gravity
     rate = gyr - np.median(gyr, axis=0)
     turned = np.abs(np.cumsum(rate * rows.length[:, None], axis=0))
-    if np.nanmax(leant) > TURNED and (turned.max() > TURNED or not gyr.any()):
+    elsewhere = np.deg2rad(thresholds.NOT_HELD_DEG)
+    if np.nanmax(leant) > elsewhere and (turned.max() > elsewhere or not gyr.any()):
         raise InputError(
             "the device is turned in this recording, and session.toml has no"
             " [[position]]: write down when it was held, or let fieldcal import find"

@@ -50,6 +50,27 @@ leave of one that is far above the noise is as good as white."""
 MISSET_DEG = 3.0
 """Typical error of a position whose angle is not the stated one, deg."""
 
+ALONE_DEG, REPEATED_DEG, GAUGE = 10.0, 0.2, 5e-3
+"""Largest usual mistake of one position, deg, of an angle that is repeated, deg, and of
+a gauge that all angles come from, as a part of them."""
+
+ARRIVAL_S = 0.3
+"""Standard uncertainty of the instant at which a turn by hand ends."""
+
+BUILT_UP, AFTERWARDS, BUILDS_S = 0.5, 0.15, 2.0
+"""How far what settles may be off on the way and at its end, in its size, and how
+smoothly, s."""
+
+CLOCK_S, CLOCK_RATE = 1e-2, 1e-4
+"""Typical error of an alignment by correlation, s, and of a quartz, 1."""
+
+AXES_TURNED = 0.1
+"""Typical turn between two axes that are taken for the same, rad."""
+
+UPRIGHT, UNSEEN = 10.0, np.repeat([0.5, 0.01], 3)
+"""What a channel may have that a reference says nothing of, m/s^2 and rad/s: gravity
+along the axis that stands upright, and three degrees of it along those that lie."""
+
 SMALL_ROTATION = 1.0
 """Turns of a position whose orientation nobody knows, rad: any."""
 
@@ -60,9 +81,6 @@ instabilities: 0.1 m/s^2, a joint that comes back to half a degree."""
 
 BAD = 5e-3
 """Chance that a given window is disturbed in a way that it does not show itself."""
-
-PRESENT = 0.01
-"""Chance that a session has an effect for which its file states no other."""
 
 AGAIN = 0.3
 """Chance of an effect in the gyroscopes when the accelerometers have it, and back."""

@@ -54,6 +54,26 @@ LINE = 4.0
 LINE_BY_CHANCE = 1e-3
 """Probability that a line is said where there is none, over all frequencies."""
 
+ONE_LINE = 0.65
+"""Part of the energy at a frequency that one amplitude and phase must take to be a
+line: a hand that trembles has another phase each time."""
+
+LINE_LASTS, LINE_LASTS_SIGMAS = 0.2, 3.0
+"""Part of a line in either half of the windows at least, but for so many sigmas: what
+fades after turns has lines as well."""
+
+CLIPPED = 1e-3
+"""Part of a window at the rail that makes its mean useless."""
+
+NOT_HELD_DEG = 10.0
+"""Angle from which a device was not held where it was, deg: no hand is so far off."""
+
+TAKES_LITTLE = 2.0
+"""Rise of ln L by a cause that takes next to nothing: two parameters of noise do."""
+
+IN_PARAGRAPH = 3.0
+"""Standard deviations from which the paragraph names a parameter."""
+
 # -- what is said of a calibration
 
 BETTER_TILT = 3.0
@@ -89,7 +109,14 @@ MOVED_WRONG = 5.0
 be used: no navigator has that in its margin."""
 
 MOVED = 1.0
-"""Standard deviations from which what that moves is reported."""
+"""Standard deviations from which what that moves is reported, and a parameter counts
+as moved."""
+
+LOOKED_AT = 0.01
+"""Probability below which an explanation is not looked at: it moves no interval."""
+
+DOUBTED = 0.02
+"""Probability that a window is bad below which it moves no interval."""
 
 SUSPECT = 0.1
 """Probability that a window is bad from which it is reported."""

@@ -26,9 +26,6 @@ from fieldcal.model.state import State
 from fieldcal.solve.given import Given
 from fieldcal.solve.variants import variants
 
-DOUBTED = 0.02
-"""Probability that a window is bad below which it moves no interval."""
-
 
 def mixed(
     given: Given, search: Search, carried: Sequence[Member], doubt: bool = True
@@ -65,7 +62,7 @@ def averaged_over(
         only = _ended(given, likeliest, nominal)
         return Parameters(*only, np.zeros(len(only[0])))
     search = Search(given, gram)
-    found, doubt = [], bool(likeliest.bad.max(initial=0.0) > DOUBTED)
+    found, doubt = [], bool(likeliest.bad.max(initial=0.0) > thresholds.DOUBTED)
     for one in given.explanations:
         for same in variants(search, given.asked, one):
             there = likeliest

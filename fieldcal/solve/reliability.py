@@ -24,12 +24,9 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import priors
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.solve.given import Given
-
-ALONE_DEG, REPEATED_DEG, GAUGE = 10.0, 0.2, 5e-3
-"""Largest usual mistake of one position, deg, of an angle that is repeated, deg, and of
-a gauge that all angles come from, as a part of them."""
 
 JOINTS = ("α", "β")
 
@@ -61,17 +58,18 @@ class WrongAngles:
         if self.position is not None:
             return f"position {self.position + 1} with a wrong {name}"
         if self.angle_deg is not None:
-            return f"{name} = {self.angle_deg:.4g}° set {REPEATED_DEG:g}° off each time"
-        return f"every {name} set {GAUGE:.1%} too far"
+            by = f"{priors.REPEATED_DEG:g}° off each time"
+            return f"{name} = {self.angle_deg:.4g}° set {by}"
+        return f"every {name} set {priors.GAUGE:.1%} too far"
 
     def off_at(self, alpha: float, beta: float) -> tuple[float, float]:
         """What the same mistake makes of another position's angles, rad."""
         angle = (alpha, beta)[self.joint]
         off = 0.0
         if self.position is None and self.angle_deg is None:
-            off = GAUGE * angle
+            off = priors.GAUGE * angle
         elif self.angle_deg is not None and _same(angle, np.deg2rad(self.angle_deg)):
-            off = float(np.deg2rad(REPEATED_DEG))
+            off = float(np.deg2rad(priors.REPEATED_DEG))
         return (off, 0.0) if self.joint == 0 else (0.0, off)
 
     def to_json(self) -> dict[str, Any]:
@@ -129,14 +127,14 @@ def _mistakes(
     for joint, angles in enumerate((x.alpha[rows], x.beta[rows])):
         for i, place in enumerate(places.tolist()):
             u = np.zeros(2 * len(places))
-            u[2 * i + joint] = np.deg2rad(ALONE_DEG)
+            u[2 * i + joint] = np.deg2rad(priors.ALONE_DEG)
             yield joint, None, int(place), u
         for value in np.unique(np.round(angles, 9)).tolist():
             u = np.zeros(2 * len(places))
-            u[joint::2] = np.deg2rad(REPEATED_DEG) * _same(angles, value)
+            u[joint::2] = np.deg2rad(priors.REPEATED_DEG) * _same(angles, value)
             yield joint, float(np.rad2deg(value)), None, u
         u = np.zeros(2 * len(places))
-        u[joint::2] = GAUGE * angles
+        u[joint::2] = priors.GAUGE * angles
         if u.any():
             yield joint, None, None, u
 

@@ -25,6 +25,7 @@ from itertools import combinations
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
@@ -38,9 +39,6 @@ from fieldcal.physics.effect import Motion, Scatter, Sensor
 
 AXES = 3
 """Parameters from which on an effect is not taken on some of them alone."""
-
-LEAST = 0.01
-"""Probability below which an explanation is not looked at: it moves no interval."""
 
 BY_WINDOW = ("misset", "window", "position")
 """Causes by which windows are off each for itself: a given set has those already, as
@@ -88,7 +86,8 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
         own |= {group: cause for cause, group in kept}
         key = frozenset(group for _, group in kept)
         total[key] = total.get(key, 0.0) + one.probability
-    likely = {k: p for k, p in total.items() if p >= LEAST * sum(total.values())}
+    least = thresholds.LOOKED_AT * sum(total.values())
+    likely = {k: p for k, p in total.items() if p >= least}
     # in the order in which they came: that of a set is another one in every run
     wanted = {g: c for g, c in own.items() if any(g in key for key in likely)}
     here = {g: m for g, m in _moved(d, wanted)}

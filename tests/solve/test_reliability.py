@@ -10,8 +10,9 @@ from observed import observe
 
 from fieldcal.core.positions import FIVE, Position
 from fieldcal.core.samples import Array
+from fieldcal.model.priors import GAUGE, REPEATED_DEG
 from fieldcal.solve import solve
-from fieldcal.solve.reliability import GAUGE, REPEATED_DEG, WrongAngles
+from fieldcal.solve.reliability import WrongAngles
 
 G, SIGMA, ANGLES = 9.81, 1e-4, 0.003
 SIX = tuple(

@@ -12,8 +12,7 @@ from fieldcal.against.motion.following import Following, estimates
 from fieldcal.against.result import Aligned, Difference, Pair
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import Quantity
-from fieldcal.model import thresholds
-from fieldcal.model.causes.followed import TURN
+from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.gram import Eliminated
 
 PPM = 1e6
@@ -36,8 +35,8 @@ def placed(found: Following, state: Eliminated) -> Aligned:
 def turned(found: Following, state: Eliminated) -> Iterator[Difference]:
     """Axes that are turned against the reference's."""
     angle, sigma = _turn(found, state)
-    probability = differs(angle, np.diag(sigma**2), np.full(3, TURN))
-    if probability >= thresholds.NAMED and (sigma < TURN).all():
+    probability = differs(angle, np.diag(sigma**2), np.full(3, priors.AXES_TURNED))
+    if probability >= thresholds.NAMED and (sigma < priors.AXES_TURNED).all():
         pairs = {axis: Pair.of(q, None) for axis, q in _angles(angle, sigma).items()}
         yield Difference("misalignment", "left_out", probability, pairs)
 

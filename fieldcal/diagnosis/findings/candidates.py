@@ -11,6 +11,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.stretch_means import rms
 from fieldcal.diagnosis.result import Candidate, FoundEffect
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import held_out
 from fieldcal.model.search.offers import Offer
@@ -21,9 +22,6 @@ LARGEST = 40.0
 
 FOLLOWED = 1
 """Losers whose predictions are worked out: each costs a fit for every position."""
-
-LITTLE = 2.0
-"""Rise of ln L of a cause that takes next to nothing."""
 
 
 def candidates(
@@ -111,12 +109,12 @@ def _why(
                 " tell"
             )
     rise = _rise(alone, posterior.search.evaluated(())) if alone else 0.0
-    if rise < LITTLE or alone is None:
+    if rise < thresholds.TAKES_LITTLE or alone is None:
         return "takes no more than chance would"
     odds = _odds(alone.score - posterior.search.evaluated(()).score)
     if not best.members:
         return f"takes a little: its odds are {odds}"
-    if beside is not None and _rise(beside, best) > LITTLE:
+    if beside is not None and _rise(beside, best) > thresholds.TAKES_LITTLE:
         return f"beside {names} it takes a little, at odds of {odds}"
     return f"{names} takes it: beside that nothing is left for it"
 

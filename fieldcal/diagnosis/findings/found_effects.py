@@ -24,7 +24,6 @@ from fieldcal.model.evidence.sizing import Member, likeliest, likeliest_of_axis
 from fieldcal.model.posterior.held_out import turn_residual, turns_held_out
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.model.system.fitted import Fitted
-from fieldcal.model.system.way_rows import ARRIVAL_S
 from fieldcal.physics.effect import Param, Scatter
 from fieldcal.physics.recording import Fault
 
@@ -179,7 +178,7 @@ def _since_arrival(found: dict[str, Quantity], group: Group) -> dict[str, Quanti
     """Amplitudes with the uncertainty of the instant that they are counted from."""
     shapes = group.effect.shapes if group.effect else ()
     tau = next((group.shape[s.name] for s in shapes if s.kind == "turn"), np.inf)
-    part = ARRIVAL_S / max(tau, ARRIVAL_S)
+    part = priors.ARRIVAL_S / max(tau, priors.ARRIVAL_S)
     return {
         name: Quantity(q.value, float(np.hypot(q.sigma, q.value * part)), q.unit)
         for name, q in found.items()

@@ -16,6 +16,7 @@ from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.means import median_sigma
@@ -26,9 +27,6 @@ from fieldcal.physics.experience import Experience
 from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
 from fieldcal.session.description import Description
 from fieldcal.windows.noise import ChannelNoise
-
-CLIPPED = 1e-3
-"""Part of a window at the rail that makes its mean useless."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +135,7 @@ def _mask(
     if name == "saturation":
         for first, last in windows:
             inside = (fault.rows >= first) & (fault.rows < last)
-            if inside.sum() > CLIPPED * (last - first):
+            if inside.sum() > thresholds.CLIPPED * (last - first):
                 usable[first:last, c] = False
 
 

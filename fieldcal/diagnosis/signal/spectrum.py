@@ -26,17 +26,9 @@ from fieldcal.diagnosis.signal.pieces import (
     take_out,
 )
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.physics.effect import Line
-
-STEADY = 0.65
-"""Part of the energy that one amplitude and phase must take to be a line."""
-
-LASTS, CHANCE = 0.2, 3.0
-"""Part of it in either half of the windows at least, but for so many sigmas."""
-
-EXTRA = 6.9
-"""Of ln 1000: what a line has to be worth beyond the frequencies tried."""
 
 MOST, LOOKS = 4, 3
 """Lines looked for, and how often one that stands out may turn out to be none."""
@@ -101,10 +93,11 @@ def _explained(pieces: Pieces, near: float) -> Tone | None:
         return None
     best = max(tried, key=lambda tone: tone.gain)
     places = np.log(sum(map(len, pieces.samples)))
-    if best.gain <= places + EXTRA or not best.channels:
+    if best.gain <= places - np.log(thresholds.LINE_BY_CHANCE) or not best.channels:
         return None
-    steady = _share(pieces, best, moments) > STEADY and _lasts(pieces, best)
-    return best if steady else None
+    if _share(pieces, best, moments) <= thresholds.ONE_LINE:
+        return None
+    return best if _lasts(pieces, best) else None
 
 
 def _lasts(pieces: Pieces, tone: Tone) -> bool:
@@ -123,8 +116,9 @@ def _lasts(pieces: Pieces, tone: Tone) -> bool:
                 fallen = ((2 * s[some, clear] - line) * line).sum(axis=0)
                 taken[half] += (fallen / pieces.noise[clear] ** 2).sum()
     # half of E varies by 2 sqrt(E / 2)
-    chance = CHANCE * 2 * np.sqrt(max(float(taken.sum()), 0.0) / 2)
-    return bool(taken.min() + chance > LASTS * taken.sum())
+    sigma = 2 * np.sqrt(max(float(taken.sum()), 0.0) / 2)
+    most = taken.min() + thresholds.LINE_LASTS_SIGMAS * sigma
+    return bool(most > thresholds.LINE_LASTS * taken.sum())
 
 
 def _share(pieces: Pieces, tone: Tone, moments: Moments) -> float:

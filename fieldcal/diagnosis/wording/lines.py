@@ -9,10 +9,8 @@ from fieldcal.calibration.wording import pretty, title
 from fieldcal.diagnosis.result import EffectLine, FoundEffect, Quantity
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
 from fieldcal.physics.effect import Chain, Line, Scatter
-
-SEEN = 1.0
-"""Standard deviations below which a parameter counts as not moved."""
 
 TREATED = {
     "mend": "nothing: put right",
@@ -87,8 +85,8 @@ def _does(found: FoundEffect) -> str:
     name = max(found.moves, key=lambda n: _clear(found.moves[n]))
     most = found.moves[name]
     sigmas = _clear(most)
-    if sigmas < SEEN:
-        return f"less than {SEEN:g} σ"
+    if sigmas < thresholds.MOVED:
+        return f"less than {thresholds.MOVED:g} σ"
     unit = pretty(most.unit)
     by = f"{most.value:+.2g} {unit}".rstrip()
     return f"{title(name)} {by} ({sigmas:.0f} σ)"

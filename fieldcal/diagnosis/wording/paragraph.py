@@ -16,9 +16,6 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Scatter
 
-SHOWN = 3.0
-"""Standard deviations from which the paragraph names a parameter."""
-
 EACH = 3
 """Number of times up to which an effect is named each time."""
 
@@ -51,7 +48,11 @@ def named(found: FoundEffect) -> str:
     """An effect with the parameters that stand out."""
     parts = []
     for name, q in found.parameters.items():
-        if isinstance(q.value, str) or not q.sigma or abs(q.value) > SHOWN * q.sigma:
+        if (
+            isinstance(q.value, str)
+            or not q.sigma
+            or abs(q.value) > thresholds.IN_PARAGRAPH * q.sigma
+        ):
             parts.append(f"{name} = {with_uncertainty(q)}")
     return f"{found.id} ({', '.join(parts)})" if parts else found.id
 

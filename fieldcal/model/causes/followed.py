@@ -23,16 +23,6 @@ from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.physics.effect import Motion
 
-DELAY_S, DRIFT = 1e-2, 1e-4
-"""Typical error of an alignment by correlation, s, and of a quartz, 1."""
-
-TURN = 0.1
-"""Typical turn between two axes that are taken for the same, rad."""
-
-UPRIGHT, UNSEEN = 10.0, np.repeat([0.5, 0.01], 3)
-"""What a channel may have that the reference says nothing of, m/s^2 and rad/s: gravity
-along the axis that stands upright, and three degrees of it along those that lie."""
-
 
 class Place:
     """Where the recording stands beside its reference now, for all columns.
@@ -116,16 +106,16 @@ class MotionDictionary(Dictionary):
             return np.broadcast_to(some, (len(view.x), 6, len(lost)))
 
         self.clock = self.add(General("clock", clock), 2)
-        sizes = np.array([DELAY_S, DRIFT])
+        sizes = np.array([priors.CLOCK_S, priors.CLOCK_RATE])
         yield Group("clock", "", self.clock + np.arange(2), sizes, fixed=free)
         self.turn = self.add(General("turn", turn), 3)
         at = self.turn + np.arange(3)
-        yield Group("turn", "", at, np.full(3, TURN), fixed=free)
+        yield Group("turn", "", at, np.full(3, priors.AXES_TURNED), fixed=free)
         if len(lost):
             self.unseen = self.add(General("unseen", unseen), len(lost))
             at = self.unseen + np.arange(len(lost))
-            wide = UNSEEN.copy()
-            wide[np.flatnonzero(place.rows.alignment.unseen)] = UPRIGHT
+            wide = priors.UNSEEN.copy()
+            wide[np.flatnonzero(place.rows.alignment.unseen)] = priors.UPRIGHT
             yield Group("unseen", "", at, wide[lost], fixed=1.0)
 
     def _causes(self) -> Iterator[Cause]:

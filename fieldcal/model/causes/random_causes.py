@@ -12,7 +12,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes import smooth
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.physics.effect import Scatter
+from fieldcal.physics.effect import CHANCE, Scatter
 
 
 def of_chance(table: ColumnTable) -> Iterator[Cause]:
@@ -30,7 +30,7 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
                   position=int(p), in_state=True)
             for p in oriented
         )  # fmt: skip
-        yield Cause("misset", "", priors.PRESENT, groups, "position")
+        yield Cause("misset", "", CHANCE, groups, "position")
 
 
 def _of_scatter(table: ColumnTable, effect: Scatter) -> Iterator[Cause]:

@@ -17,13 +17,14 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
+from fieldcal.model import priors
 from fieldcal.model.causes.cause import triads_of
 from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.linear_rows import Linear
-from fieldcal.model.system.way_rows import BUILT_UP, WayRows, on_the_way, settling
+from fieldcal.model.system.way_rows import WayRows, on_the_way, settling
 from fieldcal.model.turns.attitude import between, geometry
 from fieldcal.model.turns.turn import Turn, Turning, moved, only
 from fieldcal.physics.experience import Experience
@@ -157,7 +158,7 @@ class Turns:
         length = float(np.ptp(turn.x.t))
         wide = float(np.sqrt((spread**2).mean())) * np.sqrt(length)
         fading = settling(state, turn.x, since)[3:] / np.abs(state.scale[3:])
-        unsure = BUILT_UP * length * float(np.abs(fading).max())
+        unsure = priors.BUILT_UP * length * float(np.abs(fading).max())
         earth = EARTH_RATE / 3**0.5 * length if d.free.any() else 0.0
         alike = wide**2 + turn.blur**2 + unsure**2 + earth**2
         basis, info = _plane(across, ends, alike)

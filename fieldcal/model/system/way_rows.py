@@ -23,13 +23,6 @@ from fieldcal.model.state import State
 from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.experience import Experience
 
-ARRIVAL_S = 0.3
-"""Standard uncertainty of the instant at which a turn by hand ends."""
-
-BUILT_UP, AFTERWARDS, BUILDS_S = 0.5, 0.15, 2.0
-"""How far what settles may be off on the way and at its end, in its size, and how
-smoothly, s."""
-
 
 class WayRows:
     """Rows of the accelerometers of one turn.
@@ -132,7 +125,7 @@ class WayRows:
         built = _built_up(x, self.view.since, middle)
         cov += np.kron(built, np.outer(fading[:3], fading[:3]))
         density = self.noise[3:] / np.abs(state.scale[3:]) * np.sqrt(turn.interval)
-        building = BUILT_UP * np.sqrt(length) * fading[3:] / state.scale[3:]
+        building = priors.BUILT_UP * np.sqrt(length) * fading[3:] / state.scale[3:]
         density = np.hypot(density, building)
         for axis in range(3):
             along = np.broadcast_to(np.eye(3)[axis][:, None], (len(x.t), 3, 1))
@@ -143,7 +136,7 @@ class WayRows:
         sizes = priors.SIZES[list(self.known.sizes.instability)]
         loose = (sizes * self.dictionary.unstable)[:3]
         # what windows are off by for reasons unknown changes with the attitude as well
-        apart = np.subtract.outer(middle, middle) / BUILDS_S
+        apart = np.subtract.outer(middle, middle) / priors.BUILDS_S
         course = 1.0 + np.exp(-(apart**2) / 2)
         walks = self.dictionary.wander.apart(middle, np.diff(x.t[turn.cut]))
         for c in range(3):
@@ -176,7 +169,9 @@ def _built_up(x: Experience, since: Array, middle: Array) -> Array:
     rest = np.isfinite(since[0])
     k = int(np.argmax(rest)) if rest.any() else len(x.t) - 1
     arrived = x.t[k] - (since[0, k] if rest.any() else 0.0) - x.t[0]
-    unsure = np.where(middle < arrived + ARRIVAL_S, BUILT_UP, AFTERWARDS)
-    apart = np.subtract.outer(middle, middle) / BUILDS_S
+    unsure = np.where(
+        middle < arrived + priors.ARRIVAL_S, priors.BUILT_UP, priors.AFTERWARDS
+    )
+    apart = np.subtract.outer(middle, middle) / priors.BUILDS_S
     out: Array = np.outer(unsure, unsure) * np.exp(-(apart**2) / 2)
     return out

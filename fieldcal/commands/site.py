@@ -10,7 +10,7 @@ from fieldcal.commands.several import StoreSeveral
 
 
 def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
-    """Declare the options of device, site and frame, of `several` devices maybe."""
+    """Declare the options of device, site and frame, of more than one if `several`."""
     group = parser.add_argument_group("device and place")
     add = group.add_argument
     add("--name", help="name of the device")

@@ -17,7 +17,7 @@ PAUSE = 1.0
 
 
 def mean_period(t: Array) -> float:
-    """Mean distance of times (n,) between pauses, s; nan of one.
+    """Mean interval between times (n,), pauses left out, s; nan of one.
 
     What a pause is depends on the period, so the longest are left out until none is.
 

@@ -1,4 +1,4 @@
-"""What terminal and page say of the noise of a device in the same words."""
+"""Words for the noise of a device, the same on the terminal and on the page."""
 
 from __future__ import annotations
 

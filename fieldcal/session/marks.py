@@ -1,7 +1,7 @@
 """marks.jsonl: what happened while a session was recorded, a line each.
 
-Every line carries the checksum of its own text, so that one that was cut off or changed
-is left out and said, and those about it count.
+Every line carries the checksum of its own text: one that was cut off or changed is left
+out and reported, and the lines around it count.
 """
 
 from __future__ import annotations

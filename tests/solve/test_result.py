@@ -12,7 +12,7 @@ from observed import GYR_BIAS, observe, outputs
 
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.positions import FIVE, TWO, Position
-from fieldcal.solve import observations, result, solve, words
+from fieldcal.solve import observations, result, solve
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.estimation import Estimated
 from fieldcal.solve.observations import Observations
@@ -58,116 +58,6 @@ def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
     text = str(error.value)
     assert text.startswith("these positions determine nothing: acc_bias.x and")
     assert text.endswith("; a note")
-
-
-@pytest.mark.parametrize(
-    ("turned", "rates", "gyr", "cross", "says"),
-    [
-        (False, False, ["gyr_scale.x"], [],
-         "gyr_scale.x is left out: the Earth's rate gives it only roughly in these"
-         " windows; average longer, or integrate turns between the positions"),
-        (False, False, ["gyr_scale.x", "gyr_scale.y"], [],
-         "gyr_scale.x and gyr_scale.y are left out: the Earth's rate gives it only"
-         " roughly in these windows; average longer, or integrate turns between the"
-         " positions"),
-        (True, False, ["gyr_scale.y"], ["gyro_cross_coupling.s13"],
-         "gyr_scale.y and 1 of 6 gyro_cross_coupling are not determined by these turns:"
-         " add turns about device axis y and z while that axis is level"),
-        (False, True, [], ["gyro_cross_coupling.s21", "gyro_cross_coupling.s31"],
-         "2 of 6 gyro_cross_coupling is not determined by this schedule: add a rate of"
-         " 20°/s about device axis x"),
-    ],
-)  # fmt: skip
-def test_what_turns_or_rates_leave_open(
-    turned: bool, rates: bool, gyr: list[str], cross: list[str], says: str
-) -> None:
-    found = estimated()
-    found.given.wanted.turned = turned  # type: ignore[misc]
-    seen = observed()
-    if rates:
-        seen = observed((FIVE[0], Position("", rate=(0.1, 0.0, 0.0))))
-    assert result._turning(gyr, cross, seen, found) == says
-
-
-@pytest.mark.parametrize(
-    ("missing", "n", "dof", "says"),
-    [
-        (["acc_bias.x", "cross_coupling.k12"], 12, 5,
-         "acc_bias.x and cross_coupling.k12 are not determined by these orientations:"
-         " add positions with each axis up and down"),
-        (["cross_coupling.k12"], 12, 5,
-         "cross_coupling.k12 is not determined, axes held up and down alone cannot show"
-         " it: add positions with gravity half way between x and y"),
-        (["cross_coupling.k13", "cross_coupling.k23"], 8, 1,
-         "cross_coupling.k13 and cross_coupling.k23 are not determined, 8 norms cannot"
-         " carry 9 parameters: add positions with gravity half way between x and z and"
-         " y and z"),
-        (["cross_coupling.k23"], 9, 2,
-         "cross_coupling.k23 is not determined, axes held up and down alone cannot show"
-         " it (and all nine would leave two degrees of freedom): add positions with"
-         " gravity half way between y and z"),
-    ],
-)  # fmt: skip
-def test_what_lengths_leave_open(
-    missing: list[str], n: int, dof: int, says: str
-) -> None:
-    assert result._scalar(missing, estimated(acc=fit(dof=dof)), n) == says
-
-
-def test_of_so_few_windows_the_residual_says_nothing() -> None:
-    assert result._few("joint", estimated(acc=fit(dof=0))) == [words.NO_DOF]
-    assert result._few("joint", estimated(acc=fit(dof=1))) == []
-    one = "one degree of freedom: the residual says nothing about the fit; add"
-    assert result._few("scalar", estimated(acc=fit(dof=1))) == [
-        f"{one} positions in other orientations"
-    ]
-    assert result._few("scalar", estimated(acc=fit(dof=3))) == []
-    assert result._few("joint", estimated(acc=fit(dof=0, rms=np.nan))) == []
-
-
-def test_a_base_that_two_positions_take_for_level_is_said() -> None:
-    seen = observed(TWO, gravity=10.0)
-    (text,) = result._level("two_position", Asked(), seen)
-    assert text == (
-        "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to 0.017"
-        " m/s^2 unseen; take five positions, or say how level it is (--level)"
-    )
-    assert result._level("two_position", Asked(level_deg=0.1), seen) == []
-    assert result._level("joint", Asked(), seen) == []
-
-
-def test_scatter_of_each_triad_and_of_turns_is_said_with_its_unit() -> None:
-    loud = {"chi2": 60.0, "dof": 6, "rms": 1e-3}
-    spread = "an extra scatter of {} {} is in the uncertainties"
-    both = estimated(acc=fit(**loud), gyr=fit(**loud), closures=(90.0, 6))
-    acc, gyr, turns = result._scattered(both)
-    assert acc.startswith("the positions disagree")
-    assert spread.format("2.9", "m/s^2") in acc
-    assert gyr.startswith("the gyroscopes' means disagree")
-    assert spread.format("1.3", "rad/s") in gyr
-    assert turns.startswith("the turns disagree") and "dof 6" in turns
-    assert spread.format("5", "rad") in turns
-    both.given.free[:] = True
-    assert result._scattered(both)[0].startswith("the norms disagree")
-    few = estimated(closures=(90.0, 5), names=("gyr_scale.x",))
-    assert len(result._scattered(few)) == 1, "four of five are left over"
-    assert result._turns(few) == (90.0, 4)
-    more = estimated(
-        closures=(1.0, 1), names=("gyr_scale.x", "gyro_cross_coupling.s12")
-    )
-    assert result._turns(more) == (1.0, 0)
-
-
-def test_gyroscopes_of_which_no_scale_factor_is_asked_for() -> None:
-    found = estimated()
-    found.given.wanted.gyr_scale = False  # type: ignore[misc]
-    assert result._open("joint", observed(), found) == [words.NO_SCALE]
-    earth = observed(grade="navigation", latitude=0.8)
-    assert result._open("joint", earth, found) == [
-        "gyr_scale is not determined: the Earth's rate gives it only with two known"
-        " positions and the latitude"
-    ]
-    assert result._open("joint", observed(gyr=False), found) == []
 
 
 def test_wrong_angles_harm_where_they_move_more_than_the_margin() -> None:

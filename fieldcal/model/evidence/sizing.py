@@ -66,7 +66,7 @@ class Sizes:
 def alike(
     instability: Sequence[int] | Array, unstable: Array, density: Array = UNSTEADY
 ) -> Any:
-    """How likely instabilities (..., 7) are, ln: those of a triad's axes are alike.
+    """Log prior of instabilities (..., 7): those of a triad's axes are alike.
 
     `unstable` (7,) is their typical size, 0 where there is none; `density` is ln of how
     likely each of `priors.SIZES` is.

@@ -1,0 +1,172 @@
+"""What the user must know of a calibration: what is open, unchecked or too scattered.
+
+A sentence each, with what to do about it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldcal.calibration import Method
+from fieldcal.calibration.names import AXES, ParameterName, group_of
+from fieldcal.core.samples import UNITS as CHANNEL_UNITS
+from fieldcal.core.sentences import join
+from fieldcal.model import thresholds
+from fieldcal.solve import words
+from fieldcal.solve.assumed import Asked
+from fieldcal.solve.doubt import DoubtfulPosition
+from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
+from fieldcal.solve.observations import Observations
+from fieldcal.solve.rank import ladder_remedy
+
+OF_ACC = frozenset(
+    {"acc_bias", "acc_scale", "cross_coupling", "angle_offset", "base_tilt"}
+)
+"""Groups that the accelerometers at rest determine."""
+
+OF_TURNS = frozenset({"gyr_scale", "gyro_cross_coupling"})
+"""Groups that turns determine."""
+
+
+def left_open(
+    method: Method, observations: Observations, found: Estimated
+) -> list[str]:
+    """Parameters that the rows leave open, and which positions would give them."""
+    sentences = []
+    acc = [n for n in found.missing if group_of(n) in OF_ACC]
+    if acc and found.given.wanted.level_deg is not None:
+        acc = [n for n in acc if group_of(n) != "base_tilt"]
+    if acc:
+        sentences.append(
+            _scalar(acc, found, len(observations))
+            if method == "scalar"
+            else words.not_determined(
+                acc, _remedy(observations, found), "these positions"
+            )
+        )
+    gyr = [n for n in found.missing if group_of(n) == "gyr_scale"]
+    cross = [n for n in found.missing if group_of(n) == "gyro_cross_coupling"]
+    if not found.given.wanted.gyr_scale and observations.has_gyr:
+        sentences.append(
+            "gyr_scale is not determined: the Earth's rate gives it only with two "
+            "known positions and the latitude"
+            if observations.grade == "navigation"
+            else words.NO_SCALE
+        )
+    elif gyr or cross:
+        sentences.append(_turning(gyr, cross, observations, found))
+    return sentences
+
+
+def _remedy(observations: Observations, found: Estimated) -> list[str]:
+    """Positions that would determine them."""
+    names = [n for n in found.given.names if group_of(n) in OF_ACC]
+    if any(n in found.missing for n in names) and not observations.rotating.any():
+        return ladder_remedy(observations, names)
+    return []
+
+
+def _turning(
+    gyr: Sequence[str],
+    cross: Sequence[str],
+    observations: Observations,
+    found: Estimated,
+) -> str:
+    """What of the gyroscopes turns or rates leave open."""
+    missing = [*gyr] + ([f"{len(cross)} of 6 gyro_cross_coupling"] if cross else [])
+    if not found.given.wanted.turned and not observations.rotating.any():
+        return (
+            f"{join(missing)} {'are' if missing[1:] else 'is'} left out: the"
+            " Earth's rate gives it only roughly in these windows; average longer, or"
+            " integrate turns between the positions"
+        )
+    turned = {ParameterName.of(n).entry[1] for n in cross}
+    turned |= {ParameterName.of(n).axis for n in gyr}
+    about = [AXES[axis] for axis in sorted(turned)]
+    if observations.rotating.any():
+        return words.not_determined(
+            missing, [f"a rate of 20°/s about device axis {a}" for a in about],
+            "this schedule",
+        )  # fmt: skip
+    level = f"turns about device axis {join(about)} while that axis is level"
+    return words.not_determined(missing, [level], "these turns")
+
+
+def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
+    """What lengths of the force leave open."""
+    hidden = [m for m in missing if group_of(m) == "cross_coupling"]
+    if len(hidden) < len(missing):
+        return words.not_determined(
+            missing, ["positions with each axis up and down"], "these orientations"
+        )
+    entries = [ParameterName.of(name).entry for name in hidden]
+    pairs = [f"{AXES[row]} and {AXES[column]}" for row, column in entries]
+    why = "axes held up and down alone cannot show it"
+    if n < 9:
+        why = f"{n} norms cannot carry 9 parameters"
+    elif found.acc.dof in words.FEW:
+        why += f" (and all nine would leave {words.FEW[found.acc.dof]})"
+    return (
+        f"{join(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
+        f" add positions with gravity half way between {join(pairs)}"
+    )
+
+
+def not_levelled(method: Method, asked: Asked, observations: Observations) -> list[str]:
+    """That nobody said how level the base is, where nothing shows it."""
+    if method != "two_position" or asked.level_deg:
+        return []
+    moved = observations.gravity * np.deg2rad(0.1)
+    return [
+        "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to "
+        f"{moved:.3f} m/s^2 unseen; take five positions, or say how level it is"
+        " (--level)"
+    ]
+
+
+def doubts(method: Method, observations: Observations, found: Estimated) -> list[str]:
+    """What of the windows' agreement the user must know."""
+    doubt = DoubtfulPosition.of(observations, found.bad)
+    few, scattered = _few(method, found), _scattered(found)
+    return [*few, doubt.sentence if doubt else "", *scattered]
+
+
+def _few(method: Method, found: Estimated) -> list[str]:
+    """What so few windows cannot check."""
+    if np.isnan(found.acc.rms):
+        return []
+    if found.acc.dof <= 0:
+        return [words.NO_DOF]
+    if method == "scalar" and found.acc.dof in words.FEW:
+        return [
+            f"{words.FEW[found.acc.dof]}: the residual says nothing about the fit; add"
+            " positions in other orientations"
+        ]
+    return []
+
+
+def _scattered(found: Estimated) -> list[str]:
+    """Scatter beyond the noise."""
+    what = "norms" if found.given.free.all() else "positions"
+    sentences = []
+    for name, agreed, channels in (
+        (what, found.acc, (0, 1, 2)), ("gyroscopes' means", found.gyr, (3, 4, 5)),
+    ):  # fmt: skip
+        if not np.isnan(agreed.rms):
+            spread, unit = scatter_of(found.found, channels), CHANNEL_UNITS[channels[0]]
+            sentences.append(words.excess(name, agreed.chi2, agreed.dof, spread, unit))
+    chi2, dof = closure_chi2(found)
+    if dof >= thresholds.TURNS_TELL:
+        sentences.append(
+            words.excess("turns", chi2, dof, turns_scatter(found.found), "rad")
+        )
+    return sentences
+
+
+def closure_chi2(found: Estimated) -> tuple[float, int]:
+    """chi2 of the closures, and how many are left over."""
+    chi2, count = found.closures
+    spent = sum(group_of(n) in OF_TURNS for n in found.names)
+    return chi2, max(0, count - spent)

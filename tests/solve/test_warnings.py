@@ -1,0 +1,121 @@
+"""Sentences of what is open, unchecked or too scattered, of estimates made up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_result import estimated, fit, observed
+
+from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.solve import warnings, words
+from fieldcal.solve.assumed import Asked
+
+
+@pytest.mark.parametrize(
+    ("turned", "rates", "gyr", "cross", "says"),
+    [
+        (False, False, ["gyr_scale.x"], [],
+         "gyr_scale.x is left out: the Earth's rate gives it only roughly in these"
+         " windows; average longer, or integrate turns between the positions"),
+        (False, False, ["gyr_scale.x", "gyr_scale.y"], [],
+         "gyr_scale.x and gyr_scale.y are left out: the Earth's rate gives it only"
+         " roughly in these windows; average longer, or integrate turns between the"
+         " positions"),
+        (True, False, ["gyr_scale.y"], ["gyro_cross_coupling.s13"],
+         "gyr_scale.y and 1 of 6 gyro_cross_coupling are not determined by these turns:"
+         " add turns about device axis y and z while that axis is level"),
+        (False, True, [], ["gyro_cross_coupling.s21", "gyro_cross_coupling.s31"],
+         "2 of 6 gyro_cross_coupling is not determined by this schedule: add a rate of"
+         " 20°/s about device axis x"),
+    ],
+)  # fmt: skip
+def test_what_turns_or_rates_leave_open(
+    turned: bool, rates: bool, gyr: list[str], cross: list[str], says: str
+) -> None:
+    found = estimated()
+    found.given.wanted.turned = turned  # type: ignore[misc]
+    seen = observed()
+    if rates:
+        seen = observed((FIVE[0], Position("", rate=(0.1, 0.0, 0.0))))
+    assert warnings._turning(gyr, cross, seen, found) == says
+
+
+@pytest.mark.parametrize(
+    ("missing", "n", "dof", "says"),
+    [
+        (["acc_bias.x", "cross_coupling.k12"], 12, 5,
+         "acc_bias.x and cross_coupling.k12 are not determined by these orientations:"
+         " add positions with each axis up and down"),
+        (["cross_coupling.k12"], 12, 5,
+         "cross_coupling.k12 is not determined, axes held up and down alone cannot show"
+         " it: add positions with gravity half way between x and y"),
+        (["cross_coupling.k13", "cross_coupling.k23"], 8, 1,
+         "cross_coupling.k13 and cross_coupling.k23 are not determined, 8 norms cannot"
+         " carry 9 parameters: add positions with gravity half way between x and z and"
+         " y and z"),
+        (["cross_coupling.k23"], 9, 2,
+         "cross_coupling.k23 is not determined, axes held up and down alone cannot show"
+         " it (and all nine would leave two degrees of freedom): add positions with"
+         " gravity half way between y and z"),
+    ],
+)  # fmt: skip
+def test_what_lengths_leave_open(
+    missing: list[str], n: int, dof: int, says: str
+) -> None:
+    assert warnings._scalar(missing, estimated(acc=fit(dof=dof)), n) == says
+
+
+def test_of_so_few_windows_the_residual_says_nothing() -> None:
+    assert warnings._few("joint", estimated(acc=fit(dof=0))) == [words.NO_DOF]
+    assert warnings._few("joint", estimated(acc=fit(dof=1))) == []
+    one = "one degree of freedom: the residual says nothing about the fit; add"
+    assert warnings._few("scalar", estimated(acc=fit(dof=1))) == [
+        f"{one} positions in other orientations"
+    ]
+    assert warnings._few("scalar", estimated(acc=fit(dof=3))) == []
+    assert warnings._few("joint", estimated(acc=fit(dof=0, rms=np.nan))) == []
+
+
+def test_a_base_that_two_positions_take_for_level_is_said() -> None:
+    seen = observed(TWO, gravity=10.0)
+    (text,) = warnings.not_levelled("two_position", Asked(), seen)
+    assert text == (
+        "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to 0.017"
+        " m/s^2 unseen; take five positions, or say how level it is (--level)"
+    )
+    assert warnings.not_levelled("two_position", Asked(level_deg=0.1), seen) == []
+    assert warnings.not_levelled("joint", Asked(), seen) == []
+
+
+def test_scatter_of_each_triad_and_of_turns_is_said_with_its_unit() -> None:
+    loud = {"chi2": 60.0, "dof": 6, "rms": 1e-3}
+    spread = "an extra scatter of {} {} is in the uncertainties"
+    both = estimated(acc=fit(**loud), gyr=fit(**loud), closures=(90.0, 6))
+    acc, gyr, turns = warnings._scattered(both)
+    assert acc.startswith("the positions disagree")
+    assert spread.format("2.9", "m/s^2") in acc
+    assert gyr.startswith("the gyroscopes' means disagree")
+    assert spread.format("1.3", "rad/s") in gyr
+    assert turns.startswith("the turns disagree") and "dof 6" in turns
+    assert spread.format("5", "rad") in turns
+    both.given.free[:] = True
+    assert warnings._scattered(both)[0].startswith("the norms disagree")
+    few = estimated(closures=(90.0, 5), names=("gyr_scale.x",))
+    assert len(warnings._scattered(few)) == 1, "four of five are left over"
+    assert warnings.closure_chi2(few) == (90.0, 4)
+    more = estimated(
+        closures=(1.0, 1), names=("gyr_scale.x", "gyro_cross_coupling.s12")
+    )
+    assert warnings.closure_chi2(more) == (1.0, 0)
+
+
+def test_gyroscopes_of_which_no_scale_factor_is_asked_for() -> None:
+    found = estimated()
+    found.given.wanted.gyr_scale = False  # type: ignore[misc]
+    assert warnings.left_open("joint", observed(), found) == [words.NO_SCALE]
+    earth = observed(grade="navigation", latitude=0.8)
+    assert warnings.left_open("joint", earth, found) == [
+        "gyr_scale is not determined: the Earth's rate gives it only with two known"
+        " positions and the latitude"
+    ]
+    assert warnings.left_open("joint", observed(gyr=False), found) == []

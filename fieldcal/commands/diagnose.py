@@ -123,6 +123,11 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             "--motion, --patch, --limit and --junit need --against: name a simulator"
         )
+    return _diagnosed(args)
+
+
+def _diagnosed(args: argparse.Namespace) -> int:
+    """Diagnose one session, and write what was found."""
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare
     from fieldcal.diagnosis.verdict import concluded

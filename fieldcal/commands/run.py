@@ -248,9 +248,6 @@ def _record(
     page: PageServer | None,
 ) -> tuple[Calibration, dict[str, Any] | None, Sequence[Companion]]:
     """Hold the positions, record and solve; and what a virtual device conceals."""
-    from fieldcal import procedures
-    from fieldcal.acceptance.level import level_unknown
-    from fieldcal.acceptance.site import gravity_unknown
     from fieldcal.commands.run_device import device
     from fieldcal.run.companions import record_companions
     from fieldcal.run.patient_mover import PatientMover
@@ -272,10 +269,7 @@ def _record(
         turns = PatientMover(mover, patience(args))
         operator = stack.enter_context(operator_of(args, task, turns, folder, page))
         turns.tell = recorder.tell = operator.tell
-        unseen = [gravity_unknown(task.about)]
-        if procedures.most(task.about, task.procedure) is None:
-            unseen.insert(0, level_unknown(task.about))
-        for sentence in filter(None, unseen):
+        for sentence in _unsaid(task):
             operator.tell(sentence)
         if known:
             _take_besides(recorder, task, len(known.positions), args.again, taken)
@@ -292,6 +286,18 @@ def _record(
         recorder.mark("finished", verdict="good" if found.good else "bad")
         truth = getattr(mover, "truth", None)
         return found, dict(truth) if truth else None, recorder.others
+
+
+def _unsaid(task: Task) -> list[str]:
+    """What nobody said of base and site, without which it is NO-GO."""
+    from fieldcal import procedures
+    from fieldcal.acceptance.level import level_unknown
+    from fieldcal.acceptance.site import gravity_unknown
+
+    unsaid = [gravity_unknown(task.about)]
+    if procedures.most(task.about, task.procedure) is None:
+        unsaid.insert(0, level_unknown(task.about))
+    return [sentence for sentence in unsaid if sentence]
 
 
 def _take_besides(

@@ -23,7 +23,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import calibrated
 from fieldcal.diagnosis.findings.found_effects import sizes
 from fieldcal.diagnosis.prepare import Prepared
-from fieldcal.diagnosis.signal.chain import check
+from fieldcal.diagnosis.signal.chain import found_first
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
@@ -59,11 +59,8 @@ def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
     """The session with bytes put right that were decoded wrongly, and what was done."""
     if not session.positions:
         return session, ()
-    faults = [
-        fault
-        for name, fault in check(session.block, session.about).faults
-        if name == BYTES and fault.mended is not None
-    ]
+    found = found_first(BYTES, session.block, session.about)
+    faults = [fault for fault in found if fault.mended is not None]
     if not faults:
         return session, ()
     six, sentences = session.block.six, []

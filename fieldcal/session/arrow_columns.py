@@ -24,6 +24,10 @@ def numbers(column: pa.Array | pa.ChunkedArray) -> Array:
 
 
 def _numbers(chunk: pa.Array) -> Array:
-    whole = chunk.fill_null(np.nan) if chunk.null_count else chunk
-    first, last = whole.offset, whole.offset + len(whole)
-    return np.frombuffer(whole.buffers()[1], dtype=float)[first:last]
+    there, values = chunk.buffers()
+    first, last = chunk.offset, chunk.offset + len(chunk)
+    out = np.frombuffer(values, dtype=float)[first:last]
+    if not chunk.null_count:
+        return out
+    bits = np.unpackbits(np.frombuffer(there, dtype=np.uint8), bitorder="little")
+    return np.where(bits[first:last], out, np.nan)

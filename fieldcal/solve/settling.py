@@ -108,7 +108,7 @@ def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
     nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
     state = replace(state, scale=nominal)
     for _ in range(FOLLOWED):
-        inference.gram(state, values, None)
+        inference.followed(state, values)
         before = state.scale
         state, values, _ = inference.settled(state, values, given.members)
         if np.abs(state.scale / before - 1).max() < NEAR:

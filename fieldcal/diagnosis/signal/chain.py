@@ -92,6 +92,13 @@ def check(block: Block, about: Description) -> Checked:
     return Checked(block, usable, tuple(_once(faults)), samples.noise)
 
 
+def found_first(name: str, block: Block, about: Description) -> list[Fault]:
+    """What one effect does to samples as they were recorded, before any is mended."""
+    if about.means_only:
+        return []
+    return _find(name, recording(block, np.isfinite(block.six), about))
+
+
 def checked_again(checked: Checked, block: Block, about: Description) -> Checked:
     """The same with what lines in the spectrum can feign looked at without them."""
     faults = [(n, f) for n, f in checked.faults if n != "noise_level"]

@@ -55,7 +55,10 @@ class ColumnTable:
         self.bias = self.add(General("bias", columns.bias), 6)
         self.scale = self.add(General("scale", columns.scale), 6)
         turns = General(
-            "aside", columns.small_rotation, sides=columns.small_rotation_sides
+            "aside",
+            columns.small_rotation,
+            sides=columns.small_rotation_sides,
+            each=True,
         )
         self.small_rotation = self.add(turns, 2 * self.places)
         self.windows = self.course("window", self._inside, len(self.held), False)

@@ -8,7 +8,7 @@ ask the same object, with what the device goes through there.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -45,11 +45,19 @@ class RowView:
     x: Experience
     since: Array
     state: State
+    _by_origin: dict[int, Experience] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, plain: Experience, since: Array, state: State) -> RowView:
         """Rows at a base state."""
         return cls(plain, state.experienced(plain), since, state)
+
+    def counting_from(self, origin: int) -> Experience:
+        """Rows as the state has them, since the turn by one origin."""
+        if origin not in self._by_origin:
+            seen = replace(self.x, since_turn=self.since[origin])
+            self._by_origin[origin] = seen
+        return self._by_origin[origin]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,19 +83,22 @@ class General:
     of : the columns of rows
     sides : where it changes what is experienced in positions, rows with each column a
         step up and down, and the step
+    each : whether every position has columns of its own, which follow each other; in
+        `sides` all positions are then changed at once
 
     """
 
     name: str
     of: Callable[[RowView], Array]
     sides: Sides | None = None
+    each: bool = False
 
 
 def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> General:
     """Columns of an effect of the catalogue."""
 
     def sensor(view: RowView) -> Array:
-        seen = replace(view.x, since_turn=view.since[origin])
+        seen = view.counting_from(origin)
         design: Array = effect.design(seen, shape or NO_SHAPE)  # type: ignore[attr-defined]
         return design
 
@@ -122,7 +133,7 @@ def of_channels(
     def of(view: RowView) -> Array:
         courses = []
         for shape, origin in grid:
-            seen = replace(view.x, since_turn=view.since[origin])
+            seen = view.counting_from(origin)
             courses.append(effect.design(seen, shape or NO_SHAPE)[:, 0, 0])
         return np.stack(courses, axis=1)
 
@@ -253,53 +264,33 @@ def attitude(view: RowView) -> Array:
 
 
 def attitude_sides(plain: Experience, state: State) -> Iterator[Pair]:
-    """The same of one position after the other, where turns meet them."""
-    places = len(state.small_rotation)
-    known = state.attitude if state.attitude.any() else np.zeros((places, 3))
-
-    def changed(off: Array) -> State:
-        return replace(state, attitude=known + off)
-
-    yield from _one_by_one(plain, state, np.zeros((places, 3)), changed)
+    """The same, where turns meet the positions."""
+    known = state.attitude
+    if not known.any():
+        known = np.zeros((len(state.small_rotation), 3))
+    for off in SMALL * np.eye(3):
+        ends = (replace(state, attitude=known + s * off) for s in (1.0, -1.0))
+        up, down = (one.experienced(plain) for one in ends)
+        yield up, down, SMALL
 
 
 def small_rotation_sides(plain: Experience, state: State) -> Iterator[Pair]:
-    """Two small turns of each position, rad, those of a position together."""
-
-    def changed(off: Array) -> State:
-        return replace(state, small_rotation=state.small_rotation + off)
-
-    yield from _one_by_one(plain, state, np.zeros_like(state.small_rotation), changed)
-
-
-def _one_by_one(
-    plain: Experience, state: State, none: Array, changed: Callable[[Array], State]
-) -> Iterator[Pair]:
-    """One angle of one position after the other, `none` (p, k) being all of them."""
-    here = state.experienced(plain)
-    for p, i in np.ndindex(none.shape):
-        if p not in plain.position:
-            yield here, here, SMALL
-            continue
-        off = none.copy()
-        off[p, i] = SMALL
-        yield changed(off).experienced(plain), changed(-off).experienced(plain), SMALL
+    """Two small turns of every position, rad."""
+    small = state.small_rotation
+    for off in SMALL * np.eye(2):
+        ends = (replace(state, small_rotation=small + s * off) for s in (1.0, -1.0))
+        up, down = (one.experienced(plain) for one in ends)
+        yield up, down, SMALL
 
 
 def small_rotation(view: RowView) -> Array:
-    """The same as columns (n, 6, 2 p), all positions turned at once."""
+    """The same as columns (n, 6, 2 p), those of a position together."""
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
     at = view.plain.position
     held = np.flatnonzero(at >= 0)
-    for joint in range(2):
-        ends = []
-        for sign in (1.0, -1.0):
-            small = view.state.small_rotation.copy()
-            small[:, joint] += sign * SMALL
-            ends.append(
-                replace(view.state, small_rotation=small).experienced(view.plain)
-            )
-        change = _apart(ends[0], ends[1], SMALL, view.state)
+    sides = small_rotation_sides(view.plain, view.state)
+    for joint, (up, down, step) in enumerate(sides):
+        change = _apart(up, down, step, view.state)
         out[held, :, 2 * at[held] + joint] = change[held]
     return out

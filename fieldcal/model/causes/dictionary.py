@@ -210,7 +210,7 @@ class Dictionary(ColumnTable):
         if not np.isfinite(sigma).any():
             return
         sides = columns.attitude_sides
-        basis = General("attitude", columns.attitude, sides=sides)
+        basis = General("attitude", columns.attitude, sides=sides, each=True)
         self.attitude = self.add(basis, 3 * self.places)
         known = np.isfinite(sigma)
         at = self.attitude + 3 * self.held[known][:, None] + np.arange(3)

@@ -294,7 +294,12 @@ def gains(inner: Array, pull: Array, own: Array | float) -> Array:
 
 def gained(strength: Array, power: Array, sizes: Array = SIZES) -> Array:
     """Gain (3) over some sizes of lambda and q^2, (..., k) each."""
-    load = sizes[:, None] ** 2 * strength[..., None, :]
-    taken = sizes[:, None] ** 2 * power[..., None, :] / (1 + load)
-    gain: Array = 0.5 * (taken - np.log1p(load)).sum(axis=-1)
-    return gain
+    square = sizes**2
+    # columns first: sums along an axis of three cost more than what is summed
+    one = np.moveaxis(strength, -1, 0)[..., None] * square
+    one += 1
+    gain = np.moveaxis(power, -1, 0)[..., None] * square
+    gain /= one
+    gain -= np.log(one, out=one)
+    total: Array = 0.5 * gain.sum(axis=0)
+    return total

@@ -75,12 +75,17 @@ def alike(
     total = np.zeros(sizes.shape[:-1])
     for triad in TRIADS:
         if on := [c for c in triad if unstable[c] > 0]:
-            some = sizes[..., on]
-            middle = some.mean(axis=-1)
-            total = total + np.interp(middle, np.arange(len(density)), density)
-            apart = (some - middle[..., None]) * (STEP / priors.UNLIKE)
-            total -= 0.5 * (apart**2).sum(axis=-1)
+            total = total + alike_in(sizes[..., on], density)
     return total if total.ndim else float(total)
+
+
+def alike_in(some: Array, density: Array = UNSTEADY) -> Array:
+    """How likely instabilities (..., n) of a triad are, ln, (...)."""
+    middle = some.sum(axis=-1) / some.shape[-1]
+    apart = (some - middle[..., None]) * (STEP / priors.UNLIKE)
+    likely = np.interp(middle, np.arange(len(density)), density)
+    out: Array = likely - 0.5 * (apart * apart).sum(axis=-1)
+    return out
 
 
 def _told(state: Eliminated, at: Index, v: float) -> tuple[Array, Array]:
@@ -230,15 +235,15 @@ class Sizing:
         if self._level() >= level - ROUNDED:
             return profiles
         self.instability = before
-        return [self._one(c) for c in channels]
+        return [self._one(c, channels) for c in channels]
 
     def _level(self) -> float:
         """F at the sizes as they are, but for what is known of groups' sizes."""
         return self.eliminated().score + float(alike(self.instability, self.unstable))
 
-    def _one(self, c: int) -> Array:
+    def _one(self, c: int, channels: Sequence[int]) -> Array:
         """F over the instabilities of one channel, and its own at the top."""
-        profile = self._beside(c, self._channel(c))
+        profile = self._beside(c, channels, self._channel(c))
         self.instability[c] = int(np.argmax(profile))
         return profile
 
@@ -252,14 +257,19 @@ class Sizing:
         middle = int(np.argmax(total))
         for c, one in zip(channels, best, strict=True):
             self.instability[c] = int(np.argmax(one[middle]))
-        return [self._beside(c, one) for c, one in zip(channels, alone, strict=True)]
+        return [
+            self._beside(c, channels, one)
+            for c, one in zip(channels, alone, strict=True)
+        ]
 
-    def _beside(self, c: int, gain: Array) -> Array:
-        """F over the sizes of a channel beside those of the others, of its gain."""
-        every = np.tile(self.instability, (len(DENSITY), 1))
-        every[:, c] = np.arange(len(DENSITY))
-        out: Array = gain + alike(every, self.unstable)
-        return out
+    def _beside(self, c: int, channels: Sequence[int], gain: Array) -> Array:
+        """F over the sizes of one channel, of its gain, but for a constant.
+
+        Some channels are alike, it among them; the others of them stay.
+        """
+        every = np.tile([float(self.instability[i]) for i in channels], (len(gain), 1))
+        every[:, channels.index(c)] = np.arange(len(gain))
+        return gain + alike_in(every)
 
     def _channel(self, c: int) -> Array:
         """Gain over the instabilities of one channel, the others as they are."""

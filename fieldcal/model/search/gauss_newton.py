@@ -70,6 +70,14 @@ class GaussNewton:
             self.turned = self.turns.linearised(state, values, linear, known)
         return gram(linear, self.dictionary, values, self.turned)
 
+    def followed(self, state: State, values: Array) -> None:
+        """Follow the turns about a state; the accelerometers on the way are left."""
+        if self.turns is None:
+            return
+        free = self.dictionary.free.any()  # only there windows say where turns end
+        linear = self.system.linearised(state) if free else []
+        self.turned = self.turns.linearised(state, self.padded(values), linear, None)
+
     def gram_of(
         self, linear: Sequence[Linear], values: Array, wanted: NDArray[np.bool_]
     ) -> Gram:

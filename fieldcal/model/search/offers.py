@@ -151,11 +151,14 @@ class Offers(Sets):
             at = alike.cause
             profile = gain + DENSITY
             size = profile.argmax(axis=2)
-            evidence = np.logaddexp.reduce(profile, axis=2) + chances[at]
             taken = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
-            near = (taken >= LEAST) & (evidence > LOST + chances[at].min())
-            for i, m in np.argwhere(near).tolist():
-                cause, worth = self.dictionary.causes[at[m]], float(evidence[i, m])
+            level, number = np.nonzero(taken >= LEAST)
+            evidence = np.logaddexp.reduce(profile[level, number], axis=1)
+            evidence += chances[at[number]]
+            near = evidence > LOST + chances[at].min()
+            each = (level[near], number[near], evidence[near])
+            for i, m, worth in zip(*(e.tolist() for e in each), strict=True):
+                cause = self.dictionary.causes[at[m]]
                 if cause not in found[i] or worth > found[i][cause][0]:
                     found[i][cause] = worth, int(alike.variant[m]), int(size[i, m])
         return found

@@ -23,11 +23,11 @@ from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State, Term
+from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.way_rows import WayRows, on_the_way, settling
-from fieldcal.model.turns.attitude import between, geometry
-from fieldcal.model.turns.turn import Turn, Turning, moved, only
-from fieldcal.physics.experience import Experience
+from fieldcal.model.turns.attitude import closures, geometry, rows_of
+from fieldcal.model.turns.turn import Turn, Turning, moved
 
 STEADY = 3.0
 """Squares a row on the way, with everything fitted that shows there, from which a hand
@@ -99,6 +99,11 @@ class Turns:
         out: list[TurnRows] = []
         seen = self.way and known is not None and not _strange(known)
         self.scale, self.known = state.scale, known if seen else None
+        self.at_ends = {
+            first: EndColumns.of(first, one, self.rows.x, state)
+            for first, one in self.dictionary.bases
+            if isinstance(one, General) and one.sides is not None
+        }
         if self.dictionary.free.any():
             self.means = _means(windows, self.dictionary)
             self.spread = _spread(windows, self.dictionary)
@@ -137,8 +142,7 @@ class Turns:
                     at.append(first + c * table.shape[1] + np.arange(table.shape[1]))
                     closing.append(weights[:, :, c - 3] @ table)
                 continue
-            outputs, bent = self._of_basis(turn, state, view, one)
-            columns = first + np.arange(outputs.shape[2])
+            columns, outputs, bent = self._of_basis(turn, view, first, one)
             at.append(columns)
             closing.append(np.einsum("ijc,jck->ik", weights, outputs[:, 3:]) - bent)
             if self.known is not None:
@@ -180,51 +184,29 @@ class Turns:
         to see: df = -(1 - n n^T) dU / k. Numbers of the two windows, (3, 3) each.
         """
         ends = turn.ends
-        for p in turn.positions:
-            row = int(np.argmax(ends.position == p))
-            f = ends.f[row]
-            up = f / np.linalg.norm(f)
+        rows = rows_of(ends, turn.positions)
+        both, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
+        for i, p in enumerate(turn.positions):
+            up = both[i] / np.linalg.norm(both[i])
             across = (np.eye(3) - np.outer(up, up)) / self.scale[:3]
-            bent = np.zeros((3, 3))
-            for j, step in enumerate(1e-4 * np.linalg.norm(f) * np.eye(3)):
-                sides = []
-                for sign in (1.0, -1.0):
-                    g = ends.f.copy()
-                    g[ends.position == p] = f + sign * step
-                    sides.append(self._at_ends(turn, replace(ends, f=g))[1])
-                bent[:, j] = (sides[0] - sides[1]) / (2 * step[j])
+            step = 1e-4 * float(np.linalg.norm(both[i]))
+            sides = []
+            for sign in (1.0, -1.0):
+                f = np.repeat(both[None], 3, axis=0)
+                f[:, i] += sign * step * np.eye(3)
+                sides.append(closures(f, held, turn.attitude[-1])[0])
+            bent = (sides[0] - sides[1]).T / (2 * step)
             yield int(np.searchsorted(self.dictionary.held, p)), -bent @ across
 
     def _of_basis(
-        self, turn: Turn, state: State, view: RowView, one: General
-    ) -> tuple[Array, Array]:
-        """Outputs at the edges (m + 1, 6, k), and by how much the closure moves."""
-        width = len(turn.x)
-        if one.sides is None:
-            table = one.of(view)
-            return table, np.zeros((3, table.shape[2]))
-        p, q = turn.positions
-        rows = [int(np.argmax(turn.ends.position == i)) for i in (p, q)]
-        plain = only(self.rows.x, rows)
-        outputs, moved = [], []
-        for up, down, step in one.sides(plain, state):
-            if up is down:  # of another position
-                outputs.append(np.zeros((width, 6)))
-                moved.append(np.zeros(3))
-                continue
-            (f, close), (g, other) = (self._at_ends(turn, x) for x in (up, down))
-            six = np.zeros((width, 6))
-            six[:, :3] = (f - g) / (2 * step) * state.scale[:3]
-            ends = (up.w - down.w) / (2 * step)
-            six[:, 3:] = between(turn.attitude, turn.done, *ends) * state.scale[3:]
-            outputs.append(six)
-            moved.append((close - other) / (2 * step))
-        return np.stack(outputs, axis=2), np.stack(moved, axis=1)
-
-    @staticmethod
-    def _at_ends(turn: Turn, x: Experience) -> tuple[Array, Array]:
-        f, closure, _ = geometry(x, turn.positions, turn.attitude, turn.done)
-        return f, closure
+        self, turn: Turn, view: RowView, first: int, one: General
+    ) -> tuple[Index, Array, Array]:
+        """Columns, outputs at the edges (m + 1, 6, k), how the closure moves (3, k)."""
+        if first in self.at_ends:
+            return self.at_ends[first].met_by(turn, view.state.scale)
+        table = one.of(view)
+        columns = first + np.arange(table.shape[2])
+        return columns, table, np.zeros((3, table.shape[2]))
 
 
 def _strange(known: Set) -> bool:

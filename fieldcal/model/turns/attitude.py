@@ -6,10 +6,12 @@ angles in rad, t in s.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model.turns.rotation import carry, small_turns
 from fieldcal.physics.experience import Experience
 
@@ -31,9 +33,10 @@ def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
 
 
 def between(attitude: Array, done: Array, start: Array, end: Array) -> Array:
-    """A vector of the base on the way, known at both ends, (m + 1, 3)."""
+    """Vectors of the base (3, ...) on the way, known at both ends, (m + 1, 3, ...)."""
+    part = done.reshape(-1, *[1] * start.ndim)
     back = attitude @ attitude[-1].T
-    out: Array = (1 - done)[:, None] * (attitude @ start) + done[:, None] * (back @ end)
+    out: Array = (1 - part) * (attitude @ start) + part * (back @ end)
     return out
 
 
@@ -93,16 +96,42 @@ def geometry(
     -------
     f : (m + 1, 3) force on the way, from both ends
     closure : (3,) phi_T in the axes of p
-    across : (3, 3) projection on what of it is known
+    known : (3, 3) projection on what of it is known
 
     """
-    p, q = (int(np.argmax(x.position == i)) for i in pair)
-    f = between(attitude, done, x.f[p], x.f[q])
-    if x.oriented[[p, q]].all():
-        known = x.to_device[[p, q]]
-        off = attitude[-1].T @ known[1] @ known[0].T  # I + [phi]x
-        if (np.trace(off) - 1) / 2 > np.cos(ASTRAY):
-            return f, vee(off), np.eye(3)
-    up = x.f[p] / np.linalg.norm(x.f[p])
-    seen = attitude[-1].T @ x.f[q]
-    return f, np.cross(up, seen / np.linalg.norm(seen)), np.eye(3) - np.outer(up, up)
+    ends = rows_of(x, pair)
+    f, held = x.f[ends], x.to_device[ends]
+    (closure,), (whole,) = closures(f[None], held[None], attitude[-1])
+    known = np.eye(3)
+    if not whole:
+        known -= np.outer(f[0], f[0]) / (f[0] @ f[0])
+    return between(attitude, done, *f), closure, known
+
+
+def rows_of(x: Experience, positions: Iterable[int]) -> Index:
+    """The first row of each position."""
+    return np.array([int(np.argmax(x.position == p)) for p in positions])
+
+
+def closures(f: Array, held: Array, end: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """phi_T where positions are so, in the axes of p, and whether all of it is known.
+
+    Parameters
+    ----------
+    f : (n, 2, 3) forces in both positions, device axes
+    held : (n, 2, 3, 3) direction cosines from base to device; nan where unknown
+    end : (3, 3) attitude at the end of the turn
+
+    Returns
+    -------
+    (n, 3) rad, and (n,); of what is not all known, what lies across the force at p
+
+    """
+    off = end.T @ held[:, 1] @ np.swapaxes(held[:, 0], 1, 2)  # I + [phi]x
+    whole = (np.trace(off, axis1=1, axis2=2) - 1) / 2 > np.cos(ASTRAY)
+    if whole.all():
+        return vee(off), whole
+    up = f[:, 0] / np.linalg.norm(f[:, 0], axis=1, keepdims=True)
+    seen = f[:, 1] @ end
+    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+    return np.where(whole[:, None], vee(off), np.cross(up, seen)), whole

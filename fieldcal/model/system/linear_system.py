@@ -32,6 +32,10 @@ SHOWS = 1.0
 standard deviations, where they show it."""
 
 
+Parts = dict[int, list[tuple[Index, Array]]]
+"""Columns that touch each channel, with their values in all rows, (n, k)."""
+
+
 class System(ABC):
     """Rows and a dictionary, linearised about states.
 
@@ -53,6 +57,15 @@ class System(ABC):
         self, state: State, wanted: NDArray[np.bool_] | None = None
     ) -> list[Linear]:
         """Rows of every channel about a state, with all columns or those wanted."""
+
+
+def add_course(parts: Parts, at: Index, table: Array, kept: NDArray[np.bool_]) -> None:
+    """Add columns `at` of a function that is the same on every channel, those kept."""
+    width = table.shape[1]
+    for c, some in parts.items():
+        own = slice(c * width, (c + 1) * width)
+        if kept[own].any():
+            some.append((at[own][kept[own]], table[:, kept[own]]))
 
 
 def gram(

@@ -16,10 +16,7 @@ from fieldcal.model.rows.coloured import Bands
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import Linear
-from fieldcal.model.system.linear_system import SHOWS, System
-
-Parts = dict[int, list[tuple[Index, Array]]]
-"""Columns that touch each channel, with their coefficients."""
+from fieldcal.model.system.linear_system import SHOWS, Parts, System, add_course
 
 
 class MotionSystem(System):
@@ -54,16 +51,14 @@ class MotionSystem(System):
         views = self._views(state)
         off = self._off(views, state)
         white = rows.cosines(np.where(rows.used, off, 0.0))
-        parts: dict[int, list[tuple[Index, Array]]] = {
-            c: [] for c in d.observed.tolist()
-        }
+        parts: Parts = {c: [] for c in d.observed.tolist()}
         asked = self._grouped() if wanted is None else wanted
         for first, end, basis in d.spans():
             at, kept = np.arange(first, end), asked[first:end]
             if not kept.any():
                 continue
             if isinstance(basis, Course):
-                self._courses(parts, at, basis.of(views[0]), kept)
+                add_course(parts, at, rows.cosines(basis.of(views[0])), kept)
                 continue
             table = self._table(basis, views)
             for c, some in parts.items():
@@ -116,20 +111,6 @@ class MotionSystem(System):
         for group in [*d.always, *(v for c in d.causes for v in c.variants)]:
             out[group.columns] = True
         return out
-
-    def _courses(
-        self,
-        parts: Parts,
-        at: Index,
-        table: Array,
-        kept: NDArray[np.bool_],
-    ) -> None:
-        """Columns `at` of a function that is the same on every channel, those kept."""
-        every, width = self.motion.cosines(table), table.shape[1]
-        for c, some in parts.items():
-            own = slice(c * width, (c + 1) * width)
-            if kept[own].any():
-                some.append((at[own][kept[own]], every[:, kept[own]]))
 
     def _channel(
         self, c: int, some: Sequence[tuple[Index, Array]], white: Array

@@ -14,14 +14,11 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import Linear
-from fieldcal.model.system.linear_system import SHOWS, System
+from fieldcal.model.system.linear_system import SHOWS, Parts, System, add_course
 
 NOTHING = 1e-6
 """What a column of typical size makes on an accelerometer in windows that show it, at
 least, m/s^2."""
-
-Parts = list[tuple[Index, Array]]
-"""Columns that touch a channel, with their values in all rows, (n, k)."""
 
 
 class WindowSystem(System):
@@ -51,43 +48,29 @@ class WindowSystem(System):
         off = self.rows.y - state.output(view.x, d.since)
         asked = np.ones(d.width, bool) if wanted is None else wanted
         parts = self._parts(view, asked)
-        out = [self._channel(c, parts[c], off[:, c]) for c in d.observed.tolist()]
+        out = [self._channel(c, some, off[:, c]) for c, some in parts.items()]
         if wanted is None:
             for part in out:
                 d.shown[part.columns] |= self._shows(part)
         return out
 
-    def _parts(self, view: RowView, wanted: NDArray[np.bool_]) -> list[Parts]:
+    def _parts(self, view: RowView, wanted: NDArray[np.bool_]) -> Parts:
         """Columns of each channel that are wanted and touch it."""
-        parts: list[Parts] = [[] for _ in range(6)]
+        parts: Parts = {c: [] for c in self.dictionary.observed.tolist()}
         for first, end, basis in self.dictionary.spans():
             at, kept = np.arange(first, end), wanted[first:end]
             if not kept.any():
                 continue
             table = basis.of(view)
             if isinstance(basis, Course):
-                self._course(parts, at, table, kept)
+                add_course(parts, at, table, kept)
                 continue
-            for c in self.dictionary.observed:
+            for c, some in parts.items():
                 used = self.rows.used[:, c]
                 there = kept & np.any(table[used, c] != 0.0, axis=0)
                 if there.any():
-                    parts[c].append((at[there], table[:, c, there]))
+                    some.append((at[there], table[:, c, there]))
         return parts
-
-    def _course(
-        self,
-        parts: list[Parts],
-        at: Index,
-        table: Array,
-        kept: NDArray[np.bool_],
-    ) -> None:
-        """Columns `at` of a function that is the same on every channel, those kept."""
-        width = table.shape[1]
-        for c in self.dictionary.observed:
-            own = slice(c * width, (c + 1) * width)
-            if kept[own].any():
-                parts[c].append((at[own][kept[own]], table[:, kept[own]]))
 
     def _channel(
         self, c: int, parts: Sequence[tuple[Index, Array]], off: Array

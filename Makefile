@@ -53,11 +53,12 @@ docs: .venv/.docs
 
 setup: $(READY)
 
-# what calibrates; modules are compiled when they are first imported, which most never are
+# what calibrates; other modules are compiled when they are first imported, which most never are
 $(READY): pyproject.toml constraints.txt Makefile
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "fieldcal needs Python 3.11 or newer; $(PYTHON) is older. Name another: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 2; }
 	$(PYTHON) -m venv .venv
 	$(PIP) --no-compile -e .
+	@$(BIN)/python -m compileall -q fieldcal drivers procedures sim_device
 	@touch $@
 
 # what tests and linters need beside, and every format

@@ -157,13 +157,18 @@ def tilted(place: Path, count: int = 12) -> None:
 
 
 def units(
-    rng: np.random.Generator, count: int, odd: float = 0.0, shift: float = 0.0
+    rng: np.random.Generator,
+    count: int,
+    odd: float = 0.0,
+    shift: float = 0.0,
+    late: int | None = None,
 ) -> list[StoredSession]:
     """Units of nine parameters, each with an error of half the spread.
 
-    One in `odd` is off by 8 spreads; the later half is shifted by `shift` spreads in
-    acc_bias.x.
+    One in `odd` is off by 8 spreads; the `late` last ones, half of all if not given,
+    are another lot and shifted by `shift` spreads in acc_bias.x.
     """
+    first = count - (count // 2 if late is None else late)
     groups = (("acc_bias", 0.02, "m/s^2"), ("acc_scale", 1e-3, "1"),
               ("gyr_bias", 1e-3, "rad/s"))  # fmt: skip
     out = []
@@ -175,12 +180,12 @@ def units(
             for j, axis in enumerate("xyz"):
                 own = rng.standard_normal() + 0.5 * rng.standard_normal()
                 own += 8 * (strange and which == 3 * k + j)
-                own += shift * (k == j == 0 and i >= count // 2)
+                own += shift * (k == j == 0 and i >= first)
                 middle = 1.0 if group == "acc_scale" else 0.0
                 value = middle + wide * own
                 seen[f"{group}.{axis}"] = (float(value), wide / 2, unit)
         name = f"odd {i}" if strange else f"{i}"
-        levels = {"lot": "AB"[i >= count // 2], "station": "PQRS"[i % 4]}
+        levels = {"lot": "AB"[i >= first], "station": "PQRS"[i % 4]}
         at = f"2026-{1 + i // 800:02d}-{1 + i // 30 % 27:02d}T{i:06d}"
         out.append(StoredSession(f"/s/{i}", name, levels, at, True, True, {},
                                  parameters=seen))  # fmt: skip
@@ -201,28 +206,37 @@ def lots() -> None:
         f" {named + wrong}"
     )
     for size in (0.0, 0.5, 1.0):
-        for count in (100, 400):
-            kinds: Counter[str] = Counter()
-            for _ in range(TRIALS):
-                found = lot(units(rng, count, shift=size), bounds)
-                kinds["lot"] += any(
-                    s.parameter == "acc_bias.x" and s.level == "lot"
-                    for s in found.shifts
-                )
-                kinds["drift"] += any(a.parameter == "acc_bias.x" for a in found.alarms)
-                kinds["false"] += any(
-                    s.parameter != "acc_bias.x" or s.level != "lot"
-                    for s in found.shifts
-                )
-            print(
-                f"second half of {count} shifted by {size:g} spreads: lot named in"
-                f" {kinds['lot']}, chart in {kinds['drift']}, a false shift in"
-                f" {kinds['false']} of {TRIALS}"
-            )
+        for count, late in ((100, 50), (400, 200), (450, 50)):
+            shifted(rng, bounds, size, count, late)
     some = units(rng, 10_000)
     begun = perf_counter()
     lot(some, bounds)
     print(f"a lot of 10 000 units: {perf_counter() - begun:.1f} s")
+
+
+def shifted(
+    rng: np.random.Generator,
+    bounds: limits.GradeLimits,
+    size: float,
+    count: int,
+    late: int,
+) -> None:
+    """How often the last units of many are told to be shifted, also falsely."""
+    kinds: Counter[str] = Counter()
+    for _ in range(TRIALS):
+        found = lot(units(rng, count, shift=size, late=late), bounds)
+        kinds["lot"] += any(
+            s.parameter == "acc_bias.x" and s.level == "lot" for s in found.shifts
+        )
+        kinds["drift"] += any(a.parameter == "acc_bias.x" for a in found.alarms)
+        kinds["false"] += any(
+            s.parameter != "acc_bias.x" or s.level != "lot" for s in found.shifts
+        )
+    print(
+        f"the last {late} of {count} shifted by {size:g} spreads: lot named in"
+        f" {kinds['lot']}, chart in {kinds['drift']}, a false shift in"
+        f" {kinds['false']} of {TRIALS}"
+    )
 
 
 # -- shared effects

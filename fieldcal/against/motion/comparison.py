@@ -58,7 +58,8 @@ def compared_in_motion(
         *differing(found, free),
         *turned(found, state),
     )
-    differences = tuple(sorted(every, key=lambda d: -d.probability))
+    # what is certain stays in the order in which it was found, whatever rounding says
+    differences = tuple(sorted(every, key=lambda d: -round(d.probability, 6)))
     verdict = verdict_of(differences)
     shown = proof(found)
     predicted = shown.before, shown.after

@@ -41,7 +41,8 @@ class Place:
         """Take the same rows at another alignment."""
         self.rows = rows
         self.change = rows.motion(rows.gyr, 1)
-        self.change[:, ACC] = rows.motion(rows.acc, 1)[:, ACC]
+        if rows.gyr is not rows.acc:
+            self.change[:, ACC] = rows.motion(rows.acc, 1)[:, ACC]
 
 
 class MotionDictionary(Dictionary):

@@ -23,6 +23,7 @@ Stegun 25.4.45.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Self
@@ -57,7 +58,8 @@ class Reference:
     ----------
     observed : (6,) channels that it has
     start, end : s of its clock
-    splines : of the channels that it has, with their numbers
+    splines : of the channels that it has, those with the same samples as one, with the
+        channels' numbers
 
     """
 
@@ -68,10 +70,19 @@ class Reference:
         self.t, self.step = block.t[whole], float(np.median(np.diff(block.t[whole])))
         self.start, self.end = float(self.t[0]), float(self.t[-1])
         self.splines = [
-            (c, CubicSpline(block.t[known], six[known, c]))
-            for c in np.flatnonzero(self.observed)
-            for known in [np.isfinite(six[:, c])]
+            (channels, CubicSpline(block.t[known], six[np.ix_(known, channels)]))
+            for known, channels in self._alike(np.isfinite(six))
         ]
+
+    def _alike(
+        self, finite: NDArray[np.bool_]
+    ) -> Iterator[tuple[NDArray[np.bool_], Index]]:
+        """Samples (n,), and the channels that it has of which these are known."""
+        alike: dict[bytes, list[int]] = {}
+        for c in np.flatnonzero(self.observed).tolist():
+            alike.setdefault(finite[:, c].tobytes(), []).append(c)
+        for channels in alike.values():
+            yield finite[:, channels[0]], np.array(channels)
 
     @property
     def lost(self) -> Index:
@@ -82,8 +93,8 @@ class Reference:
     def at(self, s: Array, order: int = 0) -> Array:
         """The six channels, or a derivative, at instants of its clock, (n, 6)."""
         out = np.zeros((len(s), 6))
-        for c, spline in self.splines:
-            out[:, c] = spline(s, order)
+        for channels, spline in self.splines:
+            out[:, channels] = spline(s, order)
         return out
 
     def followed(self, tau: float) -> Self:
@@ -92,8 +103,8 @@ class Reference:
             return self
         out = copy(self)
         out.splines = [
-            (c, CubicSpline(spline.x, _lagging(spline, tau)))
-            for c, spline in self.splines
+            (channels, CubicSpline(spline.x, _lagging(spline, tau)))
+            for channels, spline in self.splines
         ]
         return out
 
@@ -105,14 +116,16 @@ class Reference:
 
 
 def _lagging(spline: CubicSpline, tau: float) -> Array:
-    """Values at the knots of a spline as a sensor follows it."""
+    """Values (n, k) at the knots of a spline of k channels as a sensor follows it."""
     t = spline.x
     if tau < 0:
         early: Array = spline(t) - tau * spline(t, 1)  # (2)
         return early
     ages, weights = np.polynomial.laguerre.laggauss(NODES)
-    past = np.maximum(t[:, None] - tau * ages, t[0])
-    late: Array = spline(past) @ weights  # (1)
+    late: Array = sum(
+        weight * spline(np.maximum(t - tau * age, t[0]))  # (1)
+        for age, weight in zip(ages, weights, strict=True)
+    )
     return late
 
 

@@ -56,3 +56,15 @@ def test_before_its_first_sample_a_reference_is_as_at_it() -> None:
     found = Reference(Block.of(even, rising[:, :3], rising[:, 3:])).followed(0.2)
     expected = even - 0.2 * (1 - np.exp(-even / 0.2))  # of a ramp that begins at 0
     np.testing.assert_allclose(found.at(even)[:, 0], expected, atol=0.02)
+
+
+def test_channels_sampled_at_other_instants_are_each_followed_by_their_own() -> None:
+    six = waves(T)
+    six[1::2, 3:] = np.nan  # gyroscopes at half the rate
+    six[:, 1] = np.nan
+    found = Reference(Block.of(T, six[:, :3], six[:, 3:]))
+    np.testing.assert_array_equal(found.observed, [1, 0, 1, 1, 1, 1])
+    np.testing.assert_array_equal(found.lost, [1])
+    expected = waves(INSIDE, np.arctan(W * 0.02) / W, np.hypot(1, W * 0.02) ** -1)
+    expected[:, 1] = 0.0
+    np.testing.assert_allclose(found.followed(0.02).at(INSIDE), expected, atol=3e-4)

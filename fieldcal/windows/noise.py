@@ -16,6 +16,14 @@ which window is louder: there the short-lag noise is
 
     s^2 = <(x_{k+1} - x_k)^2> / 2                                                (2)
 
+What turns to and fro, as a hand that trembles, has an s^2(m) that rises above that of
+one sample to the next and falls again, in the end as 1/m: how far an angle has come in
+a time does not grow with it. Noise of a sensor, whatever its colour, does not fall. The
+noise beside it is that of fourth differences, of which what is slower than a tenth of
+the samples a second has next to nothing,
+
+    s^2 = <(x_{k+2} - 4 x_{k+1} + 6 x_k - 4 x_{k-1} + x_{k-2})^2> / 70            (3)
+
 No level is below what the steps of the outputs allow (`rounding`). Source: IEEE Std
 952, annex C; J. von Neumann 1941 for (2).
 """
@@ -40,6 +48,10 @@ MOST = 200_000
 
 SHOWN = 2000
 """Samples of a window in which the step of coarse outputs shows."""
+
+RISES, FALLS = 2.0, 2.0
+"""By how much s^2(m) exceeds that of one sample to the next, and its last value, where
+something goes to and fro."""
 
 AGREE = 3.0
 ANCHOR_S = 1.0
@@ -81,6 +93,38 @@ def noise_of(pieces: Sequence[Array], rate_hz: float) -> ChannelNoise:
     least = rounding.least(steps_of(pieces))
     quick = np.maximum(np.sqrt(levels[:, -1]), least)
     return ChannelNoise(np.maximum(white, least), quick)
+
+
+def to_and_fro(pieces: Sequence[Array]) -> bool:
+    """Whether what a triad shows beyond its quickest noise comes back.
+
+    Parameters
+    ----------
+    pieces : (n_i, 3) samples of each window, nan where not to be used
+
+    """
+    longest = max((len(p) for p in pieces), default=0) // 4
+    lengths = [1 << k for k in range(longest.bit_length())]
+    found = [_level(pieces, m)[0].sum() for m in lengths]
+    levels = np.array([v for v in found if np.isfinite(v)])
+    if len(levels) < 3:
+        return False
+    top = levels.max()
+    return bool(top > RISES * levels[0] and top > FALLS * levels[-1])
+
+
+def quickest(pieces: Sequence[Array]) -> Array:
+    """Deviation of one sample (c,) beside whatever is slower, (3).
+
+    Parameters
+    ----------
+    pieces : (n_i, c) samples of each window, nan where not to be used
+
+    """
+    most = max(MOST // max(len(pieces), 1), 1)
+    steps = [np.diff(p[:most], 4, axis=0) for p in pieces]
+    square: Array = np.nanmean(np.concatenate(steps) ** 2, axis=0) / 70  # (3)
+    return np.sqrt(square)
 
 
 def short_lag(values: Array) -> Array:

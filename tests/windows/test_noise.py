@@ -8,8 +8,14 @@ from scipy.stats import truncnorm
 
 from fieldcal.core.samples import Array
 from fieldcal.windows import noise
-from fieldcal.windows.noise import noise_of, short_lag, steps_of
-from windows.signals import low_passed, white
+from fieldcal.windows.noise import (
+    noise_of,
+    quickest,
+    short_lag,
+    steps_of,
+    to_and_fro,
+)
+from windows.signals import flicker, low_passed, white
 
 RATE = 100.0
 
@@ -227,3 +233,54 @@ def test_the_step_is_looked_for_at_the_beginning_of_each_window() -> None:
     x[2200] = 0.25
     assert steps_of([x]) == 1.0
     assert steps_of([x, x[1000:]]) == 0.25
+
+
+def trembling(n: int, seed: int, hz: tuple[float, float] = (1.0, 8.0)) -> Array:
+    """Rate of an angle that trembles about each axis with an rms of 1, (n, 3)."""
+    rng, t = np.random.default_rng(seed), np.arange(n) / RATE
+    out = np.zeros((n, 3))
+    for _ in range(8):
+        f = rng.uniform(*hz, 3)
+        phase = np.multiply.outer(t, 2 * np.pi * f) + rng.uniform(0, 6.3, 3)
+        out += 0.5 * 2 * np.pi * f * np.cos(phase)
+    return out
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_trembles_comes_back_and_no_noise_of_a_sensor_does(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    pieces = [trembling(500, seed * 9 + i) + white(rng, 500, 3) for i in range(6)]
+    assert to_and_fro(pieces)
+    noises = [white(rng, 500, 3) for _ in range(6)]
+    assert not to_and_fro(noises)
+    assert not to_and_fro([low_passed(6.0)(rng, 500, 3) for _ in range(6)])
+    assert not to_and_fro([flicker(2.0)(rng, 500, 3) for _ in range(6)])
+    assert not to_and_fro([walk(500, 3, i) for i in range(6)])
+    assert not to_and_fro([p + walk(500, 3, i) for i, p in enumerate(noises)])
+    assert not to_and_fro([p + 0.005 * trembling(500, 3) for p in noises]), "too weak"
+
+
+def test_of_next_to_nothing_nobody_can_tell() -> None:
+    assert not to_and_fro([])
+    assert not to_and_fro([trembling(9, 1)])
+    assert not to_and_fro([np.full((500, 3), np.nan)])
+
+
+def test_the_quickest_noise_is_that_of_fourth_differences() -> None:
+    """By a slow sum, with samples that are missing; what is slow leaves nothing."""
+    x = white(np.random.default_rng(4), 400, 2) * [1.0, 0.3]
+    x[100] = np.nan
+    found = quickest([x[:150], x[150:]])
+    for c in range(2):
+        squares = [
+            (x[i - 2, c] - 4 * x[i - 1, c] + 6 * x[i, c] - 4 * x[i + 1, c]
+             + x[i + 2, c]) ** 2
+            for part in (range(150), range(150, 400))
+            for i in part[2:-2]
+        ]  # fmt: skip
+        assert found[c] == pytest.approx(np.sqrt(np.nanmean(squares) / 70))
+    size = np.array([0.5, 0.01, 2.0])
+    quiet = white(np.random.default_rng(5), 20_000, 3) * size
+    np.testing.assert_allclose(quickest([quiet]), size, rtol=0.03)
+    slow = trembling(20_000, 2) / 40
+    np.testing.assert_allclose(quickest([quiet[:, :1] + slow[:, :1]]), 0.5, rtol=0.03)

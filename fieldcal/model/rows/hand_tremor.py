@@ -15,7 +15,11 @@ sums up to has about a line the variance
 
     a^2 + N^2 T / 15                                                               (2)
 
-with N the density of white noise, whose sum is a walk.
+with N the density of white noise, whose sum is a walk. A tremor is real motion, and no
+noise of the sensors: the gyroscopes follow it from one rest to the next, and how far it
+has turned the device at the end of a rest bends the closure of a turn. To the force it
+adds the push of the hand. Along gravity that sums up to a speed, which comes back as
+the angle does, so that of the mean force along it (1) and (2) hold with the speed.
 """
 
 from __future__ import annotations
@@ -23,12 +27,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource, averaged, reduce
+from fieldcal.windows.noise import quickest, to_and_fro
 
 WANDERS = 6.0
 """Standard deviations of what the squares across the force have too many."""
@@ -44,48 +51,74 @@ def rows_of(source: RowSource) -> Rows:
     """Rows of a recording, one for each window of a device held by hand."""
     rows = reduce(source)
     held = np.unique(rows.x.position)
-    if not (angle := wander(rows)):
+    bound = spans(source.block, source.about)[held]
+    angle, noise = wander(rows), _beside_tremor(source, rows, bound)
+    if not angle and noise is None:
         return rows
     samples = rows.length[:, None] * rate_of(source.block)
     level = [
         np.nanmedian((rows.sd * np.sqrt(samples))[rows.x.position == p], axis=0)
         for p in held
     ]
-    bound = spans(source.block, source.about)[held]
+    if noise is not None:
+        level, rows = [noise] * len(held), replace(rows, noise=noise)
     shaken = [rows.x.variance[rows.x.position == p].mean(axis=0) for p in held]
     one = averaged(source, bound, held, np.array(level), rows.noise, np.array(shaken))
-    rates = masked(source.block, source.usable).gyr
-    unsteady = [
-        _unsteady(rates[a:b], length, white)
-        for (a, b), length, white in zip(bound, one.length, one.sd[:, 3:], strict=True)
-    ]
-    slow = np.sqrt(2.0) * angle / one.length[:, None]  # (1)
-    one.sd[:, 3:] = np.sqrt(one.sd[:, 3:] ** 2 + slow**2 + np.square(unsteady))
+    block = masked(source.block, source.usable)
+    unit = np.abs(source.about.nominal["acc_scale"])
+    turned, pushed = np.zeros((len(held), 3)), np.zeros(len(held))
+    for i, (a, b) in enumerate(bound):
+        white, lasts = one.sd[i], float(one.length[i])
+        turned[i] = _to_and_fro(block.gyr[a:b], lasts, white[3:])
+        up = one.x.f[i] / np.linalg.norm(one.x.f[i])
+        along = (block.acc[a:b] / unit) @ up
+        spread = np.array([np.linalg.norm(white[:3] / unit * up)])
+        pushed[i] = _to_and_fro(along[:, None], lasts, spread)[0]
+    slow = np.sqrt(2 * (angle**2 + turned**2)) / one.length[:, None]  # (1)
+    one.sd[:, 3:] = np.hypot(one.sd[:, 3:], slow)
+    fast = np.sqrt(2.0) * pushed / one.length  # (1)
+    one.sd[:, :3] = np.hypot(one.sd[:, :3], fast[:, None] * unit)
     first = np.searchsorted(rows.x.position, held)
-    force = angle * source.about.gravity * np.abs(source.about.nominal["acc_scale"])
+    most = max(angle, float(np.sqrt((turned**2).mean())))
+    force = most * source.about.gravity * unit
     return replace(one, common=rows.common[first], wander=float(force.mean()))
 
 
-def _unsteady(rates: Array, length: float, white: Array) -> Array:
-    """What trembling adds to the mean rates of a window, by axis, (3,) outputs.
+def _beside_tremor(
+    source: RowSource, rows: Rows, bound: NDArray[np.intp]
+) -> Array | None:
+    """Noise of one sample beside a tremor, (6,); None where nothing trembles."""
+    block = masked(source.block, source.usable)
+    free = ~rows.x.oriented.any() and len(bound) >= FEWEST
+    if not free or not to_and_fro([block.gyr[a:b] for a, b in bound]):
+        return None
+    least = grain_of(block, bound)
+    both = [
+        quickest([triad[a:b] for a, b in bound]) for triad in (block.acc, block.gyr)
+    ]
+    beside: Array = np.maximum(np.concatenate(both), least)
+    return beside
+
+
+def _to_and_fro(values: Array, length: float, white: Array) -> Array:
+    """What trembles sums up to an angle or a speed: its rms about a line, (k,).
 
     Parameters
     ----------
-    rates : (n, 3) outputs, nan where missing
+    values : (n, k) outputs, nan where missing
     length : T, s
-    white : (3,) deviation of the mean by white noise, N / sqrt(T)
+    white : (k,) deviation of the mean by white noise, N / sqrt(T)
 
     """
-    known = np.isfinite(rates)
-    mean = np.nan_to_num(rates).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    off = np.where(known, rates - mean, 0.0)
-    angle = np.cumsum(off, axis=0) * (length / len(off))
+    known = np.isfinite(values)
+    mean = np.nan_to_num(values).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    off = np.where(known, values - mean, 0.0)
+    total = np.cumsum(off, axis=0) * (length / len(off))
     part = np.linspace(-1.0, 1.0, len(off))
     line = np.linalg.qr(np.column_stack([np.ones_like(part), part]))[0]
-    angle -= line @ (line.T @ angle)
+    total -= line @ (line.T @ total)
     noise = (white * length) ** 2 / 15
-    square = np.maximum((angle**2).mean(axis=0) - noise, 0.0)  # (2)
-    out: Array = np.sqrt(2.0 * square) / length  # (1)
+    out: Array = np.sqrt(np.maximum((total**2).mean(axis=0) - noise, 0.0))  # (2)
     return out
 
 

@@ -132,6 +132,18 @@ class Cause:
     variants: tuple[Group, ...]
     kind: Kind = "effect"
 
+    def at_once(self, other: Group) -> tuple[Group, ...]:
+        """Variants that happen when a group does of the same effect on the other triad.
+
+        Those of the instants next to it; none where the effect has no instant.
+        """
+        shapes = other.effect.shapes if other.effect and other.shape else ()
+        if other.cause != self.name or [s.kind for s in shapes] != ["instant"]:
+            return ()
+        apart = [g.apart(other) for g in self.variants]
+        least = min(apart)
+        return tuple(g for g, d in zip(self.variants, apart, strict=True) if d == least)
+
     @property
     def key(self) -> str:
         """Unique among the causes of a session."""

@@ -20,6 +20,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
+from fieldcal.model.causes.cause import Cause
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed
 from fieldcal.model.evidence.sizing import Member, Sizes, Sizing, alike
@@ -47,6 +48,24 @@ class Set:
     def keys(self) -> frozenset[str]:
         """Of the causes in it."""
         return frozenset(c.key for c, _ in self.members)
+
+
+def chances(cause: Cause, there: Iterable[Member]) -> Array:
+    """Of a cause beside others, ln: of each variant, or of all alike ().
+
+    What has an instant happens to both triads at once, or it is another event.
+    """
+    share = np.array(np.log(cause.chance / len(cause.variants)))
+    if cause.kind != "effect":
+        return share
+    same = [group for other, group in there if other.name == cause.name]
+    at_once = [g for other in same for g in cause.at_once(other)]
+    if at_once:
+        some = [g in at_once for g in cause.variants]
+        return np.where(some, np.log(priors.AGAIN / len(at_once)), share)
+    if same:
+        share = np.array(np.log(priors.AGAIN / len(cause.variants)))
+    return share
 
 
 class Sets:
@@ -77,14 +96,13 @@ class Sets:
 
     def chance(self, members: Iterable[Member]) -> float:
         """Of the causes of a set, ln."""
-        names: set[str] = set()
-        total = 0.0
-        for cause, _ in members:
-            again = cause.kind == "effect" and cause.name in names
-            total += np.log(priors.AGAIN if again else cause.chance)
-            total -= np.log(len(cause.variants))
-            names.add(cause.name)
-        return float(total)
+        total, before = 0.0, list[Member]()
+        for cause, group in members:
+            shares = chances(cause, before)
+            own = shares[cause.variants.index(group)] if shares.ndim else shares
+            total += float(own)
+            before.append((cause, group))
+        return total
 
     def weighed(self, instability: Iterable[int]) -> Weighed:
         """Rows at some instabilities."""

@@ -46,6 +46,6 @@ def elsewhere(found: Inferred) -> list[Set]:
             members = list(found.best.members)
             members[i] = (cause, one)
             moved.append(tuple(members))
-    search = inference.search_among(found, moved)
+    search = inference.search_among(found.state, found.values, moved)
     sizes = found.best.sizes
     return [reported(search, search.evaluated(one, sizes)) for one in moved]

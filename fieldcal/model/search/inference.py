@@ -8,21 +8,20 @@ What a part of the same recording was explained by may be begun with as well.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import Member, Sizes
+from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportion import in_proportion
+from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import SETTLED, Search, is_function
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import whole
 from fieldcal.model.system.turn_rows import TurnRows, Turns
-from fieldcal.physics.shape import FINEST
 
 PASSES = 8
 """Linearisations at most; a set that comes and goes is settled by weight."""
@@ -69,7 +68,7 @@ class Inferred:
         return search.evaluated(self.best.members, self.best.sizes).score
 
 
-class Inference(GaussNewton):
+class Inference(Refinement):
     """The inference of one session."""
 
     def run(self, begin: Sequence[Member] | None = None) -> Inferred:
@@ -191,15 +190,6 @@ class Inference(GaussNewton):
             return state, values, about.run(members)
         return None
 
-    def shaped(
-        self, state: State, values: Array, members: tuple[Member, ...], sizes: Sizes
-    ) -> tuple[Member, ...]:
-        """The members with their shapes refined between the points of the grid."""
-        for i, (_, group) in enumerate(members):
-            if len(group.shape) == 1 and group.effect is not None:
-                members = self.refined(state, values, members, i, sizes)
-        return members
-
     def beside(self, found: Inferred, there: Set) -> Set:
         """A set with its shapes refined, but for those that what was found has.
 
@@ -210,9 +200,10 @@ class Inference(GaussNewton):
         for i, (_, group) in enumerate(members):
             if group.shape and group.effect is not None and group not in known:
                 members = own.refined(
-                    found.state, found.values, members, i, there.sizes
+                    found.state, found.values, members, [i], there.sizes
                 )
-        return own.search_among(found, [members]).evaluated(members, there.sizes)
+        search = own.search_among(found.state, found.values, [members])
+        return search.evaluated(members, there.sizes)
 
     def copied(self, found: Inferred) -> Inference:
         """The same about what was found, of which columns that are added are its own.
@@ -222,88 +213,3 @@ class Inference(GaussNewton):
         own = Inference(self.system.apart(), self.nominal)
         own.turned = list(found.turned)
         return own
-
-    def search_among(
-        self, found: Inferred, sets: Sequence[tuple[Member, ...]]
-    ) -> Search:
-        """What the rows about a state that was found say of some sets."""
-        values = self.padded(found.values)
-        wanted = values != 0
-        for members in sets:
-            wanted = wanted | self.wanted(members)
-        linear = self.system.linearised(found.state, wanted)
-        return Search(self.dictionary, self.gram_of(linear, values, wanted))
-
-    def refined(
-        self,
-        state: State,
-        values: Array,
-        members: tuple[Member, ...],
-        i: int,
-        sizes: Sizes,
-    ) -> tuple[Member, ...]:
-        """The members with one shape where the evidence is highest.
-
-        By steps closer and closer; last by the parabola through three points of a time
-        constant's logarithm, which gives its uncertainty as well.
-        """
-        cause, group = members[i]
-        (shape,) = group.effect.shapes  # type: ignore[union-attr]
-        scores: list[float] = []
-        for ratio in shape.finer:
-            here = group
-            near = shape.near(self.dictionary.x, group.shape[shape.name], ratio)
-            cause, tried = self.near(cause, group, near)
-            every = [group, *tried]
-            scores = self._scores(state, values, members, i, cause, every, sizes)
-            group = every[int(np.argmax(scores))]
-        if shape.kind != "instant" and len(scores) == 3:
-            cause, group = self._at_top(cause, here, group, scores, shape.name)
-        return (*members[:i], (cause, group), *members[i + 1 :])
-
-    def _scores(
-        self,
-        state: State,
-        values: Array,
-        members: tuple[Member, ...],
-        i: int,
-        cause: Cause,
-        every: Sequence[Group],
-        sizes: Sizes,
-    ) -> list[float]:
-        """Weights of a set with each of some groups in the place of one member."""
-        values = self.padded(values)
-        wanted = self.wanted([*members[:i], *members[i + 1 :]]) | (values != 0)
-        for one in every:
-            wanted[one.columns] = True
-        linear = self.system.linearised(state, wanted)
-        search = Search(self.dictionary, self.gram_of(linear, values, wanted))
-        return [
-            search.evaluated(
-                (*members[:i], (cause, one), *members[i + 1 :]), sizes
-            ).score
-            for one in every
-        ]
-
-    def _at_top(
-        self, cause: Cause, here: Group, best: Group, scores: list[float], name: str
-    ) -> tuple[Cause, Group]:
-        """The group at the top of the parabola through its last three points."""
-        middle, down, up = scores
-        step = float(np.log(FINEST))
-        bend = max(2 * middle - down - up, 1e-6) / step**2
-        moved = float(np.clip((up - down) / (2 * step * bend), -step, step))
-        at = here.shape[name] * float(np.exp(moved))
-        cause, (group,) = self.near(cause, best, [at])
-        known = replace(group, unsure=at / float(np.sqrt(bend)))
-        variants = tuple(known if g is group else g for g in cause.variants)
-        return self.dictionary.exchanged(cause, variants), known
-
-    def near(
-        self, cause: Cause, group: Group, values: Sequence[float]
-    ) -> tuple[Cause, list[Group]]:
-        """A cause with more variants; on turns they are as the one they are near."""
-        cause, new = self.dictionary.refined(cause, group, values)
-        for one in new:
-            self.turned = [t.copied(group.columns, one.columns) for t in self.turned]
-        return cause, new

@@ -17,7 +17,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE, Cause
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed, gains
-from fieldcal.model.evidence.sets import Set, Sets
+from fieldcal.model.evidence.sets import Set, Sets, chances
 from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member, Sizes
 
 LEVELS = (3, 6, 9, 40)
@@ -136,14 +136,16 @@ class Offers(Sets):
         asked = key, None if (key, None) in self._tables else beside
         if asked not in self._tables:
             levels = list(self._levels(there, beside))
-            found = self._found(levels, self._chances(there))
+            found = self._found(levels, *self._chances(there))
             self._tables[asked] = [
                 OfferTable(less, state, score, _offered(there, score, less, best))
                 for (less, state, score), best in zip(levels, found, strict=True)
             ]
         return self._tables[asked]
 
-    def _found(self, levels: Sequence[Level], chances: Array) -> list[Best]:
+    def _found(
+        self, levels: Sequence[Level], share: Array, apart: dict[int, Array]
+    ) -> list[Best]:
         """Every cause's best variant beside each level of a set."""
         found: list[Best] = [{} for _ in levels]
         screened = self._screen(levels)
@@ -154,8 +156,11 @@ class Offers(Sets):
             taken = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
             level, number = np.nonzero(taken >= LEAST)
             evidence = np.logaddexp.reduce(profile[level, number], axis=1)
-            evidence += chances[at[number]]
-            near = evidence > LOST + chances[at].min()
+            evidence += share[at[number]]
+            for i, shares in apart.items():
+                some = at[number] == i
+                evidence[some] += shares[alike.variant[number[some]]] - share[i]
+            near = evidence > LOST + share[at].min()
             each = (level[near], number[near], evidence[near])
             for i, m, worth in zip(*(e.tolist() for e in each), strict=True):
                 cause = self.dictionary.causes[at[m]]
@@ -163,14 +168,17 @@ class Offers(Sets):
                     found[i][cause] = worth, int(alike.variant[m]), int(size[i, m])
         return found
 
-    def _chances(self, there: Set) -> Array:
-        """Of every cause beside a set, by its number, ln."""
-        names = {c.name for c, _ in there.members if c.kind == "effect"}
-        out = self.dictionary.chances.copy()
+    def _chances(self, there: Set) -> tuple[Array, dict[int, Array]]:
+        """Of every cause beside a set, ln; of those whose variants differ, of each."""
+        names = {c.name for c, _ in there.members}
+        out, apart = self.dictionary.chances.copy(), dict[int, Array]()
         for i, cause in enumerate(self.dictionary.causes):
-            if cause.name in names and cause.kind == "effect":
-                out[i] += np.log(priors.AGAIN / cause.chance)
-        return out
+            if cause.name in names:
+                shares = chances(cause, there.members)
+                out[i] = shares.min()
+                if shares.ndim:
+                    apart[i] = shares
+        return out, apart
 
     def _levels(self, there: Set, beside: Less | None) -> Iterator[Level]:
         """The set with its instability as it is and another, and its score then."""

@@ -178,12 +178,13 @@ def test_the_top_of_a_parabola_is_where_it_is() -> None:
     at, sharp = here.shape["tau_s"], 40.0
     top = 0.3 * np.log(FINEST)
     scores = [-0.5 * sharp * (k * np.log(FINEST) - top) ** 2 for k in (0, -1, 1)]
-    _, group = inference._at_top(cause, here, here, scores, "tau_s")
+    own = ((cause, here),)
+    ((_, group),) = inference._at_top(own, own, 0, scores, "tau_s")
     found = group.shape["tau_s"]
     assert found == pytest.approx(at * FINEST**0.3)
     assert group.unsure == pytest.approx(found / sharp**0.5)
     beyond = [0.0, -5.0, 4.0]
-    _, group = inference._at_top(cause, here, here, beyond, "tau_s")
+    ((_, group),) = inference._at_top(own, own, 0, beyond, "tau_s")
     assert group.shape["tau_s"] == pytest.approx(at * FINEST), "no further than a step"
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_sessions import Session, ladder
 
 from fieldcal.model import priors
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, chances
 from fieldcal.model.evidence.sizing import Member, Sizes
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.selection import SLACK, Search
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "cross_coupling", "settling:acc",
         "time:acc", "time:ax")  # fmt: skip
@@ -33,13 +35,15 @@ def having(search: Search, *keys: str) -> Set:
 def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
     search = drawn()
     there = having(search, "bias_drift:acc", "time:acc")
-    found = dict(zip(KEYS, search._chances(there), strict=True))
+    share, apart = search._chances(there)
+    found = dict(zip(KEYS, share, strict=True))
+    assert not apart, "the variants of each are alike"
     for key, cause in CAUSES.items():
         again = key.startswith("bias_drift")
         chance = priors.AGAIN if again else cause.chance
         assert found[key] == pytest.approx(np.log(chance / len(cause.variants)))
     np.testing.assert_array_equal(
-        search._chances(search.evaluated(())), SESSION.dictionary.chances
+        search._chances(search.evaluated(()))[0], SESSION.dictionary.chances
     )
 
 
@@ -91,3 +95,41 @@ def test_wide_groups_are_looked_up_where_rows_say_the_same_of_them() -> None:
         scaled = np.linalg.solve(inner[i] + np.eye(40) / v**2, pull[i])
         log_det = np.linalg.slogdet(np.eye(40) + v**2 * inner[i])[1]
         assert found[i, at] == pytest.approx(0.5 * (pull[i] @ scaled - log_det))
+
+
+JUMPS = Session.of(ladder(), ("bias_step:acc", "bias_step:gyr", "bias_drift:acc"))
+ACC, GYR, DRIFT = JUMPS.dictionary.causes
+
+
+def test_what_jumps_on_both_triads_jumps_at_once_or_is_two_events() -> None:
+    (one, *_) = [g for g in GYR.variants if len(g.params) == 3][20:]
+    shares = chances(ACC, [(GYR, one)])
+    at = np.array([g.shape["at_s"] for g in ACC.variants])
+    at_once = np.abs(at - one.shape["at_s"]) == np.abs(at - one.shape["at_s"]).min()
+    assert at_once.sum() == 4, "all axes together, or one"
+    assert np.exp(shares[at_once]).sum() == pytest.approx(priors.AGAIN)
+    np.testing.assert_allclose(shares[~at_once], np.log(ACC.chance / len(at)))
+    for other in ([], [(DRIFT, DRIFT.variants[0])]):
+        assert chances(ACC, other) == pytest.approx(np.log(ACC.chance / len(at)))
+    again = np.log(priors.AGAIN / len(DRIFT.variants))
+    assert chances(DRIFT, [(replace(DRIFT, part="gyr"), DRIFT.variants[0])]) == again
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -> None:
+    rng, x = np.random.default_rng(seed), JUMPS.dictionary.x
+    off = JUMPS.noise(rng)
+    off[x.t > 130.0] += np.repeat([4e-4, 1e-4], 3)
+    best = JUMPS.search(off).run()
+    found = {c.part: g.shape["at_s"] for c, g in best.members}
+    assert set(found) == {"acc", "gyr"}
+    assert found["acc"] == pytest.approx(found["gyr"])
+    search = JUMPS.search(off)
+    acc, gyr = (next(m for m in best.members if m[0] is c) for c in (ACC, GYR))
+    assert search.chance((acc, gyr)) == pytest.approx(search.chance((gyr, acc)))
+    both = search.evaluated((gyr, acc))
+    offered = search.offers(search.evaluated((gyr,)), both.sizes.instability)
+    (offer,) = [o for o in offered if o.member[0] is ACC]
+    assert offer.member[1].shape == acc[1].shape
+    taken = search.taken(search.evaluated((gyr,)), offer)
+    assert abs(taken.score - offer.score) < 2 * SLACK

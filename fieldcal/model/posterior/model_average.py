@@ -46,14 +46,16 @@ class ModelAverage:
     @cached_property
     def sets(self) -> list[tuple[Set, float]]:
         """Sets that count, as numbers are taken from them, and their weights."""
-        every = self.posterior.at_points
+        every, out = self.posterior.at_points, list[tuple[Set, float]]()
         least = np.exp(-KEPT) * max(w for _, w in every)
-        near = [(s, w) for s, w in every if w > least]
-        return [
-            (one, w / len(of)) for s, w in near for of in (self._of(s),) for one in of
-        ]
+        for one, weight in every:
+            if weight > least:
+                told = self._told(one)
+                out += [(s, weight / len(told)) for s in told]
+        return out
 
-    def _of(self, one: Set) -> Sequence[Set]:
+    def _told(self, one: Set) -> Sequence[Set]:
+        """A set as numbers are taken from it."""
         if one is self.posterior.best:
             return self.best
         return [reported(self.posterior.search, one)]

@@ -7,7 +7,7 @@ of columns by what the model has of them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import pytest
@@ -59,6 +59,11 @@ class Draw:
     known: Eliminated
     found: Set
 
+    @cached_property
+    def posterior(self) -> Posterior:
+        """What is said of it."""
+        return Posterior(self.search, self.best)
+
 
 def instabilities(rng: np.random.Generator, search: Search) -> Array:
     """Typical instabilities by `Search.alike`, (7,)."""
@@ -107,7 +112,7 @@ def said() -> tuple[Array, Array]:
     """Probabilities that were said, and whether it was so."""
     found = []
     for one in draws():
-        for standing in Posterior(one.search, one.best).standing():
+        for standing in one.posterior.standing():
             so = bool(one.true & {standing.name, *standing.aliases})
             found.append((standing.probability, so))
     share, true = zip(*found, strict=True)
@@ -126,7 +131,7 @@ def test_what_is_said_is_true_as_often_as_is_said(low: float, high: float) -> No
 
 def test_that_nothing_is_there_is_as_unlikely_as_is_said() -> None:
     """Above one half it is that nothing shows: what is too small may be there."""
-    every = [(Posterior(one.search, one.best), not one.true) for one in draws()]
+    every = [(one.posterior, not one.true) for one in draws()]
     for low, high in ((0.0, 0.01), (0.01, 0.6)):
         some = [(p.nothing, so) for p, so in every if low <= p.nothing < high]
         mean = float(np.mean([p for p, _ in some]))
@@ -152,7 +157,7 @@ def test_what_is_large_is_said() -> None:
     missed, shown = 0, 0
     for one in draws():
         state = one.known
-        names = {s.name for s in Posterior(one.search, one.best).standing()}
+        names = {s.name for s in one.posterior.standing()}
         for cause, group in one.found.members:
             at = np.isin(state.columns, group.columns)
             pull = state.estimate[at] / np.sqrt(np.diag(state.inverse)[at])

@@ -15,7 +15,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.held_out import HeldOut, in_question
+from fieldcal.model.posterior.held_out import HeldOut, in_question, turns_held_out
 from fieldcal.model.posterior.model_average import ModelAverage
 from fieldcal.model.posterior.probabilities import Posterior, Standing
 from fieldcal.model.posterior.reported import reported
@@ -84,6 +84,11 @@ class Explanation:
         """Numbers over all sets that count."""
         around = elsewhere(self.inferred)
         return ModelAverage(self.posterior, around or [self.best.set])
+
+    @cached_property
+    def turns_held_out(self) -> Array:
+        """Whitened residuals of the turns, each predicted without itself."""
+        return turns_held_out(self.best, self.inferred.turned)
 
     @cached_property
     def standing(self) -> tuple[Standing, ...]:

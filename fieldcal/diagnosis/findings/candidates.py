@@ -69,10 +69,8 @@ def candidates(
 def _alone(explanation: Explanation, there: Set) -> float:
     """Part of the held-out rms that goes with a set, in the channel where most goes."""
     best, nothing = explanation.best, explanation.posterior.search.evaluated(())
-    before, after = (
-        rms(best.rows, held_out(replace(best, set=one), [one]))
-        for one in (nothing, there)
-    )
+    before = rms(best.rows, explanation.held_out.residual([nothing]))
+    after = rms(best.rows, held_out(replace(best, set=there), [there]))
     known = np.isfinite(before) & np.isfinite(after) & (before > 0)
     if not known.any():
         return np.nan

@@ -273,8 +273,8 @@ def gain(explanation: Explanation, lost: Removed, then: Agreement) -> float:
     best, turned = explanation.best, explanation.inferred.turned
     there = Fitted(best.rows, best.dictionary, best.linear, best.values, lost.set)
     if in_turns(lost):
-        predicted = [rms_of(turns_held_out(f, turned)) for f in (there, best)]
-        return float(1 - predicted[1] / predicted[0])
+        without = rms_of(turns_held_out(there, turned))
+        return float(1 - rms_of(explanation.turns_held_out) / without)
     ahead = rms(best.rows, explanation.held_out.residual([lost.set]))
     now = then.held_out
     share = np.where(np.isfinite(now) & (ahead > 0), lost.squares, -1.0)

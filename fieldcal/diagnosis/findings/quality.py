@@ -74,12 +74,14 @@ def in_turns(explanation: Explanation) -> tuple[Quality, Quality]:
     best, turned = explanation.best, explanation.inferred.turned
     nothing = explanation.posterior.search.evaluated(())
     plain = replace(best, set=nothing)
-    return _of_turns(plain, turned), _of_turns(best, turned)
+    return (
+        _of_turns(plain, turned, turns_held_out(plain, turned)),
+        _of_turns(best, turned, explanation.turns_held_out),
+    )
 
 
-def _of_turns(fitted: Fitted, turned: Sequence[TurnRows]) -> Quality:
+def _of_turns(fitted: Fitted, turned: Sequence[TurnRows], ahead: Array) -> Quality:
     residual = np.concatenate([turn_residual(t, fitted.estimate) for t in turned])
-    ahead = turns_held_out(fitted, turned)
     return Quality(rms_of(residual), float(np.mean(residual**2)), rms_of(ahead))
 
 

@@ -295,11 +295,11 @@ def gains(inner: Array, pull: Array, own: Array | float) -> Array:
 def gained(strength: Array, power: Array, sizes: Array = SIZES) -> Array:
     """Gain (3) over some sizes of lambda and q^2, (..., k) each."""
     square = sizes**2
-    # columns first: sums along an axis of three cost more than what is summed
-    one = np.moveaxis(strength, -1, 0)[..., None] * square
+    # sizes last: sums along an axis of three cost more than what is summed
+    one = strength[..., None] * square
     one += 1
-    gain = np.moveaxis(power, -1, 0)[..., None] * square
+    gain = power[..., None] * square
     gain /= one
     gain -= np.log(one, out=one)
-    total: Array = 0.5 * gain.sum(axis=0)
+    total: Array = 0.5 * gain.sum(axis=-2)
     return total

@@ -8,6 +8,7 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ class Rows:
         return replace(self, sd=np.where(left[:, None], np.nan, self.sd))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RowSource:
     """What rows are made of.
 
@@ -95,10 +96,15 @@ class RowSource:
     left: Array | None = None
     white: Array | None = None
 
+    @cached_property
+    def rate(self) -> float:
+        """Samples a second."""
+        return rate_of(self.block)
+
 
 def reduce(source: RowSource) -> Rows:
     """Cut the windows into blocks and average them."""
-    block, rate = masked(source.block, source.usable), rate_of(source.block)
+    block, rate = masked(source.block, source.usable), source.rate
     windows = spans(block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
     shaken = shaking(block, windows[held], rate)

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.turns.attitude import between
 from fieldcal.model.turns.rotation import carry, small_turns
@@ -108,7 +107,7 @@ class Integrated:
 def divided(leg: Leg) -> Steps | None:
     """Steps of about `FINE_S`, and pieces of about `PIECE_S`; None of too few."""
     block, first = leg.source.block, leg.first
-    rate = rate_of(block)
+    rate = leg.source.rate
     each = max(1, round(FINE_S * rate))
     count = (leg.last - first - 1) // each
     if count < FEWEST:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.core.sampling import rate_of, unbroken
+from fieldcal.core.sampling import unbroken
 from fieldcal.model.rows.reduce import Rows, RowSource
 
 MARGIN_S = 0.6
@@ -37,7 +37,7 @@ def moving(
     first, last : bounds of the gap between them, in samples
 
     """
-    block, rate = source.block, rate_of(source.block)
+    block, rate = source.block, source.rate
     gap, m = slice(first, last), max(2, round(0.1 * rate))
     if last - first < 4 * m or not source.usable[gap].all():
         return None

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.state import State
@@ -200,7 +199,7 @@ class Turning:
         sd = self.rows.noise[:3] / np.sqrt(np.diff(steps.edge[cut]))[:, None]
         return Turn(
             pair, ends, x, felt, way.attitude, way.done, cut, acc, sd, unsure,
-            1 / rate_of(self.source.block),
+            1 / self.source.rate,
         )  # fmt: skip
 
     def after(self, t: Array, q: int) -> Array:

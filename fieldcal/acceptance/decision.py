@@ -96,7 +96,7 @@ def decide(
         *_odd_positions(found, verification.ok is True),
         *_turns(found, limits),
         *_angles(found, about, limits, circumstances),
-        *check_uncertainty(found, about, limits),
+        *check_uncertainty(found, about, limits, circumstances.windows),
         *_site(found, about),
         *_level(found, about),
         *check_change(found, limits, circumstances.family),

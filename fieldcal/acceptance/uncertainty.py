@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fieldcal.acceptance.check import Check, shown_unit
@@ -10,6 +12,7 @@ from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
 from fieldcal.session.description import Description
+from fieldcal.windows.mean import Average
 
 UNCERTAINTY = " uncertainty"
 """Behind the name of a group, of the check that its parameters are well known."""
@@ -19,13 +22,19 @@ REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
 
 
 def check_uncertainty(
-    found: Calibration, about: Description, limits: GradeLimits
+    found: Calibration,
+    about: Description,
+    limits: GradeLimits,
+    windows: Sequence[Average],
 ) -> list[Check]:
-    """Whether each group that has a limit is known well enough."""
+    """Whether each group that has a limit is known well enough.
+
+    A sensor that the windows have, and of which nothing was determined, is not.
+    """
     checks = []
+    read = {sensor_of(group_of(name)) for name in found.names} | _measured(windows)
     for group in COMPONENTS:
         limit = limits.sigma(group)
-        read = {sensor_of(group_of(name)) for name in found.names}
         sensor_read = sensor_of(group) in read
         if limit is None or not sensor_read:
             continue
@@ -53,6 +62,13 @@ def check_uncertainty(
             value = float(sigma[worst])
             checks.append(Check(group + UNCERTAINTY, stands, says, value, limit, unit))
     return checks
+
+
+def _measured(windows: Sequence[Average]) -> set[str]:
+    """Sensors whose three axes a window has, as in `names.sensor_of`."""
+    has = [np.isfinite(window.mean) for window in windows]
+    sides = {"acc": slice(0, 3), "gyr": slice(3, 6)}
+    return {name for name, s in sides.items() if any(h[s].all() for h in has)}
 
 
 def _apart(value: float, limit: float) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
+from fieldcal.core.sentences import join
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.row_times import FRACTIONS, RowTimes
 from fieldcal.importing.scales import FEWEST
@@ -78,6 +79,11 @@ def check(wanted: ReadOptions) -> None:
         raise InputError(f"a column is named twice in {','.join(wanted.columns)}")
     if not {"ax", "gx", "temperature"} & set(named):
         raise InputError("name the columns: neither ax ay az nor gx gy gz is there")
+    if 0 < len(forces := [c for c in named if c in ("ax", "ay", "az")]) < len("xyz"):
+        raise InputError(
+            f"of the accelerometers only {join(forces)} is named: the force is known by"
+            " three axes alone; name all, or none to use the gyroscopes"
+        )
     if not has_time(named) and not wanted.rate_hz:
         raise InputError("no column is t, the time: give the rate, e.g. --rate 100")
     _ = wanted.acc_scale, wanted.gyr_scale, wanted.time_scale, wanted.celsius

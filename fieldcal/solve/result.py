@@ -41,8 +41,7 @@ def calibration(
     Raises
     ------
     NotObservable
-        If it has no parameter, or the accelerometers were at rest and none of theirs
-        is determined.
+        If it has no parameter.
 
     """
     names, sigma = found.names, np.sqrt(np.diag(found.covariance))
@@ -53,7 +52,7 @@ def calibration(
         *notes,
         *not_levelled(method, asked, observations),
     ]
-    if not names or _blind(found, observations):
+    if not names:
         raise NotObservable(
             "these positions determine nothing: " + "; ".join(filter(None, sentences))
         )
@@ -78,13 +77,6 @@ def calibration(
         good=not odd and not fit.contradicts,
         info=info | ({"borrowed": told.to_json()} if told else {}),
     )
-
-
-def _blind(found: Estimated, observations: Observations) -> bool:
-    """Whether the accelerometers at rest gave nothing, and no table turned."""
-    if not observations.has_acc or observations.rotating.any():
-        return False
-    return not any(map(_is_acc, found.names))
 
 
 def _is_acc(name: str) -> bool:

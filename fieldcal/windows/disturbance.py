@@ -59,31 +59,64 @@ class Statistic:
     z: Array
 
 
-def pushes(about: Array, noise: QuietNoise, least: Array) -> list[Statistic]:
-    """Deviations of cell means from their line, `about` (m, c), (1).
+@dataclass(frozen=True, slots=True)
+class Least:
+    """The least that spreads of c channels can be, whatever the window shows.
 
-    `least` (c,) is the least that a spread can be, SI.
+    Attributes
+    ----------
+    always : (c,) of means over any duration, SI
+    sampled : (c,) of one sample, SI: less the longer the duration
+    number : (c,) samples in a cell
+
     """
+
+    always: Array
+    sampled: Array
+    number: Array
+
+    def of_means(self, cells: int) -> Array:
+        """Least spread of a mean over so many cells, (c,)."""
+        least: Array = np.maximum(self.always, self._drawn(cells))
+        return least
+
+    def of_changes(self, cells: int) -> Array:
+        """Least spread of what two such means side by side differ by, (c,)."""
+        least: Array = np.maximum(self.always, np.sqrt(2.0) * self._drawn(cells))
+        return least
+
+    def of_roots(self) -> Array:
+        """Least spread of the cube root of a cell's short-lag noise, (c,)."""
+        drawn = np.cbrt(self.sampled**2) / np.sqrt(np.maximum(self.number, 1.0))
+        least: Array = np.maximum(np.cbrt(self.always**2), drawn)
+        return least
+
+    def _drawn(self, cells: int) -> Array:
+        drawn: Array = self.sampled / np.sqrt(cells * np.maximum(self.number, 1.0))
+        return drawn
+
+
+def pushes(about: Array, noise: QuietNoise, least: Least) -> list[Statistic]:
+    """Deviations of cell means from their line, `about` (m, c), (1)."""
     levels = zip(running(about), noise.spread, strict=False)
     return [
-        Statistic("push", 2**k, u, s, np.abs(u) / _no_less(s, least))
+        Statistic("push", 2**k, u, s, np.abs(u) / _no_less(s, least.of_means(2**k)))
         for k, (u, s) in enumerate(levels)
     ]
 
 
-def steps(means: Array, noise: QuietNoise, least: Array) -> list[Statistic]:
+def steps(means: Array, noise: QuietNoise, least: Least) -> list[Statistic]:
     """Changes between neighbouring running means, (2)."""
     levels = zip(running(means), np.sqrt(2.0) * noise.allan, strict=False)
     tests = []
     for k, (u, s) in enumerate(levels):
         change = u[2**k :] - u[: -(2**k)]
-        tests.append(
-            Statistic("step", 2**k, change, s, np.abs(change) / _no_less(s, least))
-        )
+        spread = _no_less(s, least.of_changes(2**k))
+        tests.append(Statistic("step", 2**k, change, s, np.abs(change) / spread))
     return tests
 
 
-def shakes(short: Array, number: Array, least: Array) -> list[Statistic]:
+def shakes(short: Array, number: Array, least: Least) -> list[Statistic]:
     """Excess of the short-lag noise (m, c), a variance, over its usual size, (3).
 
     `number` (m, c) tells from how many differences each is; few of them count less.
@@ -92,7 +125,7 @@ def shakes(short: Array, number: Array, least: Array) -> list[Statistic]:
     most = np.maximum(np.median(number, axis=0), 1.0)
     centred = np.sqrt(np.minimum(1.0, number / most)) * (root - np.median(root, axis=0))
     usual = _HEAVY * DEVIATION * np.median(np.abs(centred), axis=0)
-    spread = _no_less(usual, np.cbrt(least**2))
+    spread = _no_less(usual, least.of_roots())
     noise = np.sqrt(np.median(short, axis=0))
     levels = zip(
         running(centred, SHAKE_LEVELS), running(short, SHAKE_LEVELS), strict=True

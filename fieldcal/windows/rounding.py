@@ -19,7 +19,14 @@ a unit normal); over s < 0.3 q the mean of its square is near
 
     var = (1 - 4 p (1 - p)) q^2 / 12,   p (1 - p) q^2 the variance of the values     (3)
 
-Source: B. Widrow and I. Kollar, Quantization Noise, chapter 4; (3) is worked out here.
+How often neighbouring samples differ bounds what they scatter by. It is most where the
+mean lies in the middle of a step, and a share p / 2 of the samples one step to each
+side: then a share f of them differs from the one before, and
+
+    var U <= p q^2,   f = 2 p - 3 p^2 / 2                                        (4)
+
+Source: B. Widrow and I. Kollar, Quantization Noise, chapter 4; (3) and (4) are worked
+out here.
 """
 
 from __future__ import annotations
@@ -73,6 +80,19 @@ def of_few(step: Array, sampled: Array) -> Array:
     share = sampled / np.where(step > 0, step, 1.0)
     variance: Array = step**2 * np.maximum(0.0, 1 - UNSURE * share**2) / 12
     return variance
+
+
+def most_scatter(step: Array, changed: Array) -> Array:
+    """Deviation of samples, (c,), of which a share `changed` differs, at most (4).
+
+    It is told by how many differ, not by how much, so that one which is far off counts
+    as one. Where two of three differ, single steps no longer show.
+
+    >>> most_scatter(np.array([2.0]), np.array([0.0, 0.185, 1.0])).round(3)
+    array([0.   , 0.632, 1.633])
+    """
+    p = (2 - np.sqrt(np.maximum(4 - 6 * changed, 0.0))) / 3
+    return step * np.sqrt(p)
 
 
 def visible_steps(step: Array, sampled: Array) -> Array:

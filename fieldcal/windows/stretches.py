@@ -152,8 +152,9 @@ def _passing(
     worst = judge(sums.table, StillnessLimits()).worst
     if worst.ratio <= 1:
         return [(first, float(np.nextafter(last, np.inf)))]
+    # at an end of the stretch it is the last or the first sample that goes
     after = max(worst.at + worst.seconds, first + CELL)
     return [
-        *_passing(between, start, min(worst.at, end), shortest),
+        *_passing(between, start, min(worst.at, last), shortest),
         *_passing(between, max(after, start), end, shortest),
     ]

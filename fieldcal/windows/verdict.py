@@ -10,10 +10,18 @@ import numpy as np
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.windows.cells import CELL, CellTable
-from fieldcal.windows.disturbance import Kind, Statistic, pushes, repeats, shakes, steps
+from fieldcal.windows.disturbance import (
+    Kind,
+    Least,
+    Statistic,
+    pushes,
+    repeats,
+    shakes,
+    steps,
+)
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.quiet import QuietNoise, quiet
-from fieldcal.windows.rounding import of_mean
+from fieldcal.windows.rounding import most_scatter, of_mean
 from fieldcal.windows.trend import line
 
 THRESHOLD = 5.8
@@ -109,9 +117,9 @@ def judge(
     noise = quiet(means, before)
     allowed = THRESHOLD * (1 + (EARLY / (CELL * noise.cells)) ** 2)
     jumps = cells.rounding if shows is None else np.maximum(cells.rounding, shows)
-    laid = line(means)
+    laid = line(means, cells.resolution / np.maximum(_number(cells), 1.0))
     least = np.maximum((1 + ROUNDED) * jumps / allowed, _rounding_noise(cells))
-    tests = _tests(cells, means, laid, noise, least)
+    tests = _tests(cells, means, laid, noise, _least(cells, least))
     worst = [_worst(cells, test, allowed) for test in tests] + _stuck(cells)
     worst.append(_beyond_drift(cells, laid, noise, limits))
     worst.append(_beyond_noise(cells, noise.spread[0], limits))
@@ -124,7 +132,7 @@ def judge(
 
 
 def _tests(
-    cells: CellTable, means: Array, laid: Array, noise: QuietNoise, least: Array
+    cells: CellTable, means: Array, laid: Array, noise: QuietNoise, least: Least
 ) -> list[Statistic]:
     m = len(means)
     return [
@@ -137,6 +145,24 @@ def _tests(
 def _rounding_noise(cells: CellTable) -> Array:
     """What rounding leaves in a mean of values whose noise does not hide it, (6,)."""
     return np.sqrt(of_mean(cells.resolution, np.nan_to_num(cells.noise)))
+
+
+def _least(cells: CellTable, always: Array) -> Least:
+    """The least that spreads are: what jumps may be, and how often values change.
+
+    A cell in which a value jumps by many steps counts as one that changed all through.
+    """
+    step, differ = cells.resolution, cells.steps
+    unit = np.where(step > 0, step, np.inf) ** 2
+    share = np.minimum(2 * np.nan_to_num(cells.short) / unit, 1.0)
+    changed = (share * differ).sum(axis=0) / np.maximum(differ.sum(axis=0), 1.0)
+    return Least(always, most_scatter(step, changed), _number(cells))
+
+
+def _number(cells: CellTable) -> Array:
+    """Samples that a cell usually has, (6,)."""
+    number: Array = np.median(cells.counts, axis=0)
+    return number
 
 
 def _stuck(cells: CellTable) -> list[Departure]:

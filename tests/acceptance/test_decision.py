@@ -99,7 +99,19 @@ def test_a_required_group_that_is_missing_is_no_go_unless_its_sensor_is_not_read
     whole = calibration()
     without_scale = _only(whole, ("acc_bias", "gyr_bias"))
     assert "acc_scale x y z was not determined" in decided(without_scale).reasons[0]
-    assert decided(_only(whole, ("acc_bias", "acc_scale"))).go
+    alone = _only(whole, ("acc_bias", "acc_scale"))
+    assert decided(alone).go
+    # gyroscopes that were there, and gave nothing, are no sensor that is not read
+    windows = [_held(position, np.random.default_rng(1)) for position in FIVE]
+    made = _on_the_ladder(alone, windows)
+    assert not made.go and "gyr_bias x y z was not determined" in made.reasons[0]
+    without = [replace(w, mean=np.r_[w.mean[:3], [np.nan] * 3]) for w in windows]
+    assert _on_the_ladder(alone, without).go
+
+
+def _on_the_ladder(found: Calibration, windows: list[Average]) -> Decision:
+    known = Circumstances(temperatures=[21.0, 21.5], link=LINK, windows=windows)
+    return decide(found, replace(ABOUT, positions=FIVE), BOUNDS, known)
 
 
 def test_a_tilt_that_nobody_saw_and_nobody_excluded_is_no_go() -> None:

@@ -80,14 +80,6 @@ def test_what_is_carried_says_when_and_at_which_temperature() -> None:
     assert "as_of" not in result._carried(seen, estimated(**known | {"ended_s": None}))
 
 
-def test_accelerometers_that_gave_nothing_are_no_result() -> None:
-    found = estimated(names=("gyr_bias.x",))
-    assert result._blind(found, observed())
-    assert not result._blind(estimated(), observed())
-    turning = observed((FIVE[0], Position("", rate=(0.1, 0.0, 0.0))))
-    assert not result._blind(found, turning)
-
-
 def test_conditions_are_those_that_were_given() -> None:
     temperature = np.array([20.0, np.nan, 22.0, 24.0, 26.0])
     seen = observed(latitude=0.7, temperature=temperature, gyr=False)

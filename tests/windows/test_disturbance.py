@@ -6,11 +6,20 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.disturbance import pushes, repeats, shakes, steps
+from fieldcal.windows.disturbance import Least, pushes, repeats, shakes, steps
 from fieldcal.windows.quiet import quiet
 
 M = 64
-NONE = np.zeros(2)
+
+
+def at_least(*always: float, sampled: float = 0.0, number: float = 1.0) -> Least:
+    """Bounds of as many channels as there are numbers."""
+    bound = np.array(always)
+    ones = np.ones(len(bound))
+    return Least(bound, sampled * ones, number * ones)
+
+
+NONE, ONE = at_least(0.0, 0.0), at_least(0.0)
 
 
 def cells(seed: int = 0) -> Array:
@@ -72,7 +81,7 @@ def test_a_shake_is_an_excess_of_the_noise_from_sample_to_sample() -> None:
 
 def test_the_cube_root_of_a_variance_of_few_is_close_to_normal() -> None:
     q = np.random.default_rng(2).chisquare(9, (4000, 1)) / 9
-    first, *_, last = shakes(q, np.full((4000, 1), 9.0), np.zeros(1))
+    first, *_, last = shakes(q, np.full((4000, 1), 9.0), ONE)
     # 1.3 wider than normal, for sensors that are low-passed
     assert first.z.std() == pytest.approx(1 / 1.3, abs=0.03)
     assert last.z.std() == pytest.approx(1 / 1.3, abs=0.06)
@@ -82,18 +91,18 @@ def test_cells_without_a_change_do_not_shake() -> None:
     q = np.random.default_rng(3).chisquare(9, (M, 1)) / 9
     number = np.full((M, 1), 9.0)
     q[5], number[5] = 100.0, 0.0
-    assert shakes(q, number, np.zeros(1))[0].z[5] == 0
+    assert shakes(q, number, ONE)[0].z[5] == 0
     # one change is all that a cell of a slow device has
-    each = shakes(q, np.ones((M, 1)), np.zeros(1))
-    full = shakes(q, np.full((M, 1), 9.0), np.zeros(1))
+    each = shakes(q, np.ones((M, 1)), ONE)
+    full = shakes(q, np.full((M, 1), 9.0), ONE)
     np.testing.assert_array_equal(each[0].z[20:], full[0].z[20:])
-    nothing = shakes(np.zeros((M, 1)), np.zeros((M, 1)), np.zeros(1))
+    nothing = shakes(np.zeros((M, 1)), np.zeros((M, 1)), ONE)
     assert not any(test.z.any() or test.size.any() for test in nothing)
 
 
 def test_nothing_is_measured_finer_than_the_least_spread() -> None:
     y, noise = cells(), quiet(cells())
-    least = np.array([0.0, 100.0])
+    least = at_least(0.0, 100.0)
     for make in (pushes, steps):
         for plain, bound in zip(
             make(y, noise, NONE), make(y, noise, least), strict=True
@@ -106,6 +115,20 @@ def test_nothing_is_measured_finer_than_the_least_spread() -> None:
     root = np.cbrt(q[:, 1])
     expected = (root - np.median(root)) / np.cbrt(100.0**2)
     np.testing.assert_allclose(bound.z[:, 1], expected)
+
+
+def test_noise_that_steps_hide_counts_less_the_more_samples_a_mean_has() -> None:
+    y, noise = cells(), quiet(cells())
+    hidden = at_least(0.0, 0.0, sampled=300.0, number=9.0)
+    for make, more in ((pushes, 1.0), (steps, np.sqrt(2.0))):
+        for test in make(y, noise, hidden):
+            spread = more * 300 / np.sqrt(9 * test.cells)
+            np.testing.assert_allclose(test.z, abs(test.size) / spread)
+    q = np.random.default_rng(5).chisquare(9, (M, 2)) / 9
+    (first, *_) = shakes(q, np.full((M, 2), 9.0), hidden)
+    root = np.cbrt(q)
+    expected = (root - np.median(root, axis=0)) / (np.cbrt(300.0**2) / 3)
+    np.testing.assert_allclose(first.z, expected)
 
 
 def test_what_never_varies_is_no_disturbance() -> None:

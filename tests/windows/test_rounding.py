@@ -81,6 +81,18 @@ def test_two_values_that_take_turns_tell_where_between_them_the_mean_is(
     assert rounding.of_few(np.array([step]), np.array([step])) == 0
 
 
+@pytest.mark.parametrize("noise", [0.15, 0.2, 0.3, 0.45])
+def test_how_often_neighbours_differ_bounds_their_scatter(noise: float) -> None:
+    """(4) by drawing: in the middle of a step it is the scatter, elsewhere more."""
+    rng = np.random.default_rng(4)
+    for middle in (0.0, 0.2, 0.35, 0.5):
+        values = np.round(middle + noise * rng.normal(size=200_000))
+        changed = np.array([np.mean(np.diff(values) != 0)])
+        ratio = rounding.most_scatter(np.ones(1), changed)[0] / values.std()
+        assert ratio == pytest.approx(1, rel=0.03) if middle == 0 else ratio > 1
+    assert rounding.most_scatter(np.full(1, 3.0), np.ones(1)) == np.sqrt(6)
+
+
 def test_single_steps_show_where_the_noise_is_lower() -> None:
     step = np.full(5, 2.0)
     sampled = np.array([0.0, 1.1, 1.2, 5.0, np.nan])

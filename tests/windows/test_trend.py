@@ -42,3 +42,22 @@ def test_a_disturbance_of_a_sixth_does_not_turn_it(at: int) -> None:
     values = truth.copy()
     values[at : at + 20] += 7.0
     np.testing.assert_allclose(line(values), truth, atol=1e-9)
+
+
+@pytest.mark.parametrize("noise", [0.4, 0.6, 0.9])
+def test_of_rounded_values_it_is_no_step_of_theirs(noise: float) -> None:
+    drawn = np.random.default_rng(6).normal(size=(1200, 40))
+    middles = np.linspace(-0.5, 0.5, 40)
+    values = np.round(middles + noise * drawn)
+    off, plain = line(values, np.ones(40)) - middles, line(values) - middles
+    assert off.std() < 0.12 and off.std() < 0.5 * plain.std()
+    # a slope is as that of values which are not rounded
+    rising = np.arange(1200)[:, None] * 0.002
+    found = line(np.round(rising + middles + noise * drawn), np.ones(40))
+    assert (found - rising - middles).std() < 0.12
+
+
+def test_of_fine_values_the_step_says_nothing() -> None:
+    values = np.random.default_rng(7).normal(size=(240, 3))
+    fine = line(values, np.full(3, 1e-9))
+    np.testing.assert_allclose(fine, line(values), atol=1e-8)

@@ -8,7 +8,7 @@ import pytest
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows import StillnessLimits, average
 from fieldcal.windows.cells import Cells, CellTable
-from fieldcal.windows.disturbance import pushes, shakes, steps
+from fieldcal.windows.disturbance import Least, pushes, shakes, steps
 from fieldcal.windows.quiet import QuietNoise, quiet
 from fieldcal.windows.trend import line
 from fieldcal.windows.verdict import Departure, Verdict, judge
@@ -124,6 +124,23 @@ def test_a_device_coarser_than_its_noise_is_not_stuck() -> None:
     assert judge(table(block), LIMITS).worst.ratio < 1
 
 
+@pytest.mark.parametrize("noise", [0.25, 0.4, 0.55, 0.8])
+@pytest.mark.parametrize("rate", [10.0, 20.0, 50.0])
+def test_values_that_flicker_between_coarse_steps_are_at_rest(
+    noise: float, rate: float
+) -> None:
+    """Where most neighbours are alike, their median difference tells of no noise."""
+    rng, passed, pushed, runs = np.random.default_rng(int(rate)), 0, 0, 30
+    second = int(rate)
+    for _ in range(runs):
+        drawn = noise * rng.normal(size=(24 * second, 6))
+        x = np.round(rng.uniform(-0.5, 0.5, 6) + drawn)
+        passed += verdict(x, rate).worst.ratio <= 1
+        x[12 * second : 13 * second, 2] += 6.0
+        pushed += verdict(x, rate).worst.ratio > 1
+    assert passed >= runs - 3 and pushed == runs
+
+
 def allowed(cells: float) -> float:
     """Twice as much in a window of 8 s as in a long one."""
     return 5.8 * (1 + (8.0 / (0.1 * cells)) ** 2)
@@ -134,10 +151,11 @@ def test_the_ratio_is_the_largest_departure_over_what_is_allowed(n: int) -> None
     cells = table(block_of(rest(n, seed=n), start=100.0))
     found = judge(cells, LIMITS)
     noise, means = quiet(cells.means), cells.means
+    least = Least(np.zeros(6), np.zeros(6), np.ones(6))
     tests = [
-        *pushes(means - line(means), noise, np.zeros(6)),
-        *steps(means, noise, np.zeros(6)),
-        *shakes(cells.short, cells.steps, np.zeros(6)),
+        *pushes(means - line(means), noise, least),
+        *steps(means, noise, least),
+        *shakes(cells.short, cells.steps, least),
     ]
     bound = allowed(len(cells))
     largest = max(test.z.max() for test in tests) / bound

@@ -243,7 +243,7 @@ def _open(explanation: Explanation) -> list[str]:
 
 
 def _warnings(explanation: Explanation) -> tuple[str, ...]:
-    out = []
+    out = list(explanation.prepared.checked.unused)
     numbers = calibrated(explanation, explanation.best.set)
     for name, first in (("accelerometers", 0), ("gyroscopes", 3)):
         if explanation.rows.used[:, first : first + 3].any():

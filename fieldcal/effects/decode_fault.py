@@ -105,7 +105,7 @@ def _fault(recording: CheckedSamples, c: int) -> Fault | None:
     """What happened to one channel."""
     lsb = float(recording.steps[c])
     values, t = recording.channel(c), recording.block.t
-    if not lsb or not np.isfinite(values).all():
+    if not lsb or not np.isfinite(values).all() or not np.ptp(values):
         return None
     if np.abs(values).max() > WIDEST * lsb:
         return None

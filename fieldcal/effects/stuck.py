@@ -78,34 +78,40 @@ class Stuck(Chain):
         """Runs of equal values in each channel."""
         t, out = recording.block.t, []
         step = float(np.median(np.diff(t)))
-        still, steps = recording.still, grids_of(recording.block)
         for c, name in enumerate(CHANNELS):
-            values_of = recording.channel(c)
-            step_of = float(steps[c]) / max(float(recording.noise[c]), 1e-300)
-            for first, last in repeats(values_of):
-                if step_of > 2 and still[first:last].all():
+            for first, last in repeats(recording.channel(c)).tolist():
+                if _no_wonder(recording, c, first, last):
                     continue
-                if step_of > 1 and _usual(
-                    recording, c, float(steps[c]), int(first), int(last)
-                ):
-                    continue
-                values: dict[str, float | str] = {
-                    "channel": name,
-                    "from_s": float(t[first]),
-                    "to_s": float(t[last - 1] + step),
-                }
+                begins, ends = float(t[first]), float(t[last - 1] + step)
                 out.append(
                     Fault(
                         channel=name,
-                        values=values,
+                        values={"channel": name, "from_s": begins, "to_s": ends},
                         sigmas={"from_s": step, "to_s": step},
-                        from_s=float(t[first]),
-                        to_s=float(t[last - 1] + step),
+                        from_s=begins,
+                        to_s=ends,
                         rows=np.arange(first, last),
                         size=float(recording.noise[c]),
                     )
                 )
         return out
+
+
+def _no_wonder(recording: CheckedSamples, c: int, first: int, last: int) -> bool:
+    """Whether a run of equal values comes of steps that are coarse."""
+    if last - first == len(recording.block):
+        return not _would_vary(recording, c)
+    step = float(grids_of(recording.block)[c])
+    step_of = step / max(float(recording.noise[c]), 1e-300)
+    if step_of > 2 and recording.still[first:last].all():
+        return True
+    return step_of > 1 and _usual(recording, c, step, first, last)
+
+
+def _would_vary(recording: CheckedSamples, c: int) -> bool:
+    """Whether a channel that never changed would, by the noise of those beside it."""
+    beside = [i for i in range(c - c % 3, c - c % 3 + 3) if i != c]
+    return bool((recording.noise[beside] > grids_of(recording.block)[beside]).all())
 
 
 def _usual(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fieldcal.calibration import Calibration, Nominal, limits
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import FieldcalError, SessionError
-from fieldcal.core.samples import ACC, CHANNELS, GYR, Grain
+from fieldcal.core.samples import ACC, GYR, Grain
 from fieldcal.core.version import __version__
 from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
 from fieldcal.model.rows.swaying import swaying
@@ -25,6 +25,7 @@ from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, LearnedNoise
+from fieldcal.windows.dead_axis import dead_sensors, without_dead
 
 ROUNDED = 1e-6
 """Share of a full scale that units and rounding may make of it."""
@@ -132,8 +133,10 @@ def rests(session: Session) -> Rests:
     session.about.refuse_overlap()
     if session.about.means_only:
         return _of_means(session)
-    block = session.block
+    block, dead = session.block, dead_sensors(session.block.six)
     refuse_copies(block)
+    told = without_dead(block.six)
+    block = replace(block, acc=told[:, :3], gyr=told[:, 3:])
     taken: dict[int, Average] = {}
     warnings = [*session.warnings, *_beyond(session)]
     sways = swaying(block, session.about)
@@ -166,8 +169,10 @@ def rests(session: Session) -> Rests:
             f"{_worth(session.about)}"
         )
     rows = sorted(taken)
-    averages, dead = _without_dead([taken[i] for i in rows])
-    return Rests(tuple(rows), tuple(averages), (*warnings, *dead))
+    averages = [taken[i] for i in rows]
+    for one in dead:
+        averages = [_without(average, one.channels) for average in averages]
+    return Rests(tuple(rows), tuple(averages), (*warnings, *(one.says for one in dead)))
 
 
 def _of_means(session: Session) -> Rests:
@@ -219,27 +224,6 @@ def _named(session: Session, row: int) -> str:
     """A position by its number, from 1, and by its name if it has one."""
     number, name = f"position {row + 1}", session.positions[row].name
     return number if name == number else f"{number} ({name})"
-
-
-def _without_dead(averages: list[Average]) -> tuple[list[Average], list[str]]:
-    """Averages without a sensor of which an axis says nothing in any window.
-
-    A device without gyroscopes may send zeros in their place.
-    """
-    remarks = []
-    for sensor, channels in (("accelerometers", ACC), ("gyroscopes", GYR)):
-        sigma = np.array([a.sigma[channels] for a in averages])
-        if not np.isfinite(sigma).any():
-            continue
-        dead = ~(sigma > 0).any(axis=0)
-        if not dead.any():
-            continue
-        names = " ".join(np.array(CHANNELS[channels])[dead])
-        remarks.append(
-            f"the {sensor} are not used: {names} never changes, or is missing"
-        )
-        averages = [_without(a, channels) for a in averages]
-    return averages, remarks
 
 
 def _without(average: Average, channels: slice) -> Average:

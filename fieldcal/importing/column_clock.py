@@ -17,12 +17,13 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing import columns
 from fieldcal.importing.column_times import (
-    coarse_question,
+    batches,
     counted_question,
     counts_rows,
     goes_on,
     is_clock_number,
     rates_of_turns,
+    shared_question,
     split_seconds,
 )
 from fieldcal.importing.gravity_size import are_means
@@ -32,8 +33,9 @@ from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
 from fieldcal.importing.row_times import FRACTIONS
 from fieldcal.importing.time_units import (
     TICKED,
-    coarse_clock,
+    SharedTimes,
     counts_from_long_ago,
+    shared_times,
     unit_by_rate,
     unit_of_ticks,
 )
@@ -166,8 +168,8 @@ class ColumnClock:
             return wanted
         t = table[:, at]
         both = any(name in numbers_of(self._of, wanted) for name in FRACTIONS)
-        if not both and (coarse := coarse_clock(t)) is not None:
-            raise InputError(f"{self._of.path}: {coarse_question(wanted, coarse, t)}")
+        if not both and (shared := shared_times(t)) is not None:
+            return self._spread(wanted, shared, t)
         if wanted.time_unit:
             return wanted
         if is_clock_number(t):
@@ -193,6 +195,28 @@ class ColumnClock:
             return wanted
         self._of.guessed["time"] = f"{unit}: {why}"
         return replace(wanted, time_unit=unit)
+
+    def _spread(
+        self, wanted: ReadOptions, shared: SharedTimes, t: Array
+    ) -> ReadOptions:
+        """Options by which rows of one batch do not all have its time.
+
+        Raises
+        ------
+        InputError
+            If batches differ too much in their rows to say when one was taken.
+
+        """
+        spread = batches(wanted, shared, t)
+        if spread is None or spread.batch is None:
+            raise InputError(f"{self._of.path}: {shared_question(wanted, shared, t)}")
+        batch = spread.batch
+        self._of.guessed["time"] = (
+            f"{spread.time_unit}, of {batch.rows:.0f} rows that come together each"
+            f" {batch.seconds:.3g} s: they are spread evenly,"
+            f" {batch.rows / batch.seconds:.4g} Hz"
+        )
+        return spread
 
     def _signed(self, wanted: ReadOptions) -> ReadOptions:
         """Options with the kinds of channel whose sign was not read."""
@@ -223,7 +247,7 @@ def with_times(way: Heading, table: Array) -> Heading:
     if len(named) < 2 or table.shape[1] != len(way.columns):
         return way
     fit = [i for i in named if goes_on(table[:, i])]
-    for lacks in (counts_rows, lambda t: coarse_clock(t) is not None):
+    for lacks in (counts_rows, lambda t: shared_times(t) is not None):
         fit = [i for i in fit if not lacks(table[:, i])] or fit
     if not fit:
         return way

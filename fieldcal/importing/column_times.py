@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from shlex import quote
 from typing import NamedTuple
 
@@ -12,14 +13,17 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.gravity_size import gravity_in
 from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.recording import TIME_UNITS, ReadOptions
+from fieldcal.importing.recording import TIME_UNITS, Batch, ReadOptions
 from fieldcal.importing.row_times import FRACTIONS, NEAR
 from fieldcal.importing.scales import FEWEST
-from fieldcal.importing.time_units import CoarseClock, time_units
+from fieldcal.importing.time_units import SharedTimes, time_units
 
 SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
 """Rates of logs, Hz."""
 
+
+COARSEST = 1.001
+"""Step of the coarsest clock, s."""
 
 LATER = 0.999
 """Share of rows that are later than the row before, of a clock: one may be damaged."""
@@ -99,14 +103,28 @@ def is_clock_number(t: Array) -> bool:
                 and (ends[1] < NEAR * usual).all())  # fmt: skip
 
 
-def coarse_question(wanted: ReadOptions, coarse: CoarseClock, t: Array) -> str:
-    """Ask for the rate where many rows share one of the times (n,)."""
+def batches(wanted: ReadOptions, shared: SharedTimes, t: Array) -> ReadOptions | None:
+    """Options by which rows that share times (n,) are spread; None if nobody can tell.
+
+    A second is the coarsest clock, and beyond it rows are bursts with pauses between.
+    """
+    t = t[np.isfinite(t)]
+    each = np.linspace(t[0], t[-1], len(t))  # as if every row had its own
+    unit = wanted.time_unit or next(iter(time_units(each)), "s")
+    seconds = shared.step * TIME_UNITS[unit]
+    if not shared.even or seconds > COARSEST or shared.rows < len("12"):
+        return None
+    return replace(wanted, time_unit=unit, batch=Batch(seconds, shared.rows))
+
+
+def shared_question(wanted: ReadOptions, shared: SharedTimes, t: Array) -> str:
+    """Ask for the rate where rows share times (n,), now more, now fewer."""
     unit = wanted.time_unit or next(iter(time_units(t)), "s")
-    rate = coarse.rows / (coarse.step * TIME_UNITS[unit])
+    rate = shared.rows / (shared.step * TIME_UNITS[unit])
     named = [c for c in wanted.columns if not c.startswith("t=")]
     names = [SKIP if name == "t" else name for name in named]
     return (
-        f"its times step by {coarse.step:g} {unit}, with about {coarse.rows:.0f} rows"
+        f"its times step by {shared.step:g} {unit}, with about {shared.rows:.0f} rows"
         " in each, so they do not say when a row was taken: add --columns"
         f" {quote(','.join(names))} --rate {rate:.3g}"
     )

@@ -24,12 +24,11 @@ from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
-from fieldcal.windows.cells import Cells, CellTable
+from fieldcal.windows.cells import Between, Cells, CellTable
 from fieldcal.windows.jumps import Jumps
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.stretch_ends import reasons
 from fieldcal.windows.stretches import (
-    Between,
     still_stretches_of_file,
     summary,
     why_none,

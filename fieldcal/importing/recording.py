@@ -80,6 +80,13 @@ class MeanScatter(NamedTuple):
     timed: bool
 
 
+class Batch(NamedTuple):
+    """Rows that share a time: seconds from one batch to the next, and rows in each."""
+
+    seconds: float
+    rows: float
+
+
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
     """Options of the user for what a file does not state.
@@ -97,6 +104,7 @@ class ReadOptions:
     named : kinds of channel (a, g, t) whose unit the file's headings say
     unsigned : kinds of channel (a, g) in 16 bits of which the sign was not read
     reversed : channels whose axis points the other way in the file
+    batch : rows that share a time, where they do
 
     """
 
@@ -116,6 +124,7 @@ class ReadOptions:
     named: frozenset[str] = frozenset()
     unsigned: frozenset[str] = frozenset()
     reversed: frozenset[str] = frozenset()
+    batch: Batch | None = None
 
     @property
     def acc_scale(self) -> float:

@@ -8,11 +8,12 @@ bits or the day end and begin again.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
+from fieldcal.importing.recording import CLOCK_NUMBER, Batch, ReadOptions
 
 FRACTIONS = {"t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9}
 """Columns that hold what is beyond the whole seconds of ``t``, and s in one of each."""
@@ -27,6 +28,11 @@ NEAR = 20.0
 """Usual steps by which a clock is before its end, and behind its beginning."""
 
 
+PAUSED, PULL = 1.5, 0.05
+"""Distances of batches that are a pause, and the part of what one comes late that
+those behind it do as well."""
+
+
 def clock_numbers(values: Array) -> Array:
     """Seconds since midnight of numbers (n,) such as 142031.5.
 
@@ -36,6 +42,45 @@ def clock_numbers(values: Array) -> Array:
     minutes = np.floor(values / 100)
     since: Array = values % 100 + 60 * (minutes % 100) + 3600 * np.floor(minutes / 100)
     return since
+
+
+class SpreadTimes:
+    """Times of rows that share those of their batch, spread evenly over it.
+
+    Each row is later than the one before by what it is on average; a batch that comes
+    early or late moves this a little, and one that comes after a pause anew.
+
+    Parameters
+    ----------
+    batch : how far batches are from each other, and how many rows they have
+
+    """
+
+    def __init__(self, batch: Batch) -> None:
+        self._step, self._long = batch.seconds / batch.rows, PAUSED * batch.seconds
+        self._last, self._next = -np.inf, -np.inf
+
+    def of(self, t: Array) -> Array:
+        """Times (n,) of the next rows, of which those of a batch have one, s."""
+        step, spread = self._step, np.empty(len(t))
+        known = np.where(np.isfinite(t), t, -np.inf)
+        before = np.concatenate([[self._last], known[:-1]])
+        begins = known - before > step / 2
+        edges = np.unique([0, *np.flatnonzero(begins), len(t)])
+        for first, last in pairwise(edges):
+            if begins[first] and known[first] - self._next > self._long:
+                # the first one may be cut off: what is whole begins with the next
+                own = known[first : last + 1]
+                behind = own[-1] - step * (last - first)
+                whole = last < len(t) and own[-1] - own[0] < self._long
+                self._next = max(float(behind if whole else own[0]), self._next)
+            elif begins[first]:
+                late = float(known[first]) - self._next
+                self._next += max(PULL * late, -step / 2)
+            spread[first:last] = self._next + step * np.arange(last - first)
+            self._next += step * (last - first)
+        self._last = float(known[-1]) if len(t) else self._last
+        return np.where(np.isfinite(t), spread, np.nan)
 
 
 class RowTimes:
@@ -55,13 +100,15 @@ class RowTimes:
         self._wanted, self.says = wanted, list[str]()
         self._seen, self._sum, self._offset = 0, 0.0, 0.0
         self._last = self._usual = np.nan
+        self._spread = SpreadTimes(wanted.batch) if wanted.batch else None
 
     def of(self, columns: Mapping[str, Array], n: int) -> Array:
         """Times (n,) of the next rows."""
         scale = self._wanted.time_scale
         self._seen += n
         if "t" in columns:
-            return self._of_clock(columns["t"], columns, scale)
+            t = self._of_clock(columns["t"], columns, scale)
+            return t if self._spread is None else self._spread.of(t)
         if "dt" in columns:
             passed = np.cumsum(np.nan_to_num(columns["dt"])) * scale + self._sum
             self._sum = float(passed[-1]) if n else self._sum

@@ -29,8 +29,9 @@ TICKED = "100ns"
 EPOCHS = (11644473600.0, 62135596800.0)
 """Time from where they count, 1601 and the year 1, to 1970, s."""
 
-SHARED = 0.5
-"""Part of the rows whose time is that of the row before, of a clock too coarse."""
+SHARED, TOGETHER, REGULAR = 0.5, 0.1, 0.9
+"""Part of the rows that come with the row before, of a clock too coarse; the part of
+the mean step by which they follow; and of batches that have as many rows."""
 
 UNIX = (1e9, 4e9)
 """Times of day since 1970, s: 2001 to 2096."""
@@ -122,30 +123,38 @@ def unit_of_ticks(t: Array) -> str:
     return usual[0] if len(usual) == 1 else ""
 
 
-class CoarseClock(NamedTuple):
-    """Times that many rows share.
+class SharedTimes(NamedTuple):
+    """Times of rows that came together.
 
     Attributes
     ----------
-    step : of the times, in their unit
-    rows : that share one
+    step : from those of one batch to those of the next, in their unit
+    rows : in a batch
+    even : whether all batches have as many, but for one row
 
     """
 
     step: float
     rows: float
+    even: bool
 
 
-def coarse_clock(t: Array) -> CoarseClock | None:
-    """What times (n,) are that most rows share with the one before; None of others."""
+def shared_times(t: Array) -> SharedTimes | None:
+    """How rows share times (n,): a coarse clock, or when a batch of them came.
+
+    None where most rows have a time of their own.
+    """
     t = t[np.isfinite(t)]
     steps = np.diff(t)
-    if len(steps) < FEWEST or (steps == 0).mean() <= SHARED:
+    if len(steps) < FEWEST:
         return None
-    begins = np.flatnonzero(steps > 0)
-    if len(begins) < len("12"):
+    together = steps < TOGETHER * steps.mean()
+    begins = np.flatnonzero(~together)
+    if together.mean() < SHARED or len(begins) < len("12"):
         return None
-    return CoarseClock(_step(t), float(np.median(np.diff(begins))))
+    rows, usual = np.diff(begins), float(np.median(np.diff(begins)))
+    even = float((np.abs(rows - usual) <= 1).mean()) >= REGULAR
+    return SharedTimes(float(np.median(np.diff(t[begins + 1]))), usual, even)
 
 
 def _step(t: Array) -> float:

@@ -14,7 +14,9 @@ sum. Device axes, SI.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +34,20 @@ _CHUNK = 8192
 
 _GRACE = 1e-5
 """Part of a cell by which a time may miss its edge through rounding."""
+
+
+Between = Callable[[float, float], Iterable[Block]]
+"""Samples from a time up to another, s, in order, in blocks."""
+
+
+class CellRows(Protocol):
+    """Start and sums of all cells of a recording, in memory or elsewhere."""
+
+    def __len__(self) -> int:
+        """Count the cells."""
+
+    def __getitem__(self, some: slice, /) -> Array:
+        """Give some of them, (k, 35)."""
 
 
 @dataclass(frozen=True, slots=True)

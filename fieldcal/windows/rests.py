@@ -11,12 +11,12 @@ run ends there.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fieldcal.core.samples import Array, runs
-from fieldcal.windows.cells import CELL, CellTable, hold_last
+from fieldcal.windows.cells import CELL, CellRows, CellTable, hold_last
 
 SPAN = 10
 """Cells whose spread tells rest from motion: 1 s."""
@@ -47,16 +47,6 @@ _RATE = 0.02
 
 Spans = tuple[int, Array, Array]
 """First of some spans, the spread and the mean of each, (k, 6)."""
-
-
-class CellRows(Protocol):
-    """Rows of `summary` of all cells of a recording, in memory or elsewhere."""
-
-    def __len__(self) -> int:
-        """Count the cells."""
-
-    def __getitem__(self, some: slice, /) -> Array:
-        """Give some of them, (k, 35)."""
 
 
 class RestRun(NamedTuple):

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, UNITS, Array
-from fieldcal.windows.cells import CELL, CellTable
-from fieldcal.windows.rests import CellRows
+from fieldcal.windows.cells import CELL, CellRows, CellTable
 
 BEYOND = 1.0
 """Time beyond a stretch that is looked at, s."""

@@ -6,14 +6,15 @@ no sample of a turn gets in.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells, CellTable
+from fieldcal.windows.cells import CELL, Between, CellRows, Cells, CellTable
+from fieldcal.windows.dead_axis import LivingRows
 from fieldcal.windows.limits import StillnessLimits
-from fieldcal.windows.rests import SPAN, CellRows, at_rest, table_of
+from fieldcal.windows.rests import SPAN, at_rest, table_of
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.verdict import judge
 
@@ -22,9 +23,6 @@ FEWEST = 3
 
 _CLEARLY = 0.98
 """Ratio of departure to what is allowed that the sums of a recording must keep."""
-
-Between = Callable[[float, float], Iterable[Block]]
-"""Samples from a time up to another, s, in order, in blocks."""
 
 
 def still_stretches(
@@ -65,6 +63,8 @@ def still_stretches_of_file(
     """
     if len(rows) < 2 * SPAN:
         return []
+    living = LivingRows(rows)
+    rows, between = living, living.of(between)
     shortest = max(1.0, min_seconds)
     runs = at_rest(rows, StillnessLimits().noise)
     middles = [(r.first + SPAN // 2, r.last - 1 + SPAN // 2) for r in runs]
@@ -110,6 +110,7 @@ def why_none(rows: CellRows, origin: Array) -> str:
     """
     if len(rows) < 2 * SPAN:
         return f"it lasts less than {2 * SPAN * CELL:g} s"
+    rows = LivingRows(rows)
     runs = at_rest(rows, StillnessLimits().noise)
     if not runs:
         return "nowhere is it calmer than elsewhere, or it turns all the time"

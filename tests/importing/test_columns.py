@@ -190,14 +190,44 @@ def test_days_of_a_spreadsheet_are_seconds(tmp_path: Path) -> None:
     np.testing.assert_allclose(session.block.t, rows[:, 0], atol=1e-5)
 
 
-def test_a_clock_of_whole_seconds_is_asked_about_with_its_rate(
+def clocks(rows: Array) -> dict[str, Array]:
+    """Times of the same rows as three loggers write them, s."""
+    t = rows[:, 0] + 0.33
+    arrives = np.array([t[min(8 * (i // 8) + 7, len(t) - 1)] for i in range(len(t))])
+    return {
+        "whole seconds": np.floor(t),
+        "tenths": np.floor(10 * t) / 10,
+        "arrival": arrives + 1e-4 * (np.arange(len(t)) % 8),
+    }
+
+
+@pytest.mark.parametrize("kind", ["whole seconds", "tenths", "arrival"])
+def test_rows_that_share_a_time_are_spread_evenly(
+    tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(6, 50.0)
+    shared = np.column_stack([clocks(rows)[kind], rows[:, 1:]])
+    path = write(tmp_path, shared, heading="time,ax,ay,az,gx,gy,gz")
+    session = imported(path)
+    said = " ".join(capsys.readouterr().err.split())
+    assert "they are spread evenly, 50 Hz" in said
+    assert "spread evenly" in (session.folder / "session.toml").read_text()
+    off = session.block.t - rows[:, 0]
+    assert np.ptp(off) < 0.011 and np.abs(np.diff(off)).max() < 0.005
+
+
+def test_rows_of_which_now_more_now_fewer_share_a_time_are_asked_about(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rows = turned(6, 50.0)
-    coarse = np.column_stack([np.floor(rows[:, 0]), rows[:, 1:]])
-    path = write(tmp_path, coarse, heading="time,ax,ay,az,gx,gy,gz")
+    many = np.random.default_rng(1).integers(2, 90, 200)
+    coarse = np.repeat(np.arange(len(many)), many)[: len(rows)]
+    path = write(
+        tmp_path, np.column_stack([coarse, rows[:, 1:]]),
+        heading="time,ax,ay,az,gx,gy,gz",
+    )  # fmt: skip
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
-    asks = "about 50 rows in each.*add --columns _,ax,ay,az,gx,gy,gz --rate 50"
+    asks = r"about \d+ rows in each.*add --columns _,ax,ay,az,gx,gy,gz --rate"
     assert re.search(asks, capsys.readouterr().err)
     answer = ("--columns", "_,ax,ay,az,gx,gy,gz", "--rate", "50")
     assert_same(imported(path, *answer), rows)

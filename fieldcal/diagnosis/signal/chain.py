@@ -26,6 +26,7 @@ from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
 from fieldcal.session.description import Description
+from fieldcal.windows.dead_axis import dead_sensors
 from fieldcal.windows.noise import ChannelNoise
 
 
@@ -39,6 +40,7 @@ class Checked:
     usable : (n, 6) samples that can be used
     faults : what was found, by the effect's id
     noise : (6,) standard deviation of one usable sample in the windows
+    unused : sentences about sensors of which an axis tells nothing at all
 
     """
 
@@ -46,6 +48,7 @@ class Checked:
     usable: NDArray[np.bool_]
     faults: tuple[tuple[str, Fault], ...]
     noise: Array
+    unused: tuple[str, ...] = ()
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -69,14 +72,11 @@ def check(block: Block, about: Description) -> Checked:
     if about.means_only:
         return Checked(block, usable, (), median_sigma(about.mean_sigma))
     faults: list[tuple[str, Fault]] = []
-    samples = recording(block, usable, about)
-    for name in _treated("mend"):
-        for fault in _find(name, samples):
-            faults.append((name, fault))
-            if fault.mended is not None:
-                six = _mended(block, fault)
-                block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
-                samples = recording(block, usable, about)
+    dead = dead_sensors(block.six)
+    for sensor in dead:
+        # of one that sends nothing at all nothing is stuck either
+        usable[:, sensor.channels] &= not sensor.absent
+    block, samples = _put_right(block, usable, about, faults)
     for name in _treated("mask"):
         before = len(faults)
         found = _find(name, samples)
@@ -87,9 +87,32 @@ def check(block: Block, about: Description) -> Checked:
             _mask(name, fault, usable, samples.windows)
         if len(faults) > before:
             samples = recording(block, usable, about)
+    for sensor in dead:
+        usable[:, sensor.channels] = False
+    if dead:
+        samples = recording(block, usable, about)
     for name in _treated("note"):
         faults += [(name, fault) for fault in _find(name, samples)]
-    return Checked(block, usable, tuple(_once(faults)), samples.noise)
+    unused = tuple(sensor.says for sensor in dead)
+    return Checked(block, usable, tuple(_once(faults)), samples.noise, unused)
+
+
+def _put_right(
+    block: Block,
+    usable: NDArray[np.bool_],
+    about: Description,
+    faults: list[tuple[str, Fault]],
+) -> tuple[Block, CheckedSamples]:
+    """Samples with what can be undone undone; what it was is added to `faults`."""
+    samples = recording(block, usable, about)
+    for name in _treated("mend"):
+        for fault in _find(name, samples):
+            faults.append((name, fault))
+            if fault.mended is not None:
+                six = _mended(block, fault)
+                block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
+                samples = recording(block, usable, about)
+    return block, samples
 
 
 def found_first(name: str, block: Block, about: Description) -> list[Fault]:

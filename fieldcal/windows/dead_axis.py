@@ -1,0 +1,143 @@
+"""An axis that tells nothing all through a recording, and so its sensor with it.
+
+A wire that is off, a column of zeros, a device without gyroscopes that sends zeros in
+their place: the force is known by three axes alone, and so is a turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Block
+from fieldcal.core.sentences import join
+from fieldcal.windows.cells import Between, CellRows
+
+OFTEN = 0.5
+"""Part of the samples that differ from the one before where noise exceeds a step."""
+
+_PART = 1 << 16
+"""Cells looked through at a time."""
+
+_SUMS, _FINEST = (1, 7, 13, 19), slice(27, 33)
+"""Where a row of `CellRows` has what a channel sums to, and its smallest change."""
+
+
+class DeadSensor(NamedTuple):
+    """A sensor that cannot be used.
+
+    Attributes
+    ----------
+    channels : its three, in `CHANNELS`
+    axes : those that tell nothing, in `CHANNELS`
+    says : a sentence for the user
+
+    """
+
+    channels: slice
+    axes: tuple[int, ...]
+    says: str
+
+    @property
+    def absent(self) -> bool:
+        """Whether none of its axes tells anything."""
+        return len(self.axes) == len("xyz")
+
+
+def dead_sensors(six: Array) -> list[DeadSensor]:
+    """Sensors of which an axis tells nothing; not those that were not recorded.
+
+    It is missing, or never changes while the axes beside it are noisier than their
+    steps; where these are coarse as well, it may just never be turned.
+
+    Parameters
+    ----------
+    six : (n, 6) samples in `CHANNELS` order, nan where missing
+
+    """
+    found = []
+    for sensor, channels in (("accelerometers", ACC), ("gyroscopes", GYR)):
+        axes = _dead(six[:, channels])
+        if not axes:
+            continue
+        names = [CHANNELS[channels][axis] for axis in axes]
+        what = "never change, or are missing"
+        if len(names) == 1:
+            what = "never changes, or is missing"
+        says = f"the {sensor} are not used: {join(names)} {what}"
+        numbers = tuple(channels.start + axis for axis in axes)
+        found.append(DeadSensor(channels, numbers, says))
+    return found
+
+
+def _dead(triad: Array) -> list[int]:
+    """Axes of a sensor that tell nothing; none of one that was not recorded."""
+    known = np.isfinite(triad)
+    if not known.any():
+        return []
+    step = np.diff(triad, axis=0)
+    pairs = np.isfinite(step).sum(axis=0)
+    often = (np.nan_to_num(step) != 0).sum(axis=0) > OFTEN * pairs
+    still = ~(np.nan_to_num(step) != 0).any(axis=0)
+    if still.all():
+        return [0, 1, 2]
+    dead = ~known.any(axis=0) | (still & (often | still).all())
+    return [int(axis) for axis in np.flatnonzero(dead)]
+
+
+def without_dead(six: Array) -> Array:
+    """Samples (n, 6) with nan in place of axes that tell nothing.
+
+    The others of their sensor still say whether the device is at rest.
+    """
+    dead = [axis for sensor in dead_sensors(six) for axis in sensor.axes]
+    if not dead:
+        return six
+    told = six.copy()
+    told[:, dead] = np.nan
+    return told
+
+
+class LivingRows:
+    """Rows of all cells in which axes that never change are as if not recorded.
+
+    Parameters
+    ----------
+    rows : of a recording
+
+    """
+
+    def __init__(self, rows: CellRows) -> None:
+        changed = np.zeros(6, dtype=bool)
+        for first in range(0, len(rows), _PART):
+            part = rows[first : first + _PART]
+            changed |= np.isfinite(part[:, _FINEST]).any(axis=0)
+        self._rows = rows
+        # where nothing changes at all, that is all there is to judge by
+        self._dead = np.flatnonzero(~changed) if changed.any() else np.arange(0)
+
+    def __len__(self) -> int:
+        """Count the cells."""
+        return len(self._rows)
+
+    def __getitem__(self, some: slice, /) -> Array:
+        """Give some of them, (k, 35)."""
+        rows = self._rows[some]
+        if len(self._dead):
+            rows = rows.copy()
+            rows[:, [first + c for c in self._dead for first in _SUMS]] = 0.0
+        return rows
+
+    def of(self, between: Between) -> Between:
+        """Samples of the recording without these axes."""
+
+        def living(start: float, end: float) -> Iterator[Block]:
+            for block in between(start, end):
+                six = block.six
+                six[:, self._dead] = np.nan
+                yield replace(block, acc=six[:, :3], gyr=six[:, 3:])
+
+        return living if len(self._dead) else between

@@ -19,7 +19,7 @@ from fieldcal.windows.cells import Between, CellRows
 OFTEN = 0.5
 """Part of the samples that differ from the one before where noise exceeds a step."""
 
-_PART = 1 << 16
+_PART = 1 << 12
 """Cells looked through at a time."""
 
 _SUMS, _FINEST = (1, 7, 13, 19), slice(27, 33)

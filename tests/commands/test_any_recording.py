@@ -395,7 +395,7 @@ def test_what_cannot_be_diagnosed_is_one_sentence(
     [
         (
             lambda b: replace(b, gyr=0 * b.gyr),
-            "gyroscopes are not used: gx gy gz",
+            "gyroscopes are not used: gx, gy and gz",
             "acc",
         ),
         pytest.param(

@@ -61,6 +61,8 @@ class Group:
     unsure : standard uncertainty of the shape, where it was refined
     in_step : whether one cause may change all its columns by the same
     fixed : v, where that is known
+    random : whether it is what is drawn anew all the time: it takes nothing from a
+        residual, and predicts nothing
 
     """
 
@@ -77,6 +79,7 @@ class Group:
     in_step: bool = False
     unsure: float = np.nan
     fixed: float | None = None
+    random: bool = False
 
     @property
     def foremost(self) -> Index:

@@ -88,4 +88,4 @@ def flicker(table: ColumnTable) -> Iterator[Group]:
             size = priors.INSTABILITY_ACC if part == "acc" else priors.INSTABILITY_GYR
             columns = np.concatenate([table.wave(c) for c in at])
             sizes = np.concatenate([shape * size * table.unit[c] for c in at])
-            yield Group("flicker", part, columns, sizes)
+            yield Group("flicker", part, columns, sizes, random=True)

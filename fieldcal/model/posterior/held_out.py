@@ -239,7 +239,7 @@ def _wander(chosen: Set, d: Dictionary) -> Array:
     out, first = np.zeros(d.width), 0
     for group in d.always:
         some = slice(first, first := first + len(group.columns))
-        if not group.in_state:
+        if group.random:
             np.add.at(out, group.columns, chosen.state.estimate[some])
     return out
 

@@ -45,7 +45,7 @@ class Fitted:
         """The same without what is random: that takes nothing from a residual."""
         out = self.estimate
         for group in self.dictionary.always:
-            if not group.in_state:
+            if group.random:
                 out[group.columns] = 0.0
         for cause, group in self.set.members:
             if cause.kind == "random":

@@ -57,7 +57,7 @@ class Refit:
         first = 0
         for group in self.dictionary.always:
             own = slice(first, first := first + len(group.columns))
-            if not group.in_state:  # it says nothing of another position
+            if group.random:  # it says nothing of another position
                 mean[own] = 0.0
         np.add.at(value, state.columns, mean)
         return value, np.sqrt(np.bincount(state.columns, state.sizes**2, len(value)))
@@ -65,7 +65,8 @@ class Refit:
 
 def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Refit:
     """Random rows, with all sizes given, about a state with values of its own."""
-    x, rng = ladder(3, free), np.random.default_rng(seed)
+    # gravity is as little known as where nobody says the place
+    x, rng = ladder(3, free, gravity_sigma=0.015), np.random.default_rng(seed)
     d = dictionary(x, common=2e-4)
     d.always = [replace(g, fixed=0.3) for g in d.always]
     d.unstable = np.zeros(7)

@@ -4,6 +4,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
     $IMU,0.01,0.1*5A                   lines with a checksum
+    %RAWIMUSA,2209,4916.2;...*1fb76c28  messages of a receiver
     0.01,0.1,0.2,9.8;                  lines with a mark at their end
     angular_velocity:\n  x: 0.1        messages as ROS shows them
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
@@ -24,6 +25,7 @@ from fieldcal.importing.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.clock_text import IN_LINE, ClockText, is_clock, is_date
 from fieldcal.importing.labels import labelled_values, names_of
 from fieldcal.importing.line_forms import CheckedLines, EchoedMessages, EndedLines
+from fieldcal.importing.receiver_lines import ReceiverLines
 from fieldcal.importing.tagged_lines import TaggedLines
 from fieldcal.importing.text_form import MOSTLY, Reader, TextForm, most
 from fieldcal.importing.text_top import cells, separator_of
@@ -253,7 +255,7 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, CheckedLines, EchoedMessages, EndedLines, QuotedCells,
+    DataflashText, ReceiverLines, CheckedLines, EchoedMessages, EndedLines, QuotedCells,
     LabelledValues, BarTable, ListCells, TaggedLines, ArrivalPrefix, HexCells,
     ClockColumn,
 )  # fmt: skip

@@ -25,6 +25,7 @@ from fieldcal.importing.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.clock_text import IN_LINE, ClockText, is_clock, is_date
 from fieldcal.importing.labels import labelled_values, names_of
 from fieldcal.importing.line_forms import CheckedLines, EchoedMessages, EndedLines
+from fieldcal.importing.rate_on_top import RateOnTop
 from fieldcal.importing.receiver_lines import ReceiverLines
 from fieldcal.importing.tagged_lines import TaggedLines
 from fieldcal.importing.text_form import MOSTLY, Reader, TextForm, most
@@ -255,8 +256,8 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, ReceiverLines, CheckedLines, EchoedMessages, EndedLines, QuotedCells,
-    LabelledValues, BarTable, ListCells, TaggedLines, ArrivalPrefix, HexCells,
-    ClockColumn,
+    DataflashText, RateOnTop, ReceiverLines, CheckedLines, EchoedMessages, EndedLines,
+    QuotedCells, LabelledValues, BarTable, ListCells, TaggedLines, ArrivalPrefix,
+    HexCells, ClockColumn,
 )  # fmt: skip
 """Forms in the order in which they are looked for."""

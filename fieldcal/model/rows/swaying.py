@@ -82,7 +82,7 @@ def swaying(block: Block, about: Description) -> Swaying | None:
     found = {
         p: some
         for p, (a, b) in enumerate(windows)
-        if b > a and (some := waves_of(block.t[a:b], block.six[a:b], scale))
+        if b > a and (some := waves_of(block.t[a:b], block[a:b].six, scale))
     }
     if len(found) < SHARE * len(windows):
         return None

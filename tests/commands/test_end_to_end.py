@@ -75,7 +75,7 @@ def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
     done = run(
         *("two_position", "--headless", f"--virtual={shlex.join(steady(tmp_path))}"),
         *("--no-report", "-o", str(tmp_path / "s"), "--level=0.001", "--angles=0.001"),
-        *("--speed", "60", "--seconds", "15", "--json"),
+        *("--speed", "60", "--json"),
     )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -93,7 +93,7 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     done = run(
         *("two_position", "--headless", f"--virtual={virtual}", "--json"),
         *("--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"),
-        *("--speed", "60", "--seconds", "30"),
+        *("--speed", "60"),
     )
     assert done.returncode == 1, done.stderr
     told = [json.loads(line) for line in done.stderr.splitlines()]

@@ -153,7 +153,7 @@ def test_a_recorded_session_is_taken_through_a_procedure_again(
         assert np.all(np.abs(off) < 4 * np.array(first[group]["sigma"]))
     # a recording that was too short does not come back
     capsys.readouterr()
-    short = [*run, "--device", url, "--seconds=14"]
-    assert main([*short, "-o", str(tmp_path / "third")]) == 3
+    longer = [*run, "--device", url.replace("=20", "=max"), "--seconds=3600"]
+    assert main([*longer, "-o", str(tmp_path / "third")]) == 3
     said = capsys.readouterr().err
     assert "has ended after" in said and "once it is back" not in said

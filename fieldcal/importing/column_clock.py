@@ -33,7 +33,6 @@ from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
 from fieldcal.importing.row_times import FRACTIONS
 from fieldcal.importing.time_units import (
     TICKED,
-    SharedTimes,
     counts_from_long_ago,
     shared_times,
     unit_by_rate,
@@ -169,7 +168,12 @@ class ColumnClock:
         t = table[:, at]
         both = any(name in numbers_of(self._of, wanted) for name in FRACTIONS)
         if not both and (shared := shared_times(t)) is not None:
-            return self._spread(wanted, shared, t)
+            spread = batches(wanted, shared, t)
+            if spread is not None:
+                return self._said(spread)
+            if shared.equal:
+                asks = shared_question(wanted, shared, t)
+                raise InputError(f"{self._of.path}: {asks}")
         if wanted.time_unit:
             return wanted
         if is_clock_number(t):
@@ -196,26 +200,14 @@ class ColumnClock:
         self._of.guessed["time"] = f"{unit}: {why}"
         return replace(wanted, time_unit=unit)
 
-    def _spread(
-        self, wanted: ReadOptions, shared: SharedTimes, t: Array
-    ) -> ReadOptions:
-        """Options by which rows of one batch do not all have its time.
-
-        Raises
-        ------
-        InputError
-            If batches differ too much in their rows to say when one was taken.
-
-        """
-        spread = batches(wanted, shared, t)
-        if spread is None or spread.batch is None:
-            raise InputError(f"{self._of.path}: {shared_question(wanted, shared, t)}")
-        batch = spread.batch
-        self._of.guessed["time"] = (
-            f"{spread.time_unit}, of {batch.rows:.0f} rows that come together each"
-            f" {batch.seconds:.3g} s: they are spread evenly,"
-            f" {batch.rows / batch.seconds:.4g} Hz"
-        )
+    def _said(self, spread: ReadOptions) -> ReadOptions:
+        """Options by which rows of one batch do not all have its time, and say so."""
+        if batch := spread.batch:
+            self._of.guessed["time"] = (
+                f"{spread.time_unit}, of {batch.rows:.0f} rows that come together each"
+                f" {batch.seconds:.3g} s: they are spread evenly,"
+                f" {batch.rows / batch.seconds:.4g} Hz"
+            )
         return spread
 
     def _signed(self, wanted: ReadOptions) -> ReadOptions:
@@ -247,7 +239,7 @@ def with_times(way: Heading, table: Array) -> Heading:
     if len(named) < 2 or table.shape[1] != len(way.columns):
         return way
     fit = [i for i in named if goes_on(table[:, i])]
-    for lacks in (counts_rows, lambda t: shared_times(t) is not None):
+    for lacks in (counts_rows, shares_times):
         fit = [i for i in fit if not lacks(table[:, i])] or fit
     if not fit:
         return way
@@ -255,6 +247,12 @@ def with_times(way: Heading, table: Array) -> Heading:
     for i in {*named} - {*fit}:
         names[i] = names[i]._replace(name="")
     return Heading(names, way.skip)
+
+
+def shares_times(t: Array) -> bool:
+    """Whether times (n,) are those of batches, or of a clock too coarse."""
+    shared = shared_times(t)
+    return shared is not None and shared.equal
 
 
 def numbers_of(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:

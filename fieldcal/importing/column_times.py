@@ -25,6 +25,10 @@ SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
 COARSEST = 1.001
 """Step of the coarsest clock, s."""
 
+HELD = 128
+"""Rows that come together at most, as a packet or the buffer of a sensor holds no more:
+4 kB of six channels and a temperature. More are a burst, with a pause behind it."""
+
 LATER = 0.999
 """Share of rows that are later than the row before, of a clock: one may be damaged."""
 
@@ -113,6 +117,8 @@ def batches(wanted: ReadOptions, shared: SharedTimes, t: Array) -> ReadOptions |
     unit = wanted.time_unit or next(iter(time_units(each)), "s")
     seconds = shared.step * TIME_UNITS[unit]
     if not shared.even or seconds > COARSEST or shared.rows < len("12"):
+        return None
+    if not shared.equal and shared.rows > HELD:
         return None
     return replace(wanted, time_unit=unit, batch=Batch(seconds, shared.rows))
 

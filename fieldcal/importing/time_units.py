@@ -131,12 +131,15 @@ class SharedTimes(NamedTuple):
     step : from those of one batch to those of the next, in their unit
     rows : in a batch
     even : whether all batches have as many, but for one row
+    equal : whether they have the very same time; else they may be bursts of a device
+        that pauses between them
 
     """
 
     step: float
     rows: float
     even: bool
+    equal: bool
 
 
 def shared_times(t: Array) -> SharedTimes | None:
@@ -154,7 +157,8 @@ def shared_times(t: Array) -> SharedTimes | None:
         return None
     rows, usual = np.diff(begins), float(np.median(np.diff(begins)))
     even = float((np.abs(rows - usual) <= 1).mean()) >= REGULAR
-    return SharedTimes(float(np.median(np.diff(t[begins + 1]))), usual, even)
+    equal = float((steps == 0).mean()) > SHARED
+    return SharedTimes(float(np.median(np.diff(t[begins + 1]))), usual, even, equal)
 
 
 def _step(t: Array) -> float:

@@ -311,3 +311,13 @@ def test_columns_of_a_text_are_chosen_by_name(
     wrong = ["--columns", named.replace("u1", "w1"), "-o", out]
     assert main(["import", str(path), *wrong]) == 2
     assert "there are clock, u1, u2" in capsys.readouterr().err
+
+
+def test_bursts_with_pauses_between_are_no_batches(tmp_path: Path) -> None:
+    rows = turned(9, 50.0)
+    t = rows[:, 0] + 20.0 * np.floor(rows[:, 0] / 2.0)
+    path = write(
+        tmp_path, np.column_stack([t, rows[:, 1:]]), heading="time,ax,ay,az,gx,gy,gz"
+    )
+    session = imported(path, "--gyr-unit", "rad/s")
+    np.testing.assert_allclose(session.block.t, t, atol=1e-9)

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import KEPT
@@ -61,17 +62,30 @@ class ModelAverage:
         return [reported(self.posterior.search, one)]
 
     def of_member(self, member: Member) -> tuple[Array, Array]:
-        """Mean (k,) and covariance (k, k) of a member's parameters, if it is there."""
+        """Mean (k,) and covariance (k, k) of a member's parameters, if it is there.
+
+        Where nobody knows the orientations, all axes may be turned, which makes k31 of
+        k13: a set that has other parameters has the same device in other axes.
+        """
         cause, group = member
         there = [(s, w) for s, w in self.sets if cause.key in s.keys]
+        if self.posterior.search.dictionary.free.any():
+            mine = set(group.params)
+            there = [(s, w) for s, w in there if set(_own(s, member).params) <= mine]
 
         def places(one: Set) -> list[Index]:
-            (own,) = (g for c, g in one.members if c.key == cause.key)
+            own = _own(one, member)
             at = dict(zip(own.params or own.columns, own.columns, strict=True))
             wanted = [at.get(p, -1) for p in group.params or group.columns]
             return [np.flatnonzero(one.state.columns == c)[-1:] for c in wanted]
 
         return averaged(there, places)
+
+
+def _own(one: Set, member: Member) -> Group:
+    """The group by which a set has the cause of a member."""
+    (own,) = (g for c, g in one.members if c.key == member[0].key)
+    return own
 
 
 def of_columns(

@@ -89,6 +89,24 @@ def test_numbers_of_a_member_are_those_of_the_sets_that_have_it() -> None:
     assert (np.diag(cov) > 0).all()
 
 
+def test_where_axes_may_be_turned_other_parameters_are_the_same_device(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else a number would be the mean of itself and of 0, in other axes."""
+    search = search_of(np.array([3e-5, 2e-5, -3e-5]), 7)
+    average, _ = average_of(search)
+    by = {group.params: group for group in QUADRATIC.variants}
+    first, last = (search.evaluated(((QUADRATIC, by[p]),)) for p in ((0, 1), (1, 2)))
+    monkeypatch.setitem(vars(average), "sets", [(first, 0.6), (last, 0.4)])
+    member = QUADRATIC, by[0, 1]
+    at = [np.flatnonzero(first.state.columns == c)[-1] for c in by[0, 1].columns]
+    own = first.state.estimate[at]
+    assert average.of_member(member)[0][0] == pytest.approx(0.6 * own[0])
+    free = np.ones_like(search.dictionary.free)
+    monkeypatch.setattr(search.dictionary, "free", free)
+    np.testing.assert_allclose(average.of_member(member)[0], own)
+
+
 def test_only_sets_count_that_are_likely_beside_the_best() -> None:
     search = search_of(np.array([1e-4, 1e-4, -1e-4]), 9)
     average, _ = average_of(search)

@@ -177,18 +177,31 @@ class Mounting(Chain):
         force = np.where(oriented[:, None], recording.x.f[held], acc)
         if rate := rate_unit(turns_seen(recording, held, force)):
             return [_of_rates(recording, RATES[rate] * np.eye(3), {"unit": rate})]
-        # against what the accelerometers read: both may be mounted otherwise together
-        turned = axes_by_turns(turns_seen(recording, held, acc))
+        return self._axes(recording, held, acc)
+
+    def _axes(
+        self, recording: CheckedSamples, held: Sequence[int], acc: Array
+    ) -> list[Fault]:
+        """Axes of the whole device, and those that the gyroscopes have beside it.
+
+        `acc` (n, 3) is measured in the windows `held`, m/s^2. A mirrored device has
+        gyroscopes that seem to turn the other way, so its own axes are put right first.
+        """
+        axes: Array = np.eye(3)
+        oriented = recording.x.oriented[held]
+        if oriented.sum() >= 2:
+            found, odds = turned_axes(acc[oriented], recording.x.f[held][oriented])
+            axes = found if odds >= BETTER else axes
+        seen = turns_seen(recording, held, acc @ axes)
+        turned = axes_by_turns([t._replace(angles=t.angles @ axes) for t in seen])
+        values: dict[str, float | str] = {}
         if turned is not None:
-            return [_of_rates(recording, turned, {"gyr_axes": named(turned.T)})]
-        if oriented.sum() < 2:
-            return []
-        axes, odds = turned_axes(acc[oriented], recording.x.f[held][oriented])
-        if odds < BETTER:
-            return []
+            values["gyr_axes"] = named(turned.T)
+        if (axes == np.eye(3)).all():
+            return [] if turned is None else [_of_rates(recording, turned, values)]
         # the mounting that session.toml should have had
-        right = named(recording.x.mounting @ axes.T)
-        return [self._fault(recording, {"axes": right}, 1.0, axes.T)]
+        values["axes"] = named(recording.x.mounting @ axes.T)
+        return [self._fault(recording, values, 1.0, axes.T, turned)]
 
     @staticmethod
     def _unit(acc: Array, gravity: float) -> str:
@@ -204,9 +217,11 @@ class Mounting(Chain):
         values: dict[str, float | str],
         unit: float,
         undo: Array,
+        rates: Array | None = None,
     ) -> Fault:
         six = recording.block.six
         acc = six[:, :3] @ undo.T * unit
+        gyr = six[:, 3:] @ undo.T @ (np.eye(3) if rates is None else rates.T)
         return Fault(
             channel="ax",
             values=values,
@@ -214,5 +229,5 @@ class Mounting(Chain):
             from_s=float(recording.block.t[0]),
             to_s=float(recording.block.t[-1]),
             size=recording.x.gravity,
-            mended=np.hstack([acc, six[:, 3:] @ undo.T]),
+            mended=np.hstack([acc, gyr]),
         )

@@ -461,6 +461,21 @@ def test_gyroscopes_along_other_axes_than_the_ladder_are_named(
     assert said["twin"]["twin"]["chi2_per_dof"] < 1.5
 
 
+def test_a_mirrored_device_is_mirrored_and_its_gyroscopes_do_not_turn_back(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    block, swap = recorded(SAME, POSITIONS), [1, 0, 2]
+    mirrored = replace(block, acc=block.acc[:, swap], gyr=block.gyr[:, swap])
+    code, said = diagnosed(write_session(tmp_path, mirrored, POSITIONS), capsys)
+    (named,) = [e["parameters"] for e in said["effects"] if e["id"] == "mounting"]
+    assert code == 1 and {k: v["value"] for k, v in named.items()} == {"axes": "+y+x+z"}
+    other = replace(mirrored, gyr=mirrored.gyr * [-1, -1, 1])
+    _, said = diagnosed(write_session(tmp_path / "b", other, POSITIONS), capsys)
+    (named,) = [e["parameters"] for e in said["effects"] if e["id"] == "mounting"]
+    found = {k: v["value"] for k, v in named.items()}
+    assert found["axes"] == "+y+x+z" and sorted(found) == ["axes", "gyr_axes"]
+
+
 def test_a_hand_that_trembles_now_and_then_is_no_noisy_sensor(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

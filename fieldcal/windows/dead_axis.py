@@ -75,17 +75,22 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
 
 def _dead(triad: Array) -> list[int]:
     """Axes of a sensor that tell nothing; none of one that was not recorded."""
-    known = np.isfinite(triad)
-    if not known.any():
+    shares = np.array([_changes(axis) for axis in triad.T])
+    if np.isnan(shares).all():
         return []
-    step = np.diff(triad, axis=0)
-    pairs = np.isfinite(step).sum(axis=0)
-    often = (np.nan_to_num(step) != 0).sum(axis=0) > OFTEN * pairs
-    still = ~(np.nan_to_num(step) != 0).any(axis=0)
+    still = ~(shares > 0)
     if still.all():
         return [0, 1, 2]
-    dead = ~known.any(axis=0) | (still & (often | still).all())
+    dead = np.isnan(shares) | (still & (still | (shares > OFTEN)).all())
     return [int(axis) for axis in np.flatnonzero(dead)]
+
+
+def _changes(values: Array) -> float:
+    """Part of the values (n,) that differ from the one before; nan where none is."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return np.nan
+    return float(np.mean(known[1:] != known[:-1])) if len(known) > 1 else 0.0
 
 
 def without_dead(six: Array) -> Array:

@@ -47,3 +47,12 @@ def test_a_sensor_that_sends_zeros_is_absent_and_one_not_recorded_is_none() -> N
     (found,) = dead_sensors(six)
     assert (found.channels, found.absent) == (GYR, True)
     assert "gx, gy and gz never change, or are missing" in found.says
+
+
+def test_rows_of_either_sensor_in_turn_are_both_alive() -> None:
+    six = np.random.default_rng(3).normal(size=(60, 6))
+    six[::2, :3] = six[1::2, 3:] = np.nan
+    assert dead_sensors(six) == []
+    six[1::2, 0] = 0.5
+    (found,) = dead_sensors(six)
+    assert found.axes == (0,)

@@ -17,7 +17,7 @@ def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
     return lines or [
         f"--{kind}-unit {unit} --{kind}-lsb {lsb:.3g} (about so many counts in one"
         f" {unit}; its data sheet says the number)",
-        f"--{kind}-unit {unit}",
+        f"--{kind}-unit {unit}, if it is so",
     ]
 
 

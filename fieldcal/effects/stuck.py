@@ -23,6 +23,7 @@ from fieldcal.core.samples import CHANNELS, Array, runs
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
 from fieldcal.physics.shape import Shape
+from fieldcal.windows.dead_axis import dead_sensors
 
 ODDS = 1e-6
 MANY = 20
@@ -100,18 +101,13 @@ class Stuck(Chain):
 def _no_wonder(recording: CheckedSamples, c: int, first: int, last: int) -> bool:
     """Whether a run of equal values comes of steps that are coarse."""
     if last - first == len(recording.block):
-        return not _would_vary(recording, c)
+        dead = dead_sensors(recording.block.six)
+        return not any(c in one.axes for one in dead if not one.absent)
     step = float(grids_of(recording.block)[c])
     step_of = step / max(float(recording.noise[c]), 1e-300)
     if step_of > 2 and recording.still[first:last].all():
         return True
     return step_of > 1 and _usual(recording, c, step, first, last)
-
-
-def _would_vary(recording: CheckedSamples, c: int) -> bool:
-    """Whether a channel that never changed would, by the noise of those beside it."""
-    beside = [i for i in range(c - c % 3, c - c % 3 + 3) if i != c]
-    return bool((recording.noise[beside] > grids_of(recording.block)[beside]).all())
 
 
 def _usual(

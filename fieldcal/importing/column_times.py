@@ -13,7 +13,7 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.gravity_size import gravity_in
 from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.recording import TIME_UNITS, Batch, ReadOptions
+from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
 from fieldcal.importing.row_times import FRACTIONS, NEAR
 from fieldcal.importing.scales import FEWEST
 from fieldcal.importing.time_units import SharedTimes, time_units
@@ -120,7 +120,7 @@ def batches(wanted: ReadOptions, shared: SharedTimes, t: Array) -> ReadOptions |
         return None
     if not shared.equal and shared.rows > HELD:
         return None
-    return replace(wanted, time_unit=unit, batch=Batch(seconds, shared.rows))
+    return replace(wanted, time_unit=unit, batch=RowBatch(seconds, shared.rows))
 
 
 def shared_question(wanted: ReadOptions, shared: SharedTimes, t: Array) -> str:

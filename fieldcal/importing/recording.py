@@ -80,7 +80,7 @@ class MeanScatter(NamedTuple):
     timed: bool
 
 
-class Batch(NamedTuple):
+class RowBatch(NamedTuple):
     """Rows that share a time: seconds from one batch to the next, and rows in each."""
 
     seconds: float
@@ -124,7 +124,7 @@ class ReadOptions:
     named: frozenset[str] = frozenset()
     unsigned: frozenset[str] = frozenset()
     reversed: frozenset[str] = frozenset()
-    batch: Batch | None = None
+    batch: RowBatch | None = None
 
     @property
     def acc_scale(self) -> float:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import CLOCK_NUMBER, Batch, ReadOptions
+from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions, RowBatch
 
 FRACTIONS = {"t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9}
 """Columns that hold what is beyond the whole seconds of ``t``, and s in one of each."""
@@ -56,7 +56,7 @@ class SpreadTimes:
 
     """
 
-    def __init__(self, batch: Batch) -> None:
+    def __init__(self, batch: RowBatch) -> None:
         self._step, self._long = batch.seconds / batch.rows, PAUSED * batch.seconds
         self._last, self._next = -np.inf, -np.inf
 

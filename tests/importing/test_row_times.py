@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import Batch
+from fieldcal.importing.recording import RowBatch
 from fieldcal.importing.row_times import SpreadTimes
 
 EACH, STEP = 10, 0.1
@@ -24,7 +24,7 @@ def stamped(
 
 
 def spread(stamps: Array, cuts: tuple[int, ...] = ()) -> Array:
-    clock, edges = SpreadTimes(Batch(STEP, EACH)), [0, *sorted(cuts), len(stamps)]
+    clock, edges = SpreadTimes(RowBatch(STEP, EACH)), [0, *sorted(cuts), len(stamps)]
     pieces = [stamps[a:b] for a, b in zip(edges, edges[1:], strict=False)]
     return np.concatenate([clock.of(piece) for piece in pieces])
 

@@ -28,6 +28,7 @@ from fieldcal.evaluation.observations import Rests
 from fieldcal.history.store import History, HistoryRun, family
 from fieldcal.session.folder import Session
 from fieldcal.windows import Average, average
+from fieldcal.windows.dead_axis import broken
 
 
 def assess(
@@ -61,13 +62,14 @@ def assess(
             earlier = [run.calibration for run in usual]
         except FieldcalError as error:
             warnings.append(str(error))
+    dead = broken(session.block.six)
     taken_out = _taken_out(session, still, limits)
     circumstances = Circumstances(
         temperatures=[a.temperature for a in still.averages],
         link=_link(session.block, still.averages, marks),
         verification=_verification(found, session, marks, limits),
         family=earlier,
-        doubts=[*_doubts(marks), *taken_out],
+        doubts=[*_doubts(marks), *dead, *taken_out],
         windows=still.at_rest(session).averages,
         held=[session.about.positions[i] for i in still.rows],
     )
@@ -92,7 +94,7 @@ def unassessed(
     about, of_acc = session.about, "acc_scale" in found.groups
     unknown = [gravity_unknown(about)] if of_acc else []
     wrong = [gravity_contradicted(about)] if of_acc else []
-    wrong += _taken_out(session, still, limits)
+    wrong += [*broken(session.block.six), *_taken_out(session, still, limits)]
     wrong = [w for w in wrong if w]
     warnings = (*wrong, *found.warnings, *filter(None, unknown))
     return replace(found, warnings=warnings, good=found.good and not wrong)

@@ -73,6 +73,31 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
     return found
 
 
+def broken(six: Array) -> list[str]:
+    """Sentences about axes that are recorded, and never change as those beside them do.
+
+    A column that is missing is a choice of whoever recorded; a value that stands still
+    for ever is a wire or a sensor that is broken, and no device to fly with.
+
+    Parameters
+    ----------
+    six : (n, 6) samples in `CHANNELS` order, nan where missing
+
+    """
+    said = []
+    for one in dead_sensors(six):
+        stuck = [a for a in one.axes if np.isfinite(six[:, a]).any() and not one.absent]
+        if not stuck:
+            continue
+        names = [CHANNELS[a] for a in stuck]
+        change = "change" if len(names) > 1 else "changes"
+        said.append(
+            f"{join(names)} never {change} while the rest of the sensor does: a wire or"
+            " the sensor is broken; repair it and record again"
+        )
+    return said
+
+
 def _dead(triad: Array) -> list[int]:
     """Axes of a sensor that tell nothing; none of one that was not recorded."""
     shares = np.array([_changes(axis) for axis in triad.T])

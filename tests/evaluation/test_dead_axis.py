@@ -17,13 +17,16 @@ HEADING = ",".join(("t", *CHANNELS))
 OTHERS = {"a": "gyr_bias", "g": "acc_bias"}
 
 
-def answers(tmp_path: Path, silent: list[int]) -> tuple[Any, Any]:
-    """What solve and diagnose say of a log with zeros in some channels."""
+def answers(tmp_path: Path, silent: list[int], code: int = 0) -> tuple[Any, Any]:
+    """What solve and diagnose say of a log with zeros in some channels.
+
+    `code` is what solve is to end with.
+    """
     rows = turned(1, 50.0, hold=6.0)
     rows[:, 1 + np.array(silent)] = 0.0
     log, folder = write(tmp_path, rows, heading=HEADING), tmp_path / "s"
     assert main(["import", str(log), "--gyr-unit", "rad/s", "-o", str(folder)]) == 0
-    assert main(["solve", str(folder)]) == 0
+    assert main(["solve", str(folder)]) == code
     assert main(["diagnose", str(folder)]) in (0, 1)
     return tuple(
         json.loads((folder / f"{name}.json").read_text())
@@ -36,7 +39,10 @@ def test_an_axis_that_never_changes_is_stuck_and_its_sensor_is_not_used(
     tmp_path: Path, channel: int
 ) -> None:
     name = CHANNELS[channel]
-    solved, told = answers(tmp_path, [channel])
+    solved, told = answers(tmp_path, [channel], code=1)
+    assert solved["verdict"] == "bad"
+    broken = f"{name} never changes while the rest of the sensor does"
+    assert any(broken in w for w in solved["warnings"])
     assert list(solved["parameters"])[0] == OTHERS[name[0]]
     said = f"are not used: {name} never changes, or is missing"
     assert any(said in w for w in solved["warnings"])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fieldcal.calibration import Calibration, Nominal, limits
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import FieldcalError, SessionError
-from fieldcal.core.samples import ACC, GYR, Grain
+from fieldcal.core.samples import ACC, GYR, Block, Grain
 from fieldcal.core.version import __version__
 from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
 from fieldcal.model.rows.swaying import swaying
@@ -133,36 +133,9 @@ def rests(session: Session) -> Rests:
     session.about.refuse_overlap()
     if session.about.means_only:
         return _of_means(session)
-    block, dead = session.block, dead_sensors(session.block.six)
-    refuse_copies(block)
-    told = without_dead(block.six)
-    block = replace(block, acc=told[:, :3], gyr=told[:, 3:])
-    taken: dict[int, Average] = {}
-    warnings = [*session.warnings, *_beyond(session)]
-    sways = swaying(block, session.about)
-    if sways is not None:
-        block = sways.block
-        warnings.append(sways.sentence)
-    noise: LearnedNoise | None = None
-    grain = _grain_shown(session)
-    # each tells the noise for the next
-    held = session.about.in_time()
-    for i, window in zip(held.numbers, held.windows, strict=True):
-        try:
-            if session.about.positions[i].turning:
-                rate = table_rate(block, window, session.about, i)
-                found, remark = take_on_a_table(block, window, rate, grain)
-            else:
-                found, noise, remark = take(block, window, noise, grain)
-        except FieldcalError as error:
-            warnings.append(f"{_named(session, i)} is left out: {error}")
-            continue
-        if sways is not None:
-            more = np.diag(sways.left[i])
-            found = replace(found, covariance=found.covariance + more)
-        taken[i] = found
-        if remark:
-            warnings.append(f"{_named(session, i)}: {remark}")
+    refuse_copies(session.block)
+    dead, warnings = dead_sensors(session.block.six), list(session.warnings)
+    taken = _averaged(session, _living(session.block), warnings)
     if not taken:
         raise SessionError(
             f"{session.folder}: no window can be used; {warnings[-1]}"
@@ -173,6 +146,43 @@ def rests(session: Session) -> Rests:
     for one in dead:
         averages = [_without(average, one.channels) for average in averages]
     return Rests(tuple(rows), tuple(averages), (*warnings, *(one.says for one in dead)))
+
+
+def _living(block: Block) -> Block:
+    """The samples without axes that tell nothing."""
+    told = without_dead(block.six)
+    return replace(block, acc=told[:, :3], gyr=told[:, 3:])
+
+
+def _averaged(session: Session, block: Block, said: list[str]) -> dict[int, Average]:
+    """Averages by the number of their position; what is left out is added to `said`."""
+    about, grain = session.about, _grain_shown(session)
+    said += _beyond(session)
+    sways = swaying(block, about)
+    if sways is not None:
+        block = sways.block
+        said.append(sways.sentence)
+    taken: dict[int, Average] = {}
+    noise: LearnedNoise | None = None
+    held = about.in_time()
+    # each tells the noise for the next
+    for i, window in zip(held.numbers, held.windows, strict=True):
+        try:
+            if about.positions[i].turning:
+                rate = table_rate(block, window, about, i)
+                found, remark = take_on_a_table(block, window, rate, grain)
+            else:
+                found, noise, remark = take(block, window, noise, grain)
+        except FieldcalError as error:
+            said.append(f"{_named(session, i)} is left out: {error}")
+            continue
+        if sways is not None:
+            more = np.diag(sways.left[i])
+            found = replace(found, covariance=found.covariance + more)
+        taken[i] = found
+        if remark:
+            said.append(f"{_named(session, i)}: {remark}")
+    return taken
 
 
 def _of_means(session: Session) -> Rests:

@@ -124,10 +124,40 @@ class Turns:
     def _rows(self, turn: Turn, state: State, values: Array) -> TurnRows:
         """Closure and way of one turn, by all columns that reach them."""
         d = self.dictionary
-        since = self.turning.after(turn.x.t, turn.positions[1])
-        view = RowView(turn.x, turn.x, since, state)
+        view = RowView(
+            turn.x, turn.x, self.turning.after(turn.x.t, turn.positions[1]), state
+        )
         _, seen, across = geometry(turn.ends, turn.positions, turn.attitude, turn.done)
-        weights = turn.weights(state.scale[3:])
+        index, close, general = self._met(turn, view)
+        loose = dict(self._loose_ends(turn)) if d.free.any() else {}
+        ends: Array = np.zeros((3, 3))
+        for p, bent in loose.items():
+            close = close - bent @ self.means[p][:, index]
+            ends += (bent * (self.spread[p] + self.rows.wander**2)) @ bent.T
+        there = np.abs(close).max(axis=0) > 0
+        for columns, outputs in general:
+            there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
+        index = index[there]
+        basis, info = _plane(across, ends, self._unsure(turn, view))
+        close = basis @ close[:, there]
+        closure = basis @ seen + close @ values[index]
+        off = [(basis @ bent) ** 2 for bent in loose.values()]
+        bent = np.sqrt(sum(off, np.zeros((len(basis), 3))))
+        way: Array = np.zeros(0)
+        design: Array = np.zeros((0, len(index)))
+        if self.known is not None:
+            seen_by = WayRows(turn, view, d, self.known, self.rows.noise)
+            way, design = seen_by.rows(general, values, index)
+        return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
+
+    def _met(
+        self, turn: Turn, view: RowView
+    ) -> tuple[Index, Array, list[tuple[Index, Array]]]:
+        """Columns that a turn can meet, and how its closure moves with each, (3, k).
+
+        Then what the way is to be looked at by: columns and outputs of each basis.
+        """
+        d, weights = self.dictionary, turn.weights(view.state.scale[3:])
         at, closing, general = [], [], []
         for first, one in d.bases:
             if isinstance(one, Course):
@@ -148,34 +178,21 @@ class Turns:
             if self.known is not None:
                 kept = on_the_way(columns, d, self.known)
                 general.append((columns[kept], outputs[:, :, kept]))
-        index, close = np.concatenate(at), np.concatenate(closing, axis=1)
-        ends: Array = np.zeros((3, 3))
-        loose = dict(self._loose_ends(turn)) if d.free.any() else {}
-        for p, bent in loose.items():
-            close = close - bent @ self.means[p][:, index]
-            ends += (bent * (self.spread[p] + self.rows.wander**2)) @ bent.T
-        there = np.abs(close).max(axis=0) > 0
-        for columns, outputs in general:
-            there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
-        index = index[there]
-        spread = self.rows.noise[3:] / np.abs(state.scale[3:]) * np.sqrt(turn.interval)
+        return np.concatenate(at), np.concatenate(closing, axis=1), general
+
+    def _unsure(self, turn: Turn, view: RowView) -> float:
+        """Variance of a closure about every axis: noise, time steps and filters, rad^2.
+
+        Between positions of unknown orientation the Earth's rate is not known either.
+        """
+        scale = np.abs(view.state.scale[3:])
         length = float(np.ptp(turn.x.t))
-        wide = float(np.sqrt((spread**2).mean())) * np.sqrt(length)
-        fading = settling(state, turn.x, since)[3:] / np.abs(state.scale[3:])
-        unsure = priors.BUILT_UP * length * float(np.abs(fading).max())
-        earth = EARTH_RATE / 3**0.5 * length if d.free.any() else 0.0
-        alike = wide**2 + turn.blur**2 + unsure**2 + earth**2
-        basis, info = _plane(across, ends, alike)
-        close = basis @ close[:, there]
-        closure = basis @ seen + close @ values[index]
-        off = [(basis @ bent) ** 2 for bent in loose.values()]
-        bent = np.sqrt(sum(off, np.zeros((len(basis), 3))))
-        way: Array = np.zeros(0)
-        design: Array = np.zeros((0, len(index)))
-        if self.known is not None:
-            seen_by = WayRows(turn, view, d, self.known, self.rows.noise)
-            way, design = seen_by.rows(general, values, index)
-        return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
+        white = self.rows.noise[3:] / scale * np.sqrt(turn.interval)
+        fading = settling(view.state, turn.x, view.since)[3:] / scale
+        built_up = priors.BUILT_UP * length * float(np.abs(fading).max())
+        earth = EARTH_RATE / 3**0.5 * length if self.dictionary.free.any() else 0.0
+        walked = float((white**2).mean()) * length
+        return walked + turn.blur**2 + built_up**2 + earth**2
 
     def _loose_ends(self, turn: Turn) -> Iterator[tuple[int, Array]]:
         """How the closure moves with what is added to the accelerometers at its ends.

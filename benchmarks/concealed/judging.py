@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -117,8 +118,10 @@ def _pulls(session: Session, told: Diagnosis) -> Iterator[tuple[str, float]]:
     """How far numbers are off, in their standard deviations."""
     for effect in told.effects:
         truth = session.concealed.get(effect.id)
-        if truth is None:
+        if not truth:  # not there, or several of it
             continue
+        if not session.angles:
+            truth = _by_own_axes(effect.id, truth, set(effect.parameters))
         for name, quantity in effect.parameters.items():
             value, sigma = quantity.value, quantity.sigma
             if isinstance(value, str) or not sigma:
@@ -127,3 +130,18 @@ def _pulls(session: Session, told: Diagnosis) -> Iterator[tuple[str, float]]:
             if isinstance(catalogue()[effect.id], Line):
                 there = abs(there)  # each channel has a phase, which takes the sign
             yield f"{effect.id}.{name}", (value - there) / sigma
+
+
+def _by_own_axes(
+    name: str, truth: Mapping[str, Any], told: set[str]
+) -> Mapping[str, Any]:
+    """Parameters in the axes that a device has where nothing says how it stood.
+
+    Axes turned by an angle take from one coefficient what they give to its mirror:
+    where one of the two is told alone, it stands for both.
+    """
+    out = dict(truth)
+    for gone, taker in getattr(catalogue()[name], "turned_into", {}).items():
+        if taker in told and gone not in told:
+            out[taker] = out.get(taker, 0.0) + out.pop(gone, 0.0)
+    return out

@@ -211,8 +211,12 @@ def _places(found: Set, columns: Index) -> Index:
 
 
 def sizes(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
-    """Sizes of what is random, each with its uncertainty."""
-    best, out = explanation.best.set, dict[str, Quantity]()
+    """Sizes of what is random, each with its uncertainty.
+
+    By the likeliest set alone: a covariance that is averaged over several sizes tells
+    none of them.
+    """
+    best, out = explanation.posterior.best, dict[str, Quantity]()
     for member in standing.members:
         tried = float(priors.SIZES[best.sizes.members[best.members.index(member)]])
         out |= sizes_of(best, explanation.dictionary, member[1], tried)

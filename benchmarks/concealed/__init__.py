@@ -66,6 +66,7 @@ def kinds() -> Mapping[str, tuple[Draw, int]]:
             out[name] = (lambda rng, n=name: others.example(n, rng), 3)  # type: ignore[misc]
     out["pier"] = (others.pier, 3)
     out["under way"] = (others.under_way, 3)
+    out["nothing, flicker"] = (others.flickering, 9)
     return out
 
 

@@ -124,6 +124,20 @@ def pier(rng: np.random.Generator) -> Session:
     return replace(session, profile=profile, concealed={"sway": {}}, label="pier")
 
 
+def flickering(rng: np.random.Generator) -> Session:
+    """Nothing concealed, on a device whose biases have flicker noise.
+
+    Allan deviations of MEMS stay at 0.02 to 0.3 mg and 3 to 30 deg/h (data sheets).
+    """
+    session = calm(plain(rng))
+    one = session.profile
+    acc = float(10 ** rng.uniform(np.log10(2e-4), np.log10(3e-3)))
+    gyr = float(10 ** rng.uniform(np.log10(1.5e-5), np.log10(1.5e-4)))
+    noise = replace(one.noise, acc_flicker=(acc,) * 3, gyr_flicker=(gyr,) * 3)
+    profile = replace(one, noise=noise)
+    return replace(session, profile=profile, label="nothing, flicker")
+
+
 def under_way(rng: np.random.Generator) -> Session:
     """Nothing concealed, on a base whose velocity over the Earth is said.
 

@@ -37,15 +37,23 @@ CLOSURE = 5e-4
 """Typical scatter of the angle that a turn closes with, rad, beyond noise: bandwidth,
 timing and the hand take half a milliradian."""
 
+FLICKER_ACC, FLICKER_GYR = 2e-3, 1e-4
+"""Typical flicker noise, m/s^2 and rad/s: where Allan deviations of consumer grade stay
+level, 0.2 mg and 20 deg/h."""
+
+FLICKERS = 0.1
+"""Chance that flicker noise, which neighbouring windows share, is more of what a bias
+wanders by than what comes anew in each of them, with how the device lies."""
+
 UNLIKE = 0.3
 """Spread of the instabilities of a triad's axes, ln: they are made alike."""
 
 UNKNOWN_ACC, UNKNOWN_GYR = 2e-2, 1e-3
 """Typical size of what no effect makes, m/s^2 and rad/s: that of the effects."""
 
-MOST_WAVES = 160
-"""Cosines of a walk at most: one for some seconds of a session of minutes. What they
-leave of one that is far above the noise is as good as white."""
+MOST_WAVES = 80
+"""Cosines of a walk or of flicker at most: one for some seconds of a session of
+minutes. What they leave of what is far above the noise is as good as white."""
 
 MISSET_DEG = 3.0
 """Typical error of a position whose angle is not the stated one, deg."""

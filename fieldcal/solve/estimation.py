@@ -125,14 +125,19 @@ class Estimated:
         """What the set has that was not asked for, with its probability."""
         out: dict[str, float] = {}
         for one in self.given.explanations:
-            for name in dict.fromkeys(cause.name for cause, _ in one.members):
+            told = (cause.name for cause, _ in one.members if cause.told)
+            for name in dict.fromkeys(told):
                 out[name] = out.get(name, 0.0) + one.probability
         return dict(sorted(out.items(), key=lambda item: -item[1]))
 
     @property
     def sure(self) -> float:
         """Probability that something is there that was not asked for."""
-        return sum(one.probability for one in self.given.explanations if one.members)
+        return sum(
+            one.probability
+            for one in self.given.explanations
+            if any(cause.told for cause, _ in one.members)
+        )
 
     @property
     def ended_s(self) -> float | None:

@@ -155,7 +155,7 @@ def _info(
         }  # fmt: skip
     if harmful := [w for w in found.wrong_angles if _harms(w, found)]:
         out["wrong_angles"] = [w.to_json() for w in harmful]
-    if found.causes:
+    if found.causes or found.ended_s is not None:
         out["carried"] = _carried(observations, found)
     if found.turns:
         chi2, dof = closure_chi2(found)

@@ -44,7 +44,7 @@ BY_WINDOW = ("misset", "window", "position")
 """Causes by which windows are off each for itself: a given set has those already, as
 windows that scatter or are bad."""
 
-CHANGING = ("time", "temperature", "force and time")
+CHANGING = ("time", "temperature", "force and time", "flicker")
 """Functions without physics whose value at the end is part of what the device has come
 to; those of angles and forces have no zero."""
 

@@ -51,9 +51,26 @@ def drift(ridden: Ride, out: Array) -> None:
     out[:, :3] += ridden.t[:, None] * [1e-4, -8e-5, 0.0]
 
 
+def asymmetry(ridden: Ride, out: Array) -> None:
+    out[:, :3] += np.abs(ridden.f) * [4e-3, 0.0, 0.0]
+
+
 def heating(ridden: Ride, out: Array) -> None:
     rate = np.gradient(ridden.warming, ridden.t)
     out[:, :3] += rate[:, None] * [0.5, -0.4, 0.3]
+
+
+def flicker(ridden: Ride, out: Array) -> None:
+    """Allan deviations that stay at 0.2 mg and 15 deg/h.
+
+    A power of h / f, whose level is sqrt(2 ln 2 h), by waves k of variance h / k.
+    """
+    n = 4 * len(out)  # so much longer, that it does not come round
+    level, k = np.repeat([2e-3, 7e-5], 3), np.arange(1, n // 2 + 1)
+    size = n / 2 * level / np.sqrt(2 * np.log(2) * k[:, None])
+    cosine, sine = ridden.rng.standard_normal((2, len(k), 6)) * size
+    waves = np.vstack([np.zeros((1, 6)), cosine - 1j * sine])
+    out += np.fft.irfft(waves, n, axis=0)[: len(out)]
 
 
 @pytest.mark.parametrize(
@@ -61,6 +78,22 @@ def heating(ridden: Ride, out: Array) -> None:
 )
 def test_nothing_left_out(tmp_path: Path, device: Device) -> None:
     assert diagnosed(tmp_path / "s", device).verdict == "consistent"
+
+
+@pytest.mark.parametrize("seed", [1, 2, pytest.param(3, marks=pytest.mark.thorough)])
+def test_flicker_that_every_device_has_is_nothing_left_out(
+    tmp_path: Path, seed: int
+) -> None:
+    """No walk, no step, and no function of the time on any axis."""
+    said = diagnosed(tmp_path / "s", TACTICAL, flicker, seed=seed)
+    assert (named(said), said.mismatch) == ([], ())
+    assert said.verdict == "consistent" and said.probability > 0.5
+
+
+def test_what_is_left_out_is_found_beside_flicker(tmp_path: Path) -> None:
+    said = diagnosed(tmp_path / "s", TACTICAL, flicker, asymmetry)
+    assert named(said) == ["scale_asymmetry"]
+    agrees(said, "scale_asymmetry", {"x": 4e-3})
 
 
 def test_angles_set_by_hand_say_nothing_of_the_gyroscopes(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def estimated(**known: Any) -> Estimated:
     )
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "missing": (), "given": given, "acc": fit(),
-        "gyr": fit(rms=np.nan), "closures": (0.0, 0),
+        "gyr": fit(rms=np.nan), "closures": (0.0, 0), "ended_s": None,
         "found": SimpleNamespace(scatter=np.array([3, 4, 0, 2, 1, 0, 5.0])),
     }  # fmt: skip
     return cast(Estimated, SimpleNamespace(**(nothing | known)))

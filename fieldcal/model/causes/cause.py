@@ -30,7 +30,7 @@ BOTH = frozenset({"acc", "gyr"})
 OFFERED = 60
 """Columns by which a group is offered: a course on three axes by twenty waves each."""
 
-Kind = Literal["effect", "random", "unknown", "position", "given"]
+Kind = Literal["effect", "random", "noise", "unknown", "position", "given"]
 
 
 def triads_of(part: str) -> frozenset[str]:
@@ -125,7 +125,8 @@ class Cause:
     part : "acc", "gyr" or ""
     chance : that a session has it
     variants : groups, one for each value of the shape
-    kind : of the catalogue, random, without physics, an angle, or asked for
+    kind : of the catalogue, random, noise that every device has, without physics, an
+        angle, or asked for
 
     """
 
@@ -146,6 +147,11 @@ class Cause:
         apart = [g.apart(other) for g in self.variants]
         least = min(apart)
         return tuple(g for g, d in zip(self.variants, apart, strict=True) if d == least)
+
+    @property
+    def told(self) -> bool:
+        """Whether it is something that is left out, and no noise."""
+        return self.kind != "noise"
 
     @property
     def key(self) -> str:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
-from fieldcal.model.causes import columns
+from fieldcal.model.causes import columns, smooth
 from fieldcal.model.causes.cause import CLOSURE, FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General
@@ -102,7 +102,8 @@ class Dictionary(ColumnTable):
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
         if len(self.held) < FEW < len(x):
-            self.always += flicker(self)
+            sizes = priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
+            self.always += flicker(self, np.full(6, smooth.WAVES), sizes)
         self.causes: list[Cause] = list(self._causes())
 
     def plain(self) -> Dictionary:

@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS
+from fieldcal.core.samples import CHANNELS, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes import smooth
-from fieldcal.model.causes.cause import TRIADS, Cause, Group
+from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.physics.effect import CHANCE, Scatter
 
@@ -20,6 +19,10 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
     for effect in catalogue().values():
         if isinstance(effect, Scatter) and effect.applies(table.x):
             yield from _of_scatter(table, effect)
+    if len(table.held) >= FEW:  # of fewer, it is always there
+        sizes = priors.FLICKER_ACC, priors.FLICKER_GYR
+        for group in flicker(table, table.wander.modes, sizes):
+            yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
     oriented = table.held[
         [bool(table.x.oriented[table.x.position == p].all()) for p in table.held]
     ]
@@ -76,16 +79,25 @@ def _walks(
     return Cause(effect.id, part, share * effect.chance(table.x), groups, "random")
 
 
-def flicker(table: ColumnTable) -> Iterator[Group]:
-    """Instability within the windows, where there are too few to have it between.
+def flicker(
+    table: ColumnTable, modes: Index, sizes: tuple[float, float]
+) -> Iterator[Group]:
+    """Instability that goes on from window to window, of equal power in every octave.
 
-    Of equal power in every octave: a cosine k has a variance as 1/k.
+    A cosine k has a variance as 1/k.
+
+    Parameters
+    ----------
+    table : of the session
+    modes : (6,) cosines of each channel
+    sizes : typical ones, m/s^2 and rad/s
+
     """
-    shape = 1 / np.sqrt(np.arange(1, smooth.WAVES + 1))
+    shape = 1 / np.sqrt(np.arange(1, modes.max() + 1))
     for part, channels in TRIADS:
         at = [c for c in channels if c in table.observed]
         if at:
-            size = priors.INSTABILITY_ACC if part == "acc" else priors.INSTABILITY_GYR
-            columns = np.concatenate([table.wave(c) for c in at])
-            sizes = np.concatenate([shape * size * table.unit[c] for c in at])
-            yield Group("flicker", part, columns, sizes, random=True)
+            size = sizes[part == "gyr"]
+            columns = np.concatenate([table.wave(c, modes[c]) for c in at])
+            wide = [shape[: modes[c]] * size * table.unit[c] for c in at]
+            yield Group("flicker", part, columns, np.concatenate(wide), random=True)

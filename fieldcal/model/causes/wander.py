@@ -1,26 +1,25 @@
-"""How fast the biases wander inside windows, before anything is fitted.
+"""How the biases wander inside windows, and what cosines leave of it.
 
-A walk of q per sqrt(s) makes the means d of two neighbouring rows of length l differ by
+Biases walk by q per sqrt(s), or flicker with cosines k of variance a^2 / k over T s: a
+one-sided power of a^2 / 2 over the frequency (`wander_sizes`). Of K cosines, means over
+l s keep of a walk
 
-    var(d' - d) = s'^2 + s^2 + q^2 (l' + l) / 3                                     (1)
+    q^2 [T / (pi^2 K) - l / 6]                                                      (1)
 
-beside their white noise s. The median of (d' - d)^2 over (1) tells q, in the later half
-of each window, when what settles after a turn has; ln r, r being that median over the
-one of chi squared, scatters by 2.3 / sqrt(n) with n differences. Of K cosines over T s
-a walk leaves rows
+of variance, which is as good as white from row to row, and of flicker
 
-    q^2 [T / (pi^2 K) - l / 6]                                                     (2)
+    a^2 / 2 [sin^2 x / (2 x^2) + sin 2x / (2 x) - Ci(2x)],    x = pi l K / (2 T)    (2)
 
-of variance, which is as good as white from row to row; two means tau apart share
+Two means tau apart share, with y = pi tau / T,
 
-    q^2 T / pi^2 [pi^2 / 6 - pi x / 2 + x^2 / 4 - sum_k cos(k x) / k^2]            (3)
+    q^2 T / pi^2 [pi^2 / 6 - pi y / 2 + y^2 / 4 - sum_k cos(k y) / k^2]             (3)
+    - a^2 / 2 Ci(K y)                                                               (4)
 
-with x = pi tau / T and k = 1 ... K. Cosine k of it, of standard deviation q sqrt(2 T) /
-(pi k), is beyond the noise of n rows up to
+with k = 1 ... K. Cosine k is beyond the noise of rows of deviations s up to
 
-    K = q sqrt(2 T) / pi sqrt(sum 1 / (2 s^2))                                      (4)
+    K = q sqrt(2 T J) / pi,    K = a^2 J,    J = sum 1 / (2 s^2)                    (5)
 
-Source: Karhunen-Loeve series of Brownian motion.
+Source: Karhunen-Loeve series of Brownian motion; IEEE Std 952 for flicker noise.
 """
 
 from __future__ import annotations
@@ -29,27 +28,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS, Array, Index
-from fieldcal.effects import catalogue
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes import smooth
+from fieldcal.model.causes.wander_sizes import sizes
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.physics.effect import Scatter
-
-CHI2_MEDIAN, SCATTERS = 0.4549, 2.3
-"""Of chi squared with one degree of freedom: median; scatter of the median's ln."""
-
-SIZES: Array = np.geomspace(priors.SIZES[0], priors.SIZES[-1], 8 * 32 + 1)
-"""Values of v, closer together than those of groups: this one is taken as it is."""
-
-DENSITY: Array = np.interp(np.log(SIZES), np.log(priors.SIZES), priors.density()) / 8
-"""Probability of each."""
-
-FEWEST = 8
-"""Differences below which they tell nothing."""
-
-TINY = 1e-12
-"""Of ratios, where a channel repeats one value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,97 +41,85 @@ class Wander:
 
     Attributes
     ----------
-    speed : (6,) of each output, per sqrt(s)
+    speed : (6,) of each output, per sqrt(s), if it walks
+    flicker : (6,) a of each output, if it flickers
     modes : (6,) cosines of it that rows see, at least those of a smooth course
     length : s that these are drawn over
 
     """
 
     speed: Array
+    flicker: Array
     modes: Index
     length: float
 
     @classmethod
     def of(cls, rows: Rows, unit: Array) -> Wander:
         """Measure it in rows; `unit` (6,) are outputs per SI unit."""
-        length, speed = float(np.ptp(rows.x.t)), _speed(rows, unit)
+        length, (speed, flicker) = float(np.ptp(rows.x.t)), sizes(rows, unit)
         information = np.where(rows.used, 1 / rows.sd**2, 0.0).sum(axis=0) / 2
-        resolved = speed * np.sqrt(2 * length * information) / np.pi  # (4)
+        walks = speed * np.sqrt(2 * length * information) / np.pi  # (5)
+        resolved = np.fmax(walks, flicker**2 * information)  # (5)
         modes = np.clip(resolved, smooth.WAVES, priors.MOST_WAVES).astype(np.intp)
-        return cls(speed, modes, length)
+        return cls(speed, flicker, modes, length)
 
     @classmethod
     def none(cls) -> Wander:
         """Of rows that are as white as their samples."""
-        return cls(np.zeros(6), np.full(6, smooth.WAVES), 0.0)
+        return cls(np.zeros(6), np.zeros(6), np.full(6, smooth.WAVES), 0.0)
 
     def left(self, length: Array, channel: int) -> Array:
         """Variance that its cosines leave of means over some lengths, (n,)."""
-        part = _left(self.length, length, int(self.modes[channel]))
-        out: Array = self.speed[channel] ** 2 * part
+        q, a, count = self._of(channel)
+        walks: Array = q**2 * _left_of_walk(self.length, length, count)
+        if not a:
+            return walks
+        flickers = a**2 * _left_of_flicker(self.length, length, count)
+        out: Array = np.fmax(walks, flickers)
         return out
 
     def apart(self, t: Array, length: Array) -> Array:
         """Covariance that they leave of means about some instants, (6, n, n)."""
-        x = np.pi * np.abs(np.subtract.outer(t, t)) / max(self.length, 1e-9)
-        shares = {}
-        for count in np.unique(self.modes).tolist():
-            k = np.arange(1, count + 1)
-            taken = np.cos(np.multiply.outer(x, k)) @ (1 / k**2)
-            left = np.pi**2 / 6 - np.pi * x / 2 + x**2 / 4 - taken
-            shares[count] = self.length / np.pi**2 * left  # (3)
-            shares[count].flat[:: len(t) + 1] = _left(self.length, length, count)
-        every = np.stack([shares[count] for count in self.modes.tolist()])
-        out: Array = self.speed[:, None, None] ** 2 * every
+        y = np.pi * np.abs(np.subtract.outer(t, t)) / max(self.length, 1e-9)
+        out, diagonal = np.zeros((6, *y.shape)), np.s_[:: len(t) + 1]
+        for c in range(6):
+            q, a, count = self._of(c)
+            alone = self.left(length, c)
+            if not alone.any():
+                continue
+            if q**2 * _left_of_walk(self.length, length[:1], count) < alone[0]:
+                out[c] = -(a**2) * _cosine_integral(count * y) / 2  # (4)
+            else:
+                k = np.arange(1, count + 1)
+                taken = np.cos(np.multiply.outer(y, k)) @ (1 / k**2)
+                left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - taken
+                out[c] = q**2 * self.length / np.pi**2 * left  # (3)
+            out[c].flat[diagonal] = alone
         return out
 
+    def _of(self, channel: int) -> tuple[float, float, int]:
+        """Walk, flicker and cosines of a channel."""
+        own = self.speed[channel], self.flicker[channel], self.modes[channel]
+        return float(own[0]), float(own[1]), int(own[2])
 
-def _left(whole: float, length: Array, count: int) -> Array:
+
+def _left_of_walk(whole: float, length: Array, count: int) -> Array:
     """Variance that cosines leave of means of a walk of 1 per sqrt(s), (n,)."""
-    left: Array = np.maximum(whole / (np.pi**2 * count) - length / 6, 0.0)  # (2)
+    left: Array = np.maximum(whole / (np.pi**2 * count) - length / 6, 0.0)  # (1)
     return left
 
 
-def _speed(rows: Rows, unit: Array) -> Array:
-    """How far each output wanders beyond its noise, per sqrt(s), (6,).
-
-    The mean over all sizes and none, by their probabilities: nothing, where rows show
-    none.
-    """
-    out = np.zeros(6)
-    for effect in catalogue().values():
-        if isinstance(effect, Scatter) and len(effect.params) == len(CHANNELS):
-            for c, param in enumerate(effect.params):
-                sizes = np.append(0.0, SIZES * param.typical * unit[c])
-                weight = _weights(rows, c, sizes, effect.chance(rows.x))
-                out[c] = np.hypot(out[c], np.sqrt(weight @ sizes**2))
+def _left_of_flicker(whole: float, length: Array, count: int) -> Array:
+    """Variance that cosines leave of means of flicker with a = 1, (n,)."""
+    x = np.maximum(np.pi * length * count / (2 * whole), 1e-12)
+    bent = np.sin(x) ** 2 / (2 * x**2) + np.sin(2 * x) / (2 * x)
+    out: Array = (bent - _cosine_integral(2 * x)) / 2  # (2)
     return out
 
 
-def _weights(rows: Rows, c: int, sizes: Array, chance: float) -> Array:
-    """Probabilities of sizes on one channel, the first of which is none."""
-    at = _later(rows)
-    at = at[rows.used[at, c] & rows.used[at + 1, c]]
-    before = np.append(1 - chance, chance * DENSITY)
-    if len(at) < FEWEST:
-        return np.where(sizes > 0, 0.0, 1.0)
-    step = rows.y[at + 1, c] - rows.y[at, c]
-    for p in np.unique(rows.x.position[at]):  # what goes evenly does not wander
-        step[rows.x.position[at] == p] -= np.median(step[rows.x.position[at] == p])
-    white = rows.sd[at, c] ** 2 + rows.sd[at + 1, c] ** 2
-    length = (rows.length[at] + rows.length[at + 1]) / 3
-    known = step**2 / (white + np.multiply.outer(sizes**2, length))  # (1)
-    ratio = np.maximum(np.median(known, axis=1) / CHI2_MEDIAN, TINY)
-    score = np.log(before) - len(step) / 2 * (np.log(ratio) / SCATTERS) ** 2
-    weight: Array = np.exp(score - np.logaddexp.reduce(score))
-    return weight
+def _cosine_integral(x: Array) -> Array:
+    """Ci of some numbers, those below 1e-12 as if they were that."""
+    from scipy.special import sici  # of those recordings only that show flicker
 
-
-def _later(rows: Rows) -> Index:
-    """Rows of the later half of each window that have a next one."""
-    position = rows.x.position
-    near = np.flatnonzero(np.diff(position) == 0)
-    first = np.searchsorted(position, position[near])
-    count = np.searchsorted(position, position[near], side="right") - first
-    out: Index = near[2 * (near - first) >= count - 1]
+    out: Array = sici(np.maximum(x, 1e-12))[1]
     return out

@@ -69,15 +69,17 @@ class Posterior:
     ) -> None:
         self.search, self.best, self._refined = search, best, refined
         self._nearer: list[tuple[Set, Set]] = []
-        self.instead = {name: self._instead(name) for name in self.names(best)}
+        every = dict.fromkeys(c.name for c, _ in best.members)
+        instead = {name: self._instead(name) for name in every}
+        self.instead = {name: instead[name] for name in self.names(best)}
         for one in list(search.visited.values()) if best.members else ():
             if one.score > best.score - KEPT:
                 search.vary(one)
 
     @staticmethod
     def names(some: Set) -> tuple[str, ...]:
-        """Names of the causes of a set, each once."""
-        return tuple(dict.fromkeys(c.name for c, _ in some.members))
+        """Names of the causes of a set that are told, each once."""
+        return tuple(dict.fromkeys(c.name for c, _ in some.members if c.told))
 
     def without(self, name: str) -> Set:
         """The best set without a cause, on both triads."""
@@ -100,6 +102,8 @@ class Posterior:
             if (near := near + 1) > LOOKED_AT:
                 break
             there = self._whole(less, offer, parts, offers)
+            if not cause.told:  # it counts, and is no name for anything
+                continue
             if self._at_best(there, own) > own - thresholds.SAME:
                 if cause.name not in found or there.score > found[cause.name].score:
                     found[cause.name] = there
@@ -165,12 +169,12 @@ class Posterior:
 
     @property
     def nothing(self) -> float:
-        """Probability that no cause is there."""
-        return sum(w for s, w in self.weights if not s.members)
+        """Probability that there is nothing but noise."""
+        return sum(w for s, w in self.weights if not self.names(s))
 
     def suspects(self) -> list[tuple[str, float]]:
         """Every cause with its probability, the likeliest first."""
-        causes = dict.fromkeys(c.name for s, _ in self.weights for c, _ in s.members)
+        causes = dict.fromkeys(n for s, _ in self.weights for n in self.names(s))
         each = [(name, self.probability([name])) for name in causes]
         return sorted(each, key=lambda one: -one[1])
 

@@ -48,7 +48,7 @@ class Fitted:
             if group.random:
                 out[group.columns] = 0.0
         for cause, group in self.set.members:
-            if cause.kind == "random":
+            if cause.kind in ("random", "noise"):
                 out[group.columns] = 0.0
         return out
 

@@ -207,7 +207,9 @@ def test_what_a_session_cannot_show_is_not_offered() -> None:
     every = keys_of(ladder())
     assert {"alpha", "beta", "joints", "position", "window", "misset"} < every
     few = keys_of(first(3))
-    assert few == {"time", "temperature", "since turn", "random_walk", "angle_setting"}
+    assert few == {"time", "temperature", "since turn", "random_walk", "angle_setting",
+                   "flicker"}  # fmt: skip
+    assert "flicker" not in keys_of(first(2))
     four = keys_of(first(4))
     assert four == every
     free = keys_of(ladder(free=(2,)))
@@ -365,3 +367,19 @@ def test_the_earth_turns_a_device_on_its_way_as_well() -> None:
     found = columns.earth_anyhow(RowView.of(way, np.array([x.since_turn]), nominal()))
     np.testing.assert_allclose(found[:, 3:, :3], np.tile(np.eye(3), (27, 1, 1)))
     np.testing.assert_allclose(found[:, 3:, 3], x.f / 9.81)
+
+
+def test_flicker_is_noise_of_as_many_cosines_as_biases_wander_by() -> None:
+    """It is there or not, and is no effect; cosine k has a variance as 1 / k."""
+    for part, some in (("acc", (0, 1, 2)), ("gyr", (3, 4, 5))):
+        cause = CAUSES[f"flicker:{part}"]
+        assert (cause.kind, cause.told, cause.chance) == ("noise", False, 0.1)
+        (group,) = cause.variants
+        assert group.random and group.effect is None
+        k = np.arange(1, smooth.WAVES + 1)
+        size = {"acc": 2e-3, "gyr": 1e-4}[part]
+        sizes = [size * UNIT[c] / np.sqrt(k) for c in some]
+        np.testing.assert_allclose(group.typical, np.concatenate(sizes))
+        at = np.concatenate([WHOLE.wave(c) for c in some])
+        np.testing.assert_array_equal(group.columns, at)
+    assert all(c.told for c in WHOLE.causes if c.name != "flicker")

@@ -11,27 +11,82 @@ from small_sessions import SD, ladder, rows_of
 from fieldcal.model import priors
 from fieldcal.model.causes import smooth
 from fieldcal.model.causes.wander import Wander
+from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.turns.turn import only
 
 X = ladder(rows=30)
 UNIT = np.ones(6)
 
 
-@pytest.mark.parametrize("speed", [1e-3, 5e-3])
-def test_a_walk_is_measured_beside_what_settles(speed: float) -> None:
+FINE = 20
+"""Instants of a random course to one row."""
+
+
+def walk(rng: np.random.Generator, lasts: float = 1.0) -> np.ndarray:
+    """Means of a walk of 1 per sqrt(s) in rows of X, in each window for itself."""
+    out = []
+    for p in np.unique(X.position):
+        count = int((X.position == p).sum()) * FINE
+        course = np.cumsum(rng.standard_normal(count) * np.sqrt(lasts / FINE))
+        out.append(course.reshape(-1, FINE).mean(axis=1))
+    return np.concatenate(out)
+
+
+def flicker(rng: np.random.Generator) -> np.ndarray:
+    """Means of flicker with a = 1: Gauss-Markov processes, four to a factor of e."""
+    lasts = np.exp(np.arange(-5.0, 9.0, 0.25))
+    out = []
+    for p in np.unique(X.position):
+        count = int((X.position == p).sum()) * FINE
+        kept = np.exp(-1 / FINE / lasts)
+        state, course = rng.standard_normal(len(lasts)), np.empty(count)
+        for i in range(count):
+            new = rng.standard_normal(len(lasts))
+            state = kept * state + np.sqrt(1 - kept**2) * new
+            course[i] = state.sum()
+        # of power a^2 / (2 f): each has 4 lasts / (1 + (2 pi f lasts)^2), and over all
+        # of them, ln lasts being 0.25 apart, 4 / 0.25 * pi / 2 / (2 pi f) = 4 / f
+        out.append(course.reshape(-1, FINE).mean(axis=1) / np.sqrt(8.0))
+    return np.concatenate(out)
+
+
+def recorded(rng: np.random.Generator, size: float, courses: np.ndarray) -> Rows:
+    """Rows of which some have a course as well, and az something that settles."""
+    y = np.hstack([X.f, X.w]) + SD * rng.standard_normal((len(X), 6))
+    y[:, : courses.shape[1]] += size * courses
+    y[:, 2] += 0.1 * np.exp(-X.since_turn / 3.0)
+    return rows_of(X, y)
+
+
+@pytest.mark.parametrize("size", [1e-3, 5e-3])
+def test_a_walk_is_measured_beside_what_settles(size: float) -> None:
     """Seen at its own size, whatever the first rows after a turn do."""
-    for seed in range(5):
+    found = []
+    for seed in range(6):
         rng = np.random.default_rng(seed)
-        y = np.hstack([X.f, X.w]) + SD * rng.standard_normal((len(X), 6))
-        steps = np.sqrt(np.diff(X.t, prepend=0.0)) * rng.standard_normal(len(X))
-        y[:, 1] += (2 / 3) ** 0.5 * speed * np.cumsum(steps)  # (1): means, not instants
-        y[:, 2] += 0.1 * np.exp(-X.since_turn / 3.0)
-        found = Wander.of(rows_of(X, y), UNIT)
-        assert found.speed[1] == pytest.approx(speed, rel=0.35)
-        assert found.modes[1] > smooth.WAVES
-        assert (found.modes[[0, 2, 3, 4, 5]] == smooth.WAVES).all()
-        left = found.left(np.ones(1), 0) + found.left(np.ones(1), 2)
-        assert left[0] < 0.01 * SD[0] ** 2
+        courses = np.column_stack([np.zeros(len(X)), walk(rng)])
+        one = Wander.of(recorded(rng, size, courses), UNIT)
+        assert one.modes[1] > smooth.WAVES
+        assert (one.speed[[0, 2, 3, 4, 5]] < 0.1 * size).all()
+        found.append(one.speed[1])
+    assert np.median(found) == pytest.approx(size, rel=0.2)
+
+
+@pytest.mark.parametrize("size", [2e-3, 1e-2])
+def test_flicker_is_measured_and_is_no_walk(size: float) -> None:
+    """At its own size: and cosines are as many as are above the noise, (5)."""
+    found = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        courses = np.column_stack([flicker(rng) for _ in range(3)])
+        one = Wander.of(recorded(rng, size, courses), UNIT)
+        assert np.ptp(one.flicker[:3]) < 1e-9 * size  # made alike
+        assert one.left(np.ones(1), 4)[0] < 0.03 * SD[4] ** 2
+        found.append(one.flicker[1])
+        modes = one.flicker[1] ** 2 * len(X) / (2 * SD[1] ** 2)
+        assert one.modes[1] == int(np.clip(modes, smooth.WAVES, priors.MOST_WAVES))
+        assert one.left(np.ones(1), 1)[0] > 0.1 * one.flicker[1] ** 2
+    assert np.median(found) == pytest.approx(size, rel=0.25)
 
 
 def test_outputs_in_counts_wander_by_counts() -> None:
@@ -57,7 +112,9 @@ def test_cosines_beyond_the_noise_are_as_many_as_it_is_above_it() -> None:
     y[:, 1] += 2e-3 * np.cumsum(steps)
     found = Wander.of(rows_of(X, y), UNIT)
     length = np.ptp(X.t)
-    modes = found.speed[1] * np.sqrt(2 * length * len(X) / 2) / SD[1] / np.pi
+    information = len(X) / (2 * SD[1] ** 2)
+    walks = found.speed[1] * np.sqrt(2 * length * information) / np.pi
+    modes = max(walks, found.flicker[1] ** 2 * information)
     assert found.modes[1] == int(min(modes, priors.MOST_WAVES)) > smooth.WAVES
     none = Wander.none()
     assert not none.speed.any() and set(none.modes) == {smooth.WAVES}
@@ -65,11 +122,11 @@ def test_cosines_beyond_the_noise_are_as_many_as_it_is_above_it() -> None:
 
 
 def test_of_few_differences_nothing_is_told() -> None:
-    for places in (3, 4):  # two of the later half of five rows each
+    for places in (7, 8):  # one of the later half of five rows each
         kept = (np.arange(len(X)) % 30 < 5) & (X.position < places)
         some = only(X, np.flatnonzero(kept).tolist())
         y = np.random.default_rng(1).standard_normal((len(some), 6))
-        assert Wander.of(rows_of(some, y), UNIT).speed.any() == (places == 4)
+        assert Wander.of(rows_of(some, y), UNIT).speed.any() == (places == 8)
 
 
 def test_what_goes_evenly_does_not_wander() -> None:
@@ -83,18 +140,31 @@ def test_what_goes_evenly_does_not_wander() -> None:
 def test_what_cosines_leave_is_the_rest_of_their_series() -> None:
     """(2) and (3), against so many cosines that no more is left."""
     length, count = 300.0, 60
-    one = Wander(np.full(6, 2e-3), np.full(6, count), length)
+    q = np.array([2e-3] * 3 + [0.0] * 3)
+    one = Wander(q, q[::-1].copy(), np.full(6, count), length)
     t, piece = np.array([10.0, 10.5, 13.0, 40.0]), 0.5
     k = np.arange(count + 1, 40_000)
     fine = t[:, None] + piece * (np.arange(50) + 0.5) / 50 - piece / 2
-    size = one.speed[0] ** 2 * length / (np.pi * k) ** 2
-    covariance = np.zeros((4, 4))
+    walks, flickers = q[0] ** 2 * length / (np.pi * k) ** 2, q[0] ** 2 / k / 2
+    covariance = np.zeros((2, 4, 4))
     for i in range(4):
         for j in range(4):
             lag = np.abs(np.subtract.outer(fine[i], fine[j])).ravel()
             each, counts = np.unique(np.round(lag, 9), return_counts=True)
-            values = [size @ np.cos(np.pi * k * v / length) for v in each]
-            covariance[i, j] = counts @ values / counts.sum()
-    some = one.apart(t, np.full(4, piece))[0]
-    assert np.abs(some - covariance).max() < 0.02 * covariance[0, 0]
-    assert some[0, 0] == pytest.approx(one.left(np.array([piece]), 0)[0])
+            waves = np.array([np.cos(np.pi * k * v / length) for v in each])
+            values = waves @ np.column_stack([walks, flickers])
+            covariance[:, i, j] = counts @ values / counts.sum()
+    every = one.apart(t, np.full(4, piece))
+    for c, there in zip((0, 5), covariance, strict=True):
+        off = np.abs(every[c] - there)
+        assert np.diag(off).max() < 0.02 * there[0, 0]
+        assert off.max() < 0.06 * there[0, 0]  # of instants, not of means
+        assert every[c][0, 0] == pytest.approx(one.left(np.array([piece]), c)[0])
+
+
+def test_one_axis_may_walk_alone_and_none_flickers_alone() -> None:
+    rng = np.random.default_rng(4)
+    courses = np.column_stack([np.zeros(len(X)), walk(rng), np.zeros(len(X))])
+    found = Wander.of(recorded(rng, 5e-3, courses), UNIT)
+    assert found.speed[1] > 20 * found.speed[[0, 2]].max()
+    assert np.ptp(found.flicker[:3]) < 1e-9

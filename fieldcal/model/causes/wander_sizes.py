@@ -1,0 +1,187 @@
+"""How fast the biases walk or flicker inside windows, before anything is fitted.
+
+Of three rows of about the same length l, tau apart, what goes evenly takes the middle
+one to the mean of the others, and
+
+    var(d'' - 2 d' + d) = s''^2 + 4 s'^2 + s^2 + 4 D(tau) - D(2 tau)                (1)
+
+where s is their white noise and D(tau) what two means tau apart differ by, squared: of
+biases that walk by q per sqrt(s), and of those that flicker with cosines k of variance
+a^2 / k,
+
+    D = q^2 [tau - l / 3]                                                           (2)
+    D = a^2 / 2 [(x + 1)^2 ln(x + 1) + (x - 1)^2 ln|x - 1| - 2 x^2 ln x]            (3)
+
+with x = tau / l. The median of the squares over (1) tells the size, in the later half
+of each window, when what settles after a turn has. Ln r, r being that median over the
+one of chi squared, scatters by 2.7 / sqrt(n) with n of white noise, and of walks with
+as many as do not overlap. Source: IEEE Std 952 and Barnes et al. 1971, of whose
+variances of averages (3) is the sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import CHANNELS, Array, Index
+from fieldcal.effects import catalogue
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import TRIADS
+from fieldcal.model.rows.reduce import Rows
+from fieldcal.physics.effect import Scatter
+
+CHI2_MEDIAN, SCATTERS = 0.4549, 2.7
+"""Of chi squared with one degree of freedom: median; scatter of the median's ln."""
+
+FINER = 4
+"""Values of v to one of those of groups: this one is taken as it is."""
+
+SIZES: Array = np.geomspace(priors.SIZES[0], priors.SIZES[-1], FINER * 32 + 1)
+
+DENSITY: Array = (
+    np.interp(np.log(SIZES), np.log(priors.SIZES), priors.density()) / FINER
+)
+"""Probability of each."""
+
+LAGS = (1, 3, 9)
+"""Rows from one to the next of three."""
+
+FEWEST = 8
+"""Differences below which they tell nothing."""
+
+TINY = 1e-12
+"""Of ratios, where a channel repeats one value."""
+
+
+class Differences(NamedTuple):
+    """Of three means of one channel each, the middle one and the others' mean.
+
+    Attributes
+    ----------
+    squares : (n,) of each
+    white : (n,) variance by the noise of all
+    walks, flickers : (n,) variance besides where q, or a, is 1
+    alone : how many of them do not overlap
+
+    """
+
+    squares: Array
+    white: Array
+    walks: Array
+    flickers: Array
+    alone: float
+
+    def scores(self, grown: Array, squares: Array) -> Array:
+        """Ln of likelihood of some sizes squared, (v,), by what grows with them."""
+        known = self.squares / (self.white + np.multiply.outer(squares, grown))
+        ratio = np.maximum(np.median(known, axis=1) / CHI2_MEDIAN, TINY)
+        out: Array = -self.alone / 2 * (np.log(ratio) / SCATTERS) ** 2
+        return out
+
+
+def sizes(rows: Rows, unit: Array) -> tuple[Array, Array]:
+    """How fast each output walks if it does, per sqrt(s), or flickers if it does, (6,).
+
+    Root mean squares over all sizes and none, by their probabilities: nothing, where
+    rows show none. Few windows do not tell which of the two it is. `unit` (6,) are
+    outputs per SI unit.
+    """
+    walk, chance = _walk(rows)
+    flicker = np.repeat([priors.FLICKER_ACC, priors.FLICKER_GYR], 3)
+    out = np.zeros((2, 6))
+    for _, triad in TRIADS:
+        at = list(triad)
+        seen = [[d for lag in LAGS for d in _differences(rows, c, lag)] for c in at]
+        by = Hypotheses(walk[at] * unit[at], chance, priors.ALONE)
+        out[0, at] = by.sizes([[(d, d.walks) for d in some] for some in seen])
+        by = Hypotheses(flicker[at] * unit[at], priors.FLICKERS, 0.0)
+        out[1, at] = by.sizes([[(d, d.flickers) for d in some] for some in seen])
+    return out[0], out[1]
+
+
+class Hypotheses(NamedTuple):
+    """That a triad wanders, or one of its axes alone, or nothing.
+
+    Attributes
+    ----------
+    typical : (3,) size of each axis at v = 1
+    chance : that the axes wander, which are made alike
+    alone : part of it that only one of them does
+
+    """
+
+    typical: Array
+    chance: float
+    alone: float
+
+    def sizes(self, seen: Sequence[Sequence[tuple[Differences, Array]]]) -> Array:
+        """Root mean square size of each axis, by its differences and what grows."""
+        square = np.append(0.0, SIZES) ** 2
+        every = np.zeros((3, len(square)))
+        for one, typical, score in zip(seen, self.typical, every, strict=True):
+            for d, grown in one:
+                score += d.scores(grown, square * typical**2)
+        nothing, own = every[:, 0], every[:, 1:]
+        others = nothing.sum() - nothing
+        together = own.sum(axis=0) + np.log(self.chance * DENSITY)
+        with np.errstate(divide="ignore"):  # none of one axis alone
+            alone = own + others[:, None] + np.log(self.chance * self.alone * DENSITY)
+        none = nothing.sum() + np.log(1 - self.chance)
+        total = np.logaddexp.reduce([none, *together, *alone.ravel()])
+        weight = np.exp(together - total) + np.exp(alone - total)
+        out: Array = self.typical * np.sqrt(weight @ square[1:])
+        return np.where([bool(one) for one in seen], out, 0.0)
+
+
+def _walk(rows: Rows) -> tuple[Array, float]:
+    """Typical walk of each channel, (6,), and the chance of one; from the catalogue."""
+    (effect,) = (
+        e
+        for e in catalogue().values()
+        if isinstance(e, Scatter) and len(e.params) == len(CHANNELS)
+    )
+    return np.array([p.typical for p in effect.params]), effect.chance(rows.x)
+
+
+def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
+    """Of one channel in the later halves of the windows; nothing of too few."""
+    at = _later(rows, 2 * lag)
+    y, sd, t = rows.y[:, c], rows.sd[:, c], rows.x.t
+    known = rows.used[:, c]
+    at = at[known[at] & known[at + lag] & known[at + 2 * lag]]
+    if len(at) < FEWEST:
+        return
+    length, tau = rows.length[at + lag], (t[at + 2 * lag] - t[at]) / 2
+    x = np.maximum(tau / length, 1.0)
+    yield Differences(
+        (y[at + 2 * lag] - 2 * y[at + lag] + y[at]) ** 2,
+        sd[at + 2 * lag] ** 2 + 4 * sd[at + lag] ** 2 + sd[at] ** 2,
+        length * (4 * (x - 1 / 3) - (2 * x - 1 / 3)),  # (1), (2)
+        4 * _apart(x) - _apart(2 * x),  # (1), (3)
+        len(at) / lag,
+    )
+
+
+def _apart(x: Array) -> Array:
+    """What two means of flicker with a = 1 differ by, squared, x lengths apart."""
+    out: Array = (_squared_ln(x + 1) + _squared_ln(x - 1)) / 2 - _squared_ln(x)  # (3)
+    return out
+
+
+def _squared_ln(x: Array) -> Array:
+    """x^2 ln x, 0 at 0."""
+    out: Array = x**2 * np.log(np.maximum(x, 1e-12))
+    return out
+
+
+def _later(rows: Rows, ahead: int) -> Index:
+    """Rows of the later half of each window that have another one so far ahead."""
+    position = rows.x.position
+    near = np.flatnonzero(position[ahead:] == position[:-ahead])
+    first = np.searchsorted(position, position[near])
+    count = np.searchsorted(position, position[near], side="right") - first
+    out: Index = near[2 * (near - first) >= count - 1]
+    return out

@@ -24,6 +24,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.samples import Block
+from fieldcal.core.sentences import join
 from fieldcal.evaluation.observations import Rests
 from fieldcal.history.store import History, HistoryRun, family
 from fieldcal.session.folder import Session
@@ -94,10 +95,35 @@ def unassessed(
     about, of_acc = session.about, "acc_scale" in found.groups
     unknown = [gravity_unknown(about)] if of_acc else []
     wrong = [gravity_contradicted(about)] if of_acc else []
-    wrong += [*broken(session.block.six), *_taken_out(session, still, limits)]
+    wrong += [_lacking(found, session, still), *broken(session.block.six)]
+    wrong += _taken_out(session, still, limits)
     wrong = [w for w in wrong if w]
     warnings = (*wrong, *found.warnings, *filter(None, unknown))
     return replace(found, warnings=warnings, good=found.good and not wrong)
+
+
+def _lacking(found: Calibration, session: Session, still: Rests) -> str:
+    """What is not determined where positions had to be left out; empty for nothing.
+
+    A person who recorded so few on purpose knows what they do not show.
+    """
+    out = len(session.positions) - len(still.rows)
+    lost = [
+        f"{group}.{axis}"
+        for group in ("acc_bias", "acc_scale")
+        if group in found.groups
+        for axis, s in zip("xyz", found.vector(group)[1], strict=True)
+        if not np.isfinite(s)
+    ]
+    if not out or not lost:
+        return ""
+    which = "a position was" if out == 1 else f"{out} positions were"
+    verb = "is" if len(lost) == 1 else "are"
+    them = "it" if out == 1 else "them"
+    return (
+        f"{which} left out, and without {them} {join(lost)} {verb} not determined:"
+        f" take {them} again"
+    )
 
 
 def _taken_out(session: Session, still: Rests, limits: GradeLimits) -> list[str]:

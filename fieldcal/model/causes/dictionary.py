@@ -102,8 +102,7 @@ class Dictionary(ColumnTable):
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
         if len(self.held) < FEW < len(x):
-            sizes = priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
-            self.always += flicker(self, np.full(6, smooth.WAVES), sizes)
+            self.always += flicker(self, np.full(6, smooth.WAVES))
         self.causes: list[Cause] = list(self._causes())
 
     def plain(self) -> Dictionary:

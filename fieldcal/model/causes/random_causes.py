@@ -11,6 +11,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.wander_sizes import flicker_sizes
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
@@ -20,8 +21,7 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
         if isinstance(effect, Scatter) and effect.applies(table.x):
             yield from _of_scatter(table, effect)
     if len(table.held) >= FEW:  # of fewer, it is always there
-        sizes = priors.FLICKER_ACC, priors.FLICKER_GYR
-        for group in flicker(table, table.wander.modes, sizes):
+        for group in flicker(table, table.wander.modes):
             yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
     oriented = table.held[
         [bool(table.x.oriented[table.x.position == p].all()) for p in table.held]
@@ -79,20 +79,12 @@ def _walks(
     return Cause(effect.id, part, share * effect.chance(table.x), groups, "random")
 
 
-def flicker(
-    table: ColumnTable, modes: Index, sizes: tuple[float, float]
-) -> Iterator[Group]:
+def flicker(table: ColumnTable, modes: Index) -> Iterator[Group]:
     """Instability that goes on from window to window, of equal power in every octave.
 
-    A cosine k has a variance as 1/k.
-
-    Parameters
-    ----------
-    table : of the session
-    modes : (6,) cosines of each channel
-    sizes : typical ones, m/s^2 and rad/s
-
+    A cosine k has a variance as 1/k; `modes` (6,) of each channel.
     """
+    sizes = flicker_sizes(len(table.held))
     shape = 1 / np.sqrt(np.arange(1, modes.max() + 1))
     for part, channels in TRIADS:
         at = [c for c in channels if c in table.observed]

@@ -17,8 +17,9 @@ Two means tau apart share, with y = pi tau / T,
 
 with k = 1 ... K. Cosine k is beyond the noise of rows of deviations s up to
 
-    K = q sqrt(2 T J) / pi,    K = a^2 J,    J = sum 1 / (2 s^2)                    (5)
+    k = q sqrt(2 T J) / pi,    k = a^2 J,    J = sum 1 / (2 s^2)                    (5)
 
+and as many more, each of which is lost in it, still show together: K is twice that.
 Source: Karhunen-Loeve series of Brownian motion; IEEE Std 952 for flicker noise.
 """
 
@@ -34,6 +35,9 @@ from fieldcal.model.causes import smooth
 from fieldcal.model.causes.wander_sizes import sizes
 from fieldcal.model.rows.reduce import Rows
 
+MORE = 2.0
+"""Times as many cosines as are each beyond the noise of the rows."""
+
 
 @dataclass(frozen=True, slots=True)
 class Wander:
@@ -43,6 +47,7 @@ class Wander:
     ----------
     speed : (6,) of each output, per sqrt(s), if it walks
     flicker : (6,) a of each output, if it flickers
+    share : (6,) probability that it is flicker if it is either
     modes : (6,) cosines of it that rows see, at least those of a smooth course
     length : s that these are drawn over
 
@@ -50,23 +55,27 @@ class Wander:
 
     speed: Array
     flicker: Array
+    share: Array
     modes: Index
     length: float
 
     @classmethod
     def of(cls, rows: Rows, unit: Array) -> Wander:
         """Measure it in rows; `unit` (6,) are outputs per SI unit."""
-        length, (speed, flicker) = float(np.ptp(rows.x.t)), sizes(rows, unit)
+        length, (speed, flicker, share) = float(np.ptp(rows.x.t)), sizes(rows, unit)
         information = np.where(rows.used, 1 / rows.sd**2, 0.0).sum(axis=0) / 2
         walks = speed * np.sqrt(2 * length * information) / np.pi  # (5)
         resolved = np.fmax(walks, flicker**2 * information)  # (5)
-        modes = np.clip(resolved, smooth.WAVES, priors.MOST_WAVES).astype(np.intp)
-        return cls(speed, flicker, modes, length)
+        modes = np.clip(MORE * resolved, smooth.WAVES, priors.MOST_WAVES).astype(
+            np.intp
+        )
+        return cls(speed, flicker, share, modes, length)
 
     @classmethod
     def none(cls) -> Wander:
         """Of rows that are as white as their samples."""
-        return cls(np.zeros(6), np.zeros(6), np.full(6, smooth.WAVES), 0.0)
+        nothing = np.zeros(6)
+        return cls(nothing, nothing, nothing, np.full(6, smooth.WAVES), 0.0)
 
     def left(self, length: Array, channel: int) -> Array:
         """Variance that its cosines leave of means over some lengths, (n,)."""
@@ -74,9 +83,8 @@ class Wander:
         walks: Array = q**2 * _left_of_walk(self.length, length, count)
         if not a:
             return walks
-        flickers = a**2 * _left_of_flicker(self.length, length, count)
-        out: Array = np.fmax(walks, flickers)
-        return out
+        flickers: Array = a**2 * _left_of_flicker(self.length, length, count)
+        return walks + flickers
 
     def apart(self, t: Array, length: Array) -> Array:
         """Covariance that they leave of means about some instants, (6, n, n)."""
@@ -87,20 +95,20 @@ class Wander:
             alone = self.left(length, c)
             if not alone.any():
                 continue
-            if q**2 * _left_of_walk(self.length, length[:1], count) < alone[0]:
-                out[c] = -(a**2) * _cosine_integral(count * y) / 2  # (4)
-            else:
-                k = np.arange(1, count + 1)
-                taken = np.cos(np.multiply.outer(y, k)) @ (1 / k**2)
-                left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - taken
-                out[c] = q**2 * self.length / np.pi**2 * left  # (3)
+            k = np.arange(1, count + 1)
+            taken = np.cos(np.multiply.outer(y, k)) @ (1 / k**2)
+            left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - taken
+            out[c] = q**2 * self.length / np.pi**2 * left  # (3)
+            if a:
+                out[c] -= a**2 * _cosine_integral(count * y) / 2  # (4)
             out[c].flat[diagonal] = alone
         return out
 
     def _of(self, channel: int) -> tuple[float, float, int]:
-        """Walk, flicker and cosines of a channel."""
-        own = self.speed[channel], self.flicker[channel], self.modes[channel]
-        return float(own[0]), float(own[1]), int(own[2])
+        """Walk and flicker of a channel as likely as each is, and its cosines."""
+        share = float(self.share[channel])
+        q = float(self.speed[channel]) * (1 - share) ** 0.5
+        return q, float(self.flicker[channel]) * share**0.5, int(self.modes[channel])
 
 
 def _left_of_walk(whole: float, length: Array, count: int) -> Array:

@@ -29,7 +29,7 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import TRIADS
+from fieldcal.model.causes.cause import FEW, TRIADS
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Scatter
 
@@ -82,24 +82,35 @@ class Differences(NamedTuple):
         return out
 
 
-def sizes(rows: Rows, unit: Array) -> tuple[Array, Array]:
+def sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
     """How fast each output walks if it does, per sqrt(s), or flickers if it does, (6,).
 
     Root mean squares over all sizes and none, by their probabilities: nothing, where
-    rows show none. Few windows do not tell which of the two it is. `unit` (6,) are
-    outputs per SI unit.
+    rows show none. Then how likely it is flicker, (6,), if it is either of the two.
+    `unit` (6,) are outputs per SI unit.
     """
     walk, chance = _walk(rows)
-    flicker = np.repeat([priors.FLICKER_ACC, priors.FLICKER_GYR], 3)
-    out = np.zeros((2, 6))
+    flicker = np.repeat(flicker_sizes(len(np.unique(rows.x.position))), 3)
+    out, evidence = np.zeros((2, 6)), np.zeros((2, 6))
     for _, triad in TRIADS:
         at = list(triad)
         seen = [[d for lag in LAGS for d in _differences(rows, c, lag)] for c in at]
         by = Hypotheses(walk[at] * unit[at], chance, priors.ALONE)
-        out[0, at] = by.sizes([[(d, d.walks) for d in some] for some in seen])
+        out[0, at], evidence[0, at] = by.sizes(
+            [[(d, d.walks) for d in some] for some in seen]
+        )
         by = Hypotheses(flicker[at] * unit[at], priors.FLICKERS, 0.0)
-        out[1, at] = by.sizes([[(d, d.flickers) for d in some] for some in seen])
-    return out[0], out[1]
+        out[1, at], evidence[1, at] = by.sizes(
+            [[(d, d.flickers) for d in some] for some in seen]
+        )
+    return out[0], out[1], 1 / (1 + np.exp(evidence[0] - evidence[1]))
+
+
+def flicker_sizes(windows: int) -> tuple[float, float]:
+    """Typical flicker, m/s^2 and rad/s; of few windows it is all their instability."""
+    if windows < FEW:
+        return priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
+    return priors.FLICKER_ACC, priors.FLICKER_GYR
 
 
 class Hypotheses(NamedTuple):
@@ -117,8 +128,13 @@ class Hypotheses(NamedTuple):
     chance: float
     alone: float
 
-    def sizes(self, seen: Sequence[Sequence[tuple[Differences, Array]]]) -> Array:
-        """Root mean square size of each axis, by its differences and what grows."""
+    def sizes(
+        self, seen: Sequence[Sequence[tuple[Differences, Array]]]
+    ) -> tuple[Array, float]:
+        """Root mean square size of each axis, by its differences and what grows.
+
+        Then ln of the evidence that it is not nothing.
+        """
         square = np.append(0.0, SIZES) ** 2
         every = np.zeros((3, len(square)))
         for one, typical, score in zip(seen, self.typical, every, strict=True):
@@ -132,8 +148,9 @@ class Hypotheses(NamedTuple):
         none = nothing.sum() + np.log(1 - self.chance)
         total = np.logaddexp.reduce([none, *together, *alone.ravel()])
         weight = np.exp(together - total) + np.exp(alone - total)
-        out: Array = self.typical * np.sqrt(weight @ square[1:])
-        return np.where([bool(one) for one in seen], out, 0.0)
+        out = self.typical * np.sqrt(weight @ square[1:])
+        something = float(np.logaddexp.reduce([*together, *alone.ravel()]))
+        return np.where([bool(one) for one in seen], out, 0.0), something
 
 
 def _walk(rows: Rows) -> tuple[Array, float]:

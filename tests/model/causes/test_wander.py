@@ -61,15 +61,17 @@ def recorded(rng: np.random.Generator, size: float, courses: np.ndarray) -> Rows
 @pytest.mark.parametrize("size", [1e-3, 5e-3])
 def test_a_walk_is_measured_beside_what_settles(size: float) -> None:
     """Seen at its own size, whatever the first rows after a turn do."""
-    found = []
+    found, shares = [], []
     for seed in range(6):
         rng = np.random.default_rng(seed)
         courses = np.column_stack([np.zeros(len(X)), walk(rng)])
         one = Wander.of(recorded(rng, size, courses), UNIT)
         assert one.modes[1] > smooth.WAVES
         assert (one.speed[[0, 2, 3, 4, 5]] < 0.1 * size).all()
+        shares.append(one.share[1])
         found.append(one.speed[1])
     assert np.median(found) == pytest.approx(size, rel=0.2)
+    assert np.median(shares) < 0.7  # before the rows it is 0.9
 
 
 @pytest.mark.parametrize("size", [2e-3, 1e-2])
@@ -83,9 +85,10 @@ def test_flicker_is_measured_and_is_no_walk(size: float) -> None:
         assert np.ptp(one.flicker[:3]) < 1e-9 * size  # made alike
         assert one.left(np.ones(1), 4)[0] < 0.03 * SD[4] ** 2
         found.append(one.flicker[1])
-        modes = one.flicker[1] ** 2 * len(X) / (2 * SD[1] ** 2)
+        modes = 2 * one.flicker[1] ** 2 * len(X) / (2 * SD[1] ** 2)
         assert one.modes[1] == int(np.clip(modes, smooth.WAVES, priors.MOST_WAVES))
-        assert one.left(np.ones(1), 1)[0] > 0.1 * one.flicker[1] ** 2
+        assert one.share[1] > 0.5
+        assert one.left(np.ones(1), 1)[0] > 0.05 * one.flicker[1] ** 2
     assert np.median(found) == pytest.approx(size, rel=0.25)
 
 
@@ -114,7 +117,7 @@ def test_cosines_beyond_the_noise_are_as_many_as_it_is_above_it() -> None:
     length = np.ptp(X.t)
     information = len(X) / (2 * SD[1] ** 2)
     walks = found.speed[1] * np.sqrt(2 * length * information) / np.pi
-    modes = max(walks, found.flicker[1] ** 2 * information)
+    modes = 2 * max(walks, found.flicker[1] ** 2 * information)
     assert found.modes[1] == int(min(modes, priors.MOST_WAVES)) > smooth.WAVES
     none = Wander.none()
     assert not none.speed.any() and set(none.modes) == {smooth.WAVES}
@@ -141,7 +144,8 @@ def test_what_cosines_leave_is_the_rest_of_their_series() -> None:
     """(2) and (3), against so many cosines that no more is left."""
     length, count = 300.0, 60
     q = np.array([2e-3] * 3 + [0.0] * 3)
-    one = Wander(q, q[::-1].copy(), np.full(6, count), length)
+    share = np.repeat([0.0, 1.0], 3)
+    one = Wander(q, q[::-1].copy(), share, np.full(6, count), length)
     t, piece = np.array([10.0, 10.5, 13.0, 40.0]), 0.5
     k = np.arange(count + 1, 40_000)
     fine = t[:, None] + piece * (np.arange(50) + 0.5) / 50 - piece / 2

@@ -11,7 +11,6 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.wander_sizes import flicker_sizes
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
@@ -84,7 +83,9 @@ def flicker(table: ColumnTable, modes: Index) -> Iterator[Group]:
 
     A cosine k has a variance as 1/k; `modes` (6,) of each channel.
     """
-    sizes = flicker_sizes(len(table.held))
+    sizes = priors.FLICKER_ACC, priors.FLICKER_GYR
+    if len(table.held) < FEW:  # it is all the instability that they have
+        sizes = priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
     shape = 1 / np.sqrt(np.arange(1, modes.max() + 1))
     for part, channels in TRIADS:
         at = [c for c in channels if c in table.observed]

@@ -86,12 +86,13 @@ def sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
     """How fast each output walks if it does, per sqrt(s), or flickers if it does, (6,).
 
     Root mean squares over all sizes and none, by their probabilities: nothing, where
-    rows show none. Then how likely it is flicker, (6,), if it is either of the two.
-    `unit` (6,) are outputs per SI unit.
+    rows show none. Then how likely it is flicker, (6,), if it is either of the two: of
+    few windows it is always there by itself. `unit` (6,) are outputs per SI unit.
     """
     walk, chance = _walk(rows)
-    flicker = np.repeat(flicker_sizes(len(np.unique(rows.x.position))), 3)
+    flicker = np.repeat([priors.FLICKER_ACC, priors.FLICKER_GYR], 3)
     out, evidence = np.zeros((2, 6)), np.zeros((2, 6))
+    few = len(np.unique(rows.x.position)) < FEW
     for _, triad in TRIADS:
         at = list(triad)
         seen = [[d for lag in LAGS for d in _differences(rows, c, lag)] for c in at]
@@ -99,18 +100,14 @@ def sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
         out[0, at], evidence[0, at] = by.sizes(
             [[(d, d.walks) for d in some] for some in seen]
         )
+        if few:
+            evidence[1, at] = -np.inf
+            continue
         by = Hypotheses(flicker[at] * unit[at], priors.FLICKERS, 0.0)
         out[1, at], evidence[1, at] = by.sizes(
             [[(d, d.flickers) for d in some] for some in seen]
         )
     return out[0], out[1], 1 / (1 + np.exp(evidence[0] - evidence[1]))
-
-
-def flicker_sizes(windows: int) -> tuple[float, float]:
-    """Typical flicker, m/s^2 and rad/s; of few windows it is all their instability."""
-    if windows < FEW:
-        return priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
-    return priors.FLICKER_ACC, priors.FLICKER_GYR
 
 
 class Hypotheses(NamedTuple):

@@ -172,3 +172,14 @@ def test_one_axis_may_walk_alone_and_none_flickers_alone() -> None:
     found = Wander.of(recorded(rng, 5e-3, courses), UNIT)
     assert found.speed[1] > 20 * found.speed[[0, 2]].max()
     assert np.ptp(found.flicker[:3]) < 1e-9
+
+
+def test_of_few_windows_flicker_is_not_measured() -> None:
+    """It is always there by itself, and a walk is measured as ever."""
+    some = only(X, np.flatnonzero(X.position < 2).tolist())
+    rng = np.random.default_rng(6)
+    y = np.hstack([some.f, some.w]) + SD * rng.standard_normal((len(some), 6))
+    y[:, 1] += 5e-3 * walk(rng)[: len(some)]
+    found = Wander.of(rows_of(some, y), UNIT)
+    assert not found.flicker.any() and not found.share.any()
+    assert found.speed[1] == pytest.approx(5e-3, rel=0.5)

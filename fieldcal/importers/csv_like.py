@@ -23,6 +23,8 @@ from fieldcal.importing import columns
 from fieldcal.importing.column_clock import Heading
 from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.columns import SKIP
+from fieldcal.importing.file_names import SENSOR, sensor_of
+from fieldcal.importing.heading_words import meaning
 from fieldcal.importing.headings import Column
 from fieldcal.importing.instances import Instances, instances_in
 from fieldcal.importing.number_table import NumberTable
@@ -111,14 +113,26 @@ class TextColumns(ColumnRecording):
             if form.clock is not None:
                 found = [_clocked(one, form.clock) for one in found]
         found = [one for way in found if (one := self._fitted(way)) is not None]
-        if not self.sensor:
+        sensor = self.sensor or sensor_of(self.path.name.split(".")[0])
+        if not sensor:
             return found
-        return [Heading([self._of(c) for c in way.columns], way.skip) for way in found]
+        if not found and self._numbers.shape[1] == len(AXES):
+            found = [Heading([Column("", axis) for axis in AXES], SKIP)]
+        ways = [
+            Heading([_of(sensor, c) for c in way.columns], way.skip) for way in found
+        ]
+        if not self.sensor and ways != found:
+            of_it = f"its axes are those of the {SENSOR[sensor]}, as the file is called"
+            self.says += [of_it] if of_it not in self.says else []
+        return ways
 
     def imus(self) -> dict[str, ReadOptions]:
         """Options of each IMU by its name; columns may be chosen by their names."""
         if any("=" in column for column in self.wanted.columns):
             self.wanted = replace(self.wanted, columns=self._by_names())
+        if (named := self.wanted.columns)[-1:] == (columns.OTHERS,):
+            more = self._numbers.shape[1] - len(named) + 1
+            self.wanted = replace(self.wanted, columns=(*named[:-1], *[SKIP] * more))
         found = super().imus()
         if self._in_turn is None or self.instance or len(found) > 1:
             return found
@@ -167,12 +181,6 @@ class TextColumns(ColumnRecording):
             names.append(Column("", ""))
         return Heading(names, way.skip) if len(names) == width or not width else None
 
-    def _of(self, column: Column) -> Column:
-        """Column of which a bare axis is one of the sensor's."""
-        bare = column.name.strip().strip('"').strip()
-        axis = bare[:1].lower() in AXES and not bare[1:2].isalpha()
-        return column._replace(name=f"{self.sensor} {bare}" if axis else bare)
-
     def beginning(self) -> Array:
         """Numbers of the first lines."""
         return self._numbers
@@ -182,7 +190,8 @@ class TextColumns(ColumnRecording):
         lines = self._top or [""]
         return (
             f"{self.path}: say what its columns are, such as --columns"
-            f" t,ax,ay,az,gx,gy,gz; its first line is {lines[0][:60]!r}"
+            f" {columns.such_as(self._numbers.shape[1])}; its first line is"
+            f" {lines[0][:60]!r}"
         )
 
     @cached_property
@@ -288,10 +297,20 @@ class TextColumns(ColumnRecording):
     def _check_width(self, line: str, separator: str | None) -> None:
         width, named = width_of(line, separator), len(self.wanted.columns)
         if width != named:
+            more = " (_... at the end skips the others)" if named < width else ""
             raise InputError(
-                f"{self.path}: has {width} columns, {named} are named;"
+                f"{self.path}: has {width} columns, {named} are named{more};"
                 f" its line {self._skip + 1} is {line[:60]!r}"
             )
+
+
+def _of(sensor: str, column: Column) -> Column:
+    """Column of which a bare axis, whose unit does not say it, is the sensor's."""
+    bare = column.name.strip().strip('"').strip()
+    axis = bare[:1].lower() in AXES and not bare[1:2].isalpha()
+    said = meaning(bare, column.unit)
+    told = said is not None and bool(said.kind)
+    return column._replace(name=f"{sensor} {bare}" if axis and not told else bare)
 
 
 def _clocked(heading: Heading, clock: int) -> Heading:

@@ -25,6 +25,7 @@ from fieldcal.importing.array_tables import ArrayTable, table_of
 from fieldcal.importing.json_lists import json_lists
 from fieldcal.importing.said_rate import scalars
 from fieldcal.importing.text_encoding import as_utf8
+from fieldcal.importing.text_form import MOSTLY
 
 WHAT = "JSON: records or lists"
 
@@ -33,9 +34,17 @@ BEGINS = re.compile(
 )
 
 
+RECORD = re.compile(rb"\s*\{\s*[\"'].*\}\s*")
+"""A line that is a record."""
+
+
 def recognises(head: bytes, path: Path) -> bool:
-    """Whether a file begins like JSON."""
-    return BEGINS.match(head) is not None
+    """Whether a file begins like JSON, or has records in most of its lines."""
+    if BEGINS.match(head) is not None:
+        return True
+    lines = [line for line in head.split(b"\n")[:-1] if line.strip()]
+    records = sum(RECORD.fullmatch(line) is not None for line in lines)
+    return records > MOSTLY * len(lines)
 
 
 class JsonLog(ArrayFile):
@@ -76,6 +85,9 @@ class JsonLog(ArrayFile):
             try:
                 found.append(_of_line(line))
             except (ValueError, RecursionError) as error:
+                if not found and not BEGINS.match(line.encode()):
+                    # what a device says while it starts
+                    continue
                 self.damaged(f"line {number}", f"is no JSON: {error}"[:80])
         return found
 

@@ -22,7 +22,7 @@ from fieldcal.importing.column_times import (
     counts_rows,
     goes_on,
     is_clock_number,
-    rates_of_turns,
+    rate_hint,
     shared_question,
     split_seconds,
 )
@@ -275,10 +275,7 @@ def ask_rate(source: ColumnSource, wanted: ReadOptions) -> None:
     """
     if columns.has_time(wanted.columns) or wanted.rate_hz or not wanted.columns:
         return
-    turns = rates_of_turns(wanted, source.beginning())
-    unit, about = next(iter(turns.items()), ("", 100.0))
-    hint = f", which its turns say about, if rates are in {unit}" if unit else ""
+    hint = rate_hint(wanted, source.beginning())
     raise InputError(
-        f"{source.path}: no column is t, the time: give the rate, e.g. --rate"
-        f" {about:.3g}{hint}"
+        f"{source.path}: no column is t, the time: give the rate, e.g. --rate {hint}"
     )

@@ -15,7 +15,7 @@ from fieldcal.importing.gravity_size import gravity_in
 from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
 from fieldcal.importing.row_times import FRACTIONS, NEAR
-from fieldcal.importing.scales import FEWEST
+from fieldcal.importing.scales import FEWEST, USUAL_COUNTS
 from fieldcal.importing.time_units import SharedTimes, time_units
 
 SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
@@ -140,13 +140,22 @@ def counted_question(wanted: ReadOptions, table: Array) -> str:
     """Ask for the rate where the times only count the rows."""
     names = [SKIP if name == "t" else name for name in wanted.columns
              if not name.startswith("t=")]  # fmt: skip
-    turns = rates_of_turns(wanted, table)
-    unit, rate = next(iter(turns.items()), ("", USUAL))
-    hint = f", which its turns say about, if rates are in {unit}" if unit else ""
     return (
         f"its times only count rows: add --columns {quote(','.join(names))} --rate"
-        f" {rate:.3g}{hint}, or --time-unit ms if a row is taken each ms"
+        f" {rate_hint(wanted, table)}, or --time-unit ms if a row is taken each ms"
     )
+
+
+def rate_hint(wanted: ReadOptions, table: Array) -> str:
+    """A rate, and what the turns say of it: of counts, one for each full scale."""
+    turns = rates_of_turns(wanted, table)
+    if not turns:
+        return f"{USUAL:.3g}"
+    (unit, rate), *others = turns.items()
+    hint = f"{rate:.3g}, which its turns say about, if rates are in {unit}"
+    if unit.startswith("counts"):
+        hint += "".join(f", or {hz:.3g} if {what.split()[1]}" for what, hz in others)
+    return hint
 
 
 def counts_rows(t: Array) -> bool:
@@ -174,13 +183,18 @@ def rates_of_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
     if gravity is None:
         return {}
     reads = rate_in(np.arange(len(table)) / 100.0, acc, gyr, gravity)
-    # of counts, each full scale would be another rate
     counts = np.isfinite(gyr).all() and (gyr == np.round(gyr)).all()
-    if reads is None or (counts and not wanted.gyr_unit):
+    if reads is None:
         return {}
     fits = {"rad/s": 1.0, "deg/s": float(np.rad2deg(1.0)), "mrad/s": 1e3}
     if wanted.gyr_unit:
         fits = {wanted.gyr_unit: 1 / wanted.gyr_scale}
+    elif counts:
+        # each full scale would be another rate
+        fits = {str(scale): scale.size for scale in USUAL_COUNTS}
     rates = {unit: 100 * reads / one for unit, one in fits.items()}
     sane = {u: rate for u, rate in rates.items() if SLOWEST <= rate <= FASTEST}
+    if counts:
+        # the full scale that a sensor begins with, first
+        return sane
     return dict(sorted(sane.items(), key=lambda one: abs(np.log(one[1] / USUAL))))

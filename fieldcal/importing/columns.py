@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.core.sentences import join
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.row_times import FRACTIONS, RowTimes
@@ -16,6 +16,9 @@ from fieldcal.session.text_files import COLUMNS
 
 SKIP = "_"
 """Name of a column to skip."""
+
+OTHERS = "_..."
+"""Skips all that follow."""
 
 HALF = 2.0**15
 """Numbers of 16 bits from which on the sign is negative."""
@@ -57,6 +60,22 @@ def wrapped(column: Array) -> Array:
 def has_time(names: Iterable[str]) -> bool:
     """Whether columns, also ``t=name``, say when a row was taken, or how much later."""
     return any(name.partition("=")[0] in ("t", "dt") for name in names)
+
+
+def such_as(many: int) -> str:
+    """Columns as they may be, where a file has so many.
+
+    >>> such_as(3), such_as(9), such_as(54)
+    ('ax,ay,az', 't,ax,ay,az,gx,gy,gz,_,_', 't,ax,ay,az,gx,gy,gz,_...')
+    """
+    usual = ["t", *CHANNELS]
+    if many in (len("xyz"), len(CHANNELS)):
+        return ",".join(CHANNELS[:many])
+    if len("xyz") < many < len(usual):
+        return ",".join([*usual[: 1 + len("xyz")], *([SKIP] * (many - 1 - len("xyz")))])
+    more = max(0, many - len(usual))
+    skipped = [OTHERS] if more > len(usual) else [SKIP] * more
+    return ",".join([*usual, *skipped])
 
 
 def check(wanted: ReadOptions) -> None:

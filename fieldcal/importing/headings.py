@@ -32,6 +32,9 @@ FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air"
            "board", "env", "cpu", "case", "gps", "room")  # fmt: skip
 """Words of thermometers that lie apart from the IMU."""
 
+G_FORCE = (("g",), ("g", "force"))
+"""Words of ``gFx``: a program that writes it calls ``ax`` what has no gravity in it."""
+
 OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "log")
 """Words of times that are another clock's than the device's."""
 
@@ -181,6 +184,9 @@ def _with_gravity(named: Sequence[Named]) -> list[Named]:
     Where gravity stands in columns of its own, both together are what was measured.
     """
     forces = [n for n in named if n.says.kind == "a"]
+    if whole := [n for n in forces if n.says.label in G_FORCE]:
+        named = [n for n in named if n in whole or n not in forces]
+        forces = whole
     weak = [n for n in forces if n.says.weak]
     gravity = [n for n in named if n.says.kind == "v"]
     others = [n for n in named if n not in weak and n not in gravity]

@@ -4,9 +4,12 @@
     Acceleration X: 0.1, Y: 0.2, Z: 9.8 m/s^2
     12:34:56.789 -> Accel: 0.1, 0.2, 9.8 g  Gyro: 1, 2, 3
     I (312) IMU: ax=0.1 ay=0.2         2024-05-03 14:20:01,123 INFO acc=(0.1, 0.2, 9.8)
+    Accel: x= 0.1 | y= 0.2 | z= 9.8    Acc (mg) [ 10.1, -2.3, 999.1 ], Tmp (C) [ 25.1 ]
+    Acceleration in g's  X: 0.1  Y: 0.2  Z: 0.9
 
-An axis alone belongs to the label before it; three values behind one label are axes; a
-unit holds for all axes before it. A time of day at the beginning is one of the monitor.
+An axis alone belongs to the label before it, which may stand without a value; three
+values behind one label are axes; a unit holds for all axes before it. A time of day at
+the beginning is one of the monitor.
 """
 
 from __future__ import annotations
@@ -35,6 +38,15 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LIST = re.compile(
     rf"(?<=[:=])\s*[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]"
 )
+_LISTED = re.compile(rf"(\([^()]*\))\s*\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]")
+"""Values in a list right behind a unit in brackets."""
+
+_SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
+"""What stands before an axis: something else, and the label of all its axes."""
+
+_IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| \(([^()]+)\))( [xyzXYZ])?")
+"""A label that says the unit of its values."""
+
 _LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
 _VALUES = re.compile(rf"\s*({_NUMBER}(?:[\s,;|]+{_NUMBER})*)\s*(.*)", re.DOTALL)
 _STEM = re.compile(r"(.*[^\s_])[\s_]*[xyzXYZ]")
@@ -48,6 +60,9 @@ _LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s
 
 _ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*(?:->|>|:|\s)\s*")
 
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_NAMED = re.compile(r"([A-Za-z_]\w*)\s*[:=]")
+
 Labelled = tuple[str, str]
 """A label and its value."""
 
@@ -60,16 +75,13 @@ def labelled_values(line: str) -> list[Labelled]:
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
-    line = _LIST.sub(r" \1", line)
+    line = _LISTED.sub(r"\1: \2", _LIST.sub(r" \1", line))
     arrival, ticks = _ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
     rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest
-    parts = _LABEL.split(rest)
-    if len(parts) < len(AXES) or parts[0].strip(" \t,;|#"):
-        return []
     read: list[tuple[str, str, str]] = []
-    for label, text in zip(parts[1::2], parts[2::2], strict=True):
+    for label, text in _parted(rest):
         said = _VALUES.fullmatch(text)
         values = re.findall(_NUMBER, said[1]) if said else []
         if said is None or len(values) not in (1, len(AXES)):
@@ -77,17 +89,36 @@ def labelled_values(line: str) -> list[Labelled]:
         label, moved = _apart(label)
         if moved and read:
             read = _with_unit(read, moved)
-        label = _whole(label, read[-1][0] if read else "")
+        label, unit = _whole(label, read)
         names = [f"{label} {a}" for a in AXES] if len(values) > 1 else [label]
-        read += [(n, v, "") for n, v in zip(names, values, strict=True)]
+        read += [(n, v, unit) for n, v in zip(names, values, strict=True)]
         behind = said[2].strip(" \t,;|")
         if len(behind) > LONGEST:
             return []
         if unit_in(behind):
             read = _with_unit(read, behind)
-    first = [(TIME, arrival[1].strip())] if arrival else []
-    first += [(TICKS, ticks[1])] if ticks else []
+    first = [(TIME, arrival[1].strip())] if read and arrival else []
+    first += [(TICKS, ticks[1])] if read and ticks else []
     return first + [(f"{n} [{u}]" if u else n, v) for n, v, u in read]
+
+
+def _parted(line: str) -> list[tuple[str, str]]:
+    """Labels, and what stands behind each; none if anything stands before the first.
+
+    >>> _parted("Accel: x= 1 | y= 2 Gyro: x= 3")
+    [('Accel x', '1 | '), ('y', '2'), ('Gyro x', '3')]
+    """
+    parts = _LABEL.split(line)
+    if len(parts) < len(AXES):
+        return []
+    labels, texts = [" ".join(one.split()) for one in parts[1::2]], parts[::2]
+    for i, label in enumerate(labels):
+        sensor = _SENSOR.fullmatch(texts[i])
+        if sensor and label.lower() in AXES:
+            texts[i], labels[i] = sensor[1], f"{sensor[2]} {label}"
+    if any(letter.isalnum() for letter in texts[0]):
+        return []
+    return [*zip(labels, texts[1:], strict=True)]
 
 
 def _apart(label: str) -> tuple[str, str]:
@@ -96,11 +127,16 @@ def _apart(label: str) -> tuple[str, str]:
     return (rest.strip(), first) if rest.strip() and unit_in(first) else (label, "")
 
 
-def _whole(label: str, before: str) -> str:
-    """A label; of an axis alone with what the one before it says."""
+def _whole(label: str, read: Sequence[tuple[str, str, str]]) -> tuple[str, str]:
+    """A label and its unit; of an axis alone with what the one before it says."""
+    before, _, unit = read[-1] if read else ("", "", "")
     bare, _, axis = before.rpartition(" ")
-    alone = label.strip().lower() in AXES and axis.lower() in AXES
-    return f"{bare} {label}" if alone and bare else label
+    if bare and label.lower() in AXES and axis.lower() in AXES:
+        return f"{bare} {label}", unit
+    said = _IN_UNIT.fullmatch(label)
+    if said and unit_in(said[2] or said[3]):
+        return said[1] + (said[4] or ""), said[2] or said[3]
+    return label, ""
 
 
 def _with_unit(
@@ -115,6 +151,28 @@ def _with_unit(
         return name == last or bool(stem and other and other[1] == stem[1])
 
     return [(n, v, u or (unit if mine(n) else "")) for n, v, u in read]
+
+
+def shape(line: str) -> str:
+    """A line without its numbers: what a program prints again and again.
+
+    >>> shape("Temperature 25.31 deg C") == shape("Temperature -1 deg C")
+    True
+    """
+    return re.sub(_NUMBER, "", line).strip()
+
+
+def repeated(lines: Iterable[str], names: Iterable[str]) -> set[str]:
+    """Shapes that come more than once, of lines that say none of these names.
+
+    What has such a name and no value is a damaged row.
+
+    >>> repeated(["--", "ax: nan", "--", "ax: nan", "ready"], ["ax", "ay", "az"])
+    {'--'}
+    """
+    words = {w for name in names for w in _WORD.findall(name.partition(" [")[0])}
+    seen = Counter(shape(line) for line in lines if not words & {*_NAMED.findall(line)})
+    return {one for one, times in seen.items() if times > 1 and one}
 
 
 def names_of(rows: Iterable[Sequence[Labelled]]) -> list[str]:

@@ -9,6 +9,8 @@ rests at both ends of the turns give it.
 
 from __future__ import annotations
 
+from typing import NamedTuple, Self
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,38 +48,91 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
     gravity : what the accelerometers read at rest
 
     """
-    known = np.isfinite(np.column_stack([t, acc, gyr])).all(axis=1)
-    t, acc, gyr = t[known], acc[known], gyr[known]
-    if len(t) < FEWEST:
+    sides = _Sides.of(t, acc, gyr, gravity)
+    if sides is None or sides.moved < _TURNED**2 * sides.lag:
         return None
-    steps = np.diff(t)
-    steps[(steps > _LAG) | (steps < 0)] = np.nan
-    step = float(np.nanmean(steps)) if np.isfinite(steps).any() else 0.0
-    lag = max(2, round(_LAG / step)) if step > 0 else len(t)
-    if len(t) < 4 * lag:
-        return None
-    clipped = _at_rails(gyr)
-    up = (acc - gravity.offset) / gravity.size
-    length = np.maximum(np.linalg.norm(up, axis=1), 0.1)
-    up, gyr = up / length[:, None], gyr - np.median(gyr, axis=0)
-    turning = np.cross(up, gyr)
-    swung = (np.abs(length - 1) > _SWUNG) | clipped
-    steps[swung[1:] | swung[:-1]] = np.nan
-    middle = (turning[1:] + turning[:-1]) / 2 * steps[:, None]
-    right = _over(middle, lag)
-    left = up[lag:] - up[:-lag]
-    whole = np.isfinite(right).all(axis=1)
-    left, right = left[whole].ravel(), right[whole].ravel()
-    power, moved = float(right @ right), float(left @ left)
-    if not power or moved < _TURNED**2 * lag:
-        return None
+    left, right = sides.left.ravel(), sides.right.ravel()
+    power = float(right @ right)
     both = float(left @ right)
-    agrees = both / np.sqrt(power * moved)
+    agrees = both / np.sqrt(power * sides.moved)
     if agrees >= _AGREES:
         return power / both
-    if agrees < _ROUGHLY or clipped.any():
+    if agrees < _ROUGHLY or sides.clipped:
         return None
-    return closing_scale(t, (acc - gravity.offset) / gravity.size, gyr, power / both)
+    return closing_scale(sides.t, sides.up, sides.gyr, power / both)
+
+
+def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> tuple[float, ...]:
+    """By how much gravity turns within half a second as rates say, and as it does, rad.
+
+    Root of the mean square; () where nothing tells. What the accelerometers show is
+    more than it turned, by their noise and by the forces of whoever moves the device;
+    so in the right unit rates cannot say much more.
+
+    Parameters
+    ----------
+    t, acc, gyr, gravity : as of `rate_in`, but rates in rad/s
+
+    """
+    sides = _Sides.of(t, acc, gyr, gravity)
+    if sides is None:
+        return ()
+    n = len(sides.left)
+    return float(np.linalg.norm(sides.right) / np.sqrt(n)), float(
+        np.sqrt(sides.moved / n)
+    )
+
+
+class _Sides(NamedTuple):
+    """Both sides of (1), over each lag.
+
+    Attributes
+    ----------
+    left, right : (n, 3) change of u, and what the rates make of it
+    lag : rows
+    moved : sum of the squares of the left one
+    clipped : whether a rate was at its rail
+    t, up, gyr : (m,), (m, 3) of the rows that are known; the rates without their median
+
+    """
+
+    left: Array
+    right: Array
+    lag: int
+    moved: float
+    clipped: bool
+    t: Array
+    up: Array
+    gyr: Array
+
+    @classmethod
+    def of(cls, t: Array, acc: Array, gyr: Array, gravity: Gravity) -> Self | None:
+        """Both sides; None of too few rows, or where no rate changes."""
+        known = np.isfinite(np.column_stack([t, acc, gyr])).all(axis=1)
+        t, acc, gyr = t[known], acc[known], gyr[known]
+        if len(t) < FEWEST:
+            return None
+        steps = np.diff(t)
+        steps[(steps > _LAG) | (steps < 0)] = np.nan
+        step = float(np.nanmean(steps)) if np.isfinite(steps).any() else 0.0
+        lag = max(2, round(_LAG / step)) if step > 0 else len(t)
+        if len(t) < 4 * lag:
+            return None
+        clipped = _at_rails(gyr)
+        whole = (acc - gravity.offset) / gravity.size
+        length = np.maximum(np.linalg.norm(whole, axis=1), 0.1)
+        up, gyr = whole / length[:, None], gyr - np.median(gyr, axis=0)
+        turning = np.cross(up, gyr)
+        swung = (np.abs(length - 1) > _SWUNG) | clipped
+        steps[swung[1:] | swung[:-1]] = np.nan
+        right = _over((turning[1:] + turning[:-1]) / 2 * steps[:, None], lag)
+        left = up[lag:] - up[:-lag]
+        told = np.isfinite(right).all(axis=1)
+        left, right = left[told], right[told]
+        if not right.any():
+            return None
+        return cls(left, right, lag, float((left**2).sum()), bool(clipped.any()),
+                   t, whole, gyr)  # fmt: skip
 
 
 def _at_rails(gyr: Array) -> NDArray[np.bool_]:

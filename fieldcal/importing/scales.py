@@ -59,6 +59,12 @@ _DEG_COUNTS = (
     *(1 / milli for milli in (8.75e-3, 17.5e-3, 35e-3, 70e-3)),
 )
 
+USUAL_COUNTS = tuple(
+    Scale(_counts(full) * 180 / np.pi, "deg/s", _counts(full))
+    for full in (250, 500, 1000, 2000)
+)
+"""Counts of rates as most sensors have them, of the full scale that they begin with."""
+
 ACC_SCALES = (
     Scale(G0, "m/s^2"),
     Scale(1.0, "g"),

@@ -18,8 +18,14 @@ WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 HALF = 0.45
 """Share of the bytes of a text in UTF-16 that are 0, all in the same half of each."""
 
-PLAIN = bytes([*range(32, 127), *b"\t\r\n"])
+SIGNS = "°²µ".encode("cp1252")
+"""Signs of units that stand in every line of a log."""
+
+PLAIN = bytes([*range(32, 127), *b"\t\r\n", *SIGNS])
 """Characters of a text."""
+
+LETTERS = PLAIN + bytes(range(128, 256))
+"""Bytes of a text in UTF-8."""
 
 TEXT = 0.95
 """Share of them that a text has among its first bytes."""
@@ -29,8 +35,20 @@ LOOKED = 4096
 
 
 def is_plain(head: bytes) -> bool:
-    """Whether most bytes are characters of a text."""
-    return len(head.translate(None, delete=PLAIN)) <= (1 - TEXT) * len(head)
+    """Whether most bytes are characters of a text.
+
+    >>> is_plain("Gx=0.6 °/s 🌐 角速度".encode()), is_plain(bytes(range(256)))
+    (True, False)
+    """
+    others = (1 - TEXT) * len(head)
+    if len(head.translate(None, delete=PLAIN)) <= others:
+        return True
+    # what no byte of UTF-8 contradicts is UTF-8; the last letter may be cut off
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return False
+    return len(head.translate(None, delete=LETTERS)) <= others
 
 
 def wide(head: bytes) -> str | None:

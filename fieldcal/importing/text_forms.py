@@ -19,11 +19,11 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from fieldcal.importing.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.clock_text import IN_LINE, ClockText, is_clock, is_date
-from fieldcal.importing.labels import labelled_values, names_of
+from fieldcal.importing.labels import labelled_values, names_of, repeated, shape
 from fieldcal.importing.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.rate_on_top import RateOnTop
 from fieldcal.importing.receiver_lines import ReceiverLines
@@ -121,10 +121,20 @@ class QuotedCells(TextForm):
 
 
 class LabelledValues(TextForm):
-    """Values with their labels, as a program prints them for people."""
+    """Values with their labels, as a program prints them for people.
 
-    def __init__(self, names: Sequence[str], separator: str, gathers: bool) -> None:
+    Its other lines, those that come again and again, are no damaged rows.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        separator: str,
+        gathers: bool,
+        others: Collection[str],
+    ) -> None:
         self.names, self._separator, self.gathers = tuple(names), separator, gathers
+        self._others = others
 
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> LabelledValues | None:
@@ -135,7 +145,8 @@ class LabelledValues(TextForm):
         if len(many) <= MOSTLY * len(lines) or len(names) < len("xyz"):
             return None
         gathers = max(len(row) for row in many) < len(names)
-        return cls(names, separator or "\t", gathers)
+        others = [one for one, row in zip(lines, read, strict=True) if not row]
+        return cls(names, separator or "\t", gathers, repeated(others, names))
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -146,7 +157,7 @@ class LabelledValues(TextForm):
             for line in lines:
                 said = labelled_values(line)
                 values = {k: v for k, v in said if k in self.names}
-                if not said:
+                if not said and shape(line) not in self._others:
                     # no row: whoever reads rows says so
                     found.append(line)
                 if row.keys() & values.keys():

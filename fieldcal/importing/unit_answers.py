@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.scales import GYR_SCALES, Scale
+from fieldcal.importing.scales import GYR_SCALES, USUAL_COUNTS, Scale
 
 
 def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
@@ -21,6 +21,21 @@ def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
     ]
 
 
+def other_rates(reads: float, rate: float, gyr: Array) -> list[str]:
+    """Rates to paste at which the unit would be a usual one.
+
+    Parameters
+    ----------
+    reads : what 1 rad/s reads at the rate that the user says
+    rate : that rate, Hz; 0 where the file has times
+    gyr : (n, 3) numbers of the file
+
+    """
+    scales = USUAL_COUNTS if (gyr == np.round(gyr)).all() else GYR_SCALES[:2]
+    rates = [f"--rate {rate * reads / s.size:.3g}, which makes it {s}" for s in scales]
+    return rates if rate else []
+
+
 def as_written(fits: list[Scale], values: Array) -> list[Scale]:
     """Scales without counts, where values are no whole numbers and others do."""
     known = values[np.isfinite(values)]
@@ -31,6 +46,5 @@ def as_written(fits: list[Scale], values: Array) -> list[Scale]:
 def unusual(gyr: Array) -> list[str]:
     """Options for rates of which no turn tells: counts, if they are whole numbers."""
     if (gyr == np.round(gyr)).all():
-        counts = [s for s in GYR_SCALES if s.lsb != 1][1:5]
-        return answers("gyr", counts, "deg/s", 16.4)
+        return answers("gyr", [*USUAL_COUNTS], "deg/s", 16.4)
     return ["--gyr-unit deg/s", "--gyr-unit rad/s, if it is so"]

@@ -10,13 +10,17 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block
 from fieldcal.importing.gravity_size import Gravity, gravity_in
-from fieldcal.importing.rate_size import rate_in
+from fieldcal.importing.rate_size import rate_in, turns_said
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.scales import ACC_SCALES, GYR_SCALES, Scale
 from fieldcal.session.units import UNSCALED
 
 FAR = 0.25
 """Logarithm of what no sensor in the unit that is said is out by."""
+
+STIRS, TIMES = 0.01, 4.0
+"""Turn within half a second, rad, that no noise of rates makes, and how many times what
+gravity shows it is where the unit is another."""
 
 NO_GRAVITY = 0.05
 """Part of g below which gravity was taken out; mg and g in m/s^2 read otherwise."""
@@ -87,10 +91,28 @@ class SaidUnits:
         if not self._has_size("g"):
             return []
         turned = rate_in(block.t, block.acc, block.gyr, gravity)
-        if turned is None or abs(np.log(turned)) <= FAR:
+        if turned is None:
+            return self._of_calm(block, gravity)
+        if abs(np.log(turned)) <= FAR:
             return []
         fits = _within(turned / self._said.gyr_scale, GYR_SCALES)
         shows = f"rates are {turned:.4g} times those at which gravity turns"
+        other = self._said.rate_hz and f"--rate {self._said.rate_hz * turned:.3g}"
+        return self._contradict("g", shows, "--gyr-unit", fits, other or "")
+
+    def _of_calm(self, block: Block, gravity: Gravity) -> list[str]:
+        """Rates by which gravity would turn where it does not."""
+        turns = turns_said(block.t, block.acc, block.gyr, gravity)
+        if not turns or turns[0] < max(STIRS, TIMES * turns[1]):
+            return []
+        said, is_so = np.rad2deg(turns)
+        plain = [s for s in GYR_SCALES if s.lsb == 1]
+        size = self._said.gyr_scale
+        fits = [s.unit for s in plain if turns[0] / s.size / size < turns[1]][:1]
+        shows = (
+            f"gravity would turn by {said:.2g} deg within half a second then, and turns"
+            f" by {is_so:.2g} deg at most"
+        )
         return self._contradict("g", shows, "--gyr-unit", fits)
 
     def _unit(self, kind: str) -> str:
@@ -103,13 +125,14 @@ class SaidUnits:
         return bool(unit) and what not in self._guessed and unit not in UNSCALED
 
     def _contradict(
-        self, kind: str, shows: str, option: str, fits: list[str]
+        self, kind: str, shows: str, option: str, fits: list[str], other: str = ""
     ) -> list[str]:
         """Ask about a unit of the file's; of the user's only say what is odd."""
         unit = self._unit(kind)
         if kind not in self._said.named:
             return [f"{unit} as you say, but {shows}"]
-        answers = [f"{option} {one}" for one in fits if one != unit]
+        answers = [other] if other else []
+        answers += [f"{option} {one}" for one in fits if one != unit]
         answers.append(f"{option} {unit}, if it is so")
         raise InputError(
             f"{self._name}: the names of its columns say {unit}, but {shows}: add"

@@ -29,7 +29,7 @@ from fieldcal.importing.scales import (
 )
 from fieldcal.importing.thermometers import temperature_counts, temperature_fits
 from fieldcal.importing.time_units import step_of, unit_taken
-from fieldcal.importing.unit_answers import answers, as_written, unusual
+from fieldcal.importing.unit_answers import answers, as_written, other_rates, unusual
 from fieldcal.importing.unit_doubts import SaidUnits, hold_own_units
 
 ROWS = 1 << 17
@@ -41,6 +41,9 @@ FAST = 0.5
 ROUGH = 0.02
 """Scatter of rates from sample to sample, rad/s, that nothing at rest shows."""
 
+
+NO_UNIT = 0.75
+"""What gravity reads at least in any unit, less what no factory scale is out by."""
 
 OFFSET = 0.25
 """Part of g that no bias is: what raw counts show more is where their zero lies."""
@@ -186,6 +189,13 @@ class _Guess:
         shows = f"|a| at rest is {gravity.size:.4g}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
+        if not fits and gravity.size < NO_UNIT:
+            raise InputError(
+                f"{self._name}: {shows}, less than gravity reads in any unit: it seems"
+                " to be taken out of these accelerations, and nothing can be"
+                " calibrated by them; log those with gravity in them, or, if it is so,"
+                f" add --acc-unit g --acc-lsb {gravity.size:.3g}"
+            )
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is gravity in"
@@ -234,7 +244,8 @@ class _Guess:
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
-                answers("gyr", fits, "deg/s", np.deg2rad(reads)),
+                answers("gyr", fits, "deg/s", np.deg2rad(reads))
+                + (other_rates(reads, self.said.rate_hz or 0, gyr) if not fits else []),
             )
         if (fits[0].unit, fits[0].lsb) != ("rad/s", 1):
             self.found["angular_rate"] = f"{fits[0]}: {shows}"

@@ -128,6 +128,86 @@ def test_a_heading_that_physics_contradicts_is_asked_about(
     assert_same(imported(path, option, unit), rows)
 
 
+def test_a_heading_that_rests_contradict_is_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Noise of 0.1 in sixteenths, as of deg/s; in rad/s gravity would turn by it."""
+    rng = np.random.default_rng(11)
+    acc = rng.normal([0.5, -5.1, 8.3], 0.015, (600, 3))
+    gyr = np.round(rng.normal(0, 0.15, (600, 3)) * 16) / 16
+    rows = np.column_stack([np.arange(600) / 50, acc, gyr])
+    heading = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    path = write(tmp_path, rows, heading=heading)
+    assert main(["import", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "gravity would turn by" in said and "add --gyr-unit deg/s or" in said
+    rows[:, 4:] = np.deg2rad(gyr)
+    assert_same(imported(write(tmp_path, rows, heading=heading)), rows)
+
+
+def test_a_rate_by_which_no_unit_fits_may_be_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(13, 50.0)
+    counts = np.round(np.rad2deg(rows[:, 4:]) * 131.072)
+    path = write(tmp_path, np.column_stack([rows[:, 1:4] / G, counts]))
+    assert main(["import", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "--rate 50, which its turns say about, if rates are in counts, 131" in said
+    assert main(["import", str(path), "--rate", "300"]) == 2
+    assert "--rate 50, which makes it counts, 131.072" in capsys.readouterr().err
+    rows[:, 1:4] /= G
+    path = write(tmp_path, rows[:, 1:], heading="ax,ay,az," + ",".join(
+        f"g{x} [rad/s]" for x in "xyz"))  # fmt: skip
+    assert main(["import", str(path), "--rate", "300"]) == 2
+    assert "add --rate 50 or --gyr-unit rad/s" in capsys.readouterr().err
+
+
+def test_an_acceleration_beside_the_g_force_has_no_gravity(tmp_path: Path) -> None:
+    rows = turned(12, 50.0)
+    up = rows[:, 1:4] / np.linalg.norm(rows[:, 1:4], axis=1)[:, None]
+    log = np.column_stack(
+        [rows[:, 0], rows[:, 1:4] / G, rows[:, 1:4] - G * up, rows[:, 4:]]
+    )
+    names = "time,gFx,gFy,gFz,ax,ay,az,wx,wy,wz"
+    assert_same(imported(write(tmp_path, log, heading=names)), rows)
+
+
+@pytest.mark.parametrize("unit", ["", " [m/s^2]"])
+def test_what_is_less_than_gravity_in_any_unit_has_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], unit: str
+) -> None:
+    rows = turned(6, 50.0)[:, :4]
+    rows[:, 1:] = np.random.default_rng(6).normal(0, 0.02, (len(rows), 3))
+    names = ",".join(f"{x}{unit}" for x in "zyx")
+    path = write(tmp_path, rows, "Accelerometer.csv", f"time,{names}")
+    assert main(["import", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "taken out of these accelerations" in said and "log those with" in said
+
+
+@pytest.mark.parametrize(
+    ("width", "such"), [(3, "ax,ay,az;"), (12, "t,ax,ay,az,gx,gy,gz,_,_,_,_,_;")]
+)
+def test_columns_are_asked_for_as_many_as_there_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], width: int, such: str
+) -> None:
+    rows = np.random.default_rng(width).normal(0, 1, (300, width))
+    assert main(["import", str(write(tmp_path, rows))]) == 2
+    assert f"such as --columns {such}" in capsys.readouterr().err
+
+
+def test_columns_behind_those_that_are_named_may_be_skipped_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(14, 50.0)
+    path = write(tmp_path, np.hstack([rows, np.ones((len(rows), 40))]))
+    named = "t,ax,ay,az,gx,gy,gz"
+    assert main(["import", str(path), "--columns", named]) == 2
+    assert "_... at the end skips the others" in capsys.readouterr().err
+    assert_same(imported(path, "--columns", f"{named},_..."), rows)
+
+
 def test_accelerations_without_gravity_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

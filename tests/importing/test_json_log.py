@@ -89,6 +89,14 @@ def test_a_line_that_is_cut_off_is_refused_or_left_out(tmp_path: Path) -> None:
     assert len(read(path, repair=True)) == ROWS - 1
 
 
+def test_what_a_device_says_before_its_first_record_is_passed_over(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text("Connecting to WiFi....\nready: 50 Hz\n" + DOCUMENTS["lines"])
+    np.testing.assert_allclose(read(path).acc, ACC)
+
+
 def test_records_of_different_sensors_are_not_mixed() -> None:
     lines = [
         {"sensor": s, "x": x, "t": i} for i in range(3) for s, x in (("a", 1), ("g", 2))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from laid_about import G, write
+from laid_about import G, turned, write
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
@@ -116,6 +116,32 @@ def test_channels_side_by_side_have_the_same_times(
     assert "join files with the same times" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("names", "files", "more"),
+    [("time,seconds_elapsed,z,y,x", ("TotalAcceleration.csv", "Gyroscope.csv"), []),
+     ("", ("acc_exp1_user1.txt", "gyro_exp1_user1.txt"), ["--rate", "50"])],
+)  # fmt: skip
+def test_the_name_of_a_file_says_whose_its_axes_are(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    names: str,
+    files: tuple[str, str],
+    more: list[str],
+) -> None:
+    rows = turned(3, 50.0)
+    t, paths = rows[:, 0], []
+    for name, three in zip(files, (rows[:, 1:4], rows[:, 4:]), strict=True):
+        columns = [1.7e18 + t * 1e9, t, *three.T[::-1]] if names else [*three.T]
+        paths.append(write(tmp_path, np.column_stack(columns), name, names))
+    out = tmp_path / "out"
+    assert main(["import", *map(str, paths), "--join", *more, "-o", str(out)]) == 0
+    said = capsys.readouterr().err
+    assert "axes are those of the gyroscopes, as the file is called" in said
+    block = Session.open(out).block
+    np.testing.assert_allclose(block.acc, rows[:, 1:4], atol=1e-6)
+    np.testing.assert_allclose(block.gyr, rows[:, 4:], atol=1e-6)
+
+
 @pytest.mark.parametrize("unit", ["s", "ms"])
 def test_accelerometers_and_gyroscopes_may_have_times_of_their_own(
     unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -135,8 +161,9 @@ def test_accelerometers_and_gyroscopes_may_have_times_of_their_own(
     second.write_text("\n".join(["time," + names, *lines]))
     for order in ([first, second], [second, first]):
         out = tmp_path / order[0].stem
-        call = ["import", *map(str, order), "--join", "-o", str(out)]
-        assert main(call) == 0
+        # its rates say when they were taken, and turn nothing
+        call = ["import", *map(str, order), "--join", "--gyr-unit", "rad/s"]
+        assert main([*call, "-o", str(out)]) == 0
         assert "times of their own" in capsys.readouterr().err
         block = Session.open(out).block
         np.testing.assert_allclose(block.t, t - t[0], atol=1e-6)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.clock_text import ClockText, is_clock
@@ -111,6 +112,13 @@ def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
         "accel: {}, {}, {}  gyro: {}, {}, {}",
         "Acceleration X: {}, Y: {}, Z: {} m/s^2\nRotation X: {}, Y: {}, Z: {} rad/s\n",
         "12:00:00.0 -> Acceleration X: {} Y: {} Z: {} m/s^2 Gyro X: {} Y: {} Z: {}",
+        "Accel:\tx= {} |\ty= {} |\tz= {}\nGyro:\tx= {} |\ty= {} |\tz= {}\n--",
+        "Raw. Acc (m/s^2) [ {}, {}, {} ], Gyr (rad/s) [ {}, {}, {} ], Tmp (C) [ 25.1 ]",
+        "Force in m/s^2\tX: {}\tY: {}\tZ: {}\tTurn in rad/s\tX: {}\tY: {}\tZ: {}",
+        "Ax={} m/s²\tAy={} m/s²\tAz={} m/s²\tGx={} rad/s\tGy={} rad/s\tGz={} rad/s",
+        "🌐 Accel: x:{} y:{} z:{}\n🌐 Gyro: x:{} y:{} z:{}",
+        "Temperature 25.31 deg C\nAccel X: {} \tY: {} \tZ: {} m/s^2 \n"
+        "Gyro X: {} \tY: {} \tZ: {} radians/s \n",
     ],
 )
 def test_values_with_labels_need_no_columns(tmp_path: Path, row: str) -> None:
@@ -149,6 +157,14 @@ def test_quoted_numbers_with_decimal_commas(tmp_path: Path) -> None:
 def test_what_is_no_label_is_left_alone() -> None:
     assert labelled_values("Fs: 100 measured by a clock") == []
     assert labelled_values("1.0,2.0,3.0") == []
+
+
+def test_a_row_with_a_name_and_no_number_is_damaged(tmp_path: Path) -> None:
+    rows = ["Accel X: {} Y: {} Z: {}\nGyro X: {} Y: {} Z: {}".format(*values(i))
+            for i in range(ROWS)]  # fmt: skip
+    rows[5] = rows[9] = "Accel X: nan Y: nan Z: nan"
+    with pytest.raises(InputError, match="copy the file again"):
+        read(tmp_path, "\n".join(rows), rate_hz=RATE)
 
 
 def test_the_text_of_a_dataflash_log_is_read_for_its_first_imu(tmp_path: Path) -> None:

@@ -1,0 +1,35 @@
+"""The sensor that the name of a file says, where its columns are axes alone.
+
+Telephones and data sets write a file for each sensor: ``Gyroscope.csv``,
+``TotalAcceleration.csv``, ``acc_exp01_user01.txt``.
+"""
+
+from __future__ import annotations
+
+from fieldcal.importing.heading_words import words_of
+
+_SENSORS = {
+    "acc": ("acc", "accel", "accelerometer", "acceleration"),
+    "gyr": ("gyr", "gyro", "gyroscope", "rotationrate", "gyroscopes"),
+}
+_OTHERS = ("mag", "magnetometer", "linear", "lin", "gravity", "imu", "and", "angle",
+           "orientation")  # fmt: skip
+"""Words of files that hold something else, or more."""
+
+SENSOR = {"acc": "accelerometers", "gyr": "gyroscopes"}
+"""What each is called in a sentence."""
+
+
+def sensor_of(stem: str) -> str:
+    """Sensor of a file by its name without the ending; "" if it says none, or several.
+
+    >>> sensor_of("TotalAcceleration"), sensor_of("gyro_exp01_user01")
+    ('acc', 'gyr')
+    >>> sensor_of("acc_and_gyro"), sensor_of("userAcceleration"), sensor_of("log")
+    ('', '', '')
+    """
+    words = words_of(stem)
+    before = dict(zip(words[1:], words, strict=False))
+    said = [sensor for sensor, names in _SENSORS.items() if {*words} & {*names}]
+    more = {*words} & {*_OTHERS} or "user" in {before.get(w) for w in _SENSORS["acc"]}
+    return said[0] if len(said) == 1 and not more else ""

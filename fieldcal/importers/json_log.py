@@ -61,7 +61,7 @@ class JsonLog(ArrayFile):
             text = b"".join(as_utf8(self.pieces())).decode(errors="replace")
             document = self._document(text)
             self._scalars = dict(scalars(document))
-            lists = json_lists(document)
+            lists = json_lists(document, says=self.says)
             self._loaded = {name: table_of(values) for name, values in lists}
         yield self._loaded
 

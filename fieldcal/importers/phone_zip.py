@@ -21,18 +21,10 @@ from fieldcal.importers.csv_like import TextColumns
 from fieldcal.importers.workbook import MARKS
 from fieldcal.importing import columns
 from fieldcal.importing.alignment import AlignedPair
+from fieldcal.importing.file_names import ACC, GYR
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 
 WHAT = "archives of telephones: phyphox, Sensor Logger"
-
-ACC = (
-    "totalacceleration",
-    "accelerometeruncalibrated",
-    "accelerometer",
-    "acceleration",
-)
-GYR = ("gyroscope", "gyroscopeuncalibrated", "rotationrate", "gyro")
-"""Names of files, those that are taken first first."""
 
 SENSOR = {"a": "acc", "g": "gyr"}
 

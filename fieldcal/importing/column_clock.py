@@ -226,7 +226,7 @@ def with_times(way: Heading, table: Array) -> Heading:
     """A heading in which only what numbers show to be times is named as one.
 
     Of several columns that are named as times, one may hold a date, count rows, or be
-    too coarse.
+    too coarse. Each may be empty.
 
     Parameters
     ----------
@@ -236,13 +236,13 @@ def with_times(way: Heading, table: Array) -> Heading:
     """
     said = [meaning(column.name, column.unit) for column in way.columns]
     named = [i for i, one in enumerate(said) if one is not None and one.kind == "t"]
-    if len(named) < 2 or table.shape[1] != len(way.columns):
+    if not named or table.shape[1] != len(way.columns) or not len(table):
         return way
+    empty = [i for i in named if np.isnan(table[:, i]).all()]
     fit = [i for i in named if goes_on(table[:, i])]
     for lacks in (counts_rows, shares_times):
         fit = [i for i in fit if not lacks(table[:, i])] or fit
-    if not fit:
-        return way
+    fit = fit if fit and len(named) > 1 else [i for i in named if i not in empty]
     names = [*way.columns]
     for i in {*named} - {*fit}:
         names[i] = names[i]._replace(name="")

@@ -17,7 +17,8 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.clock_text import ClockText, is_clock
-from fieldcal.importing.heading_words import meaning
+from fieldcal.importing.heading_words import axis_alone, meaning, words_of
+from fieldcal.importing.record_pairs import paired
 
 AXES = "xyz"
 
@@ -43,8 +44,15 @@ class JsonRecord(NamedTuple):
     samples: dict[str, Sequence[Any]]
 
 
-def json_lists(document: Any, name: str = "") -> Iterator[tuple[str, Array]]:
+def json_lists(
+    document: Any, name: str = "", says: list[str] | None = None
+) -> Iterator[tuple[str, Array]]:
     """Lists (n,) or (n, k) of a document, with their names.
+
+    Parameters
+    ----------
+    document, name : and what it lies in
+    says : grows by what the user must know, a sentence each
 
     >>> [(n, v.tolist()) for n, v in json_lists([{"t": 0, "a": {"x": 1}}, {"t": 1}])]
     [('t', [0.0, 1.0]), ('a_x', [1.0, nan])]
@@ -53,7 +61,7 @@ def json_lists(document: Any, name: str = "") -> Iterator[tuple[str, Array]]:
         for key, value in document.items():
             if name.count("/") < DEEPEST:
                 full = f"{name}/{key}" if name else key
-                yield from json_lists(value, full or "value")
+                yield from json_lists(value, full or "value", says)
     elif not isinstance(document, list) or len(document) <= 1:
         return
     elif all(_is_number(one) for one in document):
@@ -65,10 +73,25 @@ def json_lists(document: Any, name: str = "") -> Iterator[tuple[str, Array]]:
                 yield name or "list", np.array(rows)
     else:
         records = [_record(one) for one in document if isinstance(one, Mapping)]
-        for prefix, alike in _kinds(records).items():
-            for key, values in _lists(alike).items():
-                bare = f"{prefix}_{key}" if prefix else key
-                yield (f"{name}/{bare}" if name else bare), values
+        for bare, values in _fields(records, [] if says is None else says):
+            yield (f"{name}/{bare}" if name else bare), values
+
+
+def _fields(
+    records: Sequence[JsonRecord], says: list[str]
+) -> Iterator[tuple[str, Array]]:
+    """Values of each field, (n,), with the kind of its records before its name."""
+    kinds = {kind: _lists(alike) for kind, alike in _kinds(records).items()}
+    if len(kinds) > 1 and (pair := paired(kinds)) is not None:
+        says.append(
+            f"of its records, those of {pair.acc} are taken, each with the nearest of"
+            f" {pair.gyr}"
+        )
+        yield from pair.fields.items()
+        return
+    for prefix, fields in kinds.items():
+        for key, values in fields.items():
+            yield (f"{prefix}_{key}" if prefix else key), values
 
 
 def _is_number(value: Any) -> bool:
@@ -88,6 +111,20 @@ def _float(value: Any) -> float:
         return float("inf")
 
 
+def _written(name: str, text: str) -> float | None:
+    """A number that is written as a text; None of another, or of a number of a device.
+
+    >>> _written("z", "9.81"), _written("time", "17"), _written("device", "2")
+    (9.81, 17.0, None)
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    channel = meaning(name) is not None or axis_alone(words_of(name)) is not None
+    return number if channel or "." in text else None
+
+
 def _record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> JsonRecord:
     """A record, with the names of what lies within it joined."""
     found = JsonRecord({}, {}, {}, {})
@@ -101,6 +138,8 @@ def _record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> JsonRec
             found.samples.update(within.samples)
         elif _is_number(inner):
             found.numbers[full] = _float(inner)
+        elif isinstance(inner, str) and (number := _written(full, inner)) is not None:
+            found.numbers[full] = number
         elif isinstance(inner, str) and is_clock(inner):
             found.clocks[full] = inner
         elif isinstance(inner, str):
@@ -124,7 +163,8 @@ def _kinds(records: Sequence[JsonRecord]) -> dict[str, list[JsonRecord]]:
     ]
     found: dict[str, list[JsonRecord]] = {}
     for one in records:
-        found.setdefault("_".join(one.texts.get(n, "") for n in differ), []).append(one)
+        said = [one.texts.get(n, "") for n in differ]
+        found.setdefault("_".join(filter(None, said)), []).append(one)
     return found
 
 

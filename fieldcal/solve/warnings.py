@@ -11,6 +11,7 @@ import numpy as np
 
 from fieldcal.calibration import Method
 from fieldcal.calibration.names import AXES, ParameterName, group_of
+from fieldcal.core.gravity import gravity
 from fieldcal.core.samples import UNITS as CHANNEL_UNITS
 from fieldcal.core.sentences import join
 from fieldcal.model import thresholds
@@ -46,6 +47,8 @@ def left_open(
                 acc, _remedy(observations, found), "these positions"
             )
         )
+        if not any(group_of(n) in OF_ACC for n in found.names):
+            sentences.append(_length(observations))
     gyr = [n for n in found.missing if group_of(n) == "gyr_scale"]
     cross = [n for n in found.missing if group_of(n) == "gyro_cross_coupling"]
     if not found.given.wanted.gyr_scale and observations.has_gyr:
@@ -58,6 +61,25 @@ def left_open(
     elif gyr or cross:
         sentences.append(_turning(gyr, cross, observations, found))
     return sentences
+
+
+def _length(observations: Observations) -> str:
+    """That the force at rest is not gravity, where no parameter says why.
+
+    Nothing where it lies within what gravity is on the Earth.
+    """
+    nominal = observations.nominal
+    force = (observations.mean[:, :3] - nominal.acc_bias) / nominal.acc_scale
+    length = np.linalg.norm(force[np.isfinite(force).all(axis=1)], axis=1)
+    size, known = float(length.mean()) if len(length) else 0.0, observations.gravity
+    most = max(abs(gravity(at) - known) for at in (0.0, 90.0))
+    if not len(length) or abs(size - known) <= most:
+        return ""
+    return (
+        f"|a| at rest is {size:.3f} m/s², {100 * (size / known - 1):+.1f} % of gravity:"
+        " biases or scale factors of the accelerometers are out by so much, and these"
+        " orientations do not tell which"
+    )
 
 
 def _remedy(observations: Observations, found: Estimated) -> list[str]:

@@ -116,6 +116,18 @@ def test_names_that_are_not_those_of_one_imu_say_nothing(
     assert read([Column("", name) for name in names], "_") == ()
 
 
+def test_a_column_of_times_that_is_empty_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "log.txt"
+    head = ("// Update Rate: 100.0Hz", "PacketCounter\tSampleTimeFine\tSecond\t"
+            "Acc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z")  # fmt: skip
+    rows = [f"{i:05d}\t\t\t" + "\t".join(map(str, row[1:]))
+            for i, row in enumerate(ROWS.tolist())]  # fmt: skip
+    path.write_text("\n".join([*head, *rows]) + "\n")
+    _, block = taken(path)
+    np.testing.assert_allclose(block.t, np.arange(4) / 100)
+    np.testing.assert_allclose(block.acc, ROWS[:, 1:4])
+
+
 def test_units_that_differ_say_nothing(tmp_path: Path) -> None:
     for third in ("az [mg]", "az"):
         names = ("ax [g]", "ay [g]", third)

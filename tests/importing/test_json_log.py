@@ -97,6 +97,32 @@ def test_what_a_device_says_before_its_first_record_is_passed_over(
     np.testing.assert_allclose(read(path).acc, ACC)
 
 
+@pytest.mark.parametrize("lines", [False, True])
+def test_records_of_two_sensors_go_together(tmp_path: Path, lines: bool) -> None:
+    """As telephones write them, each number a text; or one a line."""
+    late = T + 0.1 / ROWS
+    kinds = {
+        "TotalAcceleration": (T, ACC), "Accelerometer": (T, 0 * ACC),
+        "Gyroscope": (late, GYR), "Magnetometer": (T, 50 * ACC),
+    }  # fmt: skip
+    records: list[dict[str, Any]] = [{"sensor": "Metadata", "device": "a telephone"}]
+    for i in range(ROWS):
+        for name, (t, three) in kinds.items():
+            axes = dict(zip("xyz", three[i].tolist(), strict=True))
+            said = {k: f"{v:.12g}" for k, v in {"time": t[i], **axes}.items()}
+            whole = {"sensor": name, "data": axes, "ts": t[i]}
+            records.append(whole if lines else {"sensor": name, **said})
+    path = tmp_path / "log.json"
+    one_each = "\n".join(json.dumps(one) for one in records[1:])
+    path.write_text(one_each if lines else json.dumps(records))
+    recording = open_recording(path, ReadOptions(time_unit="s"))
+    got = concat(list(recording.blocks(recording.streams()[0].name)))
+    np.testing.assert_allclose(got.acc, ACC)
+    np.testing.assert_allclose(got.gyr, GYR)
+    pairing = "those of TotalAcceleration are taken, each with the nearest of Gyroscope"
+    assert any(pairing in one for one in recording.says)
+
+
 def test_records_of_different_sensors_are_not_mixed() -> None:
     lines = [
         {"sensor": s, "x": x, "t": i} for i in range(3) for s, x in (("a", 1), ("g", 2))

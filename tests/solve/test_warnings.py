@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_result import estimated, fit, observed
 
+from fieldcal.core.gravity import G0
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.solve import warnings, words
 from fieldcal.solve.assumed import Asked
@@ -63,6 +64,21 @@ def test_what_lengths_leave_open(
     missing: list[str], n: int, dof: int, says: str
 ) -> None:
     assert warnings._scalar(missing, estimated(acc=fit(dof=dof)), n) == says
+
+
+@pytest.mark.parametrize(
+    ("stretched", "says"),
+    [(1.111, "|a| at rest is 10.895 m/s², +11.1 % of gravity"), (1.001, ""),
+     (np.nan, "")],
+)  # fmt: skip
+def test_a_force_that_no_parameter_explains_is_said(
+    stretched: float, says: str
+) -> None:
+    seen = observed((FIVE[0],) * 3, gravity=G0)
+    force = np.array([3.0, 4.0, np.sqrt(G0**2 - 25)])
+    seen.mean[:, :3] = stretched * force
+    told = warnings._length(seen)
+    assert told.startswith(says) and bool(told) == bool(says)
 
 
 def test_of_so_few_windows_the_residual_says_nothing() -> None:

@@ -20,10 +20,11 @@ def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
     """Functions that no effect makes, on each channel."""
     sizes = typical(table)
     for c in table.observed.tolist():
-        groups = [
-            _course(table, CHANNELS[c], [c], sizes, span) for span in smooth.SPANS
-        ]
-        yield _cause("time", CHANNELS[c], groups)
+        if _goes_on(table):
+            groups = [
+                _course(table, CHANNELS[c], [c], sizes, span) for span in smooth.SPANS
+            ]
+            yield _cause("time", CHANNELS[c], groups)
         at = table.window(c)
         if len(table.held) > 3:
             groups = [
@@ -37,8 +38,14 @@ def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
             yield _cause(
                 "position", CHANNELS[c], [Group("position", CHANNELS[c], at, wide)]
             )
-    yield from _together(table, sizes)
+    if _goes_on(table):
+        yield from _together(table, sizes)
     yield from _of_covariates(table, sizes)
+
+
+def _goes_on(table: ColumnTable) -> bool:
+    """Whether rows have times: without, a course is a constant, as a bias is."""
+    return bool(np.ptp(table.x.t) > 0)
 
 
 def typical(table: ColumnTable) -> Array:
@@ -95,7 +102,7 @@ def _shows(table: ColumnTable, covariate: str) -> bool:
     if covariate == "temperature":
         return x.warms
     if covariate == "force and time":
-        return len(table.held) > FEW
+        return len(table.held) > FEW and _goes_on(table)
     if covariate == "since turn":
         return bool(np.isfinite(x.since_turn).all())
     return len(table.held) > 3

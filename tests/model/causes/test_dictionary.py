@@ -154,6 +154,17 @@ def test_where_columns_are() -> None:
     assert d.waves - d.windows == 54
 
 
+def test_rows_without_times_have_no_course() -> None:
+    """A course would be a constant: as a bias is, and one of the force as a scale."""
+    x = ladder(1)
+    same = np.zeros(len(x))
+    untimed = made(replace(x, t=same, since_start=same))
+    kinds = {cause.key.partition(":")[0] for cause in untimed.causes}
+    assert not kinds & {"time", "force and time"}
+    assert {"force", "position", "window"} <= kinds
+    assert {"time:ax", "time:acc", "force and time:ax"} <= CAUSES.keys()
+
+
 def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
     acc, gyr = 0.02 * UNIT[:3], 1e-3 * UNIT[3:]
     both = np.concatenate([acc, gyr])

@@ -54,8 +54,8 @@ class ListCells(TextForm):
         if not lines or not most(lines, lambda line: bool(_LIST.search(line))):
             return None
         bare = _LIST.sub("0", lines[-1])
-        parted = separator or separator_of(bare) or ("\t" if " " not in bare else None)
-        if parted is None:
+        parted = separator or separator_of(bare) or ("\t" if " " not in bare else " ")
+        if parted == " " and not all(is_number(cell, False) for cell in bare.split()):
             return None
         many = [len(re.split(r"[\s,;]+", said)) if (said := _list_in(cell)) else 1
                 for cell in _cells(lines[-1], parted)]  # fmt: skip

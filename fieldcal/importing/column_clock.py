@@ -275,7 +275,11 @@ def ask_rate(source: ColumnSource, wanted: ReadOptions) -> None:
     """
     if columns.has_time(wanted.columns) or wanted.rate_hz or not wanted.columns:
         return
-    hint = rate_hint(wanted, source.beginning())
-    raise InputError(
-        f"{source.path}: no column is t, the time: give the rate, e.g. --rate {hint}"
-    )
+    table = source.beginning()
+    names = [c.name for way in source.heading() for c in way.columns][: table.shape[1]]
+    said = {name: i for i, name in enumerate(names)
+            if (one := meaning(name)) is not None and one.kind == "t"}  # fmt: skip
+    rows = next((name for name, i in said.items() if counts_rows(table[:, i])), "")
+    why = f"its {rows} only counts rows" if rows else "no column is t, the time"
+    hint = rate_hint(wanted, table)
+    raise InputError(f"{source.path}: {why}: give the rate, e.g. --rate {hint}")

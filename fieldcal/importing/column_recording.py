@@ -123,6 +123,9 @@ class ColumnRecording(Recording):
             if told is not None:
                 return {"0": told}
             self._say_unnamed(named, way)
+        for way in self.heading() if not named else ():
+            # the question of their size comes before that of their columns
+            named = named or headings.read(*with_times(way, table), weak=True)
         if not named:
             raise InputError(self.ask())
         taken = {one.name: one.taken(self.wanted) for one in named}

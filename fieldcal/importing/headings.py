@@ -110,13 +110,16 @@ class HeadingMatch:
         return f"taken from the names of its columns: {text}"
 
 
-def read(columns: Sequence[Column], skip: str = "") -> tuple[HeadingMatch, ...]:
+def read(
+    columns: Sequence[Column], skip: str = "", weak: bool = False
+) -> tuple[HeadingMatch, ...]:
     """Channels and units from headings, by IMU; none if they are not those of IMUs.
 
     Parameters
     ----------
     columns : in the order of the file
     skip : what stands for one that is not wanted; where nothing does, it is left out
+    weak : whether accelerations are taken that may lack gravity, with nothing beside
 
     """
     named = [
@@ -133,7 +136,8 @@ def read(columns: Sequence[Column], skip: str = "") -> tuple[HeadingMatch, ...]:
     if not (acc or gyr):
         return _of_a_thermometer(columns, named, skip)
     # without gyroscopes beside it, a "linear acceleration" may lack gravity
-    if not gyr and all(one.says.weak for three in acc.values() for one in three):
+    lacking = all(one.says.weak for three in acc.values() for one in three)
+    if not gyr and lacking and not weak:
         return ()
     times = _one([n for n in named if n.says.kind == "t"], OTHER_CLOCK)
     times = times or [n for n in named if n.says.kind == "dt"][:1]

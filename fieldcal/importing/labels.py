@@ -5,7 +5,8 @@
     12:34:56.789 -> Accel: 0.1, 0.2, 9.8 g  Gyro: 1, 2, 3
     I (312) IMU: ax=0.1 ay=0.2         2024-05-03 14:20:01,123 INFO acc=(0.1, 0.2, 9.8)
     Accel: x= 0.1 | y= 0.2 | z= 9.8    Acc (mg) [ 10.1, -2.3, 999.1 ], Tmp (C) [ 25.1 ]
-    Acceleration in g's  X: 0.1  Y: 0.2  Z: 0.9
+    Acceleration in g's  X: 0.1  Y: 0.2  Z: 0.9      ax 0.1 ay 0.2 az 9.8
+    accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}
 
 An axis alone belongs to the label before it, which may stand without a value; three
 values behind one label are axes; a unit holds for all axes before it. A time of day at
@@ -41,6 +42,17 @@ _LIST = re.compile(
 _LISTED = re.compile(rf"(\([^()]*\))\s*\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]")
 """Values in a list right behind a unit in brackets."""
 
+_DICT = re.compile(
+    r"\{\s*"
+    + r"\s*,\s*".join(rf"['\"]{a}['\"]\s*:\s*({_NUMBER})" for a in AXES)
+    + r"\s*\}"
+)
+"""Three axes as Python prints them."""
+
+_PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{_NUMBER}[\s,;|]*){{3,}}")
+_PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={_NUMBER})")
+"""Labels with a space before their value, where a line holds nothing else."""
+
 _SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
 """What stands before an axis: something else, and the label of all its axes."""
 
@@ -75,7 +87,9 @@ def labelled_values(line: str) -> list[Labelled]:
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
-    line = _LISTED.sub(r"\1: \2", _LIST.sub(r" \1", line))
+    line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
+    line = _LISTED.sub(r"\1: \2", line)
+    line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
     arrival, ticks = _ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest

@@ -2,7 +2,7 @@
 
 A clock may hold whole seconds in one column and what is beyond them in another, the
 hours and minutes in one number (``142031.5`` is 14:20:31.5), or count up to where its
-bits or the day end and begin again.
+bits or the day end and begin again. That of a device that starts again begins anew.
 """
 
 from __future__ import annotations
@@ -28,9 +28,19 @@ NEAR = 20.0
 """Usual steps by which a clock is before its end, and behind its beginning."""
 
 
+STARTED, BETWEEN = 30.0, 10.0
+"""Time since its start within which a device writes its first row, s, and that taken to
+have passed while it was started again, s or usual steps."""
+
 PAUSED, PULL = 1.5, 0.05
 """Distances of batches that are a pause, and the part of what one comes late that
 those behind it do as well."""
+
+
+ANEW = (
+    ", as where a device is started again: the rows behind follow"
+    f" {BETWEEN:g} s later, and what happened between is not used"
+)
 
 
 def clock_numbers(values: Array) -> Array:
@@ -100,6 +110,7 @@ class RowTimes:
         self._wanted, self.says = wanted, list[str]()
         self._seen, self._sum, self._offset = 0, 0.0, 0.0
         self._last = self._usual = np.nan
+        self._anew: list[float] = []
         self._spread = SpreadTimes(wanted.batch) if wanted.batch else None
 
     def of(self, columns: Mapping[str, Array], n: int) -> Array:
@@ -132,7 +143,10 @@ class RowTimes:
         offsets = np.full(len(t), self._offset)
         for i in np.flatnonzero(steps < 0).tolist():
             began = float(t[known[i]])
-            period = self._period(began - steps[i], began, scale)
+            before = began - steps[i]
+            period = self._period(before, began, scale)
+            if not period and _lasts(t[known[i : i + 2]], before):
+                period = self._started(before, began)
             offsets[known[i] :] += period
             self._offset += period
         self._last = float(t[known[-1]]) if len(known) else self._last
@@ -150,3 +164,19 @@ class RowTimes:
                 )
                 return period
         return 0.0
+
+    def _started(self, before: float, began: float) -> float:
+        """From the zero of a clock to that of its next start, s; 0 if there is none."""
+        if not 0 <= began < STARTED or before - began < NEAR * self._usual:
+            return 0.0
+        self._anew.append(before + self._offset)
+        first, *others = self._anew
+        again = f" (and {len(others)} times more)" if others else ""
+        self.says[:] = [one for one in self.says if not one.endswith(ANEW)]
+        self.says.append(f"its clock begins anew at {first:.4g} s{again}{ANEW}")
+        return before - began + max(BETWEEN, BETWEEN * self._usual)
+
+
+def _lasts(t: Array, before: float) -> bool:
+    """Whether a time is followed by one behind it, if by any, and not as before."""
+    return len(t) == 1 or bool(t[0] < t[1] < before)

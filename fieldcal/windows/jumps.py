@@ -4,7 +4,8 @@
 
 s is the noise of a row. A single wild row moves no median. At a jump between two rows
 (1) holds at five rows, or six with a wild one beside it; at a turn that was recorded it
-holds at more. At rest the first and the last median of a position differ by less.
+holds at more. At rest the first and the last median of a position differ by less, and
+its rows differ as much as those of another: who walks about meanwhile is told by that.
 Whoever presses a key at each position, and takes a hundred rows then, leaves such a
 recording.
 """
@@ -28,6 +29,9 @@ FAR = 8.0
 FEWEST_ROWS, FEWEST = 20, 3
 """Rows of a position, and positions, that tell such a recording from another."""
 
+ALIKE = 5.0
+"""Times by which rows of one position differ more than those of another, at most."""
+
 MOSTLY = 0.95
 """Part of the changes that are jumps, and of the positions that rest: a hand errs."""
 
@@ -39,6 +43,8 @@ class JumpRows(NamedTuple):
     ----------
     row, time : of each, (k,)
     before, after : the medians about it, (k, 3) m/s^2
+    steps : sum of what rows before it differ from the next, a jump at most, (k,)
+        m/s^2
 
     """
 
@@ -46,6 +52,7 @@ class JumpRows(NamedTuple):
     time: Array
     before: Array
     after: Array
+    steps: Array
 
 
 class Jumps:
@@ -55,6 +62,7 @@ class Jumps:
         self._held = concat([])
         self._rows = 0
         self._size = np.full(3, np.nan)
+        self._steps = self._least = 0.0
         self._changes: list[JumpRows] = []
         self._begin = self._end = (np.nan, np.full(3, np.nan))
 
@@ -66,7 +74,10 @@ class Jumps:
         if len(block) < 2 * HALF or not np.isfinite(block.acc).any(axis=0).all():
             return
         if np.isnan(self._size).any():
-            self._size = FAR * _noise(block.acc)
+            whole = block.acc[np.isfinite(block.acc).all(axis=1)]
+            apart = np.abs(np.diff(whole, axis=0))
+            self._size = FAR * _noise(apart)
+            self._least = float(np.nan_to_num(_least(apart), posinf=0.0).sum())
         view = np.lib.stride_tricks.sliding_window_view(block.acc, HALF, axis=0)
         middle = np.median(view, axis=-1)
         if np.isnan(self._begin[0]):
@@ -76,7 +87,12 @@ class Jumps:
         far: NDArray[np.bool_] = np.any(np.abs(after - before) > self._size, axis=1)
         at = np.flatnonzero(far)  # (1)
         row = at + HALF + self._rows - len(block)
-        self._changes.append(JumpRows(row, block.t[at + HALF], before[at], after[at]))
+        step = np.nan_to_num(np.abs(np.diff(block.acc[HALF - 1 : 1 - HALF], axis=0)))
+        steps = self._steps + np.cumsum(np.minimum(step, self._size).sum(axis=1))
+        self._steps = float(steps[-1])
+        self._changes.append(
+            JumpRows(row, block.t[at + HALF], before[at], after[at], steps[at])
+        )
 
     @property
     def positions(self) -> list[tuple[float, float]]:
@@ -94,15 +110,20 @@ class Jumps:
         closes = np.vstack([some.before[first], self._end[1]])
         rests = (np.abs(closes - begins) <= self._size).all(axis=1)
         middle = (first + last) // 2
-        return self._spans(some.row[middle], some.time[middle], rests)
+        return self._spans(JumpRows(*(x[middle] for x in some)), rests)
 
     def _spans(
-        self, row: NDArray[np.intp], time: Array, rests: NDArray[np.bool_]
+        self, some: JumpRows, rests: NDArray[np.bool_]
     ) -> list[tuple[float, float]]:
         """Start and end of each position, s, of which the next begin there."""
-        rows = np.diff(np.concatenate([[0], row, [self._rows]]))
+        time = some.time
+        rows = np.diff(np.concatenate([[0], some.row, [self._rows]]))
         long = rows >= FEWEST_ROWS
         if long.sum() < FEWEST or rests[long].mean() < MOSTLY:
+            return []
+        differ = np.diff(np.concatenate([[0.0], some.steps, [self._steps]])) / rows
+        quiet = max(float(differ[long].min()), self._least)
+        if (differ[long] > ALIKE * quiet).mean() > 1 - MOSTLY:
             return []
         starts = np.append(self._begin[0], time)
         ends = np.append(time, self._end[0])
@@ -111,12 +132,17 @@ class Jumps:
         return list(zip(starts[long].tolist(), ends[long].tolist(), strict=True))
 
 
-def _noise(acc: Array) -> Array:
-    """Standard deviation of a row by those beside it, (3,); of coarse ones a step."""
-    step = np.abs(np.diff(acc[np.isfinite(acc).all(axis=1)], axis=0))
+def _least(step: Array) -> Array:
+    """Least step that is one, (3,); inf where there is none."""
+    found: Array = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
+    return found
+
+
+def _noise(step: Array) -> Array:
+    """Standard deviation of a row by steps (n, 3); of coarse rows a step."""
     if not len(step):
         return np.full(3, np.nan)
     usual = DEVIATION * np.median(step, axis=0) / np.sqrt(2)
-    least = np.where(step > 0, step, np.inf).min(axis=0)
+    least = _least(step)
     noise: Array = np.maximum(usual, np.where(np.isfinite(least), least, 0.0))
     return noise

@@ -145,6 +145,17 @@ def test_a_heading_that_rests_contradict_is_asked_about(
     assert_same(imported(write(tmp_path, rows, heading=heading)), rows)
 
 
+def test_a_time_that_counts_rows_beside_axes_of_no_name_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(15, 50.0)[:, :4]
+    rows[:, 0] = np.arange(len(rows))
+    heading = "timestamp,signal_x,signal_y,signal_z"
+    assert main(["import", str(write(tmp_path, rows, heading=heading))]) == 2
+    said = capsys.readouterr().err
+    assert "its timestamp only counts rows: give the rate" in said
+
+
 def test_a_rate_by_which_no_unit_fits_may_be_another(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -217,6 +228,10 @@ def test_accelerations_without_gravity_are_refused(
     path = write(tmp_path, rows, heading=f"t [s],{names},gx,gy,gz")
     assert main(["import", str(path)]) == 2
     assert "gravity was taken out" in capsys.readouterr().err
+    bare = ",".join(f"box-12:estLinearAccel{x},box-12:valid" for x in "ZXY")
+    log = np.insert(rows[:, :4], [2, 3, 4], 1.0, axis=1)
+    assert main(["import", str(write(tmp_path, log, heading=f"Time,{bare}"))]) == 2
+    assert "less than gravity reads in any unit" in capsys.readouterr().err
 
 
 def test_a_unit_of_the_users_that_physics_contradicts_is_said(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import RowBatch
-from fieldcal.importing.row_times import SpreadTimes
+from fieldcal.importing.recording import ReadOptions, RowBatch
+from fieldcal.importing.row_times import BETWEEN, RowTimes, SpreadTimes
 
 EACH, STEP = 10, 0.1
 """Rows of a batch, and s from one to the next."""
@@ -64,3 +65,26 @@ def test_a_row_without_a_time_has_none() -> None:
     stamps[33] = np.nan
     found = spread(stamps)
     assert np.isnan(found[33]) and np.isfinite(np.delete(found, 33)).all()
+
+
+@pytest.mark.parametrize("cut", [0, 40, 61, 75])
+def test_the_clock_of_a_device_that_was_started_again_goes_on(cut: int) -> None:
+    """Twice; whatever passed meanwhile, the rows behind are 10 s later."""
+    each = 0.04 + 0.02 * np.arange(60)
+    clock = RowTimes(ReadOptions(("t",), time_unit="s"))
+    t = np.concatenate([179.3 + each, each, each + 0.5])
+    parts = [t[:cut], t[cut:]] if cut else [t]
+    got = np.concatenate([clock.of({"t": part}, len(part)) for part in parts])
+    steps = np.diff(got)
+    assert np.flatnonzero(steps > 1).tolist() == [59, 119]
+    np.testing.assert_allclose(steps[[59, 119]], BETWEEN)
+    assert len(clock.says) == 1 and "(and 1 times more)" in clock.says[0]
+
+
+def test_a_time_that_steps_back_for_another_reason_stays() -> None:
+    """One row alone, and a clock that is set back to where no start is."""
+    for odd in ([0.0], 100.0 + 0.02 * np.arange(60)):
+        t = np.concatenate([200 + 0.02 * np.arange(60), odd, [202.0, 202.02]])
+        clock = RowTimes(ReadOptions(("t",), time_unit="s"))
+        np.testing.assert_array_equal(clock.of({"t": t}, len(t)), t)
+        assert not clock.says

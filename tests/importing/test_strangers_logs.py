@@ -116,6 +116,7 @@ FORMS: dict[str, Writer] = {
     "between bars": tables,
     "lists in cells": lambda: "t,accel,gyro\n"
     + each('{},"[{}, {}, {}]","[{}, {}, {}]"', ROWS),
+    "tuples": lambda: each("{} ({}, {}, {}) ({}, {}, {})", ROWS),
     "as Python prints": lambda: "\n".join(
         str({"t": r[0], "acc": dict(zip("xyz", r[1:4], strict=True)), "gyro": r[4:]})
         for r in ROWS.tolist()

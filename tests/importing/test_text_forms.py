@@ -116,6 +116,8 @@ def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
         "Raw. Acc (m/s^2) [ {}, {}, {} ], Gyr (rad/s) [ {}, {}, {} ], Tmp (C) [ 25.1 ]",
         "Force in m/s^2\tX: {}\tY: {}\tZ: {}\tTurn in rad/s\tX: {}\tY: {}\tZ: {}",
         "Ax={} m/s²\tAy={} m/s²\tAz={} m/s²\tGx={} rad/s\tGy={} rad/s\tGz={} rad/s",
+        "ax {} ay {} az {} gx {} gy {} gz {}",
+        "accel: {{'x': {}, 'y': {}, 'z': {}}} gyro: {{'x': {}, 'y': {}, 'z': {}}}",
         "🌐 Accel: x:{} y:{} z:{}\n🌐 Gyro: x:{} y:{} z:{}",
         "Temperature 25.31 deg C\nAccel X: {} \tY: {} \tZ: {} m/s^2 \n"
         "Gyro X: {} \tY: {} \tZ: {} radians/s \n",

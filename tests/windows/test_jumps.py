@@ -79,6 +79,22 @@ def test_what_was_recorded_while_it_turned_is_no_such_recording() -> None:
     assert found(coarse) == []
 
 
+def test_who_walks_about_rests_nowhere() -> None:
+    for seed in (2, 4, 5, 6):
+        rng = np.random.default_rng(seed)
+        beat = np.outer(np.arange(270), [0.42, 0.84, 0.63]) + [0, 1, 2]
+        walk = [0, G, 0] + 3.4 * np.sin(beat) + rng.normal(0, 2.0, (270, 3))
+        rest = np.repeat([[-1.0, 9.6, -1.3], [2.7, 9.4, -0.3]], [60, 120], axis=0)
+        rest += rng.normal(0, 5 * NOISE, rest.shape)
+        assert found(np.vstack([rest[:60], walk, rest[60:]])) == []
+
+
+def test_coarse_rows_of_which_some_stay_and_others_flicker_rest_alike() -> None:
+    acc = np.round(rests(1, [80, 60, 90]) / 0.15) * 0.15
+    acc[:80] = acc[40]
+    assert len(found(acc)) == 3
+
+
 def test_rows_that_are_missing_are_no_jumps() -> None:
     acc = rests(6, [50, 70, 40, 60])
     holed = acc.copy()

@@ -223,7 +223,7 @@ def _bring(
     units = {"acceleration": args.acc_unit, "angular_rate": args.gyr_unit}
     if kept := {k: u for k, u in units.items() if u in UNSCALED}:
         about["units"] = kept
-    if args.rate:
+    if args.rate and recording.wanted.rate_hz:
         about["sampling"] = {"rate_hz": args.rate}
     guessed, bias = settle_units(recording, stream.name)
     if bias:

@@ -32,10 +32,12 @@ from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
 from fieldcal.importing.row_times import FRACTIONS
 from fieldcal.importing.time_units import (
+    NEAR,
     TICKED,
     counts_from_long_ago,
     shared_times,
     unit_by_rate,
+    unit_nearest,
     unit_of_ticks,
 )
 
@@ -187,6 +189,8 @@ class ColumnClock:
         said = self._of.rate_said()
         if self._own and said is None and counts_rows(t):
             raise InputError(f"{self._of.path}: {counted_question(wanted, table)}")
+        if wanted.rate_hz:
+            return self._beside_rate(wanted, wanted.rate_hz, t)
         names = [c.name for way in self._of.heading() for c in way.columns[at : at + 1]]
         unit, why = "", "its name says ticks"
         if said is not None:
@@ -199,6 +203,23 @@ class ColumnClock:
             return wanted
         self._of.guessed["time"] = f"{unit}: {why}"
         return replace(wanted, time_unit=unit)
+
+    def _beside_rate(self, wanted: ReadOptions, rate: float, t: Array) -> ReadOptions:
+        """Options with the unit of times (n,) that a rate beside them tells."""
+        unit, makes = unit_nearest(t, rate)
+        if not unit:
+            raise InputError(
+                f"{self._of.path}: its times make {rate:g} Hz in no unit: leave --rate"
+                " out, or name the columns with _ for that of the times"
+            )
+        if unit != "s":
+            self._of.guessed["time"] = f"{unit}: you say {rate:g} Hz"
+        if abs(np.log(makes / rate)) > NEAR:
+            self._of.says.append(
+                f"its times make {makes:.4g} Hz, not {rate:g} Hz as you say: they are"
+                " taken"
+            )
+        return replace(wanted, time_unit=unit, rate_hz=None)
 
     def _said(self, spread: ReadOptions) -> ReadOptions:
         """Options by which rows of one batch do not all have its time, and say so."""

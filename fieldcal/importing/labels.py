@@ -20,12 +20,16 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from fieldcal.importing.heading_units import unit_in
+from fieldcal.importing.heading_words import meaning
 
 TIME = "utc time [s]"
 """Name of the time that a monitor writes before a line."""
 
 TICKS = "time [ms]"
 """Name of the time since a device started."""
+
+CLOCKS = frozenset((TIME, TICKS))
+"""Names that each line of a row may have."""
 
 AXES = ("x", "y", "z")
 
@@ -39,8 +43,10 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LIST = re.compile(
     rf"(?<=[:=])\s*[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]"
 )
-_LISTED = re.compile(rf"(\([^()]*\))\s*\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]")
-"""Values in a list right behind a unit in brackets."""
+_LISTED = re.compile(
+    rf"(\([^()]*\)|[A-Za-z])\s*\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]"
+)
+"""Values in a list right behind a label or its unit in brackets."""
 
 _DICT = re.compile(
     r"\{\s*"
@@ -56,7 +62,7 @@ _PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={_NUMBER})")
 _SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
 """What stands before an axis: something else, and the label of all its axes."""
 
-_IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| \(([^()]+)\))( [xyzXYZ])?")
+_IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| ?\(([^()]+)\))( [xyzXYZ])?")
 """A label that says the unit of its values."""
 
 _LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
@@ -64,8 +70,16 @@ _VALUES = re.compile(rf"\s*({_NUMBER}(?:[\s,;|]+{_NUMBER})*)\s*(.*)", re.DOTALL)
 _STEM = re.compile(r"(.*[^\s_])[\s_]*[xyzXYZ]")
 """A label that ends with an axis, and what the other axes have before it."""
 
-_TICKS = re.compile(r"[EWIDV] \((\d+)\) [\w.-]+:\s*")
-"""What ESP-IDF writes before a line: its level, ms since the start, and a name."""
+_TICKS = re.compile(
+    r"[EWIDV] \((\d+)\) [\w.-]+:\s*|\[\s*(\d+)\]\[[EWIDV]\]\[[^\]]*\]\s*\w+\(\):\s*"
+)
+"""What ESP-IDF and Arduino write before a line: ms since the start, level and place."""
+
+_COLOURS = re.compile(r"\x1b\[[\d;]*m")
+"""Colours of a terminal."""
+
+_TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
+"""A line that holds nothing but a name."""
 
 _LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:-]*")
 """What programs write behind the time of a line."""
@@ -87,6 +101,7 @@ def labelled_values(line: str) -> list[Labelled]:
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
+    line = _COLOURS.sub("", line)
     line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
     line = _LISTED.sub(r"\1: \2", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
@@ -112,8 +127,40 @@ def labelled_values(line: str) -> list[Labelled]:
         if unit_in(behind):
             read = _with_unit(read, behind)
     first = [(TIME, arrival[1].strip())] if read and arrival else []
-    first += [(TICKS, ticks[1])] if read and ticks else []
+    first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
     return first + [(f"{n} [{u}]" if u else n, v) for n, v, u in read]
+
+
+class TitledValues:
+    """Labels and values of lines, of which some say what the axes behind them are of.
+
+    Attributes
+    ----------
+    titles : lines of that kind so far
+
+    >>> titled = TitledValues()
+    >>> [titled.of(line) for line in ("--- Gyro (deg/s) ---", "X: 1 Y: 2")]
+    [[], [('Gyro X [deg/s]', '1'), ('Gyro Y [deg/s]', '2')]]
+    """
+
+    def __init__(self) -> None:
+        self._title = self._unit = ""
+        self.titles = 0
+
+    def of(self, line: str) -> list[Labelled]:
+        """Labels and values of the next line."""
+        read = labelled_values(line)
+        title = None if read else _TITLE.fullmatch(line)
+        if title is not None:
+            bare, unit = _whole(" ".join(title[1].split()), [])
+            said = meaning(f"{bare} x")
+            if said is not None and said.kind:
+                self._title, self._unit = bare, f" [{unit}]" if unit else ""
+                self.titles += 1
+        if not self._title:
+            return read
+        return [(f"{self._title} {n}{self._unit}" if n.lower() in AXES else n, v)
+                for n, v in read]  # fmt: skip
 
 
 def _parted(line: str) -> list[tuple[str, str]]:
@@ -192,5 +239,5 @@ def repeated(lines: Iterable[str], names: Iterable[str]) -> set[str]:
 def names_of(rows: Iterable[Sequence[Labelled]]) -> list[str]:
     """Labels that come again and again, in their order."""
     seen = Counter(name for row in rows for name, _ in row)
-    usual = max(seen.values(), default=0)
+    usual = max((m for name, m in seen.items() if name not in CLOCKS), default=0)
     return [name for name, many in seen.items() if many >= OFTEN * usual]

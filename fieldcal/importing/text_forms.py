@@ -23,7 +23,13 @@ from collections.abc import Collection, Sequence
 
 from fieldcal.importing.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.clock_text import IN_LINE, ClockText, is_clock, is_date
-from fieldcal.importing.labels import labelled_values, names_of, repeated, shape
+from fieldcal.importing.labels import (
+    CLOCKS,
+    TitledValues,
+    names_of,
+    repeated,
+    shape,
+)
 from fieldcal.importing.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.rate_on_top import RateOnTop
 from fieldcal.importing.receiver_lines import ReceiverLines
@@ -139,10 +145,12 @@ class LabelledValues(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> LabelledValues | None:
         """The form, if most lines have it."""
-        read = [labelled_values(line) for line in lines]
+        titled = TitledValues()
+        read = [titled.of(line) for line in lines]
         many = [row for row in read if row]
         names = names_of(many)
-        if len(many) <= MOSTLY * len(lines) or len(names) < len("xyz"):
+        told = len(many) + titled.titles
+        if told <= MOSTLY * len(lines) or len(names) < len("xyz"):
             return None
         gathers = max(len(row) for row in many) < len(names)
         others = [one for one, row in zip(lines, read, strict=True) if not row]
@@ -151,18 +159,22 @@ class LabelledValues(TextForm):
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
         row: dict[str, str] = {}
+        titled = TitledValues()
 
         def read(lines: Sequence[str]) -> list[str]:
             found = []
             for line in lines:
-                said = labelled_values(line)
+                titles = titled.titles
+                said = titled.of(line)
+                bare = not said and titles == titled.titles
                 values = {k: v for k, v in said if k in self.names}
-                if not said and shape(line) not in self._others:
+                if bare and shape(line) not in self._others:
                     # no row: whoever reads rows says so
                     found.append(line)
-                if row.keys() & values.keys():
+                if (row.keys() & values.keys()) - CLOCKS:
                     found.append(self._row(row))
-                row.update(values)
+                # a row has the time of its first line
+                row.update({k: v for k, v in values.items() if k not in row})
                 if len(row) == len(self.names):
                     found.append(self._row(row))
             return found

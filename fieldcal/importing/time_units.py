@@ -99,6 +99,9 @@ TICKS = ("0.1ms", "us")
 TICKED_HZ = (4.0, 2000.0)
 """Rates of the devices that count them: of two units, one alone is within."""
 
+ABOUT = float(np.log(3.0))
+"""Logarithm by which a rate is out that somebody says, and his device does not keep."""
+
 NEAR = 0.1
 """Part by which a rate that is said and that of the times differ."""
 
@@ -113,6 +116,22 @@ def unit_by_rate(t: Array, rate_hz: float) -> str:
     near = [u for u, size in TIME_UNITS.items()
             if step and abs(np.log(rate_hz * step * size)) < NEAR]  # fmt: skip
     return near[0] if near else ""
+
+
+def unit_nearest(t: Array, rate_hz: float) -> tuple[str, float]:
+    """Unit in which times (n,) come about at a rate, and the rate they make.
+
+    "" if in none within a factor of three, or of unusual ones within a tenth.
+
+    >>> unit_nearest(np.arange(100) * 13.0, 100.0)[0]
+    'ms'
+    """
+    step = _step(t)
+    units = {*TIME_SIZES, unit_by_rate(t, rate_hz)} - {""}
+    rates = {u: 1 / (step * TIME_UNITS[u]) for u in units if step}
+    away = {u: abs(np.log(rate / rate_hz)) for u, rate in rates.items()}
+    unit = min(away, key=away.__getitem__, default="")
+    return (unit, rates[unit]) if unit and away[unit] < ABOUT else ("", np.nan)
 
 
 def unit_of_ticks(t: Array) -> str:

@@ -275,6 +275,29 @@ def test_ticks_of_a_device_are_told_by_the_rate_or_by_their_name(
     )
 
 
+@pytest.mark.parametrize(
+    ("rate", "says"),
+    [("50", ""), ("76", "its times make 50 Hz, not 76 Hz as you say"),
+     ("3000", "its times make 3000 Hz in no unit")],
+)  # fmt: skip
+def test_a_rate_beside_times_tells_their_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rate: str, says: str
+) -> None:
+    """They were taken for seconds: a recording of a minute lasted a day."""
+    rows = turned(16, 50.0)
+    log = rows.copy()
+    log[:, 0] *= 1e3
+    path = write(tmp_path, log, heading="t,ax,ay,az,gx,gy,gz")
+    if rate == "3000":
+        assert main(["import", str(path), "--rate", rate]) == 2
+    else:
+        session = imported(path, "--rate", rate)
+        assert_same(session, rows)
+        assert "sampling" not in session.about.raw
+        assert session.about.raw["guessed"]["time"] == f"ms: you say {rate} Hz"
+    assert says in capsys.readouterr().err
+
+
 def test_days_of_a_spreadsheet_are_seconds(tmp_path: Path) -> None:
     rows = turned(5, 50.0)
     days = np.column_stack([45415.9 + rows[:, 0] / 86400, rows[:, 1:]])

@@ -117,6 +117,11 @@ def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
         "Force in m/s^2\tX: {}\tY: {}\tZ: {}\tTurn in rad/s\tX: {}\tY: {}\tZ: {}",
         "Ax={} m/s²\tAy={} m/s²\tAz={} m/s²\tGx={} rad/s\tGy={} rad/s\tGz={} rad/s",
         "ax {} ay {} az {} gx {} gy {} gz {}",
+        "RAW. Acc [ {}, {}, {} ], Gyr [ {}, {}, {} ], Tmp [ 25.1 ]",
+        "--- Accelerometer (m/s^2) ---\nX: {} Y: {} Z: {}\n"
+        "--- Gyroscope (rad/s) ---\nX: {} Y: {} Z: {}",
+        "Accelerometer data:\nX = {}\nY = {}\nZ = {}\n"
+        "Gyroscope data:\nX = {}\nY = {}\nZ = {}\n",
         "accel: {{'x': {}, 'y': {}, 'z': {}}} gyro: {{'x': {}, 'y': {}, 'z': {}}}",
         "🌐 Accel: x:{} y:{} z:{}\n🌐 Gyro: x:{} y:{} z:{}",
         "Temperature 25.31 deg C\nAccel X: {} \tY: {} \tZ: {} m/s^2 \n"
@@ -159,6 +164,25 @@ def test_quoted_numbers_with_decimal_commas(tmp_path: Path) -> None:
 def test_what_is_no_label_is_left_alone() -> None:
     assert labelled_values("Fs: 100 measured by a clock") == []
     assert labelled_values("1.0,2.0,3.0") == []
+
+
+@pytest.mark.parametrize(
+    "prefix",
+    ["{:%H:%M:%S.%f} -> ", "\x1b[0;32mI ({ms}) IMU: ",
+     "[{ms:6d}][I][main.cpp:4] loop(): "],
+)  # fmt: skip
+def test_each_line_of_a_row_may_have_its_time(tmp_path: Path, prefix: str) -> None:
+    row = "Acceleration X: {}, Y: {}, Z: {} m/s^2\nRotation X: {}, Y: {}, Z: {} rad/s"
+    lines = []
+    for i in range(ROWS):
+        said = prefix.format(when(i), ms=300 + round(i * 1e3 / RATE))
+        both = row.format(*values(i)).split("\n")
+        lines += [said + line for line in (*both, "Temperature: 25.1 degC", "")]
+    unit = "s" if "->" in prefix else "ms"
+    got = read(tmp_path, "\n".join(lines) + "\n", time_unit=unit)
+    np.testing.assert_array_equal(got.acc[:, 0], AX)
+    np.testing.assert_allclose(got.gyr, [[0.01, -0.02, 0.03]] * ROWS)
+    np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE, atol=2e-6)
 
 
 def test_a_row_with_a_name_and_no_number_is_damaged(tmp_path: Path) -> None:

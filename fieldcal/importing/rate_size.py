@@ -34,6 +34,9 @@ _SWUNG = 0.3
 _OFTEN, _RAIL = 5, 1.5
 """Rows at one value that are a rail, and how far it is out, in standard deviations."""
 
+_UPRIGHT = 0.25
+"""Part of a turn about the vertical that seems to tilt gravity: biases of 0.25 g."""
+
 _LAG = 0.5
 """Time over which (1) is integrated, s: jerks of a hand are shorter."""
 
@@ -67,7 +70,8 @@ def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> tuple[floa
 
     Root of the mean square; () where nothing tells. What the accelerometers show is
     more than it turned, by their noise and by the forces of whoever moves the device;
-    so in the right unit rates cannot say much more.
+    so in the right unit rates cannot say much more. Nor is that told by rates about the
+    vertical: of those a bias of the accelerometers alone makes a part.
 
     Parameters
     ----------
@@ -78,6 +82,8 @@ def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> tuple[floa
     if sides is None:
         return ()
     n = len(sides.left)
+    if np.linalg.norm(sides.right) < _UPRIGHT * np.linalg.norm(sides.angles):
+        return ()
     return float(np.linalg.norm(sides.right) / np.sqrt(n)), float(
         np.sqrt(sides.moved / n)
     )
@@ -89,6 +95,7 @@ class _Sides(NamedTuple):
     Attributes
     ----------
     left, right : (n, 3) change of u, and what the rates make of it
+    angles : (n, 3) integrals of the rates
     lag : rows
     moved : sum of the squares of the left one
     clipped : whether a rate was at its rail
@@ -98,6 +105,7 @@ class _Sides(NamedTuple):
 
     left: Array
     right: Array
+    angles: Array
     lag: int
     moved: float
     clipped: bool
@@ -125,14 +133,15 @@ class _Sides(NamedTuple):
         turning = np.cross(up, gyr)
         swung = (np.abs(length - 1) > _SWUNG) | clipped
         steps[swung[1:] | swung[:-1]] = np.nan
-        right = _over((turning[1:] + turning[:-1]) / 2 * steps[:, None], lag)
+        right, angles = (_over((x[1:] + x[:-1]) / 2 * steps[:, None], lag)
+                         for x in (turning, gyr))  # fmt: skip
         left = up[lag:] - up[:-lag]
         told = np.isfinite(right).all(axis=1)
-        left, right = left[told], right[told]
+        left, right, angles = left[told], right[told], angles[told]
         if not right.any():
             return None
-        return cls(left, right, lag, float((left**2).sum()), bool(clipped.any()),
-                   t, whole, gyr)  # fmt: skip
+        moved = float((left**2).sum())
+        return cls(left, right, angles, lag, moved, bool(clipped.any()), t, whole, gyr)
 
 
 def _at_rails(gyr: Array) -> NDArray[np.bool_]:

@@ -156,6 +156,17 @@ def test_a_time_that_counts_rows_beside_axes_of_no_name_is_said(
     assert "its timestamp only counts rows: give the rate" in said
 
 
+def test_a_fast_table_and_a_bias_are_no_other_unit(tmp_path: Path) -> None:
+    rng = np.random.default_rng(17)
+    rate = np.repeat([0.0, 200.0, 0.0, -300.0, 0.0], 300)
+    acc = rng.normal([0.6, -0.1, 9.9], 0.03, (len(rate), 3))
+    gyr = np.outer(rate, [0.01, 0.015, 1.0]) + rng.normal(0, 0.1, (len(rate), 3))
+    rows = np.column_stack([np.arange(len(rate)) / 50, acc, np.deg2rad(gyr)])
+    log = np.column_stack([rows[:, :4], gyr])
+    heading = "t,ax,ay,az,gx [deg/s],gy [deg/s],gz [deg/s]"
+    assert_same(imported(write(tmp_path, log, heading=heading)), rows)
+
+
 def test_a_rate_by_which_no_unit_fits_may_be_another(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -33,7 +33,9 @@ def signed(value: int) -> bytes:
     return unsigned(2 * value if value >= 0 else -2 * value - 1)
 
 
-def header(scale: float, firmware: str = "Cleanflight", fields: str = "") -> bytes:
+def header(
+    scale: float, firmware: str = "Cleanflight", fields: str = "", more: str = ""
+) -> bytes:
     bits = struct.unpack("<I", struct.pack("<f", scale))[0]
     names = fields or ",".join(FIELDS)
     many = len(names.split(","))
@@ -47,6 +49,7 @@ def header(scale: float, firmware: str = "Cleanflight", fields: str = "") -> byt
         f"Field P predictor:{','.join('6' if not i else '1' for i in range(many))}",
         f"Field P encoding:{','.join('9' if not i else '0' for i in range(many))}",
         f"Firmware type:{firmware}", f"gyro_scale:0x{bits:08x}", "acc_1G:2048",
+        *([more] if more else []),
     ]  # fmt: skip
     return "".join(f"H {line}\n" for line in lines).encode()
 

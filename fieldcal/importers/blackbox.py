@@ -2,9 +2,10 @@
 
 A stream is a flight: a recorder appends one log behind the other. ``accSmooth`` counts
 ``acc_1G`` in one g, ``gyroADC`` times ``gyro_scale`` is deg/s (rad/us where Baseflight
-wrote it), ``time`` is us. Both went through the firmware's filters, the gyroscopes less
-what they showed when it was armed. Frames are read by `orangebox`.
-Source: Betaflight, Blackbox logging internals.
+wrote it), a tenth of it where ``blackbox_high_resolution`` is on, ``time`` is us. Both
+went through the firmware's filters, the gyroscopes less what they showed when it was
+armed. Frames are read by `orangebox`.
+Source: Betaflight, Blackbox logging internals; blackbox.c, blackboxHighResolutionScale.
 """
 
 from __future__ import annotations
@@ -33,6 +34,9 @@ ROWS = 1 << 14
 ACC = tuple(f"accSmooth[{i}]" for i in range(3))
 GYR = tuple(f"gyroADC[{i}]" for i in range(3))
 TIME = "time"
+
+FINE, FINER = "blackbox_high_resolution", 10.0
+"""Setting by which gyroADC is so many times as large, to lose less by rounding."""
 
 MEANT = "Baseflight"
 """Firmware whose gyro_scale is rad/us."""
@@ -69,7 +73,7 @@ class BlackboxLog(Recording):
         with on_disk(self.path, self.cut_off) as path:
             headers = self._opened(path, _number(stream)).headers
         said = ("Firmware type", "Firmware revision", "Craft name", "acc_1G",
-                "gyro_scale", "gyro_lowpass_hz", "acc_lpf_hz")  # fmt: skip
+                "gyro_scale", FINE, "gyro_lowpass_hz", "acc_lpf_hz")  # fmt: skip
         return {"message": stream, "acc_unit": "m/s^2", "gyr_unit": "rad/s"} | {
             name: str(headers[name]) for name in said if name in headers
         }
@@ -132,6 +136,7 @@ def _scales(path: Path, headers: Mapping[str, Any]) -> tuple[float, float]:
     whole = int(said, 16) if isinstance(said, str) else int(said)
     # a number is written as the bits of a float
     gyr = struct.unpack("<f", struct.pack("<I", whole))[0] if whole > 1 else 1.0
+    gyr /= FINER if str(headers.get(FINE, "0")) not in ("0", "OFF") else 1
     is_rad = str(headers.get("Firmware type", "")) == MEANT
     return G0 / counts, gyr * 1e6 if is_rad else float(np.deg2rad(gyr))
 

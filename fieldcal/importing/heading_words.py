@@ -41,6 +41,14 @@ _PHRASES = (
     (("linear", "accel"), "linear"),
     (("accelerometer", "acceleration"), "a"),
 )
+_GAINS = (
+    (("delta", "angle"), "g"),
+    (("delta", "theta"), "g"),
+    (("delta", "velocity"), "a"),
+    (("delta", "vel"), "a"),
+)
+"""Names of what angle and velocity gained since the row before."""
+
 _TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "sensortime",
           "zeit", "tiempo", "temps", "tempo", "tijd", "时间", "sow", "tow")  # fmt: skip
 _SINCE = ("elapsed", "epoch", "uptime", "since", "start", "boot")
@@ -63,6 +71,9 @@ MEAN = ("mean", "avg", "average")
 
 REFERENCE = ("true", "truth", "ref", "reference", "expected", "ideal")
 """Words of columns that hold what an output ought to be."""
+
+_ANGLES: dict[tuple[str, ...], str] = {("rad",): "rad/s", ("deg",): "deg/s"}
+"""Units of rates of which the name says the angle alone: PX4's ``gyro_rad[0]``."""
 
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
@@ -119,8 +130,10 @@ def meaning(name: str, unit: str = "") -> Meaning | None:
         if found is None or (said is not None and said not in UNITS[found.kind]):
             continue
         if found.kind or said is not None:
+            angle = bare_label(found.label) if found.kind == "g" else ()
             return found._replace(
                 kind=found.kind or _kind_of(said),
+                unit=_ANGLES.get(angle) if found.unit is None else found.unit,
                 weak=found.weak or bool({*_WITHOUT_GRAVITY} & {*found.label}),
             )
     return None
@@ -158,11 +171,12 @@ def _of_words(words: list[str], unit: str | None) -> Meaning | None:
         return Meaning("temperature", "", unit, tuple(w for w in words if w != "t"))
     if (step := _step(words, unit)) is not None:
         return step
-    for phrase, kind in _PHRASES:
+    for phrase, kind in (*_PHRASES, *_GAINS):
         if (at := _place(words, phrase)) is not None:
             rest = words[:at] + words[at + len(phrase) :]
-            weak = kind == "linear"
-            return _with_axis("a" if weak else kind, rest, unit, weak)
+            # of gains as well, what was measured itself goes before them
+            weak = kind == "linear" or (phrase, kind) in _GAINS
+            return _with_axis("a" if kind == "linear" else kind, rest, unit, weak)
     for i, word in enumerate(words):
         rest = words[:i] + words[i + 1 :]
         kind = next((k for k, names in _SENSORS.items() if word[:-1] in names), "")

@@ -21,6 +21,7 @@ from fieldcal.importing.heading_words import (
     Meaning,
     bare_label,
     meaning,
+    words_of,
 )
 from fieldcal.importing.recording import ReadOptions
 
@@ -34,6 +35,9 @@ FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air"
 
 G_FORCE = (("g",), ("g", "force"))
 """Words of ``gFx``: a program that writes it calls ``ax`` what has no gravity in it."""
+
+ROS = (("angular", "velocity"), ("linear", "acceleration"))
+"""Words of the axes of ROS's sensor_msgs/Imu, which is defined in rad/s."""
 
 OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "log")
 """Words of times that are another clock's than the device's."""
@@ -72,6 +76,7 @@ class HeadingMatch:
     units : said by the names, by kind of channel; None where they say none
     name : of the IMU, "0" where there is one
     says : what the user must know of them, a sentence each
+    usual : unit that rates of such names are in; "" where names tell none
 
     """
 
@@ -79,6 +84,7 @@ class HeadingMatch:
     units: Mapping[str, str | None]
     name: str = "0"
     says: tuple[str, ...] = ()
+    usual: str = ""
 
     def taken(self, wanted: ReadOptions) -> ReadOptions:
         """Return what the user says, with what the names say."""
@@ -93,6 +99,7 @@ class HeadingMatch:
             time_unit=units.get("t") or wanted.time_unit,
             temp_unit=wanted.temp_unit or ("degC" if units.get("temperature") else ""),
             named=frozenset(by_name),
+            usual=self.usual,
         )
 
     def sentence(self, wanted: ReadOptions) -> str:
@@ -129,7 +136,7 @@ def read(
         and (said := meaning(column.name, column.unit)) is not None
         and (said.kind == "t" or not set(said.label) & set(NOT_SAMPLES))
     ]
-    named = _with_gravity(_with_temperature(columns, _measured(named)))
+    named = _with_gravity(_with_rates(_with_temperature(columns, _measured(named))))
     acc, gyr = _triads(named, "a"), _triads(named, "g")
     if acc is None or gyr is None:
         return ()
@@ -139,7 +146,7 @@ def read(
     lacking = all(one.says.weak for three in acc.values() for one in three)
     if not gyr and lacking and not weak:
         return ()
-    times = _one([n for n in named if n.says.kind == "t"], OTHER_CLOCK)
+    times = _one(_stamps([n for n in named if n.says.kind == "t"]), OTHER_CLOCK)
     times = times or [n for n in named if n.says.kind == "dt"][:1]
     apart = [n for n in named if n.says.kind == "l"]
     found = []
@@ -180,6 +187,13 @@ def _measured(named: Sequence[Named]) -> list[Named]:
     ought = [n for n in named if set(n.says.label) & set(REFERENCE)]
     outputs = {n.says.kind for n in named if n not in ought}
     return [n for n in named if n not in ought or n.says.kind not in outputs]
+
+
+def _with_rates(named: Sequence[Named]) -> list[Named]:
+    """Columns without those of gains of angle, where rates are there."""
+    rates = [n for n in named if n.says.kind == "g"]
+    gains = [n for n in rates if n.says.weak]
+    return [n for n in named if n not in gains or len(gains) == len(rates)]
 
 
 def _with_gravity(named: Sequence[Named]) -> list[Named]:
@@ -239,6 +253,12 @@ def _one(named: Sequence[Named], but: Sequence[str]) -> list[Named]:
     )[:1]
 
 
+def _stamps(times: Sequence[Named]) -> list[Named]:
+    """Times at which messages were measured, where those of their arrival are there."""
+    whole = [n for n in times if n.says.unit is None and "header" in n.says.label]
+    return whole or [*times]
+
+
 def _thermometer(
     named: Iterable[Named], label: tuple[str, ...]
 ) -> tuple[list[Named], tuple[str, ...]]:
@@ -276,4 +296,6 @@ def _match(
         found.append(f"{channel}={column.place}" if column.place else channel)
         if UNITS[said.kind]:
             units["t" if said.kind == "dt" else said.kind] = said.unit
-    return HeadingMatch(tuple(found), units, name, says)
+    axes = [words_of(columns[n.number].name) for n in chosen if n.says.axis]
+    ros = all(any({*part} <= {*words} for part in ROS) for words in axes)
+    return HeadingMatch(tuple(found), units, name, says, "rad/s" if ros else "")

@@ -37,6 +37,15 @@ _OFTEN, _RAIL = 5, 1.5
 _UPRIGHT = 0.25
 """Part of a turn about the vertical that seems to tilt gravity: biases of 0.25 g."""
 
+STIRS, TIMES = 0.01, 20.0
+"""Turn within half a second, rad, that no noise of rates makes, and how many times what
+gravity shows it is where the unit is another: of deg/s some fifty. Of what flies it is
+a few, which feels its thrust and not gravity."""
+
+BIAS, STAYS = 0.5, 0.95
+"""Bias that no gyroscope has, rad/s: 30 deg/s; and length of the mean of the directions
+of gravity, of which each has length 1, where it stays."""
+
 _LAG = 0.5
 """Time over which (1) is integrated, s: jerks of a hand are shorter."""
 
@@ -65,28 +74,79 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
     return closing_scale(sides.t, sides.up, sides.gyr, power / both)
 
 
-def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> tuple[float, ...]:
-    """By how much gravity turns within half a second as rates say, and as it does, rad.
+class Turns(NamedTuple):
+    """By how much gravity turns within half a second, rad, root of the mean square.
 
-    Root of the mean square; () where nothing tells. What the accelerometers show is
-    more than it turned, by their noise and by the forces of whoever moves the device;
-    so in the right unit rates cannot say much more. Nor is that told by rates about the
-    vertical: of those a bias of the accelerometers alone makes a part.
+    What the accelerometers show is more than it turned, by their noise and by the
+    forces of whoever moves the device; so in the right unit rates cannot say much more.
+    Nor can what remains of them on the average, where gravity stays: it is their bias.
+    Rates about the vertical tell nothing: of those a bias of the accelerometers alone
+    makes a part.
+
+    Attributes
+    ----------
+    said : as the rates say, less their median, were they rad/s
+    shown : as the accelerometers show
+    bias : rate about a level axis that would be a bias then, rad/s
+
+    """
+
+    said: float
+    shown: float
+    bias: float
+
+    def allow(self, size: float, times: float = TIMES) -> bool:
+        """Whether rates can be in a unit in which 1 rad/s reads `size`.
+
+        They say no more than so many times what gravity shows.
+        """
+        turns = self.said / size < max(STIRS, times * self.shown)
+        return turns and self.bias / size < BIAS
+
+    def odd(self) -> str:
+        """What cannot be if rates are rad/s."""
+        said, shown, bias = np.rad2deg([self.said, self.shown, self.bias])
+        if self.bias > BIAS and self.said < max(STIRS, TIMES * self.shown):
+            return f"{bias:.2g} deg/s would be left at rest, which is no bias"
+        return (
+            f"gravity would turn by {said:.2g} deg within half a second then, and turns"
+            f" by {shown:.2g} deg at most"
+        )
+
+
+def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> Turns | None:
+    """By how much gravity turns as rates say, and as it does; None if nothing tells.
 
     Parameters
     ----------
-    t, acc, gyr, gravity : as of `rate_in`, but rates in rad/s
+    t, acc, gyr, gravity : as of `rate_in`
 
     """
     sides = _Sides.of(t, acc, gyr, gravity)
     if sides is None:
-        return ()
-    n = len(sides.left)
-    if np.linalg.norm(sides.right) < _UPRIGHT * np.linalg.norm(sides.angles):
-        return ()
-    return float(np.linalg.norm(sides.right) / np.sqrt(n)), float(
-        np.sqrt(sides.moved / n)
+        return None
+    up = sides.up / np.maximum(np.linalg.norm(sides.up, axis=1), 0.1)[:, None]
+    mean = up.mean(axis=0)
+    stays = float(np.linalg.norm(mean)) > STAYS
+    about = np.cross(mean, sides.usual) if stays else np.zeros(3)
+    said, shown, angle = (_size(x, sides.lag // 2)
+                          for x in (sides.right, sides.left, sides.angles))  # fmt: skip
+    upright = said < _UPRIGHT * angle
+    level = float(np.linalg.norm(about))
+    steady = level < _UPRIGHT * np.linalg.norm(sides.usual)
+    return Turns(
+        said=0.0 if upright else said,
+        shown=shown,
+        bias=0.0 if steady else level,
     )
+
+
+def _size(turns: Array, many: int) -> float:
+    """Root of the mean square of turns (n, 3), averaged over so many of them."""
+    many = min(max(many, 1), len(turns))
+    total = np.cumsum(np.vstack([np.zeros((1, 3)), turns]), axis=0)
+    mean = (total[many:] - total[:-many]) / many
+    return float(np.sqrt((mean**2).sum(axis=1).mean()))
 
 
 class _Sides(NamedTuple):
@@ -100,6 +160,7 @@ class _Sides(NamedTuple):
     moved : sum of the squares of the left one
     clipped : whether a rate was at its rail
     t, up, gyr : (m,), (m, 3) of the rows that are known; the rates without their median
+    usual : (3,) that median
 
     """
 
@@ -112,6 +173,7 @@ class _Sides(NamedTuple):
     t: Array
     up: Array
     gyr: Array
+    usual: Array
 
     @classmethod
     def of(cls, t: Array, acc: Array, gyr: Array, gravity: Gravity) -> Self | None:
@@ -129,7 +191,8 @@ class _Sides(NamedTuple):
         clipped = _at_rails(gyr)
         whole = (acc - gravity.offset) / gravity.size
         length = np.maximum(np.linalg.norm(whole, axis=1), 0.1)
-        up, gyr = whole / length[:, None], gyr - np.median(gyr, axis=0)
+        usual = np.median(gyr, axis=0)
+        up, gyr = whole / length[:, None], gyr - usual
         turning = np.cross(up, gyr)
         swung = (np.abs(length - 1) > _SWUNG) | clipped
         steps[swung[1:] | swung[:-1]] = np.nan
@@ -141,7 +204,8 @@ class _Sides(NamedTuple):
         if not right.any():
             return None
         moved = float((left**2).sum())
-        return cls(left, right, angles, lag, moved, bool(clipped.any()), t, whole, gyr)
+        return cls(left, right, angles, lag, moved, bool(clipped.any()),
+                   t, whole, gyr, usual)  # fmt: skip
 
 
 def _at_rails(gyr: Array) -> NDArray[np.bool_]:

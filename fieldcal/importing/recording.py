@@ -105,6 +105,7 @@ class ReadOptions:
     unsigned : kinds of channel (a, g) in 16 bits of which the sign was not read
     reversed : channels whose axis points the other way in the file
     batch : rows that share a time, where they do
+    usual : unit of rates that such names of columns have; "" where they tell none
 
     """
 
@@ -125,6 +126,7 @@ class ReadOptions:
     unsigned: frozenset[str] = frozenset()
     reversed: frozenset[str] = frozenset()
     batch: RowBatch | None = None
+    usual: str = ""
 
     @property
     def acc_scale(self) -> float:

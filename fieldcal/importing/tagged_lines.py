@@ -17,6 +17,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self
 
 from fieldcal.importing.heading_words import meaning
+from fieldcal.importing.nearest_lines import NearestLines
 from fieldcal.importing.text_form import MOSTLY, Reader, TextForm
 from fieldcal.importing.text_top import cells, is_number, separator_of
 
@@ -35,9 +36,6 @@ PLACES = 3
 
 FEWEST = 2
 """Lines of a kind that is none by chance."""
-
-WAITING = 1000
-"""Lines that wait for one of the gyroscope: it may end before."""
 
 _WORD = re.compile(r"[^\W\d][^,;\t]*")
 
@@ -98,7 +96,7 @@ class TaggedLines(TextForm):
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
-        pairs = _Pairs()
+        pairs = NearestLines()
 
         def read(lines: Sequence[str]) -> list[str]:
             found = []
@@ -124,42 +122,6 @@ class TaggedLines(TextForm):
     def _of_gyroscope(self, row: Sequence[str]) -> list[str]:
         """Cells of a line of the gyroscope, but its word and time."""
         return [c for i, c in enumerate(row) if i not in (self._place, self._time)]
-
-
-class _Pairs:
-    """Puts each line of one sensor beside the nearest of the other."""
-
-    def __init__(self) -> None:
-        self._waiting: list[tuple[float, list[str]]] = []
-        self._last: tuple[float, list[str]] | None = None
-        self._before = self._step = float("nan")
-
-    def force(self, t: float, row: list[str]) -> list[list[str]]:
-        """Take a line of the accelerometer in; return those that wait in vain."""
-        self._step = t - self._before if t > self._before else self._step
-        self._before = t
-        self._waiting.append((t, row))
-        many = len(self._waiting) - WAITING
-        late, self._waiting = (
-            self._waiting[: max(many, 0)],
-            self._waiting[max(many, 0) :],
-        )
-        return [self._beside(*one, None) for one in late]
-
-    def rate(self, t: float, row: list[str]) -> list[list[str]]:
-        """Take a line of the gyroscope in; return all that wait, each with one."""
-        found = [self._beside(*one, (t, row)) for one in self._waiting]
-        self._waiting, self._last = [], (t, row)
-        return found
-
-    def _beside(
-        self, t: float, row: list[str], new: tuple[float, list[str]] | None
-    ) -> list[str]:
-        near = [one for one in (self._last, new) if one is not None]
-        nearest = min(near, key=lambda one: abs(one[0] - t))
-        # what is further than a step belongs to another line
-        far = abs(nearest[0] - t) > self._step
-        return [*row, *([""] * len(nearest[1]) if far else nearest[1])]
 
 
 def _is_word(rows: Sequence[Sequence[str]], i: int) -> bool:

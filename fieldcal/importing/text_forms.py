@@ -23,6 +23,7 @@ from collections.abc import Collection, Sequence
 
 from fieldcal.importing.cell_forms import BarTable, HexCells, ListCells
 from fieldcal.importing.clock_text import IN_LINE, ClockText, is_clock, is_date
+from fieldcal.importing.dataflash_text import DataflashText
 from fieldcal.importing.labels import (
     CLOCKS,
     TitledValues,
@@ -42,8 +43,6 @@ CLOCK = "utc time [s]"
 
 _ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*->\s*")
 
-_DEFINED = re.compile(r"FMT,\s*\d+,\s*\d+,\s*IMU,\s*\w+,\s*(.*)")
-
 
 def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
     """Forms of a text by its first lines, in the order in which they are undone.
@@ -61,45 +60,6 @@ def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
             found.append(one)
             lines = one.reader()(lines)
     return found
-
-
-class DataflashText(TextForm):
-    """A dataflash log as text: of its messages, those of the first IMU."""
-
-    gathers = True
-    says = (
-        "it is the text of a dataflash log, of which the first IMU alone is read: its"
-        " .bin has all of them, with what was installed"
-    )
-
-    def __init__(self, fields: Sequence[str], separator: str | None) -> None:
-        self._instance = fields.index("I") if "I" in fields else None
-        named = ["temperature" if name == "T" else name for name in fields]
-        self.names, self._separator = tuple(named), separator
-
-    @classmethod
-    def of(cls, lines: Sequence[str], separator: str | None) -> DataflashText | None:
-        """The form, if it begins with what defines a message."""
-        if not lines or not lines[0].startswith("FMT,"):
-            return None
-        said = next((m for line in lines if (m := _DEFINED.match(line))), None)
-        return cls(["", *cells(said[1], ",")], separator) if said else None
-
-    def reader(self) -> Reader:
-        """Return what reads a text of this form from its beginning."""
-        first: list[str] = []
-
-        def is_wanted(line: str) -> bool:
-            row = cells(line, ",")
-            if row[0] != "IMU" or len(row) != len(self.names):
-                return False
-            if self._instance is None:
-                return True
-            if not first:
-                first.append(row[self._instance])
-            return row[self._instance] == first[0]
-
-        return lambda lines: [line for line in lines if is_wanted(line)]
 
 
 class QuotedCells(TextForm):

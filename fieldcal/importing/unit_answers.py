@@ -41,10 +41,3 @@ def as_written(fits: list[Scale], values: Array) -> list[Scale]:
     known = values[np.isfinite(values)]
     plain = [fit for fit in fits if fit.lsb == 1]
     return plain if plain and (known != np.round(known)).any() else fits
-
-
-def unusual(gyr: Array) -> list[str]:
-    """Options for rates of which no turn tells: counts, if they are whole numbers."""
-    if (gyr == np.round(gyr)).all():
-        return answers("gyr", [*USUAL_COUNTS], "deg/s", 16.4)
-    return ["--gyr-unit deg/s", "--gyr-unit rad/s, if it is so"]

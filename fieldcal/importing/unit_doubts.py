@@ -18,10 +18,6 @@ from fieldcal.session.units import UNSCALED
 FAR = 0.25
 """Logarithm of what no sensor in the unit that is said is out by."""
 
-STIRS, TIMES = 0.01, 4.0
-"""Turn within half a second, rad, that no noise of rates makes, and how many times what
-gravity shows it is where the unit is another."""
-
 NO_GRAVITY = 0.05
 """Part of g below which gravity was taken out; mg and g in m/s^2 read otherwise."""
 
@@ -103,17 +99,12 @@ class SaidUnits:
     def _of_calm(self, block: Block, gravity: Gravity) -> list[str]:
         """Rates by which gravity would turn where it does not."""
         turns = turns_said(block.t, block.acc, block.gyr, gravity)
-        if not turns or turns[0] < max(STIRS, TIMES * turns[1]):
+        if turns is None or turns.allow(1):
             return []
-        said, is_so = np.rad2deg(turns)
         plain = [s for s in GYR_SCALES if s.lsb == 1]
         size = self._said.gyr_scale
-        fits = [s.unit for s in plain if turns[0] / s.size / size < turns[1]][:1]
-        shows = (
-            f"gravity would turn by {said:.2g} deg within half a second then, and turns"
-            f" by {is_so:.2g} deg at most"
-        )
-        return self._contradict("g", shows, "--gyr-unit", fits)
+        fits = [s.unit for s in plain if turns.allow(size * s.size)][:1]
+        return self._contradict("g", turns.odd(), "--gyr-unit", fits)
 
     def _unit(self, kind: str) -> str:
         return self._said.acc_unit if kind == "a" else self._said.gyr_unit

@@ -15,8 +15,9 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
+from fieldcal.importing.calm_rates import calm_rates
 from fieldcal.importing.gravity_size import Gravity, are_means, gravity_in, with_length
-from fieldcal.importing.rate_size import rate_in
+from fieldcal.importing.rate_size import rate_in, turns_said
 from fieldcal.importing.recording import LARGEST, ReadOptions, Recording
 from fieldcal.importing.scales import (
     ACC_OUT,
@@ -29,18 +30,11 @@ from fieldcal.importing.scales import (
 )
 from fieldcal.importing.thermometers import temperature_counts, temperature_fits
 from fieldcal.importing.time_units import step_of, unit_taken
-from fieldcal.importing.unit_answers import answers, as_written, other_rates, unusual
+from fieldcal.importing.unit_answers import answers, as_written, other_rates
 from fieldcal.importing.unit_doubts import SaidUnits, hold_own_units
 
 ROWS = 1 << 17
 """Rows at the beginning by which units are told."""
-
-FAST = 0.5
-"""Rate, rad/s, that nothing at rest shows: 30 deg/s."""
-
-ROUGH = 0.02
-"""Scatter of rates from sample to sample, rad/s, that nothing at rest shows."""
-
 
 NO_UNIT = 0.75
 """What gravity reads at least in any unit, less what no factory scale is out by."""
@@ -219,16 +213,7 @@ class _Guess:
             return
         reads = gravity and rate_in(block.t, block.acc, block.gyr, gravity)
         if reads is None or gravity is None:
-            usual = float(np.median(np.abs(gyr).max(axis=1)))
-            noise = float(np.nanmedian(np.abs(np.diff(gyr, axis=0)), axis=0).max())
-            if usual > FAST or noise > ROUGH:
-                shown = f"{usual:.4g}" if usual > FAST else f"a scatter of {noise:.2g}"
-                self._ask(
-                    f"nothing says the unit of its rates, and {shown} rad/s is no rest",
-                    unusual(gyr),
-                )
-            self.found["angular_rate"] = "rad/s: it is the usual one, and no turn tells"
-            self.said = replace(self.said, gyr_unit="rad/s")
+            self._calm(block, gyr, gravity)
             return
         fits = fitting(reads, GYR_SCALES, GYR_OUT[not gravity.round])
         fits = as_written(fits, block.gyr)
@@ -250,6 +235,18 @@ class _Guess:
         if (fits[0].unit, fits[0].lsb) != ("rad/s", 1):
             self.found["angular_rate"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
+
+    def _calm(self, block: Block, gyr: Array, gravity: Gravity | None) -> None:
+        """Rates of which no turn tells."""
+        turns = gravity and turns_said(block.t, block.acc, block.gyr, gravity)
+        gained = self._step if self.said.acc_lsb == self._step else None
+        found = calm_rates(gyr, turns, gained, self.said.usual)
+        if found.scale is None:
+            self._ask(found.asks, [*found.answers])
+        else:
+            unit, lsb = found.scale.unit, found.scale.lsb
+            self.found["angular_rate"] = f"{found.scale}: {found.why}"
+            self.said = replace(self.said, gyr_unit=unit, gyr_lsb=lsb)
 
     def _temperature(self, values: Array) -> None:
         fits = temperature_fits(values)

@@ -44,6 +44,19 @@ def test_counts_become_si(
     np.testing.assert_allclose(got.gyr, table[:n, 2:5] * unit, rtol=1e-6)
 
 
+@pytest.mark.parametrize(("fine", "counts_in_deg"), [(0, 1), (1, 10)])
+def test_rates_of_high_resolution_are_tenths(
+    tmp_path: Path, fine: int, counts_in_deg: int
+) -> None:
+    path, table = tmp_path / "LOG.BFL", counts(1)
+    top = header(1.0, "Betaflight", more=f"blackbox_high_resolution:{fine}")
+    path.write_bytes(top + frames(table))
+    (got,) = flights(path).values()
+    n, unit = len(got), np.pi / 180 / counts_in_deg
+    np.testing.assert_allclose(got.gyr, table[:n, 2:5] * unit, rtol=1e-6)
+    np.testing.assert_allclose(got.acc, table[:n, 5:] * G0 / 2048)
+
+
 def test_flights_behind_each_other_are_apart(tmp_path: Path) -> None:
     path = tmp_path / "LOG.BFL"
     logs = [header(1.0) + frames(counts(seed)) for seed in (1, 2)]

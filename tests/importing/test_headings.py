@@ -145,7 +145,7 @@ def test_any_names_are_understood_or_not(names: list[str]) -> None:
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("imu1.AccX", ("a", "x", None)), ("gyro_rad[2]", ("g", "z", None)),
+        ("imu1.AccX", ("a", "x", None)), ("gyro_rad[2]", ("g", "z", "rad/s")),
         ("accelerometer_m_s2[0]", ("a", "x", "m/s^2")), ("TimeUS", ("t", "", "us")),
         ("y (°/s)", ("g", "y", "deg/s")),
         ("field.angular_velocity.y", ("g", "y", None)),

@@ -1,0 +1,86 @@
+"""Dataflash logs as text: rows of one IMU from messages of one kind or of two."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laid_about import turned
+
+from fieldcal.cli import main
+from fieldcal.session.folder import Session
+
+ROWS = turned(5, 50.0, 2.0)
+TOP = [
+    "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+    "FMT, 129, 31, PARM, QNf, TimeUS,Name,Value",
+    "FMT, 131, 39, IMU, QBffffffIIfBBHH, TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,"
+    "T,GH,AH,GHz,AHz",
+    "FMT, 132, 39, ACC, QBQfff, TimeUS,I,SampleUS,AccX,AccY,AccZ",
+    "FMT, 133, 39, GYR, QBQfff, TimeUS,I,SampleUS,GyrX,GyrY,GyrZ",
+    "PARM, 1000, INS_ACCOFFS_X, 0.1",
+]
+OLD = [
+    "", "0", "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+    "FMT, 131, 39, IMU, IffffffIIf, TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,Temp",
+]  # fmt: skip
+
+
+def cells(*values: float) -> str:
+    return ", ".join(f"{x:.9g}" for x in values)
+
+
+def one_kind() -> list[str]:
+    found = [*TOP]
+    for t, *row in ROWS.tolist():
+        for i in (0, 1):
+            acc = [x + i for x in row[:3]]
+            found.append(f"IMU, {9e6 + t * 1e6:.0f}, {i}, {cells(*row[3:], *acc)},"
+                         " 0, 0, 38.5, 1, 1, 1000, 1000")  # fmt: skip
+        found.append(f"ATT, {9e6 + t * 1e6:.0f}, 0.1, 0.2, 0.3")
+    return found
+
+
+def two_kinds() -> list[str]:
+    found = [*TOP]
+    for t, *row in ROWS.tolist():
+        us = 9e6 + t * 1e6
+        for i in (0, 1):
+            acc, gyr = [x + i for x in row[:3]], row[3:]
+            found.append(f"ACC, {us + 90:.0f}, {i}, {us:.0f}, {cells(*acc)}")
+            found.append(f"GYR, {us + 95:.0f}, {i}, {us + 10:.0f}, {cells(*gyr)}")
+    found.insert(len(found) // 2, "ACC, 9e6, 0, 12, 3")
+    return found
+
+
+def old() -> list[str]:
+    return OLD + [f"IMU, {9e3 + t * 1e3:.0f}, {cells(*row[3:], *row[:3])}, 0, 0, 38.5"
+                  for t, *row in ROWS.tolist()]  # fmt: skip
+
+
+@pytest.mark.parametrize("lines", [one_kind, two_kinds, old])
+def test_the_first_imu_is_read(tmp_path: Path, lines: object) -> None:
+    assert callable(lines)
+    path = tmp_path / "flight.log"
+    path.write_text("\n".join(lines()) + "\n")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+    block = Session.open(tmp_path / "out").block
+    assert len(ROWS) - 1 <= len(block) <= len(ROWS)
+    np.testing.assert_allclose(block.t, ROWS[: len(block), 0], atol=1e-6)
+    np.testing.assert_allclose(block.acc, ROWS[: len(block), 1:4], atol=1e-6)
+    np.testing.assert_allclose(block.gyr, ROWS[: len(block), 4:], atol=1e-6)
+    warm = block.temperature
+    assert np.isnan(warm).all() if lines is two_kinds else (warm == 38.5).all()
+
+
+def test_rates_of_a_flight_are_not_asked_about(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    found = [*TOP]
+    for i in range(2000):
+        row = cells(*rng.normal(0, 0.1, 3), *rng.normal([0, 0, -9.8], 0.5))
+        found.append(f"IMU, {9000000 + 20000 * i}, 0, {row},"
+                     " 0, 0, 38.5, 1, 1, 1000, 1000")  # fmt: skip
+    path = tmp_path / "flight.log"
+    path.write_text("\n".join(found) + "\n")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0

@@ -30,9 +30,9 @@ from fieldcal.importing.array_tables import (
     numpy_tables,
     tables_of,
 )
-from fieldcal.importing.column_clock import Heading
 from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.gzip_stream import head, on_disk
+from fieldcal.importing.heading import Heading
 from fieldcal.importing.matlab_objects import holds_objects, object_tables
 from fieldcal.importing.said_rate import rate_of, scalars
 

@@ -20,12 +20,11 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.codec import recognise
 from fieldcal.importing import columns
-from fieldcal.importing.column_clock import Heading
 from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.file_names import SENSOR, sensor_of
+from fieldcal.importing.heading import Column, Heading
 from fieldcal.importing.heading_words import meaning
-from fieldcal.importing.headings import Column
 from fieldcal.importing.instances import Instances, instances_in
 from fieldcal.importing.number_table import NumberTable
 from fieldcal.importing.recording import ReadOptions, Recording

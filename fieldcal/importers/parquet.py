@@ -13,10 +13,9 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
-from fieldcal.importing.column_clock import Heading
 from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.gzip_stream import on_disk
-from fieldcal.importing.headings import Column
+from fieldcal.importing.heading import Column, Heading
 from fieldcal.importing.recording import ROWS
 from fieldcal.session.arrow_columns import numbers
 

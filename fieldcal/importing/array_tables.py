@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.importing.headings import Column
+from fieldcal.importing.heading import Column
 from fieldcal.importing.matlab_objects import DECODE
 
 WIDEST = 64

@@ -6,10 +6,9 @@ rows; the file may say its rate. What only the user can know is asked.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -20,15 +19,14 @@ from fieldcal.importing.column_times import (
     batches,
     counted_question,
     counts_rows,
-    goes_on,
     is_clock_number,
     rate_hint,
     shared_question,
     split_seconds,
 )
 from fieldcal.importing.gravity_size import are_means
+from fieldcal.importing.heading import Heading
 from fieldcal.importing.heading_words import meaning
-from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
 from fieldcal.importing.row_times import FRACTIONS
 from fieldcal.importing.time_units import (
@@ -47,20 +45,6 @@ TICK = "fine"
 
 BOSCH = ("sensortime", "39.0625us")
 """Name of the counter of sensors by Bosch, and what it counts."""
-
-
-class Heading(NamedTuple):
-    """Columns of a file, as it names them.
-
-    Attributes
-    ----------
-    columns : in the order of the file
-    skip : what stands for a column that is not wanted; "" where columns have names
-
-    """
-
-    columns: Sequence[Column]
-    skip: str = ""
 
 
 class ColumnSource(Protocol):
@@ -241,39 +225,6 @@ class ColumnClock:
         if found:
             self._of.guessed["counts"] = "of 16 bits with a sign: 65535 is -1"
         return replace(wanted, unsigned=frozenset(found))
-
-
-def with_times(way: Heading, table: Array) -> Heading:
-    """A heading in which only what numbers show to be times is named as one.
-
-    Of several columns that are named as times, one may hold a date, count rows, or be
-    too coarse. Each may be empty.
-
-    Parameters
-    ----------
-    way : what stands above the columns
-    table : (n, k) numbers of the first rows; nan where a cell is none
-
-    """
-    said = [meaning(column.name, column.unit) for column in way.columns]
-    named = [i for i, one in enumerate(said) if one is not None and one.kind == "t"]
-    if not named or table.shape[1] != len(way.columns) or not len(table):
-        return way
-    empty = [i for i in named if np.isnan(table[:, i]).all()]
-    fit = [i for i in named if goes_on(table[:, i])]
-    for lacks in (counts_rows, shares_times):
-        fit = [i for i in fit if not lacks(table[:, i])] or fit
-    fit = fit if fit and len(named) > 1 else [i for i in named if i not in empty]
-    names = [*way.columns]
-    for i in {*named} - {*fit}:
-        names[i] = names[i]._replace(name="")
-    return Heading(names, way.skip)
-
-
-def shares_times(t: Array) -> bool:
-    """Whether times (n,) are those of batches, or of a clock too coarse."""
-    shared = shared_times(t)
-    return shared is not None and shared.equal
 
 
 def numbers_of(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:

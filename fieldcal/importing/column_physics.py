@@ -178,7 +178,11 @@ def _pair(
     if turning:
         return None
     if step_of(clock) and not any(_gravity(table, three) for three in usual):
-        return None
+        others = {*forces, *rates} - {*usual}
+        why = "the length of the first three at rest is what gravity gains in a step"
+        # the other one of two is what angle gained
+        alone = len(usual) == len(others) == 1
+        return ((usual[0], others.pop()), why) if alone else None
     # of counts, any length is one: without a turn they are asked about
     usual = [three for three in usual if _plain(sizes[three])]
     if len(usual) == 1:

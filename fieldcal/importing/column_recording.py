@@ -13,16 +13,11 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.importing import column_physics, columns, headings
-from fieldcal.importing.column_clock import (
-    ColumnClock,
-    Heading,
-    ask_rate,
-    numbers_of,
-    with_times,
-)
+from fieldcal.importing.column_clock import ColumnClock, ask_rate, numbers_of
 from fieldcal.importing.gravity_size import are_means
+from fieldcal.importing.heading import Heading, HeadingMatch
+from fieldcal.importing.heading_times import with_times
 from fieldcal.importing.heading_words import meaning
-from fieldcal.importing.headings import HeadingMatch
 from fieldcal.importing.means import scatter_columns
 from fieldcal.importing.recording import (
     ImuStream,

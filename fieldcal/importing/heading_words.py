@@ -32,6 +32,8 @@ _SENSORS = {
 _PHRASES = (
     (("angular", "velocity"), "g"),
     (("angular", "rate"), "g"),
+    (("angular", "vel"), "g"),
+    (("ang", "vel"), "g"),
     (("rotation", "rate"), "g"),
     (("gyro", "rotation"), "g"),
     (("velocidad", "angular"), "g"),
@@ -72,8 +74,11 @@ MEAN = ("mean", "avg", "average")
 REFERENCE = ("true", "truth", "ref", "reference", "expected", "ideal")
 """Words of columns that hold what an output ought to be."""
 
-_ANGLES: dict[tuple[str, ...], str] = {("rad",): "rad/s", ("deg",): "deg/s"}
+_ANGLES = {"rad": "rad/s", "deg": "deg/s"}
 """Units of rates of which the name says the angle alone: PX4's ``gyro_rad[0]``."""
+
+_NO_RATE = ("angle", "roll", "pitch", "yaw", "heading", "euler", "theta", "phi")
+"""Words of angles that are no rates."""
 
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
@@ -87,7 +92,8 @@ _PER = re.compile("Per(?=[A-Z])")
 _BARE = re.compile("[\u0300-\u036f]")
 """Accents, once they are apart from their letters."""
 
-_INDEX = re.compile(r"(.+)\[([012])\]")
+_INDEX = re.compile(r"(.+)(?:\[|\.0)([012])\]?")
+"""Axes of an array: ``gyro_rad[0]``, or ``gyro_rad.00`` as PlotJuggler writes it."""
 
 
 class Meaning(NamedTuple):
@@ -130,13 +136,26 @@ def meaning(name: str, unit: str = "") -> Meaning | None:
         if found is None or (said is not None and said not in UNITS[found.kind]):
             continue
         if found.kind or said is not None:
-            angle = bare_label(found.label) if found.kind == "g" else ()
+            found = _of_angle(found)
             return found._replace(
                 kind=found.kind or _kind_of(said),
-                unit=_ANGLES.get(angle) if found.unit is None else found.unit,
                 weak=found.weak or bool({*_WITHOUT_GRAVITY} & {*found.label}),
             )
     return None
+
+
+def _of_angle(found: Meaning) -> Meaning:
+    """The meaning of a rate of whose unit the name says the angle."""
+    words = [w for w in found.label if w in _ANGLES]
+    if (
+        found.kind != "g"
+        or found.unit
+        or len(words) != 1
+        or {*_NO_RATE} & {*found.label}
+    ):
+        return found
+    label = tuple(w for w in found.label if w not in words)
+    return found._replace(unit=_ANGLES[words[0]], label=label)
 
 
 def _kind_of(unit: str | None) -> str:

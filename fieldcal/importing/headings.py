@@ -9,10 +9,10 @@ has several IMUs, what their names do not share tells them apart, and what one a
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from shlex import quote
+from dataclasses import replace
 from typing import NamedTuple
 
+from fieldcal.importing.heading import Column, HeadingMatch
 from fieldcal.importing.heading_units import UNITS
 from fieldcal.importing.heading_words import (
     MEAN,
@@ -23,10 +23,10 @@ from fieldcal.importing.heading_words import (
     meaning,
     words_of,
 )
-from fieldcal.importing.recording import ReadOptions
 
 NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
-               "magnitude", "norm", "drift", "delta")  # fmt: skip
+               "magnitude", "norm", "drift", "delta",
+               "covariance")  # fmt: skip
 """Words of columns that are no samples of a sensor."""
 
 FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air",
@@ -36,27 +36,14 @@ FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air"
 G_FORCE = (("g",), ("g", "force"))
 """Words of ``gFx``: a program that writes it calls ``ax`` what has no gravity in it."""
 
-ROS = (("angular", "velocity"), ("linear", "acceleration"))
+AXES = ("x", "y", "z")
+
+ROS = (("angular", "velocity"), ("linear", "acceleration"), ("ang", "vel"),
+       ("lin", "acc"))  # fmt: skip
 """Words of the axes of ROS's sensor_msgs/Imu, which is defined in rad/s."""
 
 OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "log")
 """Words of times that are another clock's than the device's."""
-
-
-class Column(NamedTuple):
-    """A column of a file.
-
-    Attributes
-    ----------
-    place : what ``--columns`` calls it: a name, or nothing where columns have none
-    name : what stands over it
-    unit : what the file says of it elsewhere, or nothing
-
-    """
-
-    place: str
-    name: str
-    unit: str = ""
 
 
 class Named(NamedTuple):
@@ -64,57 +51,6 @@ class Named(NamedTuple):
 
     number: int
     says: Meaning
-
-
-@dataclass(frozen=True, slots=True)
-class HeadingMatch:
-    """What the names of some columns say of one IMU.
-
-    Attributes
-    ----------
-    columns : as ``--columns`` names them, all
-    units : said by the names, by kind of channel; None where they say none
-    name : of the IMU, "0" where there is one
-    says : what the user must know of them, a sentence each
-    usual : unit that rates of such names are in; "" where names tell none
-
-    """
-
-    columns: tuple[str, ...]
-    units: Mapping[str, str | None]
-    name: str = "0"
-    says: tuple[str, ...] = ()
-    usual: str = ""
-
-    def taken(self, wanted: ReadOptions) -> ReadOptions:
-        """Return what the user says, with what the names say."""
-        given = {"a": wanted.acc_unit, "g": wanted.gyr_unit, "t": wanted.time_unit}
-        units = {k: given.get(k) or unit for k, unit in self.units.items()}
-        by_name = {k for k, unit in self.units.items() if unit and not given.get(k)}
-        return replace(
-            wanted,
-            columns=self.columns,
-            acc_unit=units.get("a") or wanted.acc_unit,
-            gyr_unit=units.get("g") or wanted.gyr_unit,
-            time_unit=units.get("t") or wanted.time_unit,
-            temp_unit=wanted.temp_unit or ("degC" if units.get("temperature") else ""),
-            named=frozenset(by_name),
-            usual=self.usual,
-        )
-
-    def sentence(self, wanted: ReadOptions) -> str:
-        """Say what is taken from the names, as options that do the same."""
-        text = f"--columns {quote(','.join(self.columns))}"
-        if "t" not in self.units and not wanted.rate_hz:
-            text += " --rate HZ"
-        for kind, (option, given) in {
-            "a": ("--acc-unit", wanted.acc_unit),
-            "g": ("--gyr-unit", wanted.gyr_unit),
-            "t": ("--time-unit", wanted.time_unit),
-        }.items():
-            if kind in self.units and (unit := given or self.units[kind]):
-                text += f" {option} {quote(unit)}"
-        return f"taken from the names of its columns: {text}"
 
 
 def read(
@@ -211,7 +147,7 @@ def _with_gravity(named: Sequence[Named]) -> list[Named]:
     if len(weak) < len(forces):
         return others
     axes = [sorted(n.says.axis for n in three) for three in (weak, gravity)]
-    if axes != [["x", "y", "z"]] * 2 or weak[0].says.unit != gravity[0].says.unit:
+    if axes != [[*AXES]] * 2 or weak[0].says.unit != gravity[0].says.unit:
         return others + weak
     both = ((gravity, "a"), (weak, "l"))
     parts = [Named(n.number, n.says._replace(kind=kind, label=(), weak=False))
@@ -222,17 +158,22 @@ def _with_gravity(named: Sequence[Named]) -> list[Named]:
 def _triads(
     named: Iterable[Named], kind: str
 ) -> dict[tuple[str, ...], list[Named]] | None:
-    """Axes of a kind by what their names do not share; None if some are not whole.
+    """Axes of a kind by what their names do not share; None where that leaves a choice.
 
-    Nor are axes in different units.
+    Axes that are not whole are none where others are; nor are those in several units.
     """
     groups: dict[tuple[str, ...], list[Named]] = {}
     for one in named:
         if one.says.kind == kind:
             label = tuple(w for w in bare_label(one.says.label) if w not in MEAN)
             groups.setdefault(label, []).append(one)
+    whole = {label: three for label, three in groups.items() if len(three) == len(AXES)}
+    if all(
+        len({n.says.axis for n in three}) == len(three) for three in groups.values()
+    ):
+        groups = whole or groups
     for three in groups.values():
-        if sorted(one.says.axis for one in three) != ["x", "y", "z"]:
+        if sorted(one.says.axis for one in three) != [*AXES]:
             return None
         if len({one.says.unit for one in three}) > 1:
             return None

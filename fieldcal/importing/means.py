@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from fieldcal.core.chances import DEVIATION
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, concat
+from fieldcal.importing.heading import Column
 from fieldcal.importing.heading_words import SCATTER, axis_alone, meaning, words_of
-from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import MeanScatter, Recording
 
 COUNTS = ("n", "count", "samples", "num", "number", "n_samples")

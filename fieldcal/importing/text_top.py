@@ -14,10 +14,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.column_clock import Heading
 from fieldcal.importing.columns import SKIP
+from fieldcal.importing.heading import Column, Heading
 from fieldcal.importing.heading_units import unit_in
-from fieldcal.importing.headings import Column
 from fieldcal.importing.recording import ReadOptions
 
 SEPARATORS = (";", "\t", ",")

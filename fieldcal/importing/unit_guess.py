@@ -217,7 +217,7 @@ class _Guess:
             return
         fits = fitting(reads, GYR_SCALES, GYR_OUT[not gravity.round])
         fits = as_written(fits, block.gyr)
-        if self.said.acc_lsb == self._step:
+        if self._gained:
             # who writes gains of velocity, writes gains of angle beside them
             degrees = gains(self._step, "deg/s", 180 / np.pi)
             scales = (*gains(self._step, "rad/s"), *degrees)
@@ -236,10 +236,15 @@ class _Guess:
             self.found["angular_rate"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
 
+    @property
+    def _gained(self) -> bool:
+        """Whether accelerations are gains of velocity since the row before."""
+        return self.said.acc_lsb != 1 and self.said.acc_lsb == self._step
+
     def _calm(self, block: Block, gyr: Array, gravity: Gravity | None) -> None:
         """Rates of which no turn tells."""
         turns = gravity and turns_said(block.t, block.acc, block.gyr, gravity)
-        gained = self._step if self.said.acc_lsb == self._step else None
+        gained = self._step if self._gained else None
         found = calm_rates(gyr, turns, gained, self.said.usual)
         if found.scale is None:
             self._ask(found.asks, [*found.answers])

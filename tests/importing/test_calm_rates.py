@@ -111,7 +111,7 @@ def test_a_message_has_the_time_of_its_header_and_not_of_its_arrival(
 
 @pytest.mark.parametrize(
     "head",
-    ["t,vx,vy,vz,gx,gy,gz",
+    ["", "t,vx,vy,vz,gx,gy,gz",
      "timestamp,delta_velocity[0],delta_velocity[1],delta_velocity[2],"
      "delta_angle[0],delta_angle[1],delta_angle[2]"],
 )  # fmt: skip
@@ -120,7 +120,8 @@ def test_gains_of_velocity_have_gains_of_angle_beside_them(
 ) -> None:
     rows = driven(6)
     path = write(tmp_path / "log.csv", rows / np.array([1.0, *[RATE] * 6]), head)
-    said = ["--columns", "t,ax,ay,az,gx,gy,gz"] if "v" in head[:3] else []
+    # without names, the length of what velocity gained is that of gravity
+    said = ["--columns", "t,ax,ay,az,gx,gy,gz"] if "vx" in head else []
     assert main(["import", str(path), "-o", str(tmp_path / "out"), *said]) == 0
     found = Session.open(tmp_path / "out").block
     np.testing.assert_allclose(found.acc, rows[:, 1:4], atol=1e-5)
@@ -149,3 +150,24 @@ def test_what_flies_turns_more_than_its_thrust_shows(
     assert found.scale == scale
     named = calm_rates(gyr, Turns(0.1 * ratio, 0.1, 0.0), None, "rad/s")
     assert named.scale == (RAD if ratio < 20 else scale)
+
+
+def test_rates_that_are_called_g_are_rates(tmp_path: Path) -> None:
+    rows = driven(10)
+    write(tmp_path / "log.csv", rows[:, [0, 4, 5, 6]], "Time,Gx,Gy,Gz")
+    assert main(["import", str(tmp_path / "log.csv"), "-o", f"{tmp_path}/out"]) == 0
+    found = Session.open(tmp_path / "out").block
+    np.testing.assert_allclose(found.gyr, rows[:, 4:], atol=1e-6)
+
+
+def test_at_a_row_a_second_nothing_is_a_gain(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(11)
+    t = np.arange(200.0)
+    rows = np.column_stack([t, rng.normal([0, 0, G], 0.02, (200, 3)),
+                            rng.normal(0, 0.002, (200, 3))])  # fmt: skip
+    path = write(tmp_path / "log.csv", rows, "t,ax,ay,az,gx,gy,gz")
+    said = ["--columns", "t,ax,ay,az,gx,gy,gz", "-o", f"{tmp_path}/out"]
+    assert main(["import", str(path), *said]) == 0
+    assert "rad/s: it is the usual one" in capsys.readouterr().err

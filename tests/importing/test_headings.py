@@ -14,8 +14,9 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
+from fieldcal.importing.heading import Column
 from fieldcal.importing.heading_words import meaning
-from fieldcal.importing.headings import Column, read
+from fieldcal.importing.headings import read
 from fieldcal.importing.recording import ReadOptions, Recording
 
 ROWS = np.column_stack([np.arange(4) * 1e3, np.arange(24).reshape(4, 6)])
@@ -146,6 +147,8 @@ def test_any_names_are_understood_or_not(names: list[str]) -> None:
     ("name", "says"),
     [
         ("imu1.AccX", ("a", "x", None)), ("gyro_rad[2]", ("g", "z", "rad/s")),
+        ("sensor_combined/gyro_rad.01", ("g", "y", "rad/s")),
+        ("gyro_angle_deg_x", ("g", "x", None)), ("ang_vel_z", ("g", "z", None)),
         ("accelerometer_m_s2[0]", ("a", "x", "m/s^2")), ("TimeUS", ("t", "", "us")),
         ("y (°/s)", ("g", "y", "deg/s")),
         ("field.angular_velocity.y", ("g", "y", None)),
@@ -186,3 +189,18 @@ def test_a_barometer_is_the_last_thermometer_that_is_taken() -> None:
     assert found.columns[-1] == "temperature" and "that of the baro" in found.says[0]
     (found,) = read([Column("", n) for n in (*BARE, "baro_temp", "temp")], "_")
     assert found.columns[-2:] == ("_", "temperature") and not found.says
+
+
+def test_a_covariance_is_no_axis_and_topics_are_no_imus_of_their_own() -> None:
+    names = ["__time", *(f"/imu/data/angular_velocity/{x}" for x in "xyz"),
+             "/imu/data/angular_velocity_covariance[0]", "/imu/data/header/stamp",
+             *(f"/imu/data/linear_acceleration/{x}" for x in "xyz"),
+             "/odom/twist/angular_velocity/z"]  # fmt: skip
+    (found,) = read([Column("", name) for name in names], "_")
+    assert found.columns == ("_", "gx", "gy", "gz", "_", "t", "ax", "ay", "az", "_")
+    assert found.usual == "rad/s"
+
+
+def test_two_columns_of_an_axis_leave_a_choice() -> None:
+    names = ["t", "ax", "ay", "az", "az", "gx", "gy", "gz"]
+    assert read([Column("", name) for name in names], "_") == ()

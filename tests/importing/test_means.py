@@ -13,7 +13,8 @@ from fieldcal.cli import main
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.importing.gravity_size import are_means
-from fieldcal.importing.headings import Column, read
+from fieldcal.importing.heading import Column
+from fieldcal.importing.headings import read
 from fieldcal.importing.means import spread
 from fieldcal.session.folder import Session
 

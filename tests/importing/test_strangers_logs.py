@@ -205,6 +205,19 @@ FORMS: dict[str, Writer] = {
     "lines that end as a program's": lambda: each(
         "33,Up,{:.0f},{:.8g},{:.8g},{:.8g},{:.8g},{:.8g},{:.8g};", T * 1e9, A, W
     ),
+    "seconds, and microseconds beyond them": lambda: lines(
+        clock("%Y-%m-%d %H:%M:%S.%f"), UNIX + np.floor(T), np.round(T % 1 * 1e6),
+        A, DEG,
+        head="Human Timestamp,Unix Time,Microseconds,Accelerometer X,Accelerometer Y,"
+        "Accelerometer Z,Gyroscope X,Gyroscope Y,Gyroscope Z",
+    ),
+    "topics side by side": lambda: lines(
+        UNIX + T + 0.004, W, np.zeros(len(T)), UNIX + T, A,
+        head="__time,"
+        + ",".join(f"/imu/data/angular_velocity/{x}" for x in "xyz")
+        + ",/imu/data/angular_velocity_covariance[0],/imu/data/header/stamp,"
+        + ",".join(f"/imu/data/linear_acceleration/{x}" for x in "xyz"),
+    ),
     "names in Spanish": lambda: lines(
         T, A / G, DEG, head="Tiempo (s),Aceleración X (g),Aceleración Y (g),"
         "Aceleración Z (g),Giroscopio X (°/s),Giroscopio Y (°/s),Giroscopio Z (°/s)",

@@ -1,0 +1,91 @@
+"""What stands above the columns of a file, and what their names say of one IMU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from shlex import quote
+from typing import NamedTuple
+
+from fieldcal.importing.recording import ReadOptions
+
+
+class Column(NamedTuple):
+    """A column of a file.
+
+    Attributes
+    ----------
+    place : what ``--columns`` calls it: a name, or nothing where columns have none
+    name : what stands over it
+    unit : what the file says of it elsewhere, or nothing
+
+    """
+
+    place: str
+    name: str
+    unit: str = ""
+
+
+class Heading(NamedTuple):
+    """Columns of a file, as it names them.
+
+    Attributes
+    ----------
+    columns : in the order of the file
+    skip : what stands for a column that is not wanted; "" where columns have names
+
+    """
+
+    columns: Sequence[Column]
+    skip: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class HeadingMatch:
+    """What the names of some columns say of one IMU.
+
+    Attributes
+    ----------
+    columns : as ``--columns`` names them, all
+    units : said by the names, by kind of channel; None where they say none
+    name : of the IMU, "0" where there is one
+    says : what the user must know of them, a sentence each
+    usual : unit that rates of such names are in; "" where names tell none
+
+    """
+
+    columns: tuple[str, ...]
+    units: Mapping[str, str | None]
+    name: str = "0"
+    says: tuple[str, ...] = ()
+    usual: str = ""
+
+    def taken(self, wanted: ReadOptions) -> ReadOptions:
+        """Return what the user says, with what the names say."""
+        given = {"a": wanted.acc_unit, "g": wanted.gyr_unit, "t": wanted.time_unit}
+        units = {k: given.get(k) or unit for k, unit in self.units.items()}
+        by_name = {k for k, unit in self.units.items() if unit and not given.get(k)}
+        return replace(
+            wanted,
+            columns=self.columns,
+            acc_unit=units.get("a") or wanted.acc_unit,
+            gyr_unit=units.get("g") or wanted.gyr_unit,
+            time_unit=units.get("t") or wanted.time_unit,
+            temp_unit=wanted.temp_unit or ("degC" if units.get("temperature") else ""),
+            named=frozenset(by_name),
+            usual=self.usual,
+        )
+
+    def sentence(self, wanted: ReadOptions) -> str:
+        """Say what is taken from the names, as options that do the same."""
+        text = f"--columns {quote(','.join(self.columns))}"
+        if "t" not in self.units and not wanted.rate_hz:
+            text += " --rate HZ"
+        for kind, (option, given) in {
+            "a": ("--acc-unit", wanted.acc_unit),
+            "g": ("--gyr-unit", wanted.gyr_unit),
+            "t": ("--time-unit", wanted.time_unit),
+        }.items():
+            if kind in self.units and (unit := given or self.units[kind]):
+                text += f" {option} {quote(unit)}"
+        return f"taken from the names of its columns: {text}"

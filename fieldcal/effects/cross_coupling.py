@@ -32,6 +32,7 @@ class CrossCoupling(Sensor):
 
     params = tuple(Param(f"k{i + 1}{j + 1}", "1", 2e-2) for i, j in PAIRS)
     turned_into = {f"k{i + 1}{j + 1}": f"k{j + 1}{i + 1}" for i, j in PAIRS if j < i}
+    usual = True
     covariate = "force along the other axes"
     decided_by = "positions that load each axis alone, up and down"
     cure = "Solve with --cross: the coefficients go into the calibration."

@@ -28,6 +28,7 @@ class GyroCrossCoupling(Sensor):
     """Cross-coupling of the gyroscopes."""
 
     params = tuple(Param(f"s{i + 1}{j + 1}", "1", 2e-2) for i, j in PAIRS)
+    usual = True
     covariate = "rate about the other axes"
     decided_by = "a turn about each axis in turn, by 90° or more"
     cure = "Let solve use the turns (--turns yes), or a rate table."

@@ -26,12 +26,12 @@ class GyroProducts(Sensor):
     """Products of rates in the gyroscopes."""
 
     params = tuple(
-        Param(f"p{i}{j}", "s/rad", 3e-2) for i in (1, 2, 3) for j in (1, 2, 3)
+        Param(f"p{i}{j}", "s/rad", 6e-3) for i in (1, 2, 3) for j in (1, 2, 3)
     )
     covariate = "products of rate about two axes"
     decided_by = "rates about two axes at once on a rate table"
     cure = "Turn about one axis at a time, or calibrate on a rate table."
-    source = "Avrutov et al. 2017, (4.1) and its example 4"
+    source = "Avrutov et al. 2017, (4.1); example 4: 1e-4 s/deg of the scale factor"
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """The three products on each output."""

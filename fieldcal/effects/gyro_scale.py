@@ -29,6 +29,7 @@ class GyroScale(Sensor):
 
     params = tuple(Param(f"s{i}", "1", 3e-2) for i in (1, 2, 3))
     carried_by = "gyr_scale"
+    usual = True
     covariate = "angle turned"
     decided_by = "a turn about each axis in turn, by 90° or more"
     cure = "Let solve use the turns between the positions (--turns yes)."

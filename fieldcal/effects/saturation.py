@@ -3,8 +3,8 @@
     U = min(max(U, -limit), limit)
 
 Found where a channel's largest or smallest value is taken again and again: at the
-declared range, or in several places and far more often than the value next to it.
-Source: model of this project.
+declared range, or far more often than the value next to it: in several places, or in
+one that the channel runs into and comes out of. Source: model of this project.
 
 >>> import numpy as np
 >>> signal = np.clip(np.sin(np.arange(200) / 7.0), -0.9, 0.9)
@@ -26,6 +26,12 @@ FEWEST = 5
 BESIDE = 4.0
 """How much more often the rail is taken than the value next to it."""
 
+UNDER_WAY = 5
+"""Samples beside a run at a rail by which the channel is under way there."""
+
+PACE = 3.0
+"""Steps of that way, from the last value to the rail, at most."""
+
 CHANCE = 3.0
 """Standard deviations of a difference of two counts that chance does not make."""
 
@@ -45,8 +51,8 @@ def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
             continue
         declared = abs(abs(edge) - limit) < 1e-3 * limit
         beside = _beside(values, edge)
-        places = 1 + int((np.diff(at) > 1).sum())
-        often = places >= 2 and 0 < BESIDE * beside + FEWEST < len(at)
+        apart = bool((np.diff(at) > 1).any()) or _run_into(values, at)
+        often = apart and 0 < BESIDE * beside + FEWEST < len(at)
         # as far down as up is full scale only if more is there than beside it: gravity
         # on both faces of a box is as much up as down, and its noise thins outwards
         chance = CHANCE * (len(at) + beside) ** 0.5
@@ -54,6 +60,21 @@ def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
         if declared or (not coarse and (often or piled)):
             out.append(at)
     return out
+
+
+def _run_into(values: Array, at: Rows) -> bool:
+    """Whether a channel is under way to the one run of samples at a rail, and from it.
+
+    One that stands still where it happened to be goes on with a jump.
+    """
+    edge = values[at[0]]
+    for beside in (values[: at[0]][: -UNDER_WAY - 1 : -1], values[at[-1] + 1 :]):
+        way = np.abs(edge - beside[:UNDER_WAY])
+        if len(way) < UNDER_WAY or (np.diff(way) <= 0).any():
+            return False
+        if way[0] > PACE * (way[-1] - way[0]) / (UNDER_WAY - 1):
+            return False
+    return True
 
 
 def _beside(values: Array, edge: float) -> int:
@@ -70,8 +91,8 @@ class Saturation(Chain):
     params = (Param("limit", "m/s^2 or rad/s", 1e3),)
     covariate = "samples at the rail"
     treatment = "mask"
-    decided_by = "a larger range, or positions that load the axis less"
-    cure = "Choose a larger range, or positions that load the axis less."
+    decided_by = "a larger range, positions that load the axis less, or slower turns"
+    cure = "Choose a larger range, positions that load the axis less, or slower turns."
     source = "model of this project"
 
     def find(self, recording: CheckedSamples) -> list[Fault]:

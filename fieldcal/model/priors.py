@@ -91,7 +91,8 @@ BAD = 5e-3
 """Chance that a given window is disturbed in a way that it does not show itself."""
 
 AGAIN = 0.3
-"""Chance of an effect in the gyroscopes when the accelerometers have it, and back."""
+"""Chance of an effect in the gyroscopes when the accelerometers have it, and back; and
+of what every triad has until it is calibrated, when another of these is there."""
 
 ALONE = 0.1
 """Part of the biases that wander of which one axis does, and the others do not."""

@@ -90,6 +90,9 @@ class Effect(ABC):
     like_calibration: ClassVar[bool] = False
     """Whether bias and scale factor do the same, so that it is only ever possible."""
 
+    usual: ClassVar[bool] = False
+    """Whether every triad has it until it is calibrated: who has one has the others."""
+
     turned_into: ClassVar[Mapping[str, str]] = {}
     """Parameters with those that they become in a device that is turned as a whole:
     where nobody knows how it stands, the rows show the sum of the two."""

@@ -53,3 +53,31 @@ def test_a_coarse_step_is_known_though_the_first_rest_shows_two_values() -> None
     assert len(np.unique(values[:20_000])) == 2
     assert lsb_of(values) == pytest.approx(step, rel=1e-9)
     assert rails(values, np.nan) and not rails(values, np.nan, coarse=True)
+
+
+def swung(at: float, seconds: float = 1.0) -> np.ndarray:
+    """A rate at rest, and in turns of which the largest goes beyond a stop once."""
+    rng = np.random.default_rng(8)
+    t = np.arange(0, 40, 0.01)
+    rate = 1.2 * np.exp(-(((t - 12) / 0.5) ** 2)) - np.exp(-(((t - 20) / 0.6) ** 2))
+    rate += 5.5 * np.exp(-(((t - 30) / seconds) ** 2))
+    return np.minimum(np.round((rate + rng.normal(0, 1e-3, len(t))) / 1e-4) * 1e-4, at)
+
+
+def test_a_turn_that_runs_into_the_stop_once_is_clipped() -> None:
+    """A single fast turn of a hobby gyroscope at 250 deg/s."""
+    (at,) = rails(swung(4.3633), np.nan)
+    assert len(at) > 50 and np.ptp(at) == len(at) - 1
+    assert not rails(swung(9.0), np.nan)
+    # nor is it known of one that begins or ends there
+    values = swung(4.3633)
+    assert not rails(values[at[0] :], np.nan) and not rails(values[: at[-1]], np.nan)
+
+
+def test_what_stands_still_on_the_way_up_is_at_no_stop() -> None:
+    """The largest value, taken again and again: but it goes on with a jump."""
+    values = swung(9.0)
+    top = int(np.argmax(values))
+    values[top - 30 : top + 60] = values[top - 30]
+    assert values.max() == values[top]
+    assert not rails(values, np.nan)

@@ -149,6 +149,11 @@ class Cause:
         return tuple(g for g, d in zip(self.variants, apart, strict=True) if d == least)
 
     @property
+    def usual(self) -> bool:
+        """Whether every triad has it until it is calibrated."""
+        return any(g.effect is not None and g.effect.usual for g in self.variants[:1])
+
+    @property
     def told(self) -> bool:
         """Whether it is something that is left out, and no noise."""
         return self.kind != "noise"

@@ -53,17 +53,19 @@ class Set:
 def chances(cause: Cause, there: Iterable[Member]) -> Array:
     """Of a cause beside others, ln: of each variant, or of all alike ().
 
-    What has an instant happens to both triads at once, or it is another event.
+    What has an instant happens to both triads at once, or it is another event. A device
+    that nobody calibrated has all that is usual.
     """
     share = np.array(np.log(cause.chance / len(cause.variants)))
     if cause.kind != "effect":
         return share
+    there = list(there)
     same = [group for other, group in there if other.name == cause.name]
     at_once = [g for other in same for g in cause.at_once(other)]
     if at_once:
         some = [g in at_once for g in cause.variants]
         return np.where(some, np.log(priors.AGAIN / len(at_once)), share)
-    if same:
+    if same or (cause.usual and any(other.usual for other, _ in there)):
         share = np.array(np.log(priors.AGAIN / len(cause.variants)))
     return share
 

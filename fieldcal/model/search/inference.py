@@ -79,6 +79,9 @@ class Inference(Refinement):
         set, effects are sought by themselves as well, and it in what they leave. One
         window that is off by itself bends nothing but itself.
 
+        What explains the turns in the place of what every triad has bends it as well:
+        there they are followed from what every triad has, too.
+
         Parameters
         ----------
         begin : of any dictionary, what it is to begin with instead of with nothing;
@@ -86,10 +89,33 @@ class Inference(Refinement):
 
         """
         found = self._searched(begin)
-        if not any(map(is_function, found.best.members)):
-            return found
-        other = self._apart().effects_first()
-        return other if other.about_itself > found.about_itself else found
+        if any(map(is_function, found.best.members)):
+            found = _better(found, self._apart().effects_first())
+        if self._turned_otherwise(found):
+            found = _better(found, self._apart().usual_first())
+        return found
+
+    def _turned_otherwise(self, found: Inferred) -> bool:
+        """Whether turns are explained by what not every triad has, and not by that."""
+        members = found.best.members
+        if {c.key for c, _ in self._usual()} <= {c.key for c, _ in members}:
+            return False
+        others = [group.columns for cause, group in members if not cause.usual]
+        at = np.concatenate([np.empty(0, int), *others])
+        return any(np.isin(t.columns[t.design.any(axis=0)], at).any()
+                   for t in found.turned)  # fmt: skip
+
+    def _usual(self) -> tuple[Member, ...]:
+        """What every triad has, with all its parameters."""
+        return tuple((c, c.variants[0]) for c in self.dictionary.causes if c.usual)
+
+    def usual_first(self) -> Inferred:
+        """Search from a device that has what every triad has."""
+        start: Array = np.zeros(self.dictionary.width)
+        state, values, _ = self.settled(self.nominal, start, ())
+        search = Search(self.dictionary, self.gram(state, values, None))
+        usual = search.evaluated(self._usual())
+        return self._until_it_stays(state, values, usual, ())
 
     def _apart(self) -> Inference:
         """The same inference, of which columns that are added are its own."""
@@ -213,3 +239,8 @@ class Inference(Refinement):
         own = Inference(self.system.apart(), self.nominal)
         own.turned = list(found.turned)
         return own
+
+
+def _better(one: Inferred, other: Inferred) -> Inferred:
+    """The likelier of two, each about its own state."""
+    return other if other.about_itself > one.about_itself else one

@@ -171,9 +171,10 @@ class Offers(Sets):
     def _chances(self, there: Set) -> tuple[Array, dict[int, Array]]:
         """Of every cause beside a set, ln; of those whose variants differ, of each."""
         names = {c.name for c, _ in there.members}
+        usual = any(c.usual for c, _ in there.members)
         out, apart = self.dictionary.chances.copy(), dict[int, Array]()
         for i, cause in enumerate(self.dictionary.causes):
-            if cause.name in names:
+            if cause.name in names or (usual and cause.usual):
                 shares = chances(cause, there.members)
                 out[i] = shares.min()
                 if shares.ndim:

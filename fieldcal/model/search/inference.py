@@ -165,8 +165,11 @@ class Inference(Refinement):
                 # points, estimated beside, would be taken off the way a second time
                 state, values, found = self.settled(state, values, members, found.sizes)
             search = Search(self.dictionary, self.gram(state, values, found))
-            found = search.run(members)
-            if found.keys == frozenset(c.key for c, _ in members):
+            found = search.run(members, thorough=False)
+            same = frozenset(c.key for c, _ in members)
+            if found.keys == same:  # what costs much is tried where it stays otherwise
+                found = search.run(members)
+            if found.keys == same:
                 own = search.evaluated(members, found.sizes)  # with its own shapes
                 if found.score <= own.score + SETTLED:
                     found = own
@@ -186,7 +189,7 @@ class Inference(Refinement):
         self, state: State, values: Array, search: Search
     ) -> tuple[State, Array, Set]:
         """The best set about a state of nothing, and where it is about another one."""
-        found, turned = search.run(), self.turned
+        found, turned = search.run(thorough=False), self.turned
         far = self._afar(state, values, search)
         if far is not None and far[2].score > found.score:
             return far
@@ -213,7 +216,7 @@ class Inference(Refinement):
             members = one.members
             state, values, _ = self.settled(state, values, members, one.sizes)
             about = Search(self.dictionary, self.gram(state, values, None))
-            return state, values, about.run(members)
+            return state, values, about.run(members, thorough=False)
         return None
 
     def beside(self, found: Inferred, there: Set) -> Set:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import combinations
 
@@ -19,7 +19,7 @@ from fieldcal.model.search.pairs import Pair, pairs
 SETTLED = 0.02
 """Rise of ln Z that is none."""
 
-MOST = 10
+MOST = 30
 """Steps of one search."""
 
 FOLLOWED = 4
@@ -41,12 +41,20 @@ SLACK = 3.0
 class Search(Offers):
     """The search over one Gram matrix."""
 
-    def run(self, start: tuple[Member, ...] = ()) -> Set:
-        """The set of the highest weight that is found."""
+    def run(self, start: tuple[Member, ...] = (), thorough: bool = True) -> Set:
+        """The set of the highest weight that is found, step by step.
+
+        Each step is the first change that raises the weight, the cheap ones tried
+        first: one cause more, one less or another one in its place. Only a `thorough`
+        search tries what costs many times as much.
+        """
+        changes = [self._followed, self._replaced]
+        if thorough:
+            changes += [self._paired, self._instead, self._wider]
         best = self.evaluated(start)
         for _ in range(MOST):
-            better = self._step(best)
-            if better.score <= best.score + SETTLED:
+            better = self._step(best, changes)
+            if better is best:
                 break
             best = better
         return self._of_effects(best)
@@ -105,19 +113,26 @@ class Search(Offers):
             return best
         return max((one for one in every if not strange(one)), key=_score)
 
-    def _step(self, there: Set) -> Set:
-        """The best of the set with one or two more, with one less, or with one else."""
-        best = self._followed(there, there.score)
-        if best is there:
-            best = self._paired(there, there.score)
-        for i in range(len(best.members)):
+    @staticmethod
+    def _step(there: Set, changes: Iterable[Callable[[Set], Set]]) -> Set:
+        """The set after the first change that raises its weight, or the set itself."""
+        for change in changes:
+            better = change(there)
+            if better.score > there.score + SETTLED:
+                return better
+        return there
+
+    def _replaced(self, there: Set) -> Set:
+        """The best set with one cause less, or with another one in its place."""
+        best = there
+        for i in range(len(there.members)):
+            if i >= len(best.members):
+                break
             less = self.without(best, i)
             beside = best.sizes.instability
             other = self._followed(less, best.score, beside)
             best = max([best, less, other], key=_score)
-        if best is not there:
-            return best
-        return max(self._instead(best), self._wider(best), key=_score)
+        return best
 
     def _wider(self, there: Set) -> Set:
         """The best set with all the parameters of one of its causes and one more.
@@ -149,8 +164,14 @@ class Search(Offers):
         two = self._paired(less, there.score)
         return max([there, two, self._followed(two, there.score)], key=_score)
 
-    def _followed(self, there: Set, level: float, beside: Less | None = None) -> Set:
-        """The best set with one more; the set itself if none comes near a level."""
+    def _followed(
+        self, there: Set, level: float | None = None, beside: Less | None = None
+    ) -> Set:
+        """The best set with one more; the set itself if none comes near a level.
+
+        That is the set's own weight if it is not given.
+        """
+        level = there.score if level is None else level
         offers = self.offers(there, beside)
         found = [there]
         for offer in offers[:FOLLOWED]:
@@ -158,11 +179,12 @@ class Search(Offers):
                 found.append(self.taken(there, offer))
         return max(found, key=_score)
 
-    def _paired(self, there: Set, level: float) -> Set:
+    def _paired(self, there: Set, level: float | None = None) -> Set:
         """The best set with two more, of which neither raises the evidence by itself.
 
-        The set itself if none comes near a level.
+        The set itself if none comes near a level, its own weight if not given.
         """
+        level = there.score if level is None else level
         tried: dict[tuple[str, str], tuple[float, Offer, Offer]] = {}
         for table in self.tables(there):
             if table.less == there.sizes.instability:

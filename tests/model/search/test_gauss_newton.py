@@ -226,6 +226,29 @@ def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
     assert search._paired(empty, np.inf) is empty, "none comes near"
 
 
+class Watched(Search):
+    """A search that notes beside which sets pairs were tried."""
+
+    def _paired(self, there: Set, level: float | None = None) -> Set:
+        """Note the set, and go on as ever."""
+        self.__dict__.setdefault("asked", []).append(there)
+        return super()._paired(there, level)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_costs_much_is_tried_where_nothing_cheap_helps(seed: int) -> None:
+    """And by a thorough search alone."""
+    one, _ = drawn(seed)
+    quick, whole = (Watched(one.dictionary, one.gram) for _ in range(2))
+    best = quick.run(thorough=False)
+    assert "asked" not in quick.__dict__
+    assert quick._step(best, [quick._followed, quick._replaced]) is best
+    found = whole.run()
+    assert found.score >= best.score
+    first = whole.__dict__["asked"][0]
+    assert Search.key(first.members) == Search.key(best.members)
+
+
 def part_of(whole: Group, count: int) -> Group:
     return replace(
         whole, params=whole.params[:count], columns=whole.columns[:count],

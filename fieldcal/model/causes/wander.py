@@ -6,16 +6,18 @@ l s keep of a walk
 
     q^2 [T / (pi^2 K) - l / 6]                                                      (1)
 
-of variance, which is as good as white from row to row, and of flicker
+of variance, which is as good as white from row to row, and of flicker, with z =
+pi l / T,
 
-    a^2 / 2 [sin^2 x / (2 x^2) + sin 2x / (2 x) - Ci(2x)],    x = pi l K / (2 T)    (2)
+    a^2 / 2 [3 / 2 - ln z + z^2 / 144 - sum_k (sin(k z / 2) / (k z / 2))^2 / k]     (2)
 
 Two means tau apart share, with y = pi tau / T,
 
     q^2 T / pi^2 [pi^2 / 6 - pi y / 2 + y^2 / 4 - sum_k cos(k y) / k^2]             (3)
-    - a^2 / 2 Ci(K y)                                                               (4)
+    + a^2 / 2 [-ln(2 sin(y / 2)) - sum_k cos(k y) / k]                              (4)
 
-with k = 1 ... K. Cosine k is beyond the noise of rows of deviations s up to
+with k = 1 ... K: the sum over all k, and (2) is its mean over an interval of l to the
+fourth power of z. Cosine k is beyond the noise of rows of deviations s up to
 
     k = q sqrt(2 T J) / pi,    k = a^2 J,    J = sum 1 / (2 s^2)                    (5)
 
@@ -37,6 +39,9 @@ from fieldcal.model.rows.reduce import Rows
 
 MORE = 2.0
 """Times as many cosines as are each beyond the noise of the rows."""
+
+NEAR = 1e-12
+"""Least phase between two means: at none, flicker would be without bound."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +88,9 @@ class Wander:
         walks: Array = q**2 * _left_of_walk(self.length, length, count)
         if not a:
             return walks
-        flickers: Array = a**2 * _left_of_flicker(self.length, length, count)
+        # rows are of few lengths, but for the rounding of their times
+        few, at = np.unique(length.round(6), return_inverse=True)
+        flickers: Array = a**2 * _left_of_flicker(self.length, few, count)[at]
         return walks + flickers
 
     def apart(self, t: Array, length: Array) -> Array:
@@ -96,11 +103,12 @@ class Wander:
             if not alone.any():
                 continue
             k = np.arange(1, count + 1)
-            taken = np.cos(np.multiply.outer(y, k)) @ (1 / k**2)
-            left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - taken
+            waves = np.cos(np.multiply.outer(y, k))
+            left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - waves @ (1 / k**2)
             out[c] = q**2 * self.length / np.pi**2 * left  # (3)
             if a:
-                out[c] -= a**2 * _cosine_integral(count * y) / 2  # (4)
+                every = -np.log(2 * np.sin(np.clip(y, NEAR, np.pi) / 2))
+                out[c] += a**2 / 2 * (every - waves @ (1 / k))  # (4)
             out[c].flat[diagonal] = alone
         return out
 
@@ -119,15 +127,7 @@ def _left_of_walk(whole: float, length: Array, count: int) -> Array:
 
 def _left_of_flicker(whole: float, length: Array, count: int) -> Array:
     """Variance that cosines leave of means of flicker with a = 1, (n,)."""
-    x = np.maximum(np.pi * length * count / (2 * whole), 1e-12)
-    bent = np.sin(x) ** 2 / (2 * x**2) + np.sin(2 * x) / (2 * x)
-    out: Array = (bent - _cosine_integral(2 * x)) / 2  # (2)
-    return out
-
-
-def _cosine_integral(x: Array) -> Array:
-    """Ci of some numbers, those below 1e-12 as if they were that."""
-    from scipy.special import sici  # of those recordings only that show flicker
-
-    out: Array = sici(np.maximum(x, 1e-12))[1]
+    z, k = np.maximum(np.pi * length / whole, NEAR), np.arange(1, count + 1)
+    taken = np.sinc(np.multiply.outer(z, k) / (2 * np.pi)) ** 2 @ (1 / k)
+    out: Array = np.maximum(1.5 - np.log(z) + z**2 / 144 - taken, 0.0) / 2  # (2)
     return out

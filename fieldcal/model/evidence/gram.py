@@ -285,8 +285,11 @@ def gains(inner: Array, pull: Array, own: Array | float) -> Array:
 
     `own` (...) is the largest diagonal element of T G T before the elimination.
     """
-    strength, axes = np.linalg.eigh(inner)
-    power = (np.swapaxes(axes, -1, -2) @ pull[..., None])[..., 0] ** 2
+    if pull.shape[-1] == 1:
+        strength, power = inner[..., 0], pull**2
+    else:
+        strength, axes = np.linalg.eigh(inner)
+        power = (np.swapaxes(axes, -1, -2) @ pull[..., None])[..., 0] ** 2
     seen = strength > ROUNDED * np.maximum(np.asarray(own)[..., None], 1e-300)
     strength, power = np.where(seen, strength, 0.0), np.where(seen, power, 0.0)
     return gained(strength, power)

@@ -88,14 +88,14 @@ def alike_in(some: Array, density: Array = UNSTEADY) -> Array:
     return out
 
 
-def _told(state: Eliminated, at: Index, v: float) -> tuple[Array, Array]:
-    """What (3) needs of a group, some columns of a set in which its size is v."""
-    wide = state.sizes[at]
-    cov = state.inverse[np.ix_(at, at)] / wide / wide[:, None]
-    part, axes = np.linalg.eigh(cov)
+def _told(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, Array]:
+    """What (3) needs of groups alike in width, columns (..., k) of a set, of size v."""
+    wide, size = state.sizes[at], np.asarray(v)[..., None]
+    cov = state.inverse[at[..., :, None], at[..., None, :]]
+    part, axes = np.linalg.eigh(cov / wide[..., :, None] / wide[..., None, :])
     part = np.clip(part, LEAST, 1.0)
-    power = ((axes.T @ (state.estimate[at] / wide)) / (part * v)) ** 2
-    return (1 / part - 1) / v**2, power
+    along = (np.swapaxes(axes, -1, -2) @ (state.estimate[at] / wide)[..., None])[..., 0]
+    return (1 / part - 1) / size**2, (along / (part * size)) ** 2
 
 
 def likeliest(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
@@ -179,7 +179,7 @@ class Sizing:
         profiles: list[Array] = []
         for _ in range(ROUNDS):
             before = (*self.sizes, *self.instability)
-            profiles = [self._group(i) for i in free]
+            profiles = self._groups(free)
             for triad in TRIADS:
                 if some := [c for c in triad if c in channels]:
                     profiles += self._triad(some)
@@ -212,15 +212,35 @@ class Sizing:
             parts.append(group.sizes(free if group.fixed is None else group.fixed))
         return np.concatenate([np.empty(0), *parts])
 
-    def _group(self, i: int) -> Array:
-        """F over the sizes of one group, and its size at the top."""
-        state = self.eliminated()
-        v = float(priors.SIZES[self.sizes[i]])
-        every = np.arange(len(self.every))
-        gain = gained(*_told(state, every[self.places[i]], v))
-        profile: Array = state.score + gain - gain[self.sizes[i]] + DENSITY
-        self.sizes[i] = int(np.argmax(profile))
-        return profile
+    def _groups(self, free: Sequence[int]) -> list[Array]:
+        """F over the sizes of each of some groups, and their sizes at the top.
+
+        Each is sought beside the others as they are then; until one of them changes,
+        what is told of all at once holds.
+        """
+        start, profiles = self.eliminated(), []
+        gains = self._gains(start, free)
+        for i in free:
+            state = self.eliminated()
+            gain = gains[i] if state is start else self._gains(state, [i])[i]
+            profile: Array = state.score + gain - gain[self.sizes[i]] + DENSITY
+            self.sizes[i] = int(np.argmax(profile))
+            profiles.append(profile)
+        return profiles
+
+    def _gains(self, state: Eliminated, some: Sequence[int]) -> dict[int, Array]:
+        """Gain over the sizes of each of some groups, those of one width at once."""
+        by_width: dict[int, list[int]] = {}
+        for i in some:
+            place = self.places[i]
+            by_width.setdefault(place.stop - place.start, []).append(i)
+        out: dict[int, Array] = {}
+        for width, alike in by_width.items():
+            first = np.array([self.places[i].start for i in alike])
+            at = first[:, None] + np.arange(width)
+            v = priors.SIZES[[self.sizes[i] for i in alike]]
+            out.update(zip(alike, gained(*_told(state, at, v)), strict=True))
+        return out
 
     def _triad(self, channels: Sequence[int]) -> list[Array]:
         """F over the instabilities of each of some channels that are much alike.
@@ -230,9 +250,11 @@ class Sizing:
         orientation, each alone would fall, and all together leave it unexplained:
         then they are set one by one.
         """
-        before, level = list(self.instability), self._level()
+        before, state = list(self.instability), self.eliminated()
         profiles = self._together(channels)
-        if self._level() >= level - ROUNDED:
+        if self.instability == before or self._level() >= (
+            state.score + float(alike(before, self.unstable)) - ROUNDED
+        ):
             return profiles
         self.instability = before
         return [self._one(c, channels) for c in channels]

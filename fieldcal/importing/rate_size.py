@@ -3,8 +3,9 @@
     d(u)/dt = u x w,   u = a / |a|                                                 (1)
 
 As gravity turns in device axes while the device is turned, this gives the scale of the
-rates w. Where the hand that turns it jerks so much that (1) holds only roughly, the
-rests at both ends of the turns give it.
+rates w. A hand turns a device about its wrist or elbow and not about the sensor, and
+jerks it: such forces follow the turn, so (1) is off by up to a tenth. Where the device
+rests before the turns and behind them, the rests tell the scale without them.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _AGREES = 0.9
 """Correlation of both sides of (1) from which on it is believed."""
 
 _ROUGHLY = 0.3
-"""Correlation from which on the turns from rest to rest are looked at instead."""
+"""Correlation from which on the turns from rest to rest are looked at."""
 
 _SWUNG = 0.3
 """Part by which |a| is not g: then a hand is felt, and (1) does not hold."""
@@ -67,11 +68,11 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
     power = float(right @ right)
     both = float(left @ right)
     agrees = both / np.sqrt(power * sides.moved)
-    if agrees >= _AGREES:
-        return power / both
-    if agrees < _ROUGHLY or sides.clipped:
+    if agrees < _ROUGHLY:
         return None
-    return closing_scale(sides.t, sides.up, sides.gyr, power / both)
+    rough = power / both
+    closes = closing_scale(sides.t, sides.up, sides.gyr, rough)
+    return rough if closes is None and agrees >= _AGREES else closes
 
 
 class Turns(NamedTuple):
@@ -158,8 +159,8 @@ class _Sides(NamedTuple):
     angles : (n, 3) integrals of the rates
     lag : rows
     moved : sum of the squares of the left one
-    clipped : whether a rate was at its rail
-    t, up, gyr : (m,), (m, 3) of the rows that are known; the rates without their median
+    t, up, gyr : (m,), (m, 3) of the rows that are known; the rates without their
+        median, nan where one is at its rail
     usual : (3,) that median
 
     """
@@ -169,7 +170,6 @@ class _Sides(NamedTuple):
     angles: Array
     lag: int
     moved: float
-    clipped: bool
     t: Array
     up: Array
     gyr: Array
@@ -204,8 +204,8 @@ class _Sides(NamedTuple):
         if not right.any():
             return None
         moved = float((left**2).sum())
-        return cls(left, right, angles, lag, moved, bool(clipped.any()),
-                   t, whole, gyr, usual)  # fmt: skip
+        gyr = np.where(clipped[:, None], np.nan, gyr)
+        return cls(left, right, angles, lag, moved, t, whole, gyr, usual)
 
 
 def _at_rails(gyr: Array) -> NDArray[np.bool_]:

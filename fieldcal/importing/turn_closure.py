@@ -19,6 +19,9 @@ from fieldcal.core.samples import Array
 GROUP_S, REST_S, TURN_S = 0.1, 0.5, 20.0
 """Parts of a rest, the shortest rest and the longest turn, s."""
 
+MARGIN_S = 1.0
+"""At both ends of a rest, which may be parts of turns, at most a quarter of it, s."""
+
 NEAR_G = 0.1
 """Part by which |a| at rest is not g."""
 
@@ -62,7 +65,7 @@ def closing_scale(t: Array, up: Array, gyr: Array, rough: float) -> float | None
     ----------
     t : (n,) s
     up : (n, 3) force over gravity, device axes
-    gyr : (n, 3) numbers of the file
+    gyr : (n, 3) numbers of the file, nan where it is not known what the rate was
     rough : about what 1 rad/s reads
 
     """
@@ -82,7 +85,9 @@ def closing_scale(t: Array, up: Array, gyr: Array, rough: float) -> float | None
 
 def _turns(t: Array, up: Array, gyr: Array) -> Iterator[Turned]:
     step = float(np.median(np.diff(t)))
-    rests = _rests(up, max(4, round(GROUP_S / step)), step)
+    rests = [
+        _inner(*rest, step) for rest in _rests(up, max(4, round(GROUP_S / step)), step)
+    ]
     for (a, b), (c, d) in zip(rests, rests[1:], strict=False):
         before, behind = (_direction(up[i:j]) for i, j in ((a, b), (c, d)))
         turned = np.arccos(np.clip(before @ behind, -1, 1))
@@ -91,6 +96,8 @@ def _turns(t: Array, up: Array, gyr: Array) -> Iterator[Turned]:
             continue
         zero = (gyr[a:b].mean(axis=0) + gyr[c:d].mean(axis=0)) / 2
         angles = (gyr[b : c + 1] - zero) * steps[:, None]
+        if not np.isfinite(angles).all():
+            continue
         many = max(1, round(STEP_S / step))
         starts = np.arange(0, len(angles), many)
         yield Turned(before, behind, np.add.reduceat(angles, starts, axis=0))
@@ -108,6 +115,15 @@ def _rests(up: Array, group: int, step: float) -> list[tuple[int, int]]:
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     least = REST_S / (group * step)
     return [(group * a, group * b) for a, b in pairs if b - a >= least]
+
+
+def _inner(first: int, last: int, step: float) -> tuple[int, int]:
+    """What of a rest is surely one: a turn begins and ends slowly.
+
+    What is cut off belongs to the turn, for it may have turned already.
+    """
+    margin = min((last - first) // 4, round(MARGIN_S / step))
+    return first + margin, last - margin
 
 
 def _direction(up: Array) -> Array:

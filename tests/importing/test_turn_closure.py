@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from laid_about import G, turned
+from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.gravity_size import Gravity
@@ -32,6 +33,46 @@ def test_the_scale_of_rates_is_found_however_the_hand_jerks(
     rows = jerked(3, force)
     found = rate_in(rows[:, 0], rows[:, 1:4], rows[:, 4:] * unit, KNOWN)
     assert found == pytest.approx(unit, rel=0.03)
+
+
+def swung(seed: int) -> Array:
+    """Rows t, a, w of a device that a forearm turns about its elbow."""
+    rng = np.random.default_rng(seed)
+    now, arm, parts = Rotation.identity(), np.array([0.15, -0.05, 0.06]), []
+    for _ in range(12):
+        axis, angle, lasts = _unit(rng), rng.uniform(0.6, 2.6), rng.uniform(0.9, 2.5)
+        part = np.arange(int(lasts * RATE)) / int(lasts * RATE)
+        way = angle * (part - np.sin(2 * np.pi * part) / (2 * np.pi))
+        speed = np.outer(angle / lasts * (1 - np.cos(2 * np.pi * part)), axis)
+        up = (now * Rotation.from_rotvec(np.outer(way, axis))).inv().apply([0, 0, G])
+        pull = np.cross(np.gradient(speed, 1 / RATE, axis=0), arm)
+        parts.append(
+            np.hstack([up + pull + np.cross(speed, np.cross(speed, arm)), speed])
+        )
+        now = now * Rotation.from_rotvec(angle * axis)
+        held = [*now.inv().apply([0, 0, G]), 0, 0, 0]
+        parts.append(np.tile(held, (int(rng.uniform(3, 6) * RATE), 1)))
+    rows = np.vstack(parts) + rng.normal(
+        0, [*[0.02] * 3, *[0.002] * 3], (sum(map(len, parts)), 6)
+    )
+    return np.column_stack([np.arange(len(rows)) / RATE, rows])
+
+
+def _unit(rng: np.random.Generator) -> Array:
+    axis = rng.standard_normal(3)
+    unit: Array = axis / np.linalg.norm(axis)
+    return unit
+
+
+@pytest.mark.parametrize("rail", [np.inf, 2.5])
+@pytest.mark.parametrize("seed", range(5))
+def test_turns_about_an_elbow_or_into_a_rail_show_no_other_scale(
+    seed: int, rail: float
+) -> None:
+    rows = swung(seed)
+    rates = np.clip(rows[:, 4:], -rail, rail)
+    found = rate_in(rows[:, 0], rows[:, 1:4], rates, KNOWN)
+    assert found == pytest.approx(1.0, rel=0.02)
 
 
 def test_the_rests_alone_give_it() -> None:

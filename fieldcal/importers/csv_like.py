@@ -68,8 +68,8 @@ _CHECKED = re.compile(rb"\$.*\*[0-9A-Fa-f]{2}\s*$")
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether these are the first bytes of a text."""
-    if b"\0" in head:
-        return wide(head) is not None
+    if wide(head) is not None:
+        return True
     lines = head.split(b"\n")[1:-1]
     if lines and sum(map(_is_checked, lines)) > len(lines) / 2:
         # of a format of its own, a port's bytes; of others physics tells the units
@@ -244,7 +244,7 @@ class TextColumns(ColumnRecording):
             yield replace(block, t=since)
         self.says += [s for s in samples.says if s not in self.says]
         if table is not None and table.headings:
-            self.says.append(f"lines of names between its rows: {table.headings}")
+            self.says.append(f"lines of words between its rows: {table.headings}")
         if table is None or not table.seen:
             number, line = list(enumerate(first_lines[:2] or [""], 1))[-1]
             raise InputError(

@@ -22,6 +22,7 @@ from typing import Any
 
 from fieldcal.importers.arrays import ArrayFile
 from fieldcal.importing.array_tables import ArrayTable, table_of
+from fieldcal.importing.clock_text import is_clock
 from fieldcal.importing.json_lists import json_lists
 from fieldcal.importing.said_rate import scalars
 from fieldcal.importing.text_encoding import as_utf8
@@ -34,8 +35,14 @@ BEGINS = re.compile(
 )
 
 
+CLOCK = "time"
+"""Name of a time that stands before a record."""
+
 RECORD = re.compile(rb"\s*\{\s*[\"'].*\}\s*")
 """A line that is a record."""
+
+BEFORE = re.compile(r"([^{\[]*?)\s*(?:->|:)?\s*(\{.*)")
+"""What stands before a record in its line, and the record."""
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -43,8 +50,19 @@ def recognises(head: bytes, path: Path) -> bool:
     if BEGINS.match(head) is not None:
         return True
     lines = [line for line in head.split(b"\n")[:-1] if line.strip()]
-    records = sum(RECORD.fullmatch(line) is not None for line in lines)
-    return records > MOSTLY * len(lines)
+    return sum(map(_is_record, lines)) > MOSTLY * len(lines)
+
+
+def _is_record(line: bytes) -> bool:
+    """Whether a line is a record, also behind a time or a topic."""
+    if RECORD.fullmatch(line) is not None:
+        return True
+    if BEFORE.fullmatch(line.decode(errors="replace").strip()) is None:
+        return False
+    try:
+        return isinstance(_of_line(line.decode()), dict)
+    except (ValueError, RecursionError):
+        return False
 
 
 class JsonLog(ArrayFile):
@@ -93,11 +111,23 @@ class JsonLog(ArrayFile):
 
 
 def _of_line(line: str) -> Any:
-    """What a line holds, in JSON or as Python prints it, with single quotes."""
+    """What a line holds; what stands before a record in it is its time or its topic."""
+    said = BEFORE.fullmatch(line.strip())
+    if said is None or not said[1]:
+        return _of_text(line)
+    found = _of_text(said[2])
+    if isinstance(found, dict):
+        clock = said[1].strip(" []")
+        found.setdefault(CLOCK if is_clock(clock) else "topic", clock)
+    return found
+
+
+def _of_text(text: str) -> Any:
+    """What a text holds, in JSON or as Python prints it, with single quotes."""
     try:
-        return json.loads(line)
+        return json.loads(text)
     except ValueError as error:
         try:
-            return ast.literal_eval(line)
+            return ast.literal_eval(text)
         except (ValueError, SyntaxError, MemoryError):
             raise error from None

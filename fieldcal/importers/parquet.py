@@ -13,13 +13,18 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
+from fieldcal.importing.clock_text import ClockText, is_clock
 from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.gzip_stream import on_disk
 from fieldcal.importing.heading import Column, Heading
+from fieldcal.importing.heading_words import meaning
 from fieldcal.importing.recording import ROWS
 from fieldcal.session.arrow_columns import numbers
 
 WHAT = "Parquet and Arrow"
+
+TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Seconds in one of what stored times count."""
 
 PARQUET, FEATHER, STREAM = b"PAR1", b"ARROW1", b"\xff\xff\xff\xff"
 
@@ -35,22 +40,19 @@ class ParquetFile(ColumnRecording):
     def heading(self) -> list[Heading]:
         """Names of its columns, with their units."""
         with self._batches() as (schema, _):
-            return [Heading([Column(f.name, f.name, _unit(f)) for f in schema])]
+            return [Heading([_column(f) for f in schema])]
 
     def beginning(self) -> Array:
         """Numbers of its first batch; columns of other things are unknown."""
-        import pyarrow as pa
-
         with self._batches(every=True) as (schema, batches):
             first = next(batches, None)
             if first is None:
                 return np.empty((0, len(schema)))
-            kinds = [pa.types.is_floating(f.type) or pa.types.is_integer(f.type)
-                     for f in schema]  # fmt: skip
             found = np.full((first.num_rows, len(schema)), np.nan)
-            for i, plain in enumerate(kinds):
-                if plain:
-                    found[:, i] = self._numbers(first, schema.names[i])
+            for i, name in enumerate(schema.names):
+                values = self._values(first.column(name), ClockText())
+                if values is not None:
+                    found[:, i] = values
             return found
 
     def ask(self) -> str:
@@ -67,12 +69,12 @@ class ParquetFile(ColumnRecording):
         if len(self.imus()) > 1:
             yield from self.alone(stream).blocks(stream)
             return
-        samples = columns.ColumnReader(self.wanted)
+        samples, clock = columns.ColumnReader(self.wanted), ClockText()
         with self._batches() as (schema, batches):
             named = self._named(schema)
             for batch in batches:
                 batch.validate(full=True)
-                table = {c: self._numbers(batch, n) for c, n in named.items()}
+                table = {c: self._numbers(batch, n, clock) for c, n in named.items()}
                 yield samples.block(table, batch.num_rows)
 
     @contextmanager
@@ -118,19 +120,50 @@ class ParquetFile(ColumnRecording):
         columns.check(replace(self.wanted, columns=tuple(named)))
         return named
 
-    def _numbers(self, batch: Any, name: str) -> Array:
+    def _numbers(self, batch: Any, name: str, clock: ClockText) -> Array:
+        found = self._values(batch.column(name), clock)
+        if found is None:
+            raise InputError(
+                f"{self.path}: column {name} holds {batch.column(name).type}, not"
+                " numbers; name another with --columns"
+            )
+        return found
+
+    def _values(self, column: Any, clock: ClockText) -> Array | None:
+        """Numbers of a column; None of other things.
+
+        Times that are stored as such know their unit, and texts may be times.
+        """
         import pyarrow as pa
 
-        column = batch.column(name)
         kind = column.type
         if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            column = column.cast(pa.int64())
-        elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
-            raise InputError(
-                f"{self.path}: column {name} holds {kind}, not numbers; name another"
-                " with --columns"
-            )
-        return numbers(column.cast(pa.float64(), safe=False))
+            ticks = numbers(column.cast(pa.int64()).cast(pa.float64(), safe=False))
+            return ticks * TICKS[kind.unit] / self.wanted.time_scale
+        if pa.types.is_floating(kind) or pa.types.is_integer(kind):
+            return numbers(column.cast(pa.float64(), safe=False))
+        if not _is_text(kind) or not len(column) or not is_clock(str(column[0])):
+            return None
+        read = (clock.seconds(str(text)) for text in column)
+        found = np.array([np.nan if since is None else since for since in read])
+        return found / self.wanted.time_scale
+
+
+def _is_text(kind: Any) -> bool:
+    import pyarrow as pa
+
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _column(field: Any) -> Column:
+    """A column with its name and unit; one of times is called so."""
+    import pyarrow as pa
+
+    if not (pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type)):
+        return Column(field.name, field.name, _unit(field))
+    said = meaning(field.name)
+    named = said is not None and said.kind == "t"
+    return Column(field.name, field.name if named else "time", "s")
 
 
 def _unit(field: Any) -> str:

@@ -15,7 +15,7 @@ from fieldcal.importing.gravity_size import gravity_in
 from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
 from fieldcal.importing.row_times import FRACTIONS, NEAR
-from fieldcal.importing.scales import FEWEST, USUAL_COUNTS
+from fieldcal.importing.scales import FEWEST, USUAL_COUNTS, about
 from fieldcal.importing.time_units import SharedTimes, time_units
 
 SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
@@ -132,7 +132,7 @@ def shared_question(wanted: ReadOptions, shared: SharedTimes, t: Array) -> str:
     return (
         f"its times step by {shared.step:g} {unit}, with about {shared.rows:.0f} rows"
         " in each, so they do not say when a row was taken: add --columns"
-        f" {quote(','.join(names))} --rate {rate:.3g}"
+        f" {quote(','.join(names))} --rate {about(rate)}"
     )
 
 
@@ -152,9 +152,9 @@ def rate_hint(wanted: ReadOptions, table: Array) -> str:
     if not turns:
         return f"{USUAL:.3g}"
     (unit, rate), *others = turns.items()
-    hint = f"{rate:.3g}, which its turns say about, if rates are in {unit}"
+    hint = f"{about(rate)}, which its turns say about, if rates are in {unit}"
     if unit.startswith("counts"):
-        hint += "".join(f", or {hz:.3g} if {what.split()[1]}" for what, hz in others)
+        hint += "".join(f", or {about(hz)} if {what.split()[1]}" for what, hz in others)
     return hint
 
 

@@ -1,4 +1,6 @@
-"""Bytes of a file, unpacked where it is packed (.gz), also of one that was cut off.
+"""Bytes of a file, unpacked where it is packed, also of one that was cut off.
+
+Packed are a .gz, and a .zip that holds one file.
 
 What comes before the place where a packed file ends or fails is whole: gzip checks
 itself only at its end, but no byte before the fault depends on what follows it.
@@ -16,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from fieldcal.core.errors import InputError, disk_says
+from fieldcal.importing import zip_member
 
 HEAD = 4096
 """First bytes by which a format is known."""
@@ -42,7 +45,7 @@ def refuse_truncated(path: Path) -> Cut:
 
 
 def open_unpacked(path: Path, cut: Cut | None = None) -> IO[bytes]:
-    """Open a file for reading, also .gz.
+    """Open a file for reading, unpacked.
 
     Parameters
     ----------
@@ -57,14 +60,30 @@ def open_unpacked(path: Path, cut: Cut | None = None) -> IO[bytes]:
     """
     try:
         file = path.open("rb")
-        magic = file.read(len(MAGIC))
+        magic = file.read(len(zip_member.MAGIC))
         file.seek(0)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    if magic != MAGIC:
+    refuse = refuse_truncated(path)
+    raw: io.RawIOBase
+    if magic == zip_member.MAGIC and (name := zip_member.only_member(path)):
+        file.close()
+        raw = zip_member.ZipMember(path, name, cut or refuse)
+    elif magic.startswith(MAGIC):
+        raw = _Gunzip(file, refuse, cut or refuse)
+    else:
         return file
-    raw = _Gunzip(file, refuse_truncated(path), cut or refuse_truncated(path))
     return io.BufferedReader(raw, 2 * _AT_ONCE)
+
+
+def _name_unpacked(path: Path) -> str | None:
+    """Name of what a file is, unpacked; None if it is not packed."""
+    with path.open("rb") as file:
+        magic = file.read(len(zip_member.MAGIC))
+    if magic == zip_member.MAGIC:
+        name = zip_member.only_member(path)
+        return name and Path(name).name
+    return path.stem if magic.startswith(MAGIC) else None
 
 
 class _Gunzip(io.RawIOBase):
@@ -150,14 +169,13 @@ def head(path: Path, many: int = HEAD) -> bytes:
 @contextmanager
 def on_disk(path: Path, cut: Cut | None = None) -> Iterator[Path]:
     """Give a file that can be searched, unpacked where it was not."""
-    with path.open("rb") as file:
-        packed = file.read(len(MAGIC)) == MAGIC
-    if not packed:
+    name = _name_unpacked(path)
+    if name is None:
         yield path
         return
     folder = Path(tempfile.mkdtemp(prefix="fieldcal."))
     try:
-        whole = folder / path.stem
+        whole = folder / name
         try:
             with whole.open("wb") as out:
                 for data in pieces(path, cut=cut):

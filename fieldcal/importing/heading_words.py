@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from fieldcal.importing.heading_units import TELLING, UNITS, unit_in
+from fieldcal.importing.rate_names import with_axis_of
 
 AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
 
@@ -186,6 +187,7 @@ def _ways(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
 def _of_words(words: list[str], unit: str | None) -> Meaning | None:
     if not words:
         return None
+    words = with_axis_of(words)
     if "t" in words and unit == "deg C":
         return Meaning("temperature", "", unit, tuple(w for w in words if w != "t"))
     if (step := _step(words, unit)) is not None:

@@ -68,14 +68,15 @@ def instances_in(lines: Sequence[str], separator: str | None) -> Instances | Non
     above = [row for row in whole if row not in numbers]
     for i in range(width):
         column = [row[i] for row in numbers]
-        named = any(_tells_devices(row[i]) for row in above)
+        named = any(tells_devices(row[i]) for row in above)
         words = not any(is_number(cell, False) for cell in column)
         if (named or words) and _in_turn(column):
             return Instances(i, parted, tuple(dict.fromkeys(column)))
     return None
 
 
-def _tells_devices(name: str) -> bool:
+def tells_devices(name: str) -> bool:
+    """Whether a name is that of a column or field that tells devices apart."""
     bare = re.sub(r"[\s_.-]+", "", name.lower().lstrip("#%/ "))
     return bare in NAMES or (bare.endswith("id") and bare[:-2] in NAMES)
 

@@ -11,37 +11,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.clock_text import ClockText, is_clock
-from fieldcal.importing.heading_words import axis_alone, meaning, words_of
+from fieldcal.importing.clock_text import ClockText
+from fieldcal.importing.heading_words import meaning
+from fieldcal.importing.json_record import (
+    DEEPEST,
+    JsonRecord,
+    floats,
+    is_number,
+    record,
+    side_by_side,
+)
 from fieldcal.importing.record_pairs import paired
-
-AXES = "xyz"
-
-DEEPEST = 20
-"""Records within records that are looked at."""
-
-
-class JsonRecord(NamedTuple):
-    """A record, without records within it.
-
-    Attributes
-    ----------
-    numbers : by name; nan where there is none
-    clocks : times of a clock by name
-    texts : other texts by name
-    samples : records of several samples by name
-
-    """
-
-    numbers: dict[str, float]
-    clocks: dict[str, str]
-    texts: dict[str, str]
-    samples: dict[str, Sequence[Any]]
 
 
 def json_lists(
@@ -64,15 +49,15 @@ def json_lists(
                 yield from json_lists(value, full or "value", says)
     elif not isinstance(document, list) or len(document) <= 1:
         return
-    elif all(_is_number(one) for one in document):
-        yield name or "list", _floats(document)
+    elif all(is_number(one) for one in document):
+        yield name or "list", floats(document)
     elif all(isinstance(one, list) for one in document):
         if len({len(one) for one in document}) == 1 and document[0]:
-            rows = [_floats(one) for one in document if all(map(_is_number, one))]
+            rows = [floats(one) for one in document if all(map(is_number, one))]
             if len(rows) == len(document):
                 yield name or "list", np.array(rows)
     else:
-        records = [_record(one) for one in document if isinstance(one, Mapping)]
+        records = [record(one) for one in document if isinstance(one, Mapping)]
         for bare, values in _fields(records, [] if says is None else says):
             yield (f"{name}/{bare}" if name else bare), values
 
@@ -94,65 +79,6 @@ def _fields(
             yield (f"{prefix}_{key}" if prefix else key), values
 
 
-def _is_number(value: Any) -> bool:
-    return value is None or (
-        isinstance(value, (int, float)) and not isinstance(value, bool)
-    )
-
-
-def _floats(values: Sequence[Any]) -> Array:
-    return np.array([_float(value) for value in values])
-
-
-def _float(value: Any) -> float:
-    try:
-        return float("nan" if value is None else value)
-    except OverflowError:
-        return float("inf")
-
-
-def _written(name: str, text: str) -> float | None:
-    """A number that is written as a text; None of another, or of a number of a device.
-
-    >>> _written("z", "9.81"), _written("time", "17"), _written("device", "2")
-    (9.81, 17.0, None)
-    """
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    channel = meaning(name) is not None or axis_alone(words_of(name)) is not None
-    return number if channel or "." in text else None
-
-
-def _record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> JsonRecord:
-    """A record, with the names of what lies within it joined."""
-    found = JsonRecord({}, {}, {}, {})
-    for key, inner in value.items():
-        full = f"{name}_{key}".strip("_") or "value"
-        if isinstance(inner, Mapping) and depth < DEEPEST:
-            within = _record(inner, full, depth + 1)
-            found.numbers.update(within.numbers)
-            found.clocks.update(within.clocks)
-            found.texts.update(within.texts)
-            found.samples.update(within.samples)
-        elif _is_number(inner):
-            found.numbers[full] = _float(inner)
-        elif isinstance(inner, str) and (number := _written(full, inner)) is not None:
-            found.numbers[full] = number
-        elif isinstance(inner, str) and is_clock(inner):
-            found.clocks[full] = inner
-        elif isinstance(inner, str):
-            found.texts[full] = inner
-        elif isinstance(inner, list) and all(_is_number(one) for one in inner):
-            axes = AXES if len(inner) == len(AXES) else range(len(inner))
-            pairs = zip(axes, inner, strict=True)
-            found.numbers.update({f"{full}_{a}": _float(v) for a, v in pairs})
-        elif isinstance(inner, list) and inner:
-            found.samples[full] = inner
-    return found
-
-
 def _kinds(records: Sequence[JsonRecord]) -> dict[str, list[JsonRecord]]:
     """Records that are alike, by the texts in which they differ from others."""
     names = {name for one in records for name in one.texts}
@@ -170,6 +96,7 @@ def _kinds(records: Sequence[JsonRecord]) -> dict[str, list[JsonRecord]]:
 
 def _lists(records: Sequence[JsonRecord]) -> dict[str, Array]:
     """Values of each field, (n,), in the order of the records."""
+    records = side_by_side(records)
     if any(one.samples for one in records):
         return _of_samples([one for one in records if one.samples])
     found = {
@@ -193,7 +120,7 @@ def _of_samples(records: Sequence[JsonRecord]) -> dict[str, Array]:
     many = [min(len(inner) for inner in one.samples.values()) for one in records]
     bare = [one._replace(samples={}) for one in records]
     whole = [
-        _record({name: inner[i] for name, inner in one.samples.items()})
+        record({name: inner[i] for name, inner in one.samples.items()})
         for one, m in zip(records, many, strict=True)
         for i in range(m)
     ]

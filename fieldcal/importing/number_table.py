@@ -6,6 +6,7 @@ so that each that is none can be named.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -29,7 +30,7 @@ class NumberTable:
     Attributes
     ----------
     seen : rows that were read
-    headings : lines of names between them, which are no rows
+    headings : lines of words between them, which are no rows
 
     """
 
@@ -73,7 +74,7 @@ class NumberTable:
     def _row(self, number: int, line: str) -> list[float]:
         """Numbers of one line, the slow way; nothing of one that is left out."""
         cells = line.split(self._separator)
-        if _are_names(cells):
+        if _are_names(cells) or (len(cells) != len(self._names) and _is_said(line)):
             self.headings += 1
             return []
         if len(cells) != len(self._names):
@@ -92,6 +93,21 @@ class NumberTable:
                 self._damaged(f"{self._place(number)}, column {name}", what)
                 return []
         return row
+
+
+def _is_said(line: str) -> bool:
+    """Whether a line is a sentence, as a device says while it starts.
+
+    What is left of a row whose bytes were lost is figures and signs, and a word for a
+    number that is missing is one of a row.
+
+    >>> [_is_said(x) for x in ("MPU6050 connected, 2 retries", "0.12,-3e", "X: nan")]
+    [True, False, False]
+    """
+    words = re.findall(r"[^\W\d_]+", line)
+    letters = sum(len(w) for w in words if len(w) > 1)
+    row = bool({*words} & {*MISSING})
+    return line.isprintable() and not row and letters > sum(map(str.isdigit, line))
 
 
 def _are_names(cells: Sequence[str]) -> bool:

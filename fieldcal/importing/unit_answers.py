@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.scales import GYR_SCALES, USUAL_COUNTS, Scale
+from fieldcal.importing.scales import GYR_SCALES, USUAL_COUNTS, Scale, about
 
 
 def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
@@ -15,7 +15,7 @@ def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
         for s in fits
     ]
     return lines or [
-        f"--{kind}-unit {unit} --{kind}-lsb {lsb:.3g} (about so many counts in one"
+        f"--{kind}-unit {unit} --{kind}-lsb {about(lsb)} (about so many counts in one"
         f" {unit}; its data sheet says the number)",
         f"--{kind}-unit {unit}, if it is so",
     ]
@@ -32,7 +32,9 @@ def other_rates(reads: float, rate: float, gyr: Array) -> list[str]:
 
     """
     scales = USUAL_COUNTS if (gyr == np.round(gyr)).all() else GYR_SCALES[:2]
-    rates = [f"--rate {rate * reads / s.size:.3g}, which makes it {s}" for s in scales]
+    rates = [
+        f"--rate {about(rate * reads / s.size)}, which makes it {s}" for s in scales
+    ]
     return rates if rate else []
 
 

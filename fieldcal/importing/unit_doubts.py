@@ -12,7 +12,7 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.gravity_size import Gravity, gravity_in
 from fieldcal.importing.rate_size import rate_in, turns_said
 from fieldcal.importing.recording import ReadOptions, Recording
-from fieldcal.importing.scales import ACC_SCALES, GYR_SCALES, Scale
+from fieldcal.importing.scales import ACC_SCALES, GYR_SCALES, Scale, about
 from fieldcal.session.units import UNSCALED
 
 FAR = 0.25
@@ -93,7 +93,7 @@ class SaidUnits:
             return []
         fits = _within(turned / self._said.gyr_scale, GYR_SCALES)
         shows = f"rates are {turned:.4g} times those at which gravity turns"
-        other = self._said.rate_hz and f"--rate {self._said.rate_hz * turned:.3g}"
+        other = self._said.rate_hz and f"--rate {about(self._said.rate_hz * turned)}"
         return self._contradict("g", shows, "--gyr-unit", fits, other or "")
 
     def _of_calm(self, block: Block, gravity: Gravity) -> list[str]:

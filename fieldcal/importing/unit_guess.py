@@ -25,6 +25,7 @@ from fieldcal.importing.scales import (
     FEW,
     GYR_OUT,
     GYR_SCALES,
+    about,
     fitting,
     gains,
 )
@@ -180,7 +181,7 @@ class _Guess:
         if not fits and self._step:
             scales = gains(self._step, "m/s^2", G0)
             fits = fitting(gravity.size, scales, ACC_OUT[not gravity.round])
-        shows = f"|a| at rest is {gravity.size:.4g}"
+        shows = f"|a| at rest is {about(gravity.size, 4)}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
         if not fits and gravity.size < NO_UNIT:
@@ -188,7 +189,7 @@ class _Guess:
                 f"{self._name}: {shows}, less than gravity reads in any unit: it seems"
                 " to be taken out of these accelerations, and nothing can be"
                 " calibrated by them; log those with gravity in them, or, if it is so,"
-                f" add --acc-unit g --acc-lsb {gravity.size:.3g}"
+                f" add --acc-unit g --acc-lsb {about(gravity.size)}"
             )
         if len(fits) != 1:
             self._ask(
@@ -225,7 +226,7 @@ class _Guess:
         elif self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
             # who writes one sensor's registers as they are, writes the other's so too
             fits = counts
-        shows = f"as gravity turns, 1 rad/s reads {reads:.4g}"
+        shows = f"as gravity turns, 1 rad/s reads {about(reads, 4)}"
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",

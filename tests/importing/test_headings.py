@@ -102,6 +102,30 @@ def test_columns_of_a_table_may_say_their_units_beside_their_names(
 
 
 @pytest.mark.parametrize(
+    "kind",
+    [pa.timestamp("ns"), pa.timestamp("ms", "UTC"), pa.duration("us"), pa.string()],
+    ids=str,
+)
+def test_a_column_that_is_stored_as_times_is_one_whatever_its_name(
+    tmp_path: Path, kind: pa.DataType
+) -> None:
+    ns = pa.array((ROWS[:, 0] * 1e6).astype("int64"), pa.int64())
+    text = kind == pa.string()
+    stored = ns.cast(pa.timestamp("ns")) if text else ns
+    if not text:
+        step = {"ns": 1, "us": 1000, "ms": 1_000_000}[kind.unit]
+        stored = pa.array(ns.to_numpy() // step).cast(kind)
+    columns = [stored.cast(pa.string()) if text else stored, *ROWS[:, 1:].T]
+    name = "time" if text else "__index_level_0__"
+    made = pa.table(columns, names=[name, *BARE[1:]])
+    pyarrow.parquet.write_table(made, tmp_path / "x.parquet")
+    _, block = taken(
+        tmp_path / "x.parquet", ReadOptions(acc_unit="g", gyr_unit="deg/s")
+    )
+    check(block)
+
+
+@pytest.mark.parametrize(
     "names",
     [
         ("t [s]", "ax [g]", "ay [g]"),

@@ -141,6 +141,30 @@ DEEP = st.recursive(
 )
 
 
+def test_imus_in_a_list_of_each_record_are_imus_and_samples_are_samples(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "log.json"
+    both = [{"acc": axes(ACC[i]), "gyro": axes(GYR[i])} for i in range(ROWS)]
+    other = [{"acc": axes(2 * ACC[i]), "gyro": axes(GYR[i])} for i in range(ROWS)]
+    path.write_text("\n".join(
+        json.dumps({"t": T[i], "imus": [{"id": "left", **a}, {"id": "right", **b}]})
+        for i, (a, b) in enumerate(zip(both, other, strict=True))
+    ))  # fmt: skip
+    recording = open_recording(path, ReadOptions())
+    left, right = recording.streams()
+    for stream, times in ((left, 1), (right, 2)):
+        got = concat(list(recording.alone(stream.name).blocks(stream.name)))
+        np.testing.assert_allclose(got.acc, times * ACC)
+        np.testing.assert_allclose(got.gyr, GYR)
+    # numbers that go on are those of samples
+    fields = [{"id": i, **row} for i, row in enumerate(both)]
+    path.write_text("\n".join(
+        json.dumps({"t": T[i], "samples": fields[i : i + 2]}) for i in range(0, ROWS, 2)
+    ))  # fmt: skip
+    np.testing.assert_allclose(read(path).acc, ACC)
+
+
 @given(st.lists(DEEP, min_size=2, max_size=6) | DEEP)
 def test_any_document_has_lists_or_none(document: Any) -> None:
     for name, values in json_lists(document):

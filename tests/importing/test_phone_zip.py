@@ -79,8 +79,8 @@ def test_an_archive_needs_no_option(
 
 @pytest.mark.parametrize(
     ("files", "says"),
-    [({"notes.csv": "a,b\n1,2\n"}, "has no file of an accelerometer"),
-     ({"readme.txt": "x"}, "no .csv files")],
+    [({"notes.csv": "a,b\n1,2\n", "more.csv": "x"}, "has no file of an accelerometer"),
+     ({"readme.txt": "x", "log.txt": "y"}, "no .csv files")],
 )  # fmt: skip
 def test_other_archives_are_refused(
     files: dict[str, str],

@@ -96,6 +96,21 @@ def again() -> str:
     return "\n".join(["ready", *rows[:3], names, *rows[3:300], names, *rows[300:]])
 
 
+def started_twice() -> str:
+    rows, says = lines(ROWS).split("\n"), "MPU6050 connected, 2 retries"
+    names = f"t,{SIX}"
+    return "\n".join([says, names, *rows[:300], "boot ok", says, names, *rows[300:]])
+
+
+def topics() -> str:
+    """Messages as a listener prints them, behind their topic and behind a time."""
+    found = []
+    for c, a, w in zip(clock("%H:%M:%S.%f"), A.tolist(), W.tolist(), strict=True):
+        said = {"acc": dict(zip("xyz", a, strict=True)), "gyro": w}
+        found.append(f"{c} -> {json.dumps(said)}")
+    return "\n".join(found)
+
+
 def tables() -> str:
     body = each("| {} | {} | {} | {} | {} | {} | {} |", ROWS)
     return f"| t | ax | ay | az | gx | gy | gz |\n|---|---|---|---|---|---|---|\n{body}"
@@ -113,6 +128,25 @@ FORMS: dict[str, Writer] = {
     "lines with a checksum": checked,
     "hexadecimal counts": hexadecimal,
     "names between rows": again,
+    "a device that is started twice": started_twice,
+    "records behind a time": topics,
+    "records behind a topic": lambda: "\n".join(
+        "lab/imu/1 " + json.dumps({"t": r[0], "acc": r[1:4], "gyro": r[4:]})
+        for r in ROWS.tolist()
+    ),
+    "rates of those who drive": lambda: lines(
+        T, A, W[:, ::-1], head="t,ax,ay,az,YawRate,pitch_rate,rollRate"
+    ),
+    "rates of those who fly": lambda: lines(
+        T, W, A, head="t,gyro_p,gyro_q,gyro_r,ax,ay,az"
+    ),
+    "counts of Analog Devices": lambda: lines(
+        T, np.round(DEG * 10 * 2**16), np.round(A / G * 800 * 2**16),
+        head="t,gx,gy,gz,ax,ay,az",
+    ),
+    "counts of 20 bits": lambda: lines(
+        T, np.round(A / G * 32768), np.round(DEG * 262.144), head=f"t,{SIX}"
+    ),
     "between bars": tables,
     "lists in cells": lambda: "t,accel,gyro\n"
     + each('{},"[{}, {}, {}]","[{}, {}, {}]"', ROWS),
@@ -261,6 +295,19 @@ def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
     assert_same(folder / "0")
     other = Session.open(folder / "1").block
     np.testing.assert_allclose(other.acc[:, 2], A[:, 2] + 1, atol=1e-5)
+
+
+def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "log.csv"
+    rows = lines(ROWS, head=f"t,{SIX}").split("\n")
+    rows[20] = "\0\0\7" + rows[20]
+    path.write_text("\n".join(rows) + "\n" + "\0" * 700)
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "line 21" in capsys.readouterr().err
+    block = Session.open(imported(path, "--repair")).block
+    np.testing.assert_allclose(block.acc, np.delete(A, 19, axis=0))
 
 
 @pytest.mark.parametrize(

@@ -138,6 +138,9 @@ class ColumnRecording(Recording):
         names = [c.name for c in way.columns] if way else []
         names = names if len(names) == k else [""] * k
         known = _known(named, way)
+        if way is not None and len(way.columns) == k and len(table):
+            table = table.copy()
+            table[:, headings.no_axes(way.columns)] = np.nan
         told = column_physics.tell(table, names, known)
         if told is None:
             return None

@@ -46,6 +46,10 @@ OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "log"
 """Words of times that are another clock's than the device's."""
 
 
+ANGLES = ("roll", "pitch", "yaw", "heading", "azimuth", "euler", "quat", "quaternion")
+"""Words of what a filter computes of an attitude."""
+
+
 class Named(NamedTuple):
     """A column by its number, and what its name says."""
 
@@ -96,6 +100,17 @@ def read(
     if len(found) == 1:
         found = [replace(found[0], name="0")]
     return tuple(found)
+
+
+def no_axes(columns: Sequence[Column]) -> list[int]:
+    """Columns whose names say that they are no axes of an IMU, whatever they hold."""
+    found = []
+    for i, column in enumerate(columns):
+        said, words = meaning(column.name, column.unit), {*words_of(column.name)}
+        kind = said.kind if said is not None else ""
+        if words & {*SCATTER} or kind == "m" or (words & {*ANGLES} and kind != "g"):
+            found.append(i)
+    return found
 
 
 def _of_a_thermometer(

@@ -200,3 +200,13 @@ def test_a_scatter_that_is_only_rounding_is_none() -> None:
     sigma = spread(means, scatter, np.full(9, 100.0), 9.8).sigma
     np.testing.assert_allclose(sigma[:, :3], 0.01)
     assert np.isnan(sigma[:, 3:]).all()
+
+
+@pytest.mark.parametrize(
+    "beside", ["std Ax,std Ay,std Az", "mx,my,mz", "Roll,Pitch,Yaw"]
+)
+def test_what_names_say_is_none_is_no_gyroscope(tmp_path: Path, beside: str) -> None:
+    other = 0.02 + 1e-3 * np.random.default_rng(6).random((6, 3))
+    rows = np.hstack([means(5, 6)[:, :3], other, np.full((6, 1), COUNT)])
+    out, made = session(tmp_path, rows, f"Ax,Ay,Az,{beside},N", "--sigma", "0.01,0.001")
+    assert made.block.acc.shape == (6, 3) and np.isnan(made.block.gyr).all()

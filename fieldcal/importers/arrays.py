@@ -109,6 +109,9 @@ class ArrayFile(ColumnRecording):
         if len(self.imus()) > 1:
             yield from self.alone(stream).blocks(stream)
             return
+        yield from self.paired(self._samples())
+
+    def _samples(self) -> Iterator[Block]:
         with self._opened() as tables:
             named = self._named(tables)
             samples = columns.ColumnReader(replace(self.wanted, columns=tuple(named)))

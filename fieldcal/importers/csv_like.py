@@ -99,7 +99,7 @@ class TextColumns(ColumnRecording):
 
     def place(self, row: int) -> str:
         """Name a line; empty ones are not counted."""
-        gathered = any(form.gathers for form in self._forms)
+        gathered = any(form.gathers for form in self._forms) or self.in_turn
         return f"{'record' if gathered else 'line'} {self._skip + row + 1}"
 
     def heading(self) -> list[Heading]:
@@ -215,6 +215,9 @@ class TextColumns(ColumnRecording):
         if len(self.imus()) > 1:
             yield from self.alone(stream).blocks(stream)
             return
+        yield from self.paired(self._samples())
+
+    def _samples(self) -> Iterator[Block]:
         columns.check(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != SKIP]

@@ -69,6 +69,9 @@ class ParquetFile(ColumnRecording):
         if len(self.imus()) > 1:
             yield from self.alone(stream).blocks(stream)
             return
+        yield from self.paired(self._samples())
+
+    def _samples(self) -> Iterator[Block]:
         samples, clock = columns.ColumnReader(self.wanted), ClockText()
         with self._batches() as (schema, batches):
             named = self._named(schema)

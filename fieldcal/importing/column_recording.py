@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from shlex import quote
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.importing import column_physics, columns, headings
 from fieldcal.importing.column_clock import ColumnClock, ask_rate, numbers_of
 from fieldcal.importing.gravity_size import are_means
@@ -25,6 +25,7 @@ from fieldcal.importing.recording import (
     ReadOptions,
     Recording,
 )
+from fieldcal.importing.rows_in_turn import RowsInTurn
 
 
 class ColumnRecording(Recording):
@@ -33,6 +34,9 @@ class ColumnRecording(Recording):
     asks_units = True
     imus_found: dict[str, ReadOptions] | None = None
     """Options of each IMU by its name, once they were looked for."""
+
+    in_turn = False
+    """Whether its rows hold the accelerometer or the gyroscope, as far as is known."""
 
     @abstractmethod
     def heading(self) -> list[Heading]:
@@ -88,6 +92,14 @@ class ColumnRecording(Recording):
             # units may have been found meanwhile
             return dict.fromkeys(self.imus_found, self.wanted)
         return self.imus_found
+
+    def paired(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """Samples of its rows, also where each holds one of two sensors alone."""
+        rows = RowsInTurn()
+        for block in rows.through(blocks):
+            self.in_turn = rows.told
+            yield block
+        self.says += [s for s in rows.says if s not in self.says]
 
     def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""

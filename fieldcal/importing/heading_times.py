@@ -15,7 +15,7 @@ def with_times(way: Heading, table: Array) -> Heading:
     """A heading in which only what numbers show to be times is named as one.
 
     Of several columns that are named as times, one may hold a date, count rows, or be
-    too coarse. Each may be empty.
+    too coarse. Each may be empty, or be the same in all rows.
 
     Parameters
     ----------
@@ -27,7 +27,8 @@ def with_times(way: Heading, table: Array) -> Heading:
     named = [i for i, one in enumerate(said) if one is not None and one.kind == "t"]
     if not named or table.shape[1] != len(way.columns) or not len(table):
         return way
-    empty = [i for i in named if np.isnan(table[:, i]).all()]
+    # a spreadsheet that shortens times to 1.7E+12 leaves one for all rows
+    empty = [i for i in named if len({*table[np.isfinite(table[:, i]), i]}) < 2]
     fit = [i for i in named if goes_on(table[:, i])]
     # what is beyond the whole seconds of another column is no time by itself
     split = split_seconds(table, range(table.shape[1]))

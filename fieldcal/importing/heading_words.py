@@ -53,7 +53,8 @@ _GAINS = (
 """Names of what angle and velocity gained since the row before."""
 
 _TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "sensortime",
-          "zeit", "tiempo", "temps", "tempo", "tijd", "时间", "sow", "tow")  # fmt: skip
+          "epoch", "epoc", "unixtime", "datetime", "zeit", "tiempo", "temps", "tempo",
+          "tijd", "时间", "sow", "tow")  # fmt: skip
 _SINCE = ("elapsed", "epoch", "uptime", "since", "start", "boot")
 """Words of a time where a unit of time stands beside them."""
 

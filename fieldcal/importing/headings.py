@@ -76,7 +76,8 @@ def read(
         and (said := meaning(column.name, column.unit)) is not None
         and (said.kind == "t" or not set(said.label) & set(NOT_SAMPLES))
     ]
-    named = _with_gravity(_with_rates(_with_temperature(columns, _measured(named))))
+    named = _in_units(_with_rates(_with_temperature(columns, _measured(named))))
+    named = _with_gravity(named)
     acc, gyr = _triads(named, "a"), _triads(named, "g")
     if acc is None or gyr is None:
         return ()
@@ -145,6 +146,22 @@ def _with_rates(named: Sequence[Named]) -> list[Named]:
     rates = [n for n in named if n.says.kind == "g"]
     gains = [n for n in rates if n.says.weak]
     return [n for n in named if n not in gains or len(gains) == len(rates)]
+
+
+def _in_units(named: Sequence[Named]) -> list[Named]:
+    """Columns without the counts of axes of which the same stands there in units."""
+    axes = [n for n in named if n.says.axis and n.says.kind in "ag"]
+    in_units = {_axis_of(n) for n in axes if n.says.unit}
+    return [
+        n for n in named
+        if n not in axes or n.says.unit or _axis_of(n) not in in_units
+        or "raw" not in n.says.label
+    ]  # fmt: skip
+
+
+def _axis_of(one: Named) -> tuple[str, str, tuple[str, ...]]:
+    """Kind, axis and IMU of a column."""
+    return one.says.kind, one.says.axis, bare_label(one.says.label)
 
 
 def _with_gravity(named: Sequence[Named]) -> list[Named]:

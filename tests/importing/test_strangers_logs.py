@@ -111,6 +111,15 @@ def topics() -> str:
     return "\n".join(found)
 
 
+def merged_by_time() -> str:
+    """Two sensors in one table, each with times of its own."""
+    found = [f"time,{SIX}"]
+    for t, a, w in zip(T, A, DEG, strict=True):
+        found.append(f"{t:.4f}," + ",".join(f"{x:.8g}" for x in a) + ",,,")
+        found.append(f"{t + 3e-3:.4f},,,," + ",".join(f"{x:.8g}" for x in w))
+    return "\n".join(found)
+
+
 def tables() -> str:
     body = each("| {} | {} | {} | {} | {} | {} | {} |", ROWS)
     return f"| t | ax | ay | az | gx | gy | gz |\n|---|---|---|---|---|---|---|\n{body}"
@@ -128,6 +137,15 @@ FORMS: dict[str, Writer] = {
     "lines with a checksum": checked,
     "hexadecimal counts": hexadecimal,
     "names between rows": again,
+    "two sensors merged by time": merged_by_time,
+    "counts beside what they are": lambda: lines(
+        T, np.round(A * 8192 / G), np.round(DEG * 65.536), A / G, DEG,
+        head="t,ax_raw,ay_raw,az_raw,gx_raw,gy_raw,gz_raw,"
+        "ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps",
+    ),
+    "whole seconds of Unix": lambda: lines(
+        [f"{UNIX + int(t + 0.4)}" for t in T.tolist()], A, W, head=f"epoch,{SIX}"
+    ),
     "a device that is started twice": started_twice,
     "records behind a time": topics,
     "records behind a topic": lambda: "\n".join(
@@ -319,8 +337,10 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
         (lines(T * 1e3, np.round(A * 16384 / G), np.round(DEG * 131.072),
                np.full(len(T), -3900.0), head=f"time_ms,{SIX},temp"), "--temp-lsb 340"),
         (lines(T, W, UP), "say what its columns are"),
+        (lines(["1.70E+12"] * len(T), A, W, head=f"time,{SIX}"), "--rate 50"),
     ],
-    ids=["rows that are counted", "a thermometer's counts", "a direction"],
+    ids=["rows that are counted", "a thermometer's counts", "a direction",
+         "a time that a spreadsheet shortened"],
 )  # fmt: skip
 def test_what_would_be_wrong_in_silence_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str

@@ -112,26 +112,33 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         return _list(opened)
     written: list[Path] = []
-    rests: list[Array] = []
+    imported: list[ImportedSession] = []
     try:
         for recording in opened:
-            rests += _bring_all(args, recording, len(opened) > 1, written)
+            imported += _bring_all(args, recording, len(opened) > 1, written)
     except InputError:
         # the same command with the answer must find its folders free
         for folder in written:
             rmtree(folder)
             sys.stderr.write(f"{folder}: removed again, for this is not all\n")
         raise
-    _say_one_each(args.files, rests)
+    _say_together(args.files, imported)
     return 0
 
 
-def _say_one_each(files: Sequence[Path], rests: Sequence[Array]) -> None:
-    """Say that files, each of one rest, look like the positions of one IMU."""
+def _say_together(files: Sequence[Path], imported: Sequence[ImportedSession]) -> None:
+    """Say that files look like the positions, or the two sensors, of one IMU."""
     import numpy as np
 
     from fieldcal.importing.gravity_size import are_means
 
+    if len(files) == 2 and {one.facts.measured for one in imported} == {"a", "g"}:
+        sys.stderr.write(
+            "one of these files holds accelerometers and the other gyroscopes: if they"
+            " are of one IMU, import them again with --join, which makes one session"
+            " of them\n"
+        )
+    rests = [one.rests for one in imported]
     if len(files) > 1 and all(len(one) == 1 for one in rests):
         if are_means(np.concatenate(rests)):
             sys.stderr.write(
@@ -143,7 +150,7 @@ def _say_one_each(files: Sequence[Path], rests: Sequence[Array]) -> None:
 
 def _bring_all(
     args: argparse.Namespace, recording: Recording, among: bool, written: list[Path]
-) -> list[Array]:
+) -> list[ImportedSession]:
     """Make a session of each IMU that is wanted, and note the folders.
 
     Parameters
@@ -152,28 +159,24 @@ def _bring_all(
     among : whether it is one of several files
     written : folders, grows
 
-    Returns
-    -------
-    of each IMU the means (m, 3) of the accelerometers at rest, m/s^2
-
     """
     name = recording.path.name.split(".")[0]
     folder = args.output or Path(name)
     if args.output and among:
         folder = args.output / name
     names = _chosen(recording, args.instance)
-    rests: dict[str, Array] = {}
+    imported: dict[str, ImportedSession] = {}
     inner = folders_of([stream.name for stream in names])
     for stream in names:
         # what was said of one IMU of the file is no matter of another
         one = recording.alone(stream.name)
         there = folder / inner[stream.name] if len(names) > 1 else folder
-        imported = _bring(args, one, stream, there)
-        rests[stream.name] = imported.rests
+        imported[stream.name] = _bring(args, one, stream, there)
         written.append(there)
     if len(names) > 1:
+        rests = {name: one.rests for name, one in imported.items()}
         _say_instances(folder, rests, float(args.gravity or G0))
-    return list(rests.values())
+    return list(imported.values())
 
 
 def _list(opened: list[Recording]) -> int:

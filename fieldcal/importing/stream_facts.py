@@ -45,7 +45,7 @@ class StreamFacts:
     pauses, paused_s : those of them that last `PAUSE`, and the duration of all these
     coldest, warmest : deg C, None where there is no temperature
     left_out : rows that were left out, where that was asked for
-    measured : whether any accelerometer or gyroscope has a number
+    measured : "a" if any accelerometer has a number, and "g" if any gyroscope has
 
     """
 
@@ -59,7 +59,7 @@ class StreamFacts:
     coldest: float | None = None
     warmest: float | None = None
     left_out: int = 0
-    measured: bool = False
+    measured: str = ""
     _period: float = float("nan")
 
     def add(self, block: Block) -> None:
@@ -78,7 +78,9 @@ class StreamFacts:
             if len(long):
                 self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
         self.rows += len(block)
-        self.measured = self.measured or bool(np.isfinite(block.six).any())
+        for kind, three in (("a", block.acc), ("g", block.gyr)):
+            if kind not in self.measured and np.isfinite(three).any():
+                self.measured += kind
         self.end_s = float(block.t[-1])
         known = block.temperature[np.isfinite(block.temperature)]
         if len(known):

@@ -81,6 +81,20 @@ def test_files_of_one_rest_each_are_asked_about(
     assert "--in-order" not in capsys.readouterr().err
 
 
+def test_files_of_two_sensors_are_pointed_to_each_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(3, 50.0)
+    acc = write(tmp_path, rows[:, :4], "acc.csv", "t,ax,ay,az")
+    gyr = write(tmp_path, rows[:, [0, 4, 5, 6]], "gyr.csv", "t,gx,gy,gz")
+    both, out = [str(acc), str(gyr)], str(tmp_path / "apart")
+    assert main(["import", *both, "-o", out]) == 0
+    assert "import them again with --join" in capsys.readouterr().err
+    assert main(["import", *both, "--join", "-o", str(tmp_path / "one")]) == 0
+    assert "--join" not in capsys.readouterr().err
+    np.testing.assert_allclose(Session.open(tmp_path / "one").block.six, rows[:, 1:])
+
+
 def test_a_bad_row_is_named_by_its_own_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -301,6 +301,24 @@ def test_a_form_is_read_with_nothing_said(tmp_path: Path, name: str) -> None:
     assert_same(imported(path))
 
 
+@pytest.mark.parametrize("slow", [slice(0, 3), slice(3, 6)], ids=["acc", "gyr"])
+def test_a_sensor_that_is_slower_than_the_rows_is_read_with_the_other(
+    tmp_path: Path, slow: slice, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "log.csv"
+    rows = [f"t,{SIX}"]
+    for i, row in enumerate(ROWS.tolist()):
+        cells = [f"{x:.8g}" for x in row[1:]]
+        cells[slow] = cells[slow] if i % 2 == 0 else [""] * 3
+        rows.append(",".join([f"{row[0]:.4f}", *cells]))
+    path.write_text("\n".join(rows) + "\n")
+    session = Session.open(imported(path))
+    np.testing.assert_allclose(session.block.acc, A[::2], rtol=1e-6)
+    np.testing.assert_allclose(session.block.gyr, W[::2], rtol=1e-6, atol=1e-8)
+    assert main(["solve", str(session.folder)]) in (0, 1)
+    assert "acc bias x" in capsys.readouterr().out
+
+
 def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     rows = ["imu,t,ax,ay,az,gx,gy,gz"]

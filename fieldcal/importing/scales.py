@@ -52,11 +52,12 @@ def _counts(per_unit: float, bits: int = 16) -> float:
 _G_COUNTS = (
     *(_counts(full) for full in (2, 3, 4, 6, 8, 12, 16, 24, 32)),
     *(512.0, 256.0, 128.0, 64.0),
-    *(_counts(full, 20) for full in (8, 16)),
+    _counts(16, 20),
     *(800.0, 800.0 * 2**16),
 )
 """Full scales in 16 bits, of 10 to 13 bits, of high resolution in 20 bits, and of the
-sensors of Analog Devices in 16 and 32 bits."""
+sensors of Analog Devices in 16 and 32 bits. Not 65536: about so reads the length of
+three words of 16 bits whose zero lies in the middle."""
 
 _DEG_COUNTS = (
     *(_counts(full) for full in (125, 250, 500, 1000, 2000)),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -108,6 +108,8 @@ def _batches(path: Path) -> Iterator[pa.RecordBatch]:
         import pyarrow.parquet
 
         whole = pyarrow.parquet.ParquetFile(path, page_checksum_verification=True)
+        if not _agrees(whole.metadata):
+            read(path)  # which says so
         names = [n for n in whole.schema_arrow.names if n in COLUMNS]
         yield from whole.iter_batches(batch_size=PART, columns=names)
     else:
@@ -163,6 +165,8 @@ def _read_parquet(path: Path) -> pa.Table:
         # its read_table loads all that reads many files as one, pandas too if installed
         file = pyarrow.parquet.ParquetFile(path, page_checksum_verification=True)
         table = file.read()
+        if not _agrees(file.metadata):
+            raise pa.ArrowInvalid("its numbers of rows contradict each other")
         # no checksum covers the names: what was changed there may be no text
         return table.select([n for n in table.column_names if n in COLUMNS])
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
@@ -171,6 +175,19 @@ def _read_parquet(path: Path) -> pa.Table:
         raise SessionError(
             f"{path}: is not a whole Parquet file; copy it again from where it came"
         ) from error
+
+
+def _agrees(about: Any) -> bool:
+    """Whether a Parquet file says everywhere how many rows it has; no checksum does."""
+    rows = 0
+    for i in range(about.num_row_groups):
+        group = about.row_group(i)
+        parts = [group.column(j) for j in range(group.num_columns)]
+        many = {p.num_values for p in parts if p.path_in_schema in COLUMNS}
+        if not many <= {group.num_rows}:
+            return False
+        rows += group.num_rows
+    return bool(rows == about.num_rows)
 
 
 def _numbers(path: Path, table: pa.Table | pa.RecordBatch, name: str) -> Array:

@@ -243,3 +243,15 @@ def test_clipped_rates_tell_their_unit_by_what_is_not(
     path, out = write(tmp_path, log), tmp_path / "out"
     assert main(["import", str(path), "--columns", COLUMNS, "-o", str(out)]) == 0
     np.testing.assert_allclose(Session.open(out).block.gyr, rows[:, 4:], atol=1e-6)
+
+
+@pytest.mark.parametrize("lsb", [256.0, 2048.0])
+def test_zeros_in_the_middle_of_16_bits_are_no_gravity(
+    tmp_path: Path, lsb: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # of three sides no sphere tells where zero lies
+    rows = turned(8, 50.0)[:600]
+    rows[:, 1:4] = np.round(rows[:, 1:4] * lsb / G) + 33000
+    path = write(tmp_path, rows, heading=COLUMNS)
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "no usual unit" in capsys.readouterr().err

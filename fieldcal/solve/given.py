@@ -27,13 +27,13 @@ from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import effect_columns, units_of
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Effect, Motion, Sensor
-from fieldcal.physics.experience import Experience
 from fieldcal.solve.shown import Shown, at_end, carried
 
 Tilt = Literal["none", "angle_offset", "base_tilt"]
@@ -216,10 +216,9 @@ class Given(Dictionary):
         own = self.rotations_of(oriented)
         wide = np.full(len(own), size)
         yield _given(Group("angle_setting", "own", own, wide, fixed=1.0, in_state=True))
-        shared = repeated(self.x, oriented)
-        if shared.shape[1]:
-            basis = General("detents", lambda v: columns.small_rotation(v) @ shared)
-            at = self.add(basis, shared.shape[1]) + np.arange(shared.shape[1])
+        # an angle that is set once has both parts of its error for itself
+        if every := list(detents(self.x, oriented)):
+            at = columns_of(self, every)
             wide = np.full(len(at), size)
             yield _given(Group("angle_setting", "repeated", at, wide, fixed=1.0))
 
@@ -280,24 +279,6 @@ def _signs(rows: Rows, cut: Array) -> Array:
         mean = np.nan_to_num(rows.y[held == p, :3]).mean(axis=0)
         out[p] = np.clip(mean / np.where(cut > 0, cut, np.inf), -1.0, 1.0)
     return out
-
-
-def repeated(x: Experience, oriented: Sequence[int]) -> Array:
-    """Which turns of the positions go together, (2 p, m): those of the same angle.
-
-    An angle that is set once has both parts of its error for itself.
-    """
-    places = int(x.position.max()) + 1
-    out = []
-    for joint, angle in enumerate((x.alpha, x.beta)):
-        first = [float(angle[int(np.argmax(x.position == p))]) for p in oriented]
-        for value in sorted(set(np.round(first, 9))):
-            column = np.zeros(2 * places)
-            same = [p for p, a in zip(oriented, first, strict=True)
-                    if abs(a - value) < 1e-8]  # fmt: skip
-            column[2 * np.array(same) + joint] = 1.0
-            out.append(column)
-    return np.array(out).reshape(-1, 2 * places).T
 
 
 def earth_known(

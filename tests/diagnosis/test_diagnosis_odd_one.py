@@ -50,6 +50,14 @@ def misset(monkeypatch: pytest.MonkeyPatch, window: int, *degrees: float) -> Non
     monkeypatch.setattr(ladder, "LADDER", tuple(way))
 
 
+def worn(monkeypatch: pytest.MonkeyPatch, joint: int, angle: float, off: float) -> None:
+    """Turn the device otherwise wherever one angle of a joint is set."""
+    way = [list(a) for a in LADDER]
+    for each in way:
+        each[joint] += off * (each[joint] == angle)
+    monkeypatch.setattr(ladder, "LADDER", tuple(map(tuple, way)))
+
+
 def places(said: Diagnosis) -> set[tuple[str, tuple[int, ...]]]:
     return {(m.channel, m.positions) for m in said.mismatch if m.kind == "position"}
 
@@ -90,6 +98,30 @@ def test_angles_that_were_set_otherwise_are_said(
             assert abs(float(value) - degrees) < 4 * float(sigma) < 0.01
         else:
             assert f"{joint} had been" not in said.says
+
+
+@pytest.mark.parametrize(
+    ("joint", "angle", "off"),
+    [(0, 45.0, 0.15), pytest.param(1, 5.0, -0.2, marks=pytest.mark.thorough)],
+)
+def test_an_angle_that_is_wrong_each_time_is_said(
+    joint: int,
+    angle: float,
+    off: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In all positions that share it, and as one cause; no effect is made of it."""
+    alike = tuple(i for i, a in enumerate(LADDER) if a[joint] == angle)
+    assert 1 < len(alike) < len(LADDER)
+    worn(monkeypatch, joint, angle, off)
+    said = diagnosed(tmp_path / "s", TACTICAL, seed=joint)
+    assert said.verdict == "unexplained" and not named(said)
+    assert {p for _, p in places(said)} == {alike}
+    assert said.after.held_out_rms < 0.5 * said.before.held_out_rms
+    _, _, rest = said.says.partition(f"{'αβ'[joint]} had been off by ")
+    value, _, sigma = rest.partition(" deg")[0].split()
+    assert abs(float(value) - off) < 4 * float(sigma) < 0.1
 
 
 @pytest.mark.thorough

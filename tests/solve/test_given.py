@@ -11,13 +11,14 @@ from fieldcal.core.positions import FIVE, SIX_FACES, Position, angles
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.detents import detents
+from fieldcal.model.causes.detents import together as turned_alike
 from fieldcal.physics.experience import Experience
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.given import (
     Given,
     Wanted,
     earth_known,
-    repeated,
     seen_by,
 )
 from fieldcal.solve.rows import of_means
@@ -50,7 +51,8 @@ def experience(places: tuple[Position, ...]) -> Experience:
 def together(places: tuple[Position, ...]) -> set[tuple[tuple[int, int], ...]]:
     """Which turns share an error: pairs of position and joint."""
     oriented = [i for i, p in enumerate(places) if p.oriented]
-    table = repeated(experience(places), oriented)
+    every = list(detents(experience(places), oriented))
+    table = turned_alike(every, len(places))
     assert table.shape[0] == 2 * len(places) and set(np.unique(table)) <= {0.0, 1.0}
     return {
         tuple((int(i) // 2, int(i) % 2) for i in np.flatnonzero(column))

@@ -135,7 +135,7 @@ def of_unknown(
 ) -> Iterator[Mismatch]:
     """Mismatches that no effect in the catalogue accounts for."""
     for cause, group in standing.members:
-        positions = (group.position,) if group.position >= 0 else None
+        positions = (group.position,) if group.position >= 0 else group.together
         triad = np.arange(3, 6) if group.part == "gyr" else np.arange(3)
         squares = np.nan_to_num(lost.squares[triad])
         channels = (
@@ -179,7 +179,7 @@ def followed(
     explanation: Explanation, name: str, channel: int, residual: Array
 ) -> tuple[str, float, float]:
     """What an unexplained residual follows best, the correlation, and its share."""
-    if name in ("window", "position", "misset"):
+    if name in ("window", "position", "misset", "detent"):
         return "the position itself", np.nan, np.nan
     x, off = explanation.rows.x, residual[:, channel]
     known = np.isfinite(off)

@@ -24,7 +24,7 @@ class Unknown:
     ----------
     cause : of the model: "time", "alpha", "window", "misset" ...
     mismatch : where it is
-    turned : joints and angles that would explain it, had a position been set so
+    turned : joints and angles that would explain it, had the positions been set so
 
     """
 
@@ -44,14 +44,14 @@ def unknown(
 def misset(
     explanation: Explanation, standing: Standing
 ) -> tuple[tuple[str, Quantity], ...]:
-    """Angles by which a position was set otherwise, as far as they stand out."""
+    """Angles by which positions were set otherwise, as far as they stand out."""
     (_, group), *_ = standing.members
     if standing.kind != "position":
         return ()
     values, sigmas, _ = estimates(explanation.best.set, group.columns)
-    pairs = zip(JOINTS, np.rad2deg(values), np.rad2deg(sigmas), strict=True)
+    pairs = zip(group.params, np.rad2deg(values), np.rad2deg(sigmas), strict=True)
     return tuple(
-        (joint, Quantity(float(v), float(s), "deg"))
+        (JOINTS[joint], Quantity(float(v), float(s), "deg"))
         for joint, v, s in pairs
         if abs(v) > thresholds.STANDS_OUT * s
     )

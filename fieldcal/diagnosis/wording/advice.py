@@ -134,6 +134,11 @@ def _look(unknown: Sequence[Unknown]) -> Iterator[str]:
 def _remedy(unknown: Unknown) -> tuple[str, str]:
     """What to do about a mismatch, and why, with room for the channels."""
     places = listed(unknown.mismatch.positions)
+    if unknown.turned and len(unknown.mismatch.positions) > 1:
+        return (
+            f"Set the angle that {places} share anew and take them again",
+            ": it was another one.",
+        )
     if unknown.turned:
         return f"Set {places} anew and take it again", ": its angles were others."
     if not np.isfinite(unknown.mismatch.correlation):

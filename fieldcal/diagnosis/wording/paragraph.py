@@ -178,6 +178,11 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
             f"{joint} had been off by {with_uncertainty(angle)}"
             for joint, angle in one.turned
         )
+        if len(where.positions) > 1:
+            return (
+                f"{places.capitalize()} are off alike, as if {angles} in each of them:"
+                " look at that angle of the fixture, set it anew, and take them again."
+            )
         return (
             f"{places.capitalize()} is off by itself, as if {angles} there: set it anew"
             " and take it again."

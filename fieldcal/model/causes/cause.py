@@ -57,6 +57,7 @@ class Group:
     effect, shape, origin : where it is an effect with an equation
     params : (k,) index of each column among the effect's parameters
     position : the one it belongs to, -1 for all
+    together : positions that it moves alike, if it moves some only
     in_state : whether its estimate is in the base state, and not only in the columns
     unsure : standard uncertainty of the shape, where it was refined
     in_step : whether one cause may change all its columns by the same
@@ -75,6 +76,7 @@ class Group:
     origin: int = 0
     params: tuple[int, ...] = ()
     position: int = -1
+    together: tuple[int, ...] = ()
     in_state: bool = False
     in_step: bool = False
     unsure: float = np.nan

@@ -11,11 +11,12 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
 def of_chance(table: ColumnTable) -> Iterator[Cause]:
-    """Every random effect of the catalogue, and each position set elsewhere."""
+    """Every random effect of the catalogue, and angles that are not the stated ones."""
     for effect in catalogue().values():
         if isinstance(effect, Scatter) and effect.applies(table.x):
             yield from _of_scatter(table, effect)
@@ -25,14 +26,34 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
     oriented = table.held[
         [bool(table.x.oriented[table.x.position == p].all()) for p in table.held]
     ]
-    if len(oriented) == len(table.held) > 3:
-        size = np.full(2, np.deg2rad(priors.MISSET_DEG))
-        groups = tuple(
-            Group("misset", "", table.rotations_of(p), size,
-                  position=int(p), in_state=True)
-            for p in oriented
-        )  # fmt: skip
-        yield Cause("misset", "", CHANCE, groups, "position")
+    if len(table.held) > 3 and len(oriented):
+        yield from _set_wrongly(table, oriented)
+
+
+def _set_wrongly(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
+    """A position that is set elsewhere, and an angle that is wrong each time.
+
+    Positions of unknown orientation bear witness to either.
+    """
+    size = np.full(2, np.deg2rad(priors.MISSET_DEG))
+    groups = tuple(
+        Group("misset", "", table.rotations_of(p), size, params=(0, 1),
+              position=int(p), in_state=True)
+        for p in oriented
+    )  # fmt: skip
+    yield Cause("misset", "", CHANCE, groups, "position")
+    several = [
+        d for d in detents(table.x, oriented) if 1 < len(d.positions) < len(oriented)
+    ]
+    if not several:
+        return
+    wide = np.full(1, np.deg2rad(priors.REPEATED_DEG))
+    groups = tuple(
+        Group("detent", "", np.array([at]), wide, params=(one.joint,),
+              together=one.positions)
+        for at, one in zip(columns_of(table, several), several, strict=True)
+    )  # fmt: skip
+    yield Cause("detent", "", CHANCE, groups, "position")
 
 
 def _of_scatter(table: ColumnTable, effect: Scatter) -> Iterator[Cause]:

@@ -1,0 +1,73 @@
+"""Angles that a fixture repeats: a detent is off by the same wherever it is set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model.causes import columns
+from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.columns import General
+from fieldcal.model.state import State
+from fieldcal.physics.experience import Experience
+
+SAME = 1e-8
+"""Difference up to which two angles are the same, rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class Detent:
+    """An angle of one joint, and the positions in which it is set.
+
+    Attributes
+    ----------
+    joint : 0 of alpha, 1 of beta
+    angle : rad
+    positions : in which it is set
+
+    """
+
+    joint: int
+    angle: float
+    positions: tuple[int, ...]
+
+
+def detents(x: Experience, oriented: Sequence[int] | Index) -> Iterator[Detent]:
+    """Every angle of positions `oriented`, also those that are set once."""
+    for joint, angle in enumerate((x.alpha, x.beta)):
+        first = [float(angle[int(np.argmax(x.position == p))]) for p in oriented]
+        for value in sorted(set(np.round(first, 9))):
+            pairs = zip(oriented, first, strict=True)
+            same = tuple(int(p) for p, a in pairs if abs(a - value) < SAME)
+            yield Detent(joint, float(value), same)
+
+
+def together(some: Sequence[Detent], places: int) -> Array:
+    """Which turns of the positions go together, (2 p, m): those of the same angle."""
+    out = np.zeros((2 * places, len(some)))
+    for k, one in enumerate(some):
+        out[2 * np.array(one.positions) + one.joint, k] = 1.0
+    return out
+
+
+def columns_of(table: ColumnTable, some: Sequence[Detent]) -> Index:
+    """Columns of what detents are off by, rad, appended to a table, (m,)."""
+    shared = together(some, table.places)
+
+    def sides(plain: Experience, state: State) -> Iterator[columns.Pair]:
+        """The same, where turns meet the positions."""
+        small = state.small_rotation
+        for column in shared.T:
+            off = columns.SMALL * column.reshape(small.shape)
+            ends = (replace(state, small_rotation=small + s * off) for s in (1, -1))
+            up, down = (one.experienced(plain) for one in ends)
+            yield up, down, columns.SMALL
+
+    basis = General(
+        "detents", lambda v: columns.small_rotation(v) @ shared, sides=sides
+    )
+    at: Index = table.add(basis, shared.shape[1]) + np.arange(shared.shape[1])
+    return at

@@ -175,11 +175,16 @@ class _Seen:
         return np.asarray(loose.any(axis=(1, 2)))
 
     def _normal(self, i: int) -> Array:
-        """What takes outputs to the input along itself, whatever the turns, (3,)."""
+        """What takes outputs to the input along itself, whatever the turns, (3,).
+
+        Without a known input, as of a rate, there is no such direction: nan.
+        """
         d, at = self.d, list(self.channels)
         one, two = self.gram.loose[i][at].T
         inputs = d.x.f if 0 in self.channels else d.x.w
         v = inputs[int(np.argmax(d.x.position == d.held[i]))]
+        if not v.any():
+            return np.full(3, np.nan)
         across = np.cross(one, two)
         out: Array = across / (across @ (d.unit[at] * v / np.linalg.norm(v)))
         return out

@@ -12,6 +12,7 @@ from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.state import State
+from fieldcal.solve import agreement
 from fieldcal.solve.estimation import Estimated, estimated
 from fieldcal.solve.given import Wanted, seen_by
 from fieldcal.solve.observations import Index
@@ -174,3 +175,14 @@ def test_directions_that_nothing_shows_take_no_degree_of_freedom() -> None:
     nominal = State(np.zeros(6), np.ones(6), np.zeros((12, 2)), np.zeros(3))
     crossed = estimated(recorded, None, nominal, Wanted(cross=True))
     assert crossed.acc.dof == 12 - 6
+
+
+def test_what_does_not_turn_has_no_direction_of_its_rate() -> None:
+    """Of a device at rest on a base that does not turn, laid by hand."""
+    places = (*PLACES, HAND)
+    one = found(places, outputs([*PLACES, PLACES[0]]))
+    known = (one.search.gram.info[: len(places), 3:] > 0).ravel()
+    means = agreement._Seen(one.search.gram, one.given, (3, 4, 5), known)
+    assert np.isnan(means._normal(len(places) - 1)).all()
+    forces = agreement._Seen(one.search.gram, one.given, (0, 1, 2), known)
+    assert np.isfinite(forces._normal(len(places) - 1)).all()

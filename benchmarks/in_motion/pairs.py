@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.in_motion.driven import Drive, recorded
 from fieldcal.against import Match
 from fieldcal.against.motion import compared_in_motion
-from fieldcal.against.result import Pair
+from fieldcal.against.result import RealAndSimulated
 from fieldcal.core.samples import Array, Block
 from fieldcal.session import description
 
@@ -127,7 +127,7 @@ def pulls(one: Drawn, found: Match) -> list[float]:
     return out
 
 
-def _pull(pair: Pair, wanted: float) -> float:
+def _pull(pair: RealAndSimulated, wanted: float) -> float:
     told = pair.real
     if told is None or not told.sigma:
         return 0.0

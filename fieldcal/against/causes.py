@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.against.joint import Relation, apart, as_large, both, likeliest, weighed
 from fieldcal.against.pairing import Pairing
-from fieldcal.against.result import Difference, Direction, Pair
+from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.against.side import Side
 from fieldcal.against.widened import Widened
 from fieldcal.diagnosis.findings import found_effects, mismatches
@@ -116,7 +116,7 @@ def _difference(
     pairing, (real, sim) = found.pairing, found.pairing.asked
     source = pairing.sim if direction == "added" else pairing.real
     other = real if direction == "added" else sim
-    parameters: dict[str, Pair] = {}
+    parameters: dict[str, RealAndSimulated] = {}
     for key in keys:
         parameters |= _pairs(found.real.member(key), found.sim.member(key), found)
     told = [other.told(key) for key in keys]
@@ -132,12 +132,14 @@ def _difference(
     )
 
 
-def _pairs(one: Member | None, two: Member | None, found: Decided) -> dict[str, Pair]:
+def _pairs(
+    one: Member | None, two: Member | None, found: Decided
+) -> dict[str, RealAndSimulated]:
     """Parameters of a cause in both sessions, as far as one determines them."""
     real = quantities(found.real, one) if one else {}
     sim = quantities(found.sim, two) if two else {}
     return {
-        name: Pair.of(real.get(name), sim.get(name))
+        name: RealAndSimulated.of(real.get(name), sim.get(name))
         for name in dict.fromkeys([*real, *sim])
         if (one is None or name in real) and (two is None or name in sim)
     }

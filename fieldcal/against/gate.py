@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from fieldcal.against.result import Difference, Match, Pair
+from fieldcal.against.result import Difference, Match, RealAndSimulated
 from fieldcal.against.sensor_model import CALIBRATION
 from fieldcal.against.wording import SHORT, named
 from fieldcal.core.errors import InputError
@@ -36,7 +36,7 @@ class Limit:
     size: float
     relative: bool = False
 
-    def allows(self, pair: Pair) -> bool:
+    def allows(self, pair: RealAndSimulated) -> bool:
         """Whether a parameter differs by no more."""
         off = pair.difference.value
         if isinstance(off, str):

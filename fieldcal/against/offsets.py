@@ -13,7 +13,7 @@ import numpy as np
 
 from fieldcal.against.causes import Decided, quantities
 from fieldcal.against.joint import differs
-from fieldcal.against.result import Difference, Direction, Pair
+from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.against.widened import Widened
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import CHANNELS, Array, Index
@@ -57,13 +57,13 @@ def earth(found: Decided) -> Iterator[Difference]:
 
 def _pairs(
     axes: Index, real: tuple[Array, Array], sim: tuple[Array, Array], unit: str
-) -> dict[str, Pair]:
+) -> dict[str, RealAndSimulated]:
     """Values with covariance of both by axis, of some channels."""
-    out: dict[str, Pair] = {}
+    out: dict[str, RealAndSimulated] = {}
     for i, c in enumerate(axes.tolist()):
         one, two = (Quantity(float(value[i]), float(np.sqrt(cov[i, i])), unit)
                     for value, cov in (real, sim))  # fmt: skip
-        out["xyz"[c % 3]] = Pair.of(one, two)
+        out["xyz"[c % 3]] = RealAndSimulated.of(one, two)
     return out
 
 

@@ -15,7 +15,7 @@ Direction = Literal["left_out", "added", "resized"]
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class RealAndSimulated:
     """One quantity in the recording and in the simulator; None where it is not.
 
     `difference` is recording less simulator, with the uncertainty of both.
@@ -26,7 +26,7 @@ class Pair:
     difference: Quantity
 
     @classmethod
-    def of(cls, real: Quantity | None, simulator: Quantity | None) -> Pair:
+    def of(cls, real: Quantity | None, simulator: Quantity | None) -> RealAndSimulated:
         """Numbers with their difference; what is not there is 0 for certain.
 
         Raises
@@ -73,14 +73,14 @@ class Difference:
     id: str
     direction: Direction
     probability: float
-    parameters: Mapping[str, Pair]
+    parameters: Mapping[str, RealAndSimulated]
     aliases: tuple[str, ...] = ()
     where: tuple[Mismatch, ...] = ()
     shown: bool = True
     explained: bool = True
 
     @property
-    def sizes(self) -> dict[str, Pair]:
+    def sizes(self) -> dict[str, RealAndSimulated]:
         """Parameters that are no instant, frequency or time constant."""
         effect = catalogue().get(self.id)
         shapes = {shape.name for shape in effect.shapes} if effect else ()

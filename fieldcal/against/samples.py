@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.against.joint import differs
-from fieldcal.against.result import Difference, Pair
+from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.against.side import Side
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.findings.agreement import UNITS
@@ -69,7 +69,9 @@ def _noise(real: Side, sim: Side, at: Sequence[int]) -> Iterator[Difference]:
     probability = differs(off, np.diag(sigma**2), np.full(len(at), LOUDER))
     if probability < thresholds.NAMED:
         return
-    pairs = {CHANNELS[c]: Pair.of(level(real, c), level(sim, c)) for c in at}
+    pairs = {
+        CHANNELS[c]: RealAndSimulated.of(level(real, c), level(sim, c)) for c in at
+    }
     silent = bool((sim.noise[at] <= NONE * one).all())
     louder = [
         c
@@ -82,7 +84,7 @@ def _noise(real: Side, sim: Side, at: Sequence[int]) -> Iterator[Difference]:
     )
 
 
-def _whole(one: Side, channel: str, pair: Pair) -> Mismatch:
+def _whole(one: Side, channel: str, pair: RealAndSimulated) -> Mismatch:
     """A mismatch of all samples of a channel."""
     positions = one.explanation.prepared.source.about.numbers or (0,)
     off = pair.difference
@@ -117,11 +119,13 @@ def lines_and_faults(real: Side, sim: Side) -> Iterator[Difference]:
             )
 
 
-def _turned(pair: Pair) -> Pair:
+def _turned(pair: RealAndSimulated) -> RealAndSimulated:
     """The same with recording and simulator exchanged."""
     value = pair.difference.value
     off = value if isinstance(value, str) else -value
-    return Pair(pair.simulator, pair.real, replace(pair.difference, value=off))
+    return RealAndSimulated(
+        pair.simulator, pair.real, replace(pair.difference, value=off)
+    )
 
 
 def _faint(one: FoundEffect, other: Side) -> FoundEffect | None:
@@ -176,7 +180,9 @@ def _difference(
     for name, q in one.parameters.items():
         other = two.parameters.get(name) if two is not None else None
         word = isinstance(q.value, str)
-        pairs[name] = Pair(q, other, q) if word else Pair.of(q, other)
+        pairs[name] = (
+            RealAndSimulated(q, other, q) if word else RealAndSimulated.of(q, other)
+        )
     if two is not None and not any(_apart(n, p) for n, p in pairs.items()):
         return
     yield Difference(
@@ -188,7 +194,7 @@ def _difference(
     )
 
 
-def _apart(name: str, pair: Pair) -> bool:
+def _apart(name: str, pair: RealAndSimulated) -> bool:
     off = pair.difference
     if name in WHEN or isinstance(off.value, str):
         return False

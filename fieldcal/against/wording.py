@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from fieldcal.against.result import Difference, Direction, Pair, SimulatorPrediction
+from fieldcal.against.result import (
+    Difference,
+    Direction,
+    RealAndSimulated,
+    SimulatorPrediction,
+)
 from fieldcal.calibration.wording import pretty
 from fieldcal.diagnosis.result import Quantity, Verdict
 from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
@@ -90,7 +95,7 @@ def _or_else(one: Difference) -> str:
     return f", or {names}" if names else ""
 
 
-def _said(name: str, direction: Direction, pair: Pair) -> str:
+def _said(name: str, direction: Direction, pair: RealAndSimulated) -> str:
     """A parameter in words: what is there alone, or by how much it differs."""
     alone = pair.simulator if direction == "added" else pair.real
     if direction != "resized" and alone is not None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.rate_size import STIRS, TIMES, Turns
+from fieldcal.importing.rate_size import STIRS, TIMES, TurnsShown
 from fieldcal.importing.scales import GYR_SCALES, USUAL_COUNTS, Scale, gains
 from fieldcal.importing.unit_answers import answers
 
@@ -49,7 +49,7 @@ class CalmRates(NamedTuple):
 
 
 def calm_rates(
-    gyr: Array, turns: Turns | None, step: float | None, usual: str
+    gyr: Array, turns: TurnsShown | None, step: float | None, usual: str
 ) -> CalmRates:
     """Say what unit rates are in of which no turn tells.
 
@@ -83,13 +83,13 @@ def calm_rates(
     return CalmRates(None, "", asks, tuple(_answers(gyr, turns, whole)))
 
 
-def _in_degrees(turns: Turns) -> bool:
+def _in_degrees(turns: TurnsShown) -> bool:
     """Whether rad/s cannot be by how gravity turns, and deg/s are as it turns."""
     least = max(STIRS, TIMES * turns.shown)
     return turns.said >= least and turns.allow(DEG.size, AS_SHOWN)
 
 
-def _answers(gyr: Array, turns: Turns | None, whole: bool) -> list[str]:
+def _answers(gyr: Array, turns: TurnsShown | None, whole: bool) -> list[str]:
     """Options: those that can be; of whole numbers counts as well."""
     scales = [DEG, *(USUAL_COUNTS if whole else [RAD])]
     fits = [s for s in scales if turns is None or turns.allow(s.size)]

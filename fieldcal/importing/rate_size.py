@@ -75,7 +75,7 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
     return rough if closes is None and agrees >= _AGREES else closes
 
 
-class Turns(NamedTuple):
+class TurnsShown(NamedTuple):
     """By how much gravity turns within half a second, rad, root of the mean square.
 
     What the accelerometers show is more than it turned, by their noise and by the
@@ -115,7 +115,7 @@ class Turns(NamedTuple):
         )
 
 
-def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> Turns | None:
+def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> TurnsShown | None:
     """By how much gravity turns as rates say, and as it does; None if nothing tells.
 
     Parameters
@@ -135,7 +135,7 @@ def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> Turns | No
     upright = said < _UPRIGHT * angle
     level = float(np.linalg.norm(about))
     steady = level < _UPRIGHT * np.linalg.norm(sides.usual)
-    return Turns(
+    return TurnsShown(
         said=0.0 if upright else said,
         shown=shown,
         bias=0.0 if steady else level,

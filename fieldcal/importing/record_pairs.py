@@ -25,7 +25,7 @@ Fields = Mapping[str, Array]
 """Values (n,) of each field of records of one kind."""
 
 
-class Pair(NamedTuple):
+class MatchedRecords(NamedTuple):
     """Fields of both sensors, and the kinds of which they are."""
 
     fields: dict[str, Array]
@@ -33,7 +33,7 @@ class Pair(NamedTuple):
     gyr: str
 
 
-def paired(kinds: Mapping[str, Fields]) -> Pair | None:
+def paired(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
     """Both sensors of one IMU, (n,) each; None where records are of no such kinds."""
     acc, gyr = (best_of(sensor, kinds) for sensor in ("acc", "gyr"))
     if acc is None or gyr is None:
@@ -54,7 +54,7 @@ def paired(kinds: Mapping[str, Fields]) -> Pair | None:
     found |= {f"acc_{axis}": force[name] for axis, name in axes[0].items()}
     for axis, name in axes[1].items():
         found[f"gyr_{axis}"] = np.where(far, np.nan, rate[name][known][partner])
-    return Pair(found, acc, gyr)
+    return MatchedRecords(found, acc, gyr)
 
 
 def _axes(fields: Fields) -> dict[str, str]:

@@ -18,7 +18,7 @@ from fieldcal.against.result import (
     Direction,
     Facts,
     Match,
-    Pair,
+    RealAndSimulated,
     SimulatorPrediction,
 )
 from fieldcal.core.errors import InputError
@@ -36,9 +36,11 @@ def differing(
     unit: str = "1",
 ) -> Difference:
     one, two, off = (Quantity(v, 1e-3, unit) for v in (real, sim, real - sim))
-    pairs = {"x": Pair(one, two, off)}
+    pairs = {"x": RealAndSimulated(one, two, off)}
     if name == "bias_step":
-        pairs["at_s"] = Pair(*(Quantity(v, 0.1, "s") for v in (60.0, 10.0, 50.0)))
+        pairs["at_s"] = RealAndSimulated(
+            *(Quantity(v, 0.1, "s") for v in (60.0, 10.0, 50.0))
+        )
     return Difference(name, direction, 1.0, pairs)
 
 
@@ -75,7 +77,7 @@ def test_when_something_happened_is_no_size() -> None:
 
 
 def test_a_delay_has_a_limit_in_s_though_instants_have_none() -> None:
-    delay = Pair(*(Quantity(v, 1e-4, "s") for v in (0.02, 0.015, 0.005)))
+    delay = RealAndSimulated(*(Quantity(v, 1e-4, "s") for v in (0.02, 0.015, 0.005)))
     found = match(Difference("time_delay", "resized", 1.0, {"seconds": delay}))
     assert not failed(found, "time_delay=0.006")
     assert failed(found, "time_delay=0.004") == ["time_delay"]

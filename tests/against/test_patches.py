@@ -15,7 +15,7 @@ from fieldcal.against.result import (
     Difference,
     Facts,
     Match,
-    Pair,
+    RealAndSimulated,
     SimulatorPrediction,
 )
 from fieldcal.against.sensor_model import SensorModel, patched
@@ -169,7 +169,10 @@ def test_an_instant_counts_from_the_start_of_the_recording_that_has_it(
     )
     step, at = Quantity(0.1, 1e-3, "m/s^2"), Quantity(60.0, 0.1, "s")
     away, before = Quantity(-0.1, 1e-3, "m/s^2"), Quantity(-60.0, 0.1, "s")
-    pairs = {"ax": Pair(None, step, away), "at_s": Pair(None, at, before)}
+    pairs = {
+        "ax": RealAndSimulated(None, step, away),
+        "at_s": RealAndSimulated(None, at, before),
+    }
     none = SimulatorPrediction(0.0, 0.0, 1.0)
     found = Match("left_out", 1.0, (Difference("bias_step", "added", 1.0, pairs),), (),
                   none, none, here, there, (), "")  # fmt: skip

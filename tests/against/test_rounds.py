@@ -13,7 +13,13 @@ from strapdown import GRAVITY, schedule
 
 from fieldcal.against import rounds as module
 from fieldcal.against.opening import read_output
-from fieldcal.against.result import Difference, Facts, Match, Pair, SimulatorPrediction
+from fieldcal.against.result import (
+    Difference,
+    Facts,
+    Match,
+    RealAndSimulated,
+    SimulatorPrediction,
+)
 from fieldcal.against.rounds import rounds
 from fieldcal.against.sensor_model import SensorModel, patched
 from fieldcal.cli import main
@@ -86,11 +92,11 @@ def test_a_command_that_is_none_is_refused(command: str, told: str) -> None:
         rounds(command, unread, 50.0, "json", 1, lambda *_: None)
 
 
-def pair(real: float, sim: float, unit: str) -> Pair:
+def pair(real: float, sim: float, unit: str) -> RealAndSimulated:
     def q(value: float) -> Quantity:
         return Quantity(value, 1e-6, unit)
 
-    return Pair(q(real), q(sim), q(real - sim))
+    return RealAndSimulated(q(real), q(sim), q(real - sim))
 
 
 def differing(*differences: Difference) -> Match:
@@ -131,7 +137,9 @@ def test_what_a_simulator_has_beyond_its_parameters_is_made_up_for() -> None:
 
 def test_effects_of_the_recording_come_in_and_those_of_the_simulator_go_out() -> None:
     step = {"ax": pair(0.1, 0.0, "m/s^2"), "at_s": pair(65.0, 0.0, "s")}
-    even = {"z": Pair(None, Quantity(3e-4, 1e-6, ""), Quantity(-3e-4, 1e-6, ""))}
+    even = {
+        "z": RealAndSimulated(None, Quantity(3e-4, 1e-6, ""), Quantity(-3e-4, 1e-6, ""))
+    }
     found = patched(
         differing(
             Difference("bias_step", "left_out", 1.0, step),

@@ -1,13 +1,13 @@
 """Rows of the table that the terminal shows."""
 
-from fieldcal.against.result import Difference, Pair
+from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.against.wording import lines
 from fieldcal.diagnosis.result import Quantity
 
 
 def bump(at: float, push: float) -> Difference:
     parameters = {
-        name: Pair(q, None, q)
+        name: RealAndSimulated(q, None, q)
         for name, q in (
             ("at_s", Quantity(at, 0.01, "s")), ("push", Quantity(push, 0.1, "m/s^2"))
         )
@@ -17,7 +17,7 @@ def bump(at: float, push: float) -> Difference:
 
 def test_what_happened_often_is_one_row_with_its_largest() -> None:
     quantity = Quantity(-0.002, 0.0001, "1")
-    added = Pair(None, Quantity(0.002, 0.0001, "1"), quantity)
+    added = RealAndSimulated(None, Quantity(0.002, 0.0001, "1"), quantity)
     tied = Difference("quadratic", "added", 0.9, {"x": added}, ("cross_coupling",))
     first, second = lines([bump(12.0, 1.0), bump(50.0, 3.0), tied])
     assert first == (

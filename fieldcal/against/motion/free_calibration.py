@@ -13,7 +13,7 @@ import numpy as np
 from fieldcal.against.joint import differs
 from fieldcal.against.motion.following import Following, estimates
 from fieldcal.against.offsets import DETERMINED
-from fieldcal.against.result import Difference, Pair
+from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.findings.calibrated import GROUPS
 from fieldcal.diagnosis.result import Quantity
@@ -42,7 +42,7 @@ def differing(found: Following, state: Eliminated) -> Iterator[Difference]:
             told = _told(found, state, name, group, known)
             nominal = 1.0 if name.endswith("scale") else 0.0
             pairs = {
-                axis: Pair.of(q, Quantity(nominal, 0.0, q.unit))
+                axis: RealAndSimulated.of(q, Quantity(nominal, 0.0, q.unit))
                 for axis, q in told.items()
             }
             yield Difference(name, "resized", probability, pairs)

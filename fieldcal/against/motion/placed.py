@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from fieldcal.against.joint import differs
 from fieldcal.against.motion.following import Following, estimates
-from fieldcal.against.result import Aligned, Difference, Pair
+from fieldcal.against.result import Aligned, Difference, RealAndSimulated
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model import priors, thresholds
@@ -37,7 +37,10 @@ def turned(found: Following, state: Eliminated) -> Iterator[Difference]:
     angle, sigma = _turn(found, state)
     probability = differs(angle, np.diag(sigma**2), np.full(3, priors.AXES_TURNED))
     if probability >= thresholds.NAMED and (sigma < priors.AXES_TURNED).all():
-        pairs = {axis: Pair.of(q, None) for axis, q in _angles(angle, sigma).items()}
+        pairs = {
+            axis: RealAndSimulated.of(q, None)
+            for axis, q in _angles(angle, sigma).items()
+        }
         yield Difference("misalignment", "left_out", probability, pairs)
 
 

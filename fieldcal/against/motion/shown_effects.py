@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fieldcal.against.motion.following import Following, estimates
-from fieldcal.against.result import Difference, Pair
+from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.effects import catalogue
@@ -22,10 +22,10 @@ def effects(
 ) -> Iterator[Difference]:
     """Causes that are likelier there than not."""
     for one in standing:
-        pairs: dict[str, Pair] = {}
+        pairs: dict[str, RealAndSimulated] = {}
         for _, group in one.members:
             for name, q in _quantities(group, state).items():
-                pairs[name] = Pair.of(q, None)
+                pairs[name] = RealAndSimulated.of(q, None)
         yield Difference(
             one.name,
             "left_out",

@@ -24,8 +24,8 @@ STEP = 1e-3
 SMALL = 1e-5
 """Of turns, rad."""
 
-Pair = tuple[Experience, Experience, float]
-Sides = Callable[[Experience, State], Iterator[Pair]]
+CentralDifference = tuple[Experience, Experience, float]
+Sides = Callable[[Experience, State], Iterator[CentralDifference]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> Genera
         design: Array = effect.design(seen, shape or NO_SHAPE)  # type: ignore[attr-defined]
         return design
 
-    def sides(plain: Experience, state: State) -> Iterator[Pair]:
+    def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
         for j, param in enumerate(effect.params):
             step = np.zeros(len(effect.params))
             step[j] = STEP * param.typical
@@ -201,7 +201,7 @@ def speed(known: Array) -> Callable[[RowView], Array]:
     return of
 
 
-def earth_sides(plain: Experience, state: State) -> Iterator[Pair]:
+def earth_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
     """The rate of the base about each of its axes, rad/s."""
     for axis in np.eye(3):
         up, down = (
@@ -263,7 +263,7 @@ def attitude(view: RowView) -> Array:
     return out
 
 
-def attitude_sides(plain: Experience, state: State) -> Iterator[Pair]:
+def attitude_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
     """The same, where turns meet the positions."""
     known = state.attitude
     if not known.any():
@@ -274,7 +274,9 @@ def attitude_sides(plain: Experience, state: State) -> Iterator[Pair]:
         yield up, down, SMALL
 
 
-def small_rotation_sides(plain: Experience, state: State) -> Iterator[Pair]:
+def small_rotation_sides(
+    plain: Experience, state: State
+) -> Iterator[CentralDifference]:
     """Two small turns of every position, rad."""
     small = state.small_rotation
     for off in SMALL * np.eye(2):

@@ -57,7 +57,7 @@ def columns_of(table: ColumnTable, some: Sequence[Detent]) -> Index:
     """Columns of what detents are off by, rad, appended to a table, (m,)."""
     shared = together(some, table.places)
 
-    def sides(plain: Experience, state: State) -> Iterator[columns.Pair]:
+    def sides(plain: Experience, state: State) -> Iterator[columns.CentralDifference]:
         """The same, where turns meet the positions."""
         small = state.small_rotation
         for column in shared.T:

@@ -99,7 +99,13 @@ def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
 
 
 def _carries(calibration: Calibration, standing: Standing) -> bool:
-    """Whether a cause is no effect, is random, or is in the calibration itself."""
+    """Whether a cause is no effect, is random, or is in the calibration itself.
+
+    A fault of the fixture that several positions share is no effect, and in none: one
+    position by itself is left out by the fit, these are not.
+    """
+    if any(group.together for _, group in standing.members):
+        return False
     effect = catalogue().get(standing.name)
     if effect is None or isinstance(effect, Scatter):
         return True

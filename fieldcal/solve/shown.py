@@ -40,7 +40,7 @@ from fieldcal.physics.effect import Motion, Scatter, Sensor
 AXES = 3
 """Parameters from which on an effect is not taken on some of them alone."""
 
-BY_WINDOW = ("misset", "detent", "window", "position")
+BY_WINDOW = ("misset", "repeated_angle", "window", "position")
 """Causes by which windows are off each for itself: a given set has those already, as
 windows that scatter or are bad."""
 

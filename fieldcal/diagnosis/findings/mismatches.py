@@ -179,7 +179,7 @@ def followed(
     explanation: Explanation, name: str, channel: int, residual: Array
 ) -> tuple[str, float, float]:
     """What an unexplained residual follows best, the correlation, and its share."""
-    if name in ("window", "position", "misset", "detent"):
+    if name in ("window", "position", "misset", "repeated_angle"):
         return "the position itself", np.nan, np.nan
     x, off = explanation.rows.x, residual[:, channel]
     known = np.isfinite(off)

@@ -49,11 +49,11 @@ def _set_wrongly(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
         return
     wide = np.full(1, np.deg2rad(priors.REPEATED_DEG))
     groups = tuple(
-        Group("detent", "", np.array([at]), wide, params=(one.joint,),
+        Group("repeated_angle", "", np.array([at]), wide, params=(one.joint,),
               together=one.positions)
         for at, one in zip(columns_of(table, several), several, strict=True)
     )  # fmt: skip
-    yield Cause("detent", "", CHANCE, groups, "position")
+    yield Cause("repeated_angle", "", CHANCE, groups, "position")
 
 
 def _of_scatter(table: ColumnTable, effect: Scatter) -> Iterator[Cause]:

@@ -216,7 +216,15 @@ def keys_of(x: Experience, channels: tuple[int, ...] = (0, 1, 2, 3, 4, 5)) -> se
 
 def test_what_a_session_cannot_show_is_not_offered() -> None:
     every = keys_of(ladder())
-    assert {"alpha", "beta", "joints", "position", "window", "misset", "detent"} < every
+    assert {
+        "alpha",
+        "beta",
+        "joints",
+        "position",
+        "window",
+        "misset",
+        "repeated_angle",
+    } < every
     few = keys_of(first(3))
     assert few == {"time", "temperature", "since turn", "random_walk", "angle_setting",
                    "flicker"}  # fmt: skip
@@ -228,7 +236,7 @@ def test_what_a_session_cannot_show_is_not_offered() -> None:
     causes = {c.key: c for c in made(ladder(free=(2,))).causes}
     others = [0, 1, 3, 4, 5, 6, 7, 8]
     assert [g.position for g in causes["misset"].variants] == others
-    assert all(2 not in g.together for g in causes["detent"].variants)
+    assert all(2 not in g.together for g in causes["repeated_angle"].variants)
     still = ladder(warming=np.zeros(27))
     assert every - keys_of(still) == {"temperature"}
     never = replace(ladder(), since_turn=np.full(27, np.inf))

@@ -13,7 +13,7 @@ Both values are the model's own, of the same rows, so that conventions do not co
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,8 +22,10 @@ from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import calibrated
 from fieldcal.diagnosis.findings.found_effects import sizes
+from fieldcal.diagnosis.findings.unknown_mismatch import angle_errors, listed
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.signal.chain import found_first
+from fieldcal.diagnosis.wording.paragraph import off_by
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
@@ -42,11 +44,13 @@ class Uncarried:
     ----------
     causes : probability by id of the effect
     moved : by how many sigmas each parameter moves with them
+    described : a cause in words, by its id, where the id is none of the catalogue
 
     """
 
     causes: Mapping[str, float]
     moved: Mapping[str, float]
+    described: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def most(self) -> tuple[str, float]:
@@ -95,7 +99,22 @@ def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
     out = [s for s in explanation.standing if not _carries(calibration, s)]
     if not out:
         return Uncarried({}, {})
-    return Uncarried({s.name: s.probability for s in out}, _moved(explanation, out))
+    return Uncarried(
+        {s.name: s.probability for s in out},
+        _moved(explanation, out),
+        {s.name: _wrong_angles(explanation, s) for s in out if s.kind == "position"},
+    )
+
+
+def _wrong_angles(explanation: Explanation, standing: Standing) -> str:
+    """Angles that were set wrongly, with positions and size."""
+    errors = angle_errors(explanation, standing)
+    return " and ".join(
+        f"a wrong angle, as {off_by(angles)} in {listed(positions)}"
+        if angles
+        else f"a wrong angle in {listed(positions)}"
+        for positions, angles in errors.items()
+    )
 
 
 def _carries(calibration: Calibration, standing: Standing) -> bool:
@@ -151,17 +170,18 @@ def with_not_carried(calibration: Calibration, missing: Uncarried) -> Calibratio
     if not missing.causes:
         return calibration
     name, sigmas = missing.most
-    listed = " and ".join(
-        f"{id_} (probability {p:.2f})" for id_, p in missing.causes.items()
+    shown = " and ".join(
+        f"{missing.described.get(id_, id_)} (probability {p:.2f})"
+        for id_, p in missing.causes.items()
     )
     info = {"causes": dict(missing.causes), "moved_sigmas": dict(missing.moved)}
     found = replace(calibration, info={**calibration.info, "not_carried": info})
     if abs(sigmas) < thresholds.MOVED:
         return found
     sentence = (
-        f"the recording shows {listed}, which this result does not carry: with it"
-        f" {name} moves by {sigmas:+.1f} σ; fieldcal diagnose says what it is and what"
-        " to do"
+        f"the recording shows {shown}, which this result does not contain: with it"
+        f" {name} would move by {sigmas:+.1f} σ; fieldcal diagnose says what it is and"
+        " what to do"
     )
     good = calibration.good and abs(sigmas) < thresholds.MOVED_WRONG
     return replace(found, warnings=(sentence, *calibration.warnings), good=good)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import ladder
@@ -10,6 +11,7 @@ import pytest
 from ladder import LADDER, TACTICAL, Array, Fault, Ride, windows
 from ladder_sessions import agrees, diagnosed, named
 
+from fieldcal.cli import main
 from fieldcal.diagnosis.result import Diagnosis
 
 AMID = (1, pytest.param(5, marks=pytest.mark.thorough))
@@ -110,6 +112,7 @@ def test_an_angle_that_is_wrong_each_time_is_said(
     off: float,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """In all positions that share it, and as one cause; no effect is made of it."""
     alike = tuple(i for i, a in enumerate(LADDER) if a[joint] == angle)
@@ -122,6 +125,18 @@ def test_an_angle_that_is_wrong_each_time_is_said(
     _, _, rest = said.says.partition(f"{'αβ'[joint]} had been off by ")
     value, _, sigma = rest.partition(" deg")[0].split()
     assert abs(float(value) - off) < 4 * float(sigma) < 0.1
+    numbers = ", ".join(str(i + 1) for i in alike)
+    head = f"Set the angle {'αβ'[joint]} of positions {numbers} again and repeat these"
+    assert (
+        f"{head} positions: {'αβ'[joint]} was off by {value} ± {sigma} deg"
+        in said.next[0]
+    )
+    main(["solve", str(tmp_path / "s"), "--json"])
+    result = json.loads(capsys.readouterr().out)
+    assert "repeated_angle" in result["not_carried"]["causes"]
+    (warning,) = (w for w in result["warnings"] if "does not contain" in w)
+    size = f"{'αβ'[joint]} was off by {value} ± {sigma} deg in positions {numbers} ("
+    assert f"a wrong angle, as {size}" in warning and "repeated_angle" not in warning
 
 
 @pytest.mark.thorough

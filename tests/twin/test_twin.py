@@ -94,9 +94,11 @@ def test_a_position_set_otherwise_is_replayed_where_it_was(
     code, said, twin = diagnosed(folder, capsys)
     assert code == 1 and said["verdict"] == "unexplained" and not twin.effects
     assert {tuple(m["positions"]) for m in said["mismatch"]} == {(4,)}
-    assert said["next"] == [
-        "Set position 5 anew and take it again: its angles were others."
-    ]
+    (advice,) = said["next"]
+    start, _, rest = advice.partition("α was off by ")
+    assert start == "Set position 5 again and repeat it: "
+    value, _, sigma = rest.removesuffix(" deg there.").split()
+    assert abs(float(value) - 2.0) < 4 * float(sigma) < 0.1
     replays = said["twin"]
     assert 0.8 < replays["twin"]["chi2_per_dof"] < 1.2
     assert replays["refitted"]["chi2_per_dof"] > 10.0

@@ -19,6 +19,7 @@ from fieldcal.diagnosis.findings.stretch_means import averages
 from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
+from fieldcal.model.causes.cause import Cause
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.model.rows.bounds import spans
 from fieldcal.physics.recording import Fault
@@ -150,7 +151,7 @@ def of_unknown(
             start, end = stretch(explanation, at)
             inside = np.isin(position, at)
             covariate, correlation, share = followed(
-                explanation, cause.name, c, lost.residual
+                explanation, cause, c, lost.residual
             )
             yield Mismatch(
                 channel=CHANNELS[c],
@@ -175,11 +176,19 @@ KINDS: dict[str, Kind] = {
 """Kind of mismatch of functions that no effect makes; the others go by position."""
 
 
+OF_POSITIONS = ("window", "position")
+"""Functions without physics that are an offset of single windows."""
+
+
 def followed(
-    explanation: Explanation, name: str, channel: int, residual: Array
+    explanation: Explanation, cause: Cause, channel: int, residual: Array
 ) -> tuple[str, float, float]:
-    """What an unexplained residual follows best, the correlation, and its share."""
-    if name in ("window", "position", "misset", "repeated_angle"):
+    """Covariate of an unexplained residual, its correlation, and the share of variance.
+
+    Correlation and share are nan where the cause belongs to single positions.
+    """
+    name = cause.name
+    if cause.kind == "position" or name in OF_POSITIONS:
         return "the position itself", np.nan, np.nan
     x, off = explanation.rows.x, residual[:, channel]
     known = np.isfinite(off)

@@ -11,9 +11,16 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.found_effects import estimates
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import thresholds
+from fieldcal.model.causes.cause import Group
 from fieldcal.model.posterior.probabilities import Standing
 
 JOINTS = ("α", "β")
+
+Places = tuple[int, ...]
+"""Positions, from 0."""
+
+Errors = tuple[tuple[str, Quantity], ...]
+"""Joints, each with the error of its angle, deg."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +29,9 @@ class Unknown:
 
     Attributes
     ----------
-    cause : of the model: "time", "alpha", "window", "misset" ...
-    mismatch : where it is
-    turned : joints and angles that would explain it, had the positions been set so
+    cause : name of the model's cause: "time", "alpha", "window", "misset" ...
+    mismatch : channel, positions and time
+    turned : joints, each with the error of its angle that would explain the mismatch
 
     """
 
@@ -36,18 +43,25 @@ class Unknown:
 def unknown(
     explanation: Explanation, standing: Standing, found: Sequence[Mismatch]
 ) -> list[Unknown]:
-    """What is said of one cause that is no effect."""
-    turned = misset(explanation, standing)
-    return [Unknown(standing.name, m, turned) for m in found]
+    """Mismatches of one cause, each with the angle errors that would explain it."""
+    turned = angle_errors(explanation, standing)
+    return [Unknown(standing.name, m, turned.get(m.positions, ())) for m in found]
 
 
-def misset(
-    explanation: Explanation, standing: Standing
-) -> tuple[tuple[str, Quantity], ...]:
-    """Angles by which positions were set otherwise, as far as they stand out."""
-    (_, group), *_ = standing.members
+def angle_errors(explanation: Explanation, standing: Standing) -> dict[Places, Errors]:
+    """Errors of angles that were set wrongly, by the positions that have them.
+
+    Only those that stand out of their ±; empty for a cause of another kind.
+    """
     if standing.kind != "position":
-        return ()
+        return {}
+    return {
+        group.together or (group.position,): _errors(explanation, group)
+        for _, group in standing.members
+    }
+
+
+def _errors(explanation: Explanation, group: Group) -> Errors:
     values, sigmas, _ = estimates(explanation.best.set, group.columns)
     pairs = zip(group.params, np.rad2deg(values), np.rad2deg(sigmas), strict=True)
     return tuple(

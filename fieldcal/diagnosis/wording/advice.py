@@ -16,6 +16,7 @@ from fieldcal.diagnosis.wording.deciding_position import (
     deciding_position,
     extent,
 )
+from fieldcal.diagnosis.wording.paragraph import off_by
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain, Scatter
 
@@ -135,12 +136,16 @@ def _remedy(unknown: Unknown) -> tuple[str, str]:
     """What to do about a mismatch, and why, with room for the channels."""
     places = listed(unknown.mismatch.positions)
     if unknown.turned and len(unknown.mismatch.positions) > 1:
+        joints = join([joint for joint, _ in unknown.turned], "and")
         return (
-            f"Set the angle that {places} share anew and take them again",
-            ": it was another one.",
+            f"Set the angle {joints} of {places} again and repeat these positions",
+            f": {off_by(unknown.turned)} in each of them.",
         )
     if unknown.turned:
-        return f"Set {places} anew and take it again", ": its angles were others."
+        return (
+            f"Set {places} again and repeat it",
+            f": {off_by(unknown.turned)} there.",
+        )
     if not np.isfinite(unknown.mismatch.correlation):
         return f"Take {places} again", ": {channels} {be} off there by itself."
     return (

@@ -174,18 +174,16 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
         )
     places = listed(where.positions)
     if one.turned:
-        angles = " and ".join(
-            f"{joint} had been off by {with_uncertainty(angle)}"
-            for joint, angle in one.turned
-        )
+        angles = off_by(one.turned, "had been")
         if len(where.positions) > 1:
             return (
                 f"{places.capitalize()} are off alike, as if {angles} in each of them:"
-                " look at that angle of the fixture, set it anew, and take them again."
+                " look at that angle of the fixture, set it again, and repeat these"
+                " positions."
             )
         return (
-            f"{places.capitalize()} is off by itself, as if {angles} there: set it anew"
-            " and take it again."
+            f"{places.capitalize()} is off by itself, as if {angles} there: set it"
+            " again and repeat it."
         )
     alike = [
         u
@@ -198,6 +196,15 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
         f"{channels} {verb} off in {places} by itself; take it again, and look for what"
         " was different there."
     )
+
+
+def off_by(turned: Sequence[tuple[str, Quantity]], verb: str = "was") -> str:
+    """Joints with the error of each angle, deg, as part of a sentence.
+
+    >>> off_by([("α", Quantity(0.21, 0.02, "deg"))])
+    'α was off by 0.210 ± 0.020 deg'
+    """
+    return " and ".join(f"{j} {verb} off by {with_uncertainty(a)}" for j, a in turned)
 
 
 def _undecided(explanation: Explanation) -> str:

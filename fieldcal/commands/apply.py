@@ -1,4 +1,4 @@
-"""`fieldcal apply`: take a calibration out of a recording."""
+"""`fieldcal apply`: apply a calibration to the samples of a recording."""
 
 from __future__ import annotations
 

@@ -39,9 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--resume",
         action="store_true",
-        help="leave out sessions that are done and have not changed since",
+        help="skip sessions that are done and unchanged",
     )
-    add("--diagnose", action="store_true", help="name the effects of each as well")
+    add("--diagnose", action="store_true", help="also diagnose each session")
     add(
         "-o",
         "--output",
@@ -55,9 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--scheduler",
         metavar="tcp://HOST:PORT",
-        help="Dask's, whose workers see the same folders (fieldcal[fleet])",
+        help="Dask scheduler; its workers see the same folders (fieldcal[fleet])",
     )
-    add("--history", metavar="FILE", help="instead of the usual store")
+    add("--history", metavar="FILE", help="use this store")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`fieldcal compare`: say whether two calibrations differ."""
+"""`fieldcal compare`: compare two calibrations."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--instances",
         action="store_true",
-        help="hold IMUs of one log against each other and g: their session folders, or"
-        " the folder that holds them; none need be solved",
+        help="compare the IMUs of one log with each other and with g: their session"
+        " folders, or the folder that contains them; they need not be solved",
     )
     add("--json", action="store_true", help="print one JSON object")
 

@@ -1,4 +1,4 @@
-"""`fieldcal completion`: print what completes commands and options in a shell."""
+"""`fieldcal completion`: print the completion script of a shell."""
 
 from __future__ import annotations
 

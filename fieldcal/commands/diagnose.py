@@ -1,4 +1,4 @@
-"""`fieldcal diagnose`: say what physics the simulation leaves out."""
+"""`fieldcal diagnose`: find which effects the simulation leaves out."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--shared",
         action="store_true",
-        help="say which effects several sessions share, and whether device, lot,"
-        " station or session has them",
+        help="find effects that several sessions share, and whether they belong to"
+        " the device, lot, station or session",
     )
-    add("--jobs", type=int, metavar="N", help="with --shared: processes")
-    add("--history", metavar="FILE", help="with --shared: instead of the usual store")
+    add("--jobs", type=int, metavar="N", help="with --shared: number of processes")
+    add("--history", metavar="FILE", help="with --shared: use this store")
     add("--json", action="store_true", help="print diagnosis.json instead of the view")
-    add("--details", action="store_true", help="all numbers behind the view as well")
-    add("--report", action="store_true", help="write report.html as well")
+    add("--details", action="store_true", help="print all numbers")
+    add("--report", action="store_true", help="also write report.html")
     add(
         "--twin",
         type=Path,
         metavar="FILE",
-        help="write the virtual device with everything that was found, for fieldcal sim"
+        help="write a virtual device with the effects found, for fieldcal sim"
         " --profile FILE, and replay the session on it",
     )
     _add_against(parser)
@@ -66,41 +66,41 @@ def _add_against(parser: argparse.ArgumentParser) -> None:
     add(
         "--against",
         metavar="SIM",
-        help="say what differs from a simulator's output: a session folder, or a file"
-        " that import reads, of the same positions or motion; or a command with {patch}"
-        " and {out} in it, which is run, patched and run again",
+        help="compare with the output of a simulator for the same positions or motion: a"
+        " session folder, or a file that import reads; or a command with {patch} and"
+        " {out}, which is run, patched and run again",
     )
     add(
         "--motion",
         action="store_true",
-        help="with --against: moment by moment, where SIM follows the motion of the"
-        " recording; so it is wherever fewer than three positions are held",
+        help="with --against: compare moment by moment, if SIM follows the motion of the"
+        " recording (default if fewer than three positions are held)",
     )
     add(
         "--patch",
         choices=("gazebo", "json", "kalibr", "px4", "sitl", "toml"),
-        help="with --against: write what makes the simulator like the recording",
+        help="with --against: write the differences in the simulator's own terms",
     )
     add(
         "--rounds",
         type=int,
         default=3,
         metavar="N",
-        help="patches that are tried on a command (default: 3)",
+        help="largest number of patches of a command (default: 3)",
     )
     add(
         "--limit",
         action="append",
         default=[],
         metavar="ID=SIZE",
-        help="with --against: what may differ by that much, as acc_bias=0.02 or"
-        " noise=10%%, so that the exit code is 0",
+        help="with --against: tolerated difference, such as acc_bias=0.02 or noise=10%%;"
+        " within it the exit code is 0",
     )
     add(
         "--junit",
         type=Path,
         metavar="FILE",
-        help="with --against: write what was compared as JUnit XML",
+        help="with --against: write the comparison as JUnit XML",
     )
 
 

@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="autopilots: sensor the numbers are for, from 0, where the recording"
-        " does not tell (default: 0)",
+        help="autopilots: number of the sensor, from 0, if the recording does not state"
+        " it (default: 0)",
     )
 
 

@@ -46,7 +46,7 @@ class CommandParser(argparse.ArgumentParser):
                 "--help-all",
                 action=_WholeHelp,
                 nargs=0,
-                help="show the options that are seldom wanted as well",
+                help="also show the rarely used options",
             )
 
     def format_help(self) -> str:

@@ -1,4 +1,4 @@
-"""`fieldcal history`: show a device's calibrations from run to run."""
+"""`fieldcal history`: show the earlier calibrations of a device."""
 
 from __future__ import annotations
 
@@ -40,24 +40,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--parameter",
         action="append",
         metavar="NAME",
-        help="as in acc_bias.x; may be given several times (default: all biases)",
+        help="such as acc_bias.x; may be given several times (default: all biases)",
     )
     add(
         "--compare",
         nargs=2,
         type=int,
         metavar="N",
-        help="whether two calibrations differ, by their numbers",
+        help="compare the two calibrations with these numbers",
     )
     add(
         "--accept",
         type=int,
         metavar="N",
-        help="let a calibration begin a new family, as after a repair",
+        help="begin a new family with this calibration, as after a repair",
     )
-    add("--png", type=Path, metavar="FILE", help="plot into a picture")
-    add("--limits", type=Path, metavar="FILE", help="limits for what is out of family")
-    add("--history", metavar="FILE", help="instead of the usual history")
+    add("--png", type=Path, metavar="FILE", help="write a plot")
+    add("--limits", type=Path, metavar="FILE", help="limits for the out-of-family test")
+    add("--history", metavar="FILE", help="use this history")
     add("--json", action="store_true", help="print one JSON object")
 
 

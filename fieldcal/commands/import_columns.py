@@ -18,14 +18,13 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
         "--columns",
         action="append",
         default=[],
-        help="what each column is, separated by commas: t, ax ay az, gx gy gz,"
-        " temperature, seq, t_host, or _ to skip one; -gx where an axis points the"
-        " other way; t=NAME,ax=NAME where they have names; with --join once for each"
-        " FILE",
+        help="meaning of each column, separated by commas: t, ax ay az, gx gy gz,"
+        " temperature, seq, t_host, or _ to skip one; -gx for a reversed axis;"
+        " t=NAME,ax=NAME if the columns have names; with --join once for each FILE",
     )
-    add("--rate", type=float, metavar="HZ", help="sampling rate, where no column is t")
-    add("--separator", help="between columns (default: found)")
-    add("--skip", type=int, metavar="N", help="lines at the top (default: found)")
+    add("--rate", type=float, metavar="HZ", help="sampling rate, if no column is t")
+    add("--separator", help="between columns (default: detected)")
+    add("--skip", type=int, metavar="N", help="lines at the top (default: detected)")
     add("--acc-unit", default="", help="m/s^2, mm/s^2, cm/s^2, g, mg, ug, V, count")
     add(
         "--gyr-unit",

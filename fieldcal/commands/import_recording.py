@@ -1,4 +1,4 @@
-"""`fieldcal import`: make a session of a recording from elsewhere."""
+"""`fieldcal import`: convert a recording from another program into a session."""
 
 from __future__ import annotations
 
@@ -54,8 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("files", type=Path, nargs="+", metavar="FILE", help="recording, also as .gz")
     add("-o", "--output", type=Path, help="session folder (default: the file's name)")
-    add("--format", default="", metavar="NAME", help="instead of what the content says")
-    add("--list", action="store_true", help="only say which IMUs are in it")
+    add(
+        "--format",
+        default="",
+        metavar="NAME",
+        help="format of the file (default: detected from the content)",
+    )
+    add("--list", action="store_true", help="list the IMUs in the file and stop")
     add(
         "--instance",
         action="append",
@@ -66,28 +71,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--repair",
         action="store_true",
-        help="leave out bad rows and what is damaged or cut off, and say which",
+        help="leave out bad rows and damaged or incomplete parts, and report them",
     )
-    add("--join", action="store_true", help="FILEs hold channels of one IMU, same time")
+    add(
+        "--join",
+        action="store_true",
+        help="FILEs have channels of one IMU at the same time",
+    )
     add(
         "--in-order",
         action="store_true",
-        help="FILEs are of one IMU, one after another, such as one a position",
+        help="FILEs are consecutive recordings of one IMU, such as one a position",
     )
-    add("--options", default="", metavar="QUERY", help="as in a device's address")
+    add(
+        "--options",
+        default="",
+        metavar="QUERY",
+        help="options of the format, as in a device address",
+    )
     add_columns(parser)
     add(
         "--still",
         type=float,
         default=1.0,
         metavar="S",
-        help="shortest still stretch that counts as a position, s (default: 1)",
+        help="shortest time at rest that counts as a position, s (default: 1)",
     )
     add(
         "--sigma",
         default="",
         metavar="A,G",
-        help="of a table of means, how well they are known, m/s^2 and rad/s",
+        help="uncertainties of the means in a table of means, m/s^2 and rad/s",
     )
     add_site(parser)
 

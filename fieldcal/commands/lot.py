@@ -1,4 +1,4 @@
-"""`fieldcal lot`: say what the units of a lot have in common, and which are odd."""
+"""`fieldcal lot`: show spread, yield, shifts and drift of a lot, and its odd units."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="model, lot, station, operator or serial, since or until a date (default:"
         " everything in the store)",
     )
-    add("--report", type=Path, metavar="FILE", help="write a page as well")
+    add("--report", type=Path, metavar="FILE", help="also write a page")
     add("--json", action="store_true", help="print one JSON object")
     add(
         "--fdr",
         type=float,
         default=0.05,
         metavar="Q",
-        help="share of false ones among the odd units (default: 0.05)",
+        help="expected share of false alarms among odd units (default: 0.05)",
     )
     add("--grade", choices=("tactical", "navigation"), default="tactical",
-        help="whose tolerances count (default: tactical)")  # fmt: skip
+        help="grade of the tolerances (default: tactical)")  # fmt: skip
     add("--limits", type=Path, metavar="FILE", help="tolerances of your own")
-    add("--history", metavar="FILE", help="instead of the usual store")
+    add("--history", metavar="FILE", help="use this store")
 
 
 def run(args: argparse.Namespace) -> int:

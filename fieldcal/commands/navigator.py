@@ -1,4 +1,4 @@
-"""`fieldcal navigator`: calibrate by the drift of a navigator at rest."""
+"""`fieldcal navigator`: calibrate an INS from the drift of its solution at rest."""
 
 from __future__ import annotations
 

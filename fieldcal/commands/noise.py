@@ -1,4 +1,4 @@
-"""`fieldcal noise`: say how noisy a device at rest is, and what follows from it."""
+"""`fieldcal noise`: estimate the random processes of a device at rest."""
 
 from __future__ import annotations
 
@@ -42,9 +42,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = "session folder of a device at rest, or a file; several count together"
     add("sessions", type=Path, nargs="+", metavar="SESSION", help=what)
     add("--json", action="store_true", help="print noise.json instead of the view")
-    add("--report", type=Path, metavar="FILE", help="write a page with the curves")
-    add("--limits", type=Path, metavar="FILE", help="limits for recalibration")
-    add("--history", metavar="FILE", help="instead of the usual history")
+    add(
+        "--report",
+        type=Path,
+        metavar="FILE",
+        help="write a page with the Allan deviation",
+    )
+    add(
+        "--limits",
+        type=Path,
+        metavar="FILE",
+        help="limits that set the date of recalibration",
+    )
+    add("--history", metavar="FILE", help="use this history")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`fieldcal plan`: choose positions and say what they will tell."""
+"""`fieldcal plan`: choose positions and predict the ± of each parameter."""
 
 from __future__ import annotations
 
@@ -51,14 +51,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--noise-of",
         type=Path,
         metavar="SESSION",
-        help="instead: as fieldcal noise found it (session folder, or its noise.json)",
+        help="use the noise found by fieldcal noise (session folder, or noise.json)",
     )
     add(
         "--set",
         choices=("two", "five", "wide", "six_faces"),
-        help="judge a known set instead of choosing positions",
+        help="evaluate a known set instead of choosing positions",
     )
-    add("-o", "--output", type=Path, metavar="FILE", help="write the plan for run")
+    add(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="write the plan for fieldcal run",
+    )
     add("--json", action="store_true", help="print one JSON object")
     add_site(parser)
 

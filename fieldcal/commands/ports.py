@@ -17,14 +17,18 @@ EXAMPLE = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
-    add("port", nargs="*", metavar="PORT", help="only these; a pty may be one")
-    add("--probe", action="store_true", help="listen which device answers, and how")
+    add("port", nargs="*", metavar="PORT", help="only these ports; a pty is possible")
+    add(
+        "--probe",
+        action="store_true",
+        help="listen on each port and identify the device",
+    )
     add(
         "--seconds",
         type=float,
         default=1.0,
         metavar="S",
-        help="listen so long at each baud rate (default: 1)",
+        help="listening time at each baud rate (default: 1)",
     )
     add("--baud", type=int, action="append", metavar="N", help="try only this rate")
     add("--json", action="store_true", help="print one JSON object instead of a table")

@@ -1,4 +1,4 @@
-"""`fieldcal report`: make a page of a session that opens offline."""
+"""`fieldcal report`: write the report of a session, one HTML file."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="RESULT",
         help="earlier sessions or result.json of the same device, oldest first"
-        " (default: what its history has)",
+        " (default: from its history)",
     )
     add("--pdf", action="store_true", help="also write a .pdf, by Chromium")
     add("--png", action="store_true", help="also write a .png, by Chromium")

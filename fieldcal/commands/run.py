@@ -64,22 +64,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"{', '.join(procedures)}, or a plan file (a session.toml with"
         " positions, and a table [run])",
     )
-    add("--resume", type=Path, metavar="SESSION", help="go on with a run broken off")
+    add("--resume", type=Path, metavar="SESSION", help="continue an interrupted run")
     _add_device(parser)
     _add_task(parser)
     add("-o", "--output", type=Path, metavar="FOLDER", help="where to record")
-    add("--headless", action="store_true", help="no operator: progress as JSON lines")
+    add(
+        "--headless",
+        action="store_true",
+        help="without operator; progress as JSON lines",
+    )
     add(
         "--page",
         nargs=argparse.OPTIONAL,
         const=LOCAL,
         metavar="HOST:PORT",
-        help="a page for phone and tablet, on the local network",
+        help="serve a page for phone and tablet on the local network",
     )
-    add("--plain", action="store_true", help="lines instead of a screen")
+    add("--plain", action="store_true", help="print lines instead of a screen")
     add("--json", action="store_true", help="print the result as one JSON object")
     add("--no-report", action="store_true", help="write no report.html")
-    add("--junit", type=Path, metavar="FILE", help="write what happened as JUnit XML")
+    add("--junit", type=Path, metavar="FILE", help="write the outcome as JUnit XML")
     add_site(parser, several=True)
 
 
@@ -89,8 +93,8 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
         "--device",
         action=StoreSeveral,
         metavar="URL",
-        help='such as "serial:/dev/ttyUSB0?format=witmotion"; again for each further'
-        " device that turns with the first",
+        help='such as "serial:/dev/ttyUSB0?format=witmotion"; repeat it for each'
+        " further device that turns with the first",
     )
     parser.set_defaults(further_device=[], further_serial=[])
     add(
@@ -98,15 +102,15 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
         nargs=argparse.OPTIONAL,
         const="",
         metavar="OPTIONS",
-        help="against a virtual device; OPTIONS of fieldcal sim in one string",
+        help="use a virtual device; OPTIONS of fieldcal sim in one string",
     )
-    add("--speed", default="1", metavar="X", help="of the virtual device's time")
-    add("--seed", default="1", metavar="N", help="of the virtual device's noise")
+    add("--speed", default="1", metavar="X", help="speed of the virtual device's time")
+    add("--seed", default="1", metavar="N", help="seed of the virtual device's noise")
     add(
         "--patience",
         type=float,
         metavar="S",
-        help="how long to wait for a device that is gone"
+        help="how long to wait for a device that disconnected"
         f" (default: {PATIENCE:g}, headless {PATIENCE_HEADLESS:g})",
     )
 
@@ -119,7 +123,7 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
         "--level",
         type=float,
         metavar="DEG",
-        help="how level the base is, 1σ about each axis; two positions cannot see it",
+        help="uncertainty of the level base, 1σ about each axis (two_position needs it)",
     )
     add(
         "--angles",
@@ -130,7 +134,7 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
     add(
         "--angles-from",
         metavar="TEXT",
-        help="who vouches for the angles: the certificate of the fixture",
+        help="source of --angles, such as the certificate of the fixture",
     )
     add(
         "--sways",
@@ -138,9 +142,13 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="the base sways: do not wait until it comes to rest",
     )
-    add("--verify", action="store_true", help="one more position, which is not fitted")
+    add(
+        "--verify",
+        action="store_true",
+        help="add a position that is not fitted, as a check",
+    )
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
-    add("--history", metavar="FILE", help="instead of the usual history")
+    add("--history", metavar="FILE", help="use this history")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`fieldcal serve`: take in sessions over HTTP and give out their results."""
+"""`fieldcal serve`: receive sessions over HTTP and return their results."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--listen",
         default=LISTEN,
         metavar="HOST:PORT",
-        help=f"where (default: {LISTEN}, this computer alone)",
+        help=f"address (default: {LISTEN}, this computer only)",
     )
     for option, kind, metavar, what in (
         ("--folder", Path, "FOLDER", "where sessions are kept (default: user's data)"),
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="HOST:PORT",
-        help="name by which a proxy passes requests on; may be given several times",
+        help="host name that a proxy forwards; may be given several times",
     )
     for option, default, what in (
         ("--upload-mib", 256, "largest recording, MiB"),

@@ -1,4 +1,4 @@
-"""`fieldcal sim`: be a virtual device on a link."""
+"""`fieldcal sim`: run a virtual device on a serial, CAN or MAVLink link."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _add_link(parser: argparse.ArgumentParser) -> None:
         "--baud",
         type=int,
         metavar="BIT/S",
-        help="of the pty: a host at another rate hears garbage (default: at any)",
+        help="of the pty; at another rate the host reads garbage (default: any rate)",
     )
     add(
         "--can",
@@ -72,7 +72,7 @@ def _add_link(parser: argparse.ArgumentParser) -> None:
     add(
         "--mavlink",
         metavar="URL",
-        help="as an autopilot instead, at udpin:HOST:PORT, udpout:HOST:PORT,"
+        help="as an autopilot, at udpin:HOST:PORT, udpout:HOST:PORT,"
         " tcpin:HOST:PORT or pty, with options as in"
         ' "tcpin:127.0.0.1:5760?autopilot=px4"',
     )
@@ -86,17 +86,17 @@ def _add_course(parser: argparse.ArgumentParser) -> None:
         "--control",
         type=Path,
         metavar="PATH",
-        help="socket that takes orders (default: a new one, printed behind the port)",
+        help="control socket (default: a new one, printed after the port)",
     )
     add(
         "--speed",
         default="1",
         metavar="X",
-        help="device time against the clock, or max: as fast as it is read (default:"
-        " 1; any other waits for the reader)",
+        help="speed of device time, or max: as fast as it is read (default: 1;"
+        " any other value waits for the reader)",
     )
-    add("--once", action="store_true", help="end when the reader goes")
-    add("--duration", type=float, metavar="S", help="end after so much device time")
+    add("--once", action="store_true", help="end when the reader disconnects")
+    add("--duration", type=float, metavar="S", help="end after this device time")
     add(
         "--steps",
         default="22.5,2.5",
@@ -124,14 +124,20 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="ID:PARAM=VALUE,…",
-        help="conceal an effect; may be given several times",
+        help="add an effect; may be given several times",
     )
-    add("--seed", type=int, default=1, metavar="N", help="of all noise (default: 1)")
+    add(
+        "--seed",
+        type=int,
+        default=1,
+        metavar="N",
+        help="seed of all noise (default: 1)",
+    )
     add("--rate", type=float, metavar="HZ", help="samples a second")
     add("--grade", choices=("tactical", "navigation"))
     add("--latitude", type=float, metavar="DEG")
     add("--height", type=float, metavar="M", help="above the ellipsoid")
-    add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
+    add("--gravity", type=float, metavar="M/S^2", help="replaces the WGS84 value")
     add("--mounting", metavar="X,Y,Z", help="as in +x,-z,+y")
     add("--turn-time", type=float, metavar="S", help="duration of a turn")
     add("--base-tilt", metavar="X,Z", help="of the base, about x and z, deg")
@@ -142,7 +148,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
     add("--gyr-scale", metavar="X,Y,Z")
     add("--acc-noise", metavar="X,Y,Z", help="white, of a sample, m/s^2")
     add("--gyr-noise", metavar="X,Y,Z", help="white, of a sample, rad/s")
-    add("--truth", type=Path, metavar="FILE", help="write what is concealed, as JSON")
+    add("--truth", type=Path, metavar="FILE", help="write the true parameters as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -15,15 +15,15 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
     add = group.add_argument
     add("--name", help="name of the device")
     if several:
-        what = "its serial number, the key of its history; again for each further one"
+        what = "serial number, key of the history; repeat it for each further device"
         add("--serial", action=StoreSeveral, help=what)
     else:
-        add("--serial", help="its serial number, the key of its history")
-    add("--lot", metavar="NAME", help="what it was made in, for fieldcal lot")
-    add("--station", metavar="NAME", help="where it is recorded, likewise")
-    add("--operator", metavar="NAME", help="who records it, likewise")
+        add("--serial", help="serial number, key of the history")
+    add("--lot", metavar="NAME", help="production lot, for fieldcal lot")
+    add("--station", metavar="NAME", help="test station, for fieldcal lot")
+    add("--operator", metavar="NAME", help="operator, for fieldcal lot")
     add("--grade", choices=("tactical", "navigation"), help="default: tactical")
-    add("--latitude", type=float, metavar="DEG", help="says how strong gravity is")
+    add("--latitude", type=float, metavar="DEG", help="of the site, for gravity")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
     add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
     add(

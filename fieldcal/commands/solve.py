@@ -1,4 +1,4 @@
-"""`fieldcal solve`: calibrate from a recorded session."""
+"""`fieldcal solve`: estimate a calibration from a recorded session."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         default="auto",
         choices=("auto", "two_position", "five_position", "joint", "scalar"),
-        help="auto (default) takes the best that the positions allow",
+        help="auto (default): the best that the positions allow",
     )
     add(
         "--tilt",
         default="auto",
         choices=("auto", "none", "angle_offset", "base_tilt"),
-        help="what a base that is not level does; auto (default) lets the data say",
+        help="model of a base that is not level; auto (default): chosen from the data",
     )
-    add("--cross", action="store_true", help="cross-coupling (non-orthogonality) too")
+    add("--cross", action="store_true", help="also estimate cross-coupling")
     add(
         "--turns",
         default="auto",
         choices=("auto", "yes", "no"),
-        help="gyroscopes' scale factor and cross-coupling from the turns between the "
-        "windows; auto (default) where they give it",
+        help="estimate scale factor and cross-coupling of the gyroscopes from the turns"
+        " between the windows; auto (default): if the turns determine them",
     )
     for option, what in (
-        ("--level", "how level the base was made, 1σ about each axis"),
+        ("--level", "uncertainty of the level base, 1σ about each axis"),
         ("--angles", "how well each position's angles were set, 1σ; else the grade's"),
         ("--heading", "how well z points north, 1σ; for the gyroscopes"),
     ):
@@ -60,15 +60,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="add what the store says of such units: lot, model and so on, as in "
-        "fieldcal lot; may be given several times",
+        help="use these units of the store as prior knowledge; conditions as in"
+        " fieldcal lot; may be given several times",
     )
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
-    add("--history", metavar="FILE", help="instead of the usual history")
+    add("--history", metavar="FILE", help="use this history")
     add(
         "--as-printed",
         action="store_true",
-        help="follow the paper's print with its misprints, for comparison",
+        help="use the equations of the paper with their misprints, for comparison",
     )
 
 

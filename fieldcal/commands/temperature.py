@@ -1,4 +1,4 @@
-"""`fieldcal temperature`: make one model of calibrations at several temperatures."""
+"""`fieldcal temperature`: combine calibrations at several temperatures into one model."""
 
 from __future__ import annotations
 
@@ -45,16 +45,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--at",
         type=float,
         metavar="DEGC",
-        help="the parameters at this temperature, and what it costs to use the last"
-        " session's there",
+        help="parameters at this temperature, and the error of the last session's"
+        " parameters there",
     )
     add("--format", choices=FORMATS, help="of the file (default: json)")
     add("-o", "--output", type=Path, metavar="FILE", help="write a file")
     add("--device", metavar="URL", help="write onto an autopilot, and read back")
     add("--instance", type=int, default=0, metavar="N",
-        help="autopilots: sensor the sessions are of, from 0 (default: 0)")  # fmt: skip
+        help="autopilots: number of the sensor, from 0 (default: 0)")  # fmt: skip
     add("--yes", action="store_true", help="do not ask")
-    add("--force", action="store_true", help="although a session is NO-GO or disagrees")
+    add(
+        "--force",
+        action="store_true",
+        help="write even if a session is NO-GO or disagrees",
+    )
     add("--limits", type=Path, metavar="FILE", help="limits of your own")
     add("--json", action="store_true", help="print one JSON object")
 

@@ -1,4 +1,4 @@
-"""`fieldcal undo`: give an autopilot back what it had before."""
+"""`fieldcal undo`: restore the previous calibration of an autopilot."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SESSION",
         help="session that was written, or its installed-before file",
     )
-    add("--device", metavar="URL", help="by default the one that was written to")
+    add("--device", metavar="URL", help="default: the one that was written to")
     add("--yes", action="store_true", help="do not ask")
-    add("--force", action="store_true", help="although somebody changed it since")
+    add("--force", action="store_true", help="restore even if parameters changed since")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`fieldcal verify`: say whether a session is whole."""
+"""`fieldcal verify`: check every file of a session against its checksum."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
     add("session", type=Path, metavar="SESSION", help="session folder")
-    add("--json", action="store_true", help="findings as one JSON object")
+    add("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:

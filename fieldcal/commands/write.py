@@ -1,4 +1,4 @@
-"""`fieldcal write`: install a calibration on an autopilot."""
+"""`fieldcal write`: write a calibration onto an autopilot."""
 
 from __future__ import annotations
 

@@ -66,15 +66,15 @@ def _add_against(parser: argparse.ArgumentParser) -> None:
     add(
         "--against",
         metavar="SIM",
-        help="compare with the output of a simulator for the same positions or motion: a"
-        " session folder, or a file that import reads; or a command with {patch} and"
+        help="compare with the output of a simulator for the same positions or motion:"
+        " a session folder, or a file that import reads; or a command with {patch} and"
         " {out}, which is run, patched and run again",
     )
     add(
         "--motion",
         action="store_true",
-        help="with --against: compare moment by moment, if SIM follows the motion of the"
-        " recording (default if fewer than three positions are held)",
+        help="with --against: compare moment by moment, if SIM follows the motion of"
+        " the recording (default if fewer than three positions are held)",
     )
     add(
         "--patch",
@@ -93,8 +93,8 @@ def _add_against(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="ID=SIZE",
-        help="with --against: tolerated difference, such as acc_bias=0.02 or noise=10%%;"
-        " within it the exit code is 0",
+        help="with --against: tolerated difference, such as acc_bias=0.02 or noise=10%%"
+        "; within it the exit code is 0",
     )
     add(
         "--junit",

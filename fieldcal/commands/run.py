@@ -123,7 +123,7 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
         "--level",
         type=float,
         metavar="DEG",
-        help="uncertainty of the level base, 1σ about each axis (two_position needs it)",
+        help="uncertainty of the level base, 1σ about each axis; two_position needs it",
     )
     add(
         "--angles",

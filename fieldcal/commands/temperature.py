@@ -1,4 +1,4 @@
-"""`fieldcal temperature`: combine calibrations at several temperatures into one model."""
+"""`fieldcal temperature`: combine calibrations at several temperatures."""
 
 from __future__ import annotations
 

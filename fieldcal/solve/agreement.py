@@ -77,7 +77,7 @@ def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -
     y = off.ravel()[used]
     random = _random(d)
     noise = (1 / info.ravel()[used]) + gram.shared[at].ravel()[used] ** 2
-    loose = _loose(gram, p, channels)[used]
+    loose = _free_rotations(gram, p, channels)[used]
     wide = means[:, random] * found.sizes[random]
     plain = np.diag(noise) + wide @ wide.T
     stated = plain + loose @ loose.T
@@ -109,8 +109,8 @@ def _random(d: Given) -> Mask:
     return np.concatenate(every)
 
 
-def _loose(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:
-    """Turns of positions whose orientation nobody knows, (3 p, 2 p)."""
+def _free_rotations(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:
+    """Columns of the rotations of positions of unknown orientation, (3 p, 2 p)."""
     some = gram.loose[:p, list(channels)]
     out = np.zeros((p, 3, p, 2))
     out[np.arange(p), :, np.arange(p)] = some

@@ -66,8 +66,8 @@ class Borrowed:
         if self.refused:
             return (
                 f"this unit is odd beside {units} (P = {self.odd:.2f}):"
-                f" {self._apart()}; nothing of the lot is in the result: see whether it"
-                " is the right lot, and examine the unit"
+                f" {self._largest_shift()}; nothing of the lot is in the result:"
+                " see whether it is the right lot, and examine the unit"
             )
         name = min(self.lot.names, key=self._share)
         unit = _unit(name)
@@ -76,8 +76,8 @@ class Borrowed:
         perhaps = ""
         if self.odd > thresholds.MENTIONED:
             perhaps = (
-                f"; the unit may be odd, P = {self.odd:.2f}: {self._apart()}, which is"
-                " in the uncertainties"
+                f"; the unit may be odd, P = {self.odd:.2f}: {self._largest_shift()},"
+                " which is in the uncertainties"
             )
         return (
             f"what {units} say is in this result: {name} has"
@@ -89,7 +89,7 @@ class Borrowed:
         """What is left of a parameter's uncertainty, as a part."""
         return self.found[name][1] / self.own.get(name, (0.0, np.inf))[1]
 
-    def _apart(self) -> str:
+    def _largest_shift(self) -> str:
         """By what the unit differs most from its lot."""
         known = [n for n in self.lot.names if n in self.own]
         off = {
@@ -154,11 +154,14 @@ def borrowed(
     others = _Hypotheses.of(own, lot)
     kept = own if others.odd > thresholds.NAMED else others.mixed_with(found)
     lot = lot.only(kept.names)
-    told = Borrowed(lot, others.odd, others.parameter, _told(own), _told(kept))
+    told = Borrowed(
+        lot, others.odd, others.parameter, _estimates(own), _estimates(kept)
+    )
     return kept, told
 
 
-def _told(one: Estimated) -> dict[str, tuple[float, float]]:
+def _estimates(one: Estimated) -> dict[str, tuple[float, float]]:
+    """Value and sigma of each parameter by its full name."""
     rows = zip(one.values.tolist(), np.sqrt(np.diag(one.covariance)), strict=True)
     return {n: (v, float(s)) for n, (v, s) in zip(one.names, rows, strict=True)}
 

@@ -161,7 +161,7 @@ class Given(Dictionary):
             yield from self._angles(float(np.deg2rad(w.angles_deg)))
         if (lost := np.flatnonzero(self.cut)).size:
             at = self.add(General("cut", self._shorter), 3) + lost
-            yield _given(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
+            yield _given_cause(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
 
     def _estimated(
         self,
@@ -187,14 +187,14 @@ class Given(Dictionary):
             size, fixed = np.full(len(some), known), 1.0
         group = Group(name, "", at, size, effect, params=tuple(some), in_state=True,
                       fixed=fixed)  # fmt: skip
-        return _given(group)
+        return _given_cause(group)
 
     def _earth(self, size: Array) -> Cause:
         """What is not known of the Earth's rate."""
         sides = columns.earth_sides
         self.earth = self.add(General("earth", columns.earth, sides=sides), 3)
         kept = np.flatnonzero(size)
-        return _given(
+        return _given_cause(
             Group("earth", "", self.earth + kept, size[kept], fixed=1.0, in_state=True)
         )
 
@@ -215,12 +215,14 @@ class Given(Dictionary):
         size = sigma / np.sqrt(2.0)
         own = self.rotations_of(oriented)
         wide = np.full(len(own), size)
-        yield _given(Group("angle_setting", "own", own, wide, fixed=1.0, in_state=True))
+        yield _given_cause(
+            Group("angle_setting", "own", own, wide, fixed=1.0, in_state=True)
+        )
         # an angle that is set once has both parts of its error for itself
         if every := list(detents(self.x, oriented)):
             at = columns_of(self, every)
             wide = np.full(len(at), size)
-            yield _given(Group("angle_setting", "repeated", at, wide, fixed=1.0))
+            yield _given_cause(Group("angle_setting", "repeated", at, wide, fixed=1.0))
 
     # -- where it stands
 
@@ -264,7 +266,7 @@ class Given(Dictionary):
         ]
 
 
-def _given(group: Group) -> Cause:
+def _given_cause(group: Group) -> Cause:
     return Cause(group.cause, group.part, 1.0, (group,), "given")
 
 

@@ -1,15 +1,15 @@
-"""What a recording shows to be there beside what is asked for, in a given set.
+"""Effects that a recording shows in addition to the requested parameters.
 
-Causes come from the search of the diagnosis, each explanation E of the recording with
-its probability, and each is a given set of its own: what was asked for, and its causes.
-What is said is the mean over the explanations,
+The search of the diagnosis gives explanations E of the recording, each a set of causes
+with its probability. `solve` fits the requested parameters with each set of causes. The
+result is the mean over the explanations,
 
     mean = sum_E P(E) mean_E,   cov = sum_E P(E) [cov_E + off_E off_E^T]           (1)
 
-so an interval contains what nobody knows about the cause. Biases and scale factors that
-change are those at the end of the recording, at the temperature of its last window and
-with the device at rest: what it starts a flight with. With outputs U(f, w) of what
-is carried at that instant,
+so an interval includes the uncertainty of the cause. Biases and scale factors that
+change are given at the end of the recording, at the temperature of its last window and
+with the device at rest, as a flight would start with them. With the outputs U(f, w) of
+the added causes at that instant,
 
     bias = U(0, 0),   scale_c = [U_c(+d e_c) - U_c(-d e_c)] / 2 d,   d -> 0        (2)
 

@@ -115,7 +115,7 @@ def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> Genera
             step = np.zeros(len(effect.params))
             step[j] = STEP * param.typical
             ends = [effect.change(view.x, s) for s in (step, -step)]  # type: ignore[attr-defined]
-            columns.append(_apart(ends[0], ends[1], float(step[j]), view.state))
+            columns.append(_difference(ends[0], ends[1], float(step[j]), view.state))
         return np.stack(columns, axis=2)
 
     if isinstance(effect, Motion):
@@ -145,7 +145,7 @@ def _of_sides(sides: Sides) -> Callable[[RowView], Array]:
 
     def of(view: RowView) -> Array:
         columns = [
-            _apart(up, down, step, view.state)
+            _difference(up, down, step, view.state)
             for up, down, step in sides(view.plain, view.state)
         ]
         return np.stack(columns, axis=2)
@@ -153,7 +153,7 @@ def _of_sides(sides: Sides) -> Callable[[RowView], Array]:
     return of
 
 
-def _apart(up: Experience, down: Experience, step: float, state: State) -> Array:
+def _difference(up: Experience, down: Experience, step: float, state: State) -> Array:
     """Difference of the outputs of two states of what is experienced, per step."""
     change: Array = np.hstack([up.f - down.f, up.w - down.w]) * state.scale
     for term in state.terms:
@@ -293,6 +293,6 @@ def small_rotation(view: RowView) -> Array:
     held = np.flatnonzero(at >= 0)
     sides = small_rotation_sides(view.plain, view.state)
     for joint, (up, down, step) in enumerate(sides):
-        change = _apart(up, down, step, view.state)
+        change = _difference(up, down, step, view.state)
         out[held, :, 2 * at[held] + joint] = change[held]
     return out

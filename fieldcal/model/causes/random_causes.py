@@ -1,4 +1,4 @@
-"""Causes that are random: walks of the biases, and angles that were set by hand."""
+"""Random causes: random walks and flicker of the biases, errors of set angles."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
         [bool(table.x.oriented[table.x.position == p].all()) for p in table.held]
     ]
     if len(table.held) > 3 and len(oriented):
-        yield from _set_wrongly(table, oriented)
+        yield from _wrong_angles(table, oriented)
 
 
-def _set_wrongly(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
-    """A position that is set elsewhere, and an angle that is wrong each time.
+def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
+    """A position set at other angles, and an angle that is wrong wherever it is set.
 
-    Positions of unknown orientation bear witness to either.
+    Only positions with known angles can have either; the others help to show them.
     """
     size = np.full(2, np.deg2rad(priors.MISSET_DEG))
     groups = tuple(
@@ -81,7 +81,7 @@ def _walks(
     sets: Sequence[Sequence[int]],
     share: float,
 ) -> Cause:
-    """Walks of some channels together, or of one of them."""
+    """Random walks of some channels together, or of single ones."""
     shape, modes = table.span.walk(), table.wander.modes
     groups = tuple(
         Group(
@@ -100,9 +100,10 @@ def _walks(
 
 
 def flicker(table: ColumnTable, modes: Index) -> Iterator[Group]:
-    """Instability that goes on from window to window, of equal power in every octave.
+    """Flicker of each triad: bias noise with equal power in every octave.
 
-    A cosine k has a variance as 1/k; `modes` (6,) of each channel.
+    The variance of cosine k is proportional to 1/k. `modes` (6,) has the number of
+    cosines of each channel.
     """
     sizes = priors.FLICKER_ACC, priors.FLICKER_GYR
     if len(table.held) < FEW:  # it is all the instability that they have

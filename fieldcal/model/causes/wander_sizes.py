@@ -174,13 +174,13 @@ def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
         (y[at + 2 * lag] - 2 * y[at + lag] + y[at]) ** 2,
         sd[at + 2 * lag] ** 2 + 4 * sd[at + lag] ** 2 + sd[at] ** 2,
         length * (4 * (x - 1 / 3) - (2 * x - 1 / 3)),  # (1), (2)
-        4 * _apart(x) - _apart(2 * x),  # (1), (3)
+        4 * _flicker_structure(x) - _flicker_structure(2 * x),  # (1), (3)
         len(at) / lag,
     )
 
 
-def _apart(x: Array) -> Array:
-    """What two means of flicker with a = 1 differ by, squared, x lengths apart."""
+def _flicker_structure(x: Array) -> Array:
+    """Mean squared difference of two means of flicker with a = 1, x lengths apart."""
     out: Array = (_squared_ln(x + 1) + _squared_ln(x - 1)) / 2 - _squared_ln(x)  # (3)
     return out
 

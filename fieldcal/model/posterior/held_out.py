@@ -99,7 +99,9 @@ class HeldOut:
         parts = list(self._parts(one))
         if not parts:
             return float("nan"), 0
-        total = sum(_left(whole) - _left(rest) for whole, rest in parts)
+        total = sum(
+            _residual_square(whole) - _residual_square(rest) for whole, rest in parts
+        )
         return total, sum(len(part.white) for part in self.linear)
 
     def _parts(self, one: Set) -> Iterator[tuple[Eliminated, Eliminated]]:
@@ -178,8 +180,8 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
     return out
 
 
-def _left(there: Eliminated) -> float:
-    """Q: squares that the estimate leaves, what it takes of its prior counted."""
+def _residual_square(there: Eliminated) -> float:
+    """Q, the weighted residual square plus the prior square of the estimate."""
     pull = there.rows.pull(there.columns)
     return there.rows.square - float(pull @ there.estimate)
 
@@ -212,7 +214,7 @@ def _predict(
 ) -> None:
     """Residuals of the rows left out, each position's own angles sought in it."""
     white = {p.channel: p.white + p.design @ step[p.columns] for p in left}
-    wide = _own(chosen, d)
+    wide = _angle_variances(chosen, d)
     for j, at in _angles(left, d):
         size = wide[at]
         if not size.any():
@@ -244,8 +246,8 @@ def _wander(chosen: Set, d: Dictionary) -> Array:
     return out
 
 
-def _own(chosen: Set, d: Dictionary) -> Array:
-    """Sizes of the turns of each position, by column."""
+def _angle_variances(chosen: Set, d: Dictionary) -> Array:
+    """Prior variances of the angles of each position, rad^2, by column."""
     out = np.zeros(d.width)
     np.add.at(out, chosen.state.columns, chosen.state.sizes**2)
     out[d.rotations_of(d.held[d.free])] += 1.0

@@ -1,13 +1,14 @@
-"""Numbers averaged over the sets that were visited: what was chosen is not certain.
+"""Estimates averaged over the sets that the search visited.
 
-An effect with all of its parameters or with some, or another effect in its place: each
-set s has numbers of its own, and is as likely as its weight w_s,
+The best set is not certain: an effect may have all of its parameters or only some, or
+an alias may be there instead. Each set s has an estimate, and its probability is its
+weight w_s,
 
     mean = sum_s w_s mean_s
     cov = sum_s w_s [cov_s + (mean_s - mean) (mean_s - mean)^T]                     (1)
 
-A parameter that a set has not is 0 there. Source: J. Hoeting and others, Bayesian model
-averaging: a tutorial, 1999, (1) to (3).
+A parameter that a set does not have is 0 in it. Source: J. Hoeting and others, Bayesian
+model averaging: a tutorial, 1999, (1) to (3).
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.reported import reported
 
 Places = Callable[[Set], Sequence[Index]]
-"""Where each of some quantities stands in the state of a set; what is there several
-times is their sum, what is nowhere is 0."""
+"""Indices of some quantities in the state of a set. A quantity with several indices is
+their sum; one without an index is 0."""
 
 
 class ModelAverage:
@@ -51,12 +52,12 @@ class ModelAverage:
         least = np.exp(-KEPT) * max(w for _, w in every)
         for one, weight in every:
             if weight > least:
-                told = self._told(one)
-                out += [(s, weight / len(told)) for s in told]
+                alike = self._with_mixed_sizes(one)
+                out += [(s, weight / len(alike)) for s in alike]
         return out
 
-    def _told(self, one: Set) -> Sequence[Set]:
-        """A set as numbers are taken from it."""
+    def _with_mixed_sizes(self, one: Set) -> Sequence[Set]:
+        """The set with its estimate averaged over sizes; several for the best set."""
         if one is self.posterior.best:
             return self.best
         return [reported(self.posterior.search, one)]
@@ -71,10 +72,12 @@ class ModelAverage:
         there = [(s, w) for s, w in self.sets if cause.key in s.keys]
         if self.posterior.search.dictionary.free.any():
             mine = set(group.params)
-            there = [(s, w) for s, w in there if set(_own(s, member).params) <= mine]
+            there = [
+                (s, w) for s, w in there if set(_group_in(s, member).params) <= mine
+            ]
 
         def places(one: Set) -> list[Index]:
-            own = _own(one, member)
+            own = _group_in(one, member)
             at = dict(zip(own.params or own.columns, own.columns, strict=True))
             wanted = [at.get(p, -1) for p in group.params or group.columns]
             return [np.flatnonzero(one.state.columns == c)[-1:] for c in wanted]
@@ -82,7 +85,7 @@ class ModelAverage:
         return averaged(there, places)
 
 
-def _own(one: Set, member: Member) -> Group:
+def _group_in(one: Set, member: Member) -> Group:
     """The group by which a set has the cause of a member."""
     (own,) = (g for c, g in one.members if c.key == member[0].key)
     return own

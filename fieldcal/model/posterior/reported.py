@@ -1,9 +1,9 @@
-"""A set as numbers are taken from it.
+"""The state of a set as it is reported: averaged over sizes and not at the likeliest.
 
-A size at its likeliest is no certainty: of a calibration that rows say little about it
-is the smallest, and of few windows the likeliest instability is often none. Before the
-rows a calibration is known as of devices of its kind, and what is said is the mean over
-all instabilities (`mixture`).
+The likeliest size may mislead. If the rows hardly determine a calibration parameter,
+its likeliest size is the smallest one, and with few windows the likeliest instability
+is often zero. So calibration parameters have the prior of devices of their kind, and
+the estimate is the mean over all instabilities (`mixture`).
 """
 
 from __future__ import annotations

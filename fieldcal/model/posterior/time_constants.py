@@ -1,13 +1,13 @@
-"""A set at other values of its time constants, in which the rows are not linear.
+"""The uncertainty of time constants, in which the rows are not linear.
 
-A time constant is uncertain by a sigma of its own, and what fades with it, and the
-biases beside that, are then otherwise. A set with n of them stands for 2 n sets, in
-each of which one of them is elsewhere,
+A time constant tau_i has a sigma of its own. The parameters that fade with it, and the
+biases, depend on it. A set with n time constants is replaced by 2 n sets, each with one
+of them at another value,
 
     tau_i exp(+- sqrt(n) sigma_i / tau_i),    weight 1 / (2 n)                      (1)
 
-which is exact for what goes with ln tau evenly. Source: I. Arasaratnam and S. Haykin,
-Cubature Kalman filters, 2009, (22), (23).
+which is exact for polynomials of third order in ln tau. Source: I. Arasaratnam and
+S. Haykin, Cubature Kalman filters, 2009, (22), (23).
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from fieldcal.model.posterior.reported import reported
 from fieldcal.model.search.inference import Inferred
 
 MOST = 1.0
-"""Largest sigma of a time constant's logarithm: one that is less certain is open."""
+"""Largest sigma of the logarithm of a time constant that is used."""
 
 
 def elsewhere(found: Inferred) -> list[Set]:
-    """The best set with each of its time constants elsewhere, as numbers are taken.
+    """The best set at the 2 n other values of its time constants, (1).
 
-    Empty where it has none, or none that is uncertain.
+    Empty if it has no time constant, or none with a known sigma.
     """
     some = [
         (i, name, min(group.unsure / value, MOST))

@@ -138,7 +138,7 @@ class Turns:
         for columns, outputs in general:
             there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
         index = index[there]
-        basis, info = _plane(across, ends, self._unsure(turn, view))
+        basis, info = _plane(across, ends, self._closure_variance(turn, view))
         close = basis @ close[:, there]
         closure = basis @ seen + close @ values[index]
         off = [(basis @ bent) ** 2 for bent in loose.values()]
@@ -180,7 +180,7 @@ class Turns:
                 general.append((columns[kept], outputs[:, :, kept]))
         return np.concatenate(at), np.concatenate(closing, axis=1), general
 
-    def _unsure(self, turn: Turn, view: RowView) -> float:
+    def _closure_variance(self, turn: Turn, view: RowView) -> float:
         """Variance of a closure about every axis: noise, time steps and filters, rad^2.
 
         Between positions of unknown orientation the Earth's rate is not known either.

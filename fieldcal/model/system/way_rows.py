@@ -57,13 +57,13 @@ class WayRows:
         """
         d, found, turn = self.dictionary, self.known.state, self.turn
         columns = np.concatenate([c for c, _ in general])
-        design = self._seen(np.concatenate([o for _, o in general], axis=2))
+        design = self._output_means(np.concatenate([o for _, o in general], axis=2))
         flat = design.reshape(-1, len(columns))
         own = ~d.shown[columns] & np.isin(columns, index)
         output = self.state.output(turn.x, self.view.since)
         off = turn.acc - turn.means(output[:, :3])
         z = off.ravel() + flat[:, own] @ values[columns[own]]
-        held, at = self._held(columns, flat)
+        held, at = self._window_columns(columns, flat)
         estimate = np.where(values[found.columns[at]] != 0, 0.0, found.estimate[at])
         z = z - held @ estimate
         cov = self._covariance()
@@ -75,15 +75,15 @@ class WayRows:
         whole[:, place] = whiten @ flat[:, own]
         return whiten @ z, whole
 
-    def _seen(self, outputs: Array) -> Array:
-        """What outputs at the edges make of the pieces, (k, 3, columns), (2)."""
+    def _output_means(self, outputs: Array) -> Array:
+        """Means over the pieces, by outputs at their edges, (k, 3, columns), (2)."""
         scale = self.state.scale
         path = self.turn.carried(outputs[:, 3:] / scale[3:, None])
         swung = self.turn.swung(path) * scale[:3, None]
         return self.turn.means(outputs[:, :3] + swung)
 
-    def _held(self, columns: Index, flat: Array) -> tuple[Array, Index]:
-        """Columns that the windows' set holds, on the way, and their number in it."""
+    def _window_columns(self, columns: Index, flat: Array) -> tuple[Array, Index]:
+        """Columns that the set of the windows has, and their indices in it."""
         d, found = self.dictionary, self.known.state
         out, at = [], []
         order = np.argsort(columns)

@@ -197,6 +197,32 @@ def test_a_rest_of_the_ladder_that_is_off_is_never_a_good_result_that_is_wrong(
         assert out["not_carried"]["moved_sigmas"]["acc_scale.z"] < -5
 
 
+BY_HAND = [(181.3, 0.8), (88.9, -1.6), (1.1, 91.4), (-92.0, 0.7)]
+"""Faces on which the device is laid: about these angles, and nobody knows which."""
+
+
+def test_faces_laid_by_hand_bear_witness_to_angles_set_badly(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each is off by another amount, 15 times what is said; the ± is for that."""
+    missed = np.random.default_rng(5).normal(0.0, 0.15, (len(LADDER), 2))
+    there = [*(np.array(LADDER) + missed).tolist(), *BY_HAND]
+    said = places([*LADDER, *BY_HAND])
+    for row in said[len(LADDER) :]:
+        del row["alpha_deg"], row["beta_deg"]
+    site = {**SITE, "angle_setting_deg": 0.01}
+    write_session(tmp_path, recorded(CALM, places(there)), said, site=site)
+    main(["solve", str(tmp_path), "--json"])
+    out: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert out["verdict"] == "good"
+    assert 0.1 < out["angle_sigma_deg"] < 0.25
+    assert (np.abs(off(out, CALM)) < 4).all()
+    main(["diagnose", str(tmp_path), "--json"])
+    (found,) = json.loads(capsys.readouterr().out)["effects"]
+    assert found["id"] == "angle_setting"
+    assert abs(found["parameters"]["sigma_deg"]["value"] - 0.15) < 0.05
+
+
 def test_gravity_that_nobody_said_is_in_the_uncertainty_and_no_finding(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -17,15 +17,15 @@ from fieldcal.physics.effect import CHANCE, Scatter
 
 def of_chance(table: ColumnTable) -> Iterator[Cause]:
     """Every random effect of the catalogue, and angles that are not the stated ones."""
-    for effect in catalogue().values():
-        if isinstance(effect, Scatter) and effect.applies(table.x):
-            yield from _of_scatter(table, effect)
-    if len(table.held) >= FEW:  # of fewer, it is always there
-        for group in flicker(table, table.wander.modes):
-            yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
     oriented = table.held[
         [bool(table.x.oriented[table.x.position == p].all()) for p in table.held]
     ]
+    for effect in catalogue().values():
+        if isinstance(effect, Scatter) and effect.applies(table.x):
+            yield from _of_scatter(table, effect, oriented)
+    if len(table.held) >= FEW:  # of fewer, it is always there
+        for group in flicker(table, table.wander.modes):
+            yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
     if len(table.held) > 3 and len(oriented):
         yield from _wrong_angles(table, oriented)
 
@@ -56,12 +56,18 @@ def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     yield Cause("repeated_angle", "", CHANCE, groups, "position")
 
 
-def _of_scatter(table: ColumnTable, effect: Scatter) -> Iterator[Cause]:
-    """A random effect by the kind of its parameters."""
+def _of_scatter(
+    table: ColumnTable, effect: Scatter, oriented: Index
+) -> Iterator[Cause]:
+    """A random effect by the kind of its parameters.
+
+    Angles scatter where they are set, in positions `oriented`; others bear witness. An
+    angle of one position alone is one that is set wrongly.
+    """
     if not {p.name for p in effect.params} <= set(CHANNELS):  # of the positions' angles
-        if len(table.held) < 3 or not table.x.oriented.all():
+        if len(table.held) < 3 or len(oriented) < 2:
             return
-        at = table.rotations_of(table.held)
+        at = table.rotations_of(oriented)
         size = np.full(len(at), np.deg2rad(effect.params[0].typical))
         group = Group(effect.id, "", at, size, effect, in_state=True)
         yield Cause(effect.id, "", effect.chance(table.x), (group,), "random")

@@ -232,11 +232,18 @@ def test_what_a_session_cannot_show_is_not_offered() -> None:
     four = keys_of(first(4))
     assert four == every
     free = keys_of(ladder(free=(2,)))
-    assert every - free == {"alpha", "beta", "joints", "angle_setting"}
-    causes = {c.key: c for c in made(ladder(free=(2,))).causes}
+    assert every - free == {"alpha", "beta", "joints"}
+    one_known = keys_of(ladder(free=range(1, 9)))
+    assert "misset" in one_known and "angle_setting" not in one_known
+    assert "angle_setting" in keys_of(ladder(free=range(2, 9)))
+    witnessed = made(ladder(free=(2,)))
+    causes = {c.key: c for c in witnessed.causes}
     others = [0, 1, 3, 4, 5, 6, 7, 8]
     assert [g.position for g in causes["misset"].variants] == others
     assert all(2 not in g.together for g in causes["repeated_angle"].variants)
+    (scatter,) = causes["angle_setting"].variants  # where angles are set, not beside
+    set_ = witnessed.small_rotation + np.arange(18).reshape(9, 2)[others].ravel()
+    np.testing.assert_array_equal(scatter.columns, set_)
     still = ladder(warming=np.zeros(27))
     assert every - keys_of(still) == {"temperature"}
     never = replace(ladder(), since_turn=np.full(27, np.inf))

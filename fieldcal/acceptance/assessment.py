@@ -128,7 +128,7 @@ def _lacking(found: Calibration, session: Session, still: Rests) -> str:
 
 def _taken_out(session: Session, still: Rests, limits: GradeLimits) -> list[str]:
     held = still.at_rest(session).averages
-    repeat = limits.gyr_bias_repeat
+    repeat = limits.acc_bias_repeat, limits.gyr_bias_repeat
     return biases_taken_out(held, session.block, repeat, limits.fit_chance)
 
 

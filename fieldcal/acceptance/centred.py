@@ -21,7 +21,15 @@ noise s, leaves
 
     P = erf(|m| sqrt(N) / (s sqrt(2)))                                             (3)
 
-The offset that was taken out is then nowhere in the recording. Device axes, SI.
+The offset that was taken out is then nowhere in the recording. Values that were rounded
+to steps q behind that leave more: of windows of n samples, parts f of all,
+
+    m = q d +- s,   s^2 = noise^2 / N + q^2 / 12 sum f^2                           (4)
+
+where d is 0 of values that were rounded to the nearest, -1/2 of those rounded down, and
+of those cut toward zero -1/2 times the mean of their signs; in windows cut to zero q is
+twice as large. For each of the three, (1) and (2) of all axes tell it from chance, s_b
+being that of accelerometers; the three chances are added. Device axes, SI.
 """
 
 from __future__ import annotations
@@ -34,6 +42,7 @@ import numpy as np
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import ACC, CHANNELS, Array, Block
+from fieldcal.physics.recording import grids_of
 from fieldcal.windows import Average
 
 LEAST = 2
@@ -44,7 +53,10 @@ SPECTRUM = 16
 
 
 def biases_taken_out(
-    windows: Sequence[Average], block: Block, repeat: float, least: float
+    windows: Sequence[Average],
+    block: Block,
+    repeat: tuple[float, float],
+    least: float,
 ) -> list[str]:
     """Sentences about biases that are not in the recording any more.
 
@@ -52,12 +64,13 @@ def biases_taken_out(
     ----------
     windows : at rest
     block : the whole recording
-    repeat : from run to run of a gyroscope's bias, 1 sigma, rad/s
+    repeat : from run to run of an accelerometer's and of a gyroscope's bias, 1 sigma,
+        m/s^2 and rad/s
     least : probability below which it is no chance
 
     """
     said = []
-    chance, what = tracked(windows, block, repeat, least)
+    chance, what = tracked(windows, block, repeat[1], least)
     if chance < least:
         said.append(
             "the gyroscopes' means at rest are zero within their noise, with neither a"
@@ -67,6 +80,8 @@ def biases_taken_out(
             " again"
         )
     odd = [name for name, p in centred(block) if p < least]
+    if not odd and centred_and_rounded(windows, block, repeat[0], least) < least:
+        odd = list(CHANNELS[ACC])
     if odd:
         said.append(
             f"the mean of the whole recording is zero in {', '.join(odd)}, closer than"
@@ -89,15 +104,24 @@ def tracked(
     seen = np.isfinite(means) & (sigma > 0)
     if (count := int(seen.sum())) < 3 * LEAST or not seen.any(axis=0).all():
         return 1.0, ""
-    chi2 = float(np.sum((means[seen] / sigma[seen]) ** 2))  # (1)
-    larger = chi2_tail(chi2, count)
+    chi2, larger = _about_zero(means[seen], sigma[seen])
     if larger < least:
         return 1.0, ""
     info = np.where(seen, 1.0 / np.where(seen, sigma, 1.0) ** 2, 0.0).sum(axis=0)
     felt = float(np.hypot(repeat, EARTH_RATE / np.sqrt(3.0)))
-    small = np.minimum(4 / np.sqrt(2 * np.pi * info) / felt, 1.0)  # (2)
-    chance = (1.0 - larger) * float(small.prod())
+    chance = (1.0 - larger) * _so_near(1 / np.sqrt(info), felt)
     return chance, f"(χ² about zero {chi2:.2g} of {count} means)"
+
+
+def _about_zero(means: Array, sigma: Array) -> tuple[float, float]:
+    """Chi-squared of means, and the probability of a larger one, (1)."""
+    chi2 = float(np.sum((means / sigma) ** 2))
+    return chi2, chi2_tail(chi2, len(means))
+
+
+def _so_near(sigma: Array, spread: float) -> float:
+    """Probability that offsets of a spread come so close to zero on all axes, (2)."""
+    return float(np.minimum(4 * sigma / np.sqrt(2 * np.pi) / spread, 1.0).prod())
 
 
 def _settled(block: Block, window: Average) -> tuple[Array, Array]:
@@ -121,6 +145,31 @@ def centred(block: Block) -> list[tuple[str, float]]:
             off = abs(float(known.mean())) * np.sqrt(len(known) / 2) / noise
             out.append((name, erf(off)))  # (3)
     return out
+
+
+def centred_and_rounded(
+    windows: Sequence[Average], block: Block, repeat: float, least: float
+) -> float:
+    """Probability of accelerometers' means so close to those that rounding leaves, (4).
+
+    1 where values lie on no grid, or where they are elsewhere.
+    """
+    step = grids_of(block)[:3]
+    held = [block.between(w.start, w.end).acc for w in windows]
+    held = [acc for acc in held if len(acc)]
+    if not (step > 0).all() or not held or not np.isfinite(block.acc).all():
+        return 1.0
+    part = np.array([len(acc) for acc in held])[:, None] / len(block)
+    zero = np.abs([acc.mean(axis=0) for acc in held]) < step / 2
+    white = np.array([np.diff(acc, axis=0).var(axis=0) / 2 / len(acc) for acc in held])
+    mean, signs = block.acc.mean(axis=0), np.sign(block.acc).mean(axis=0)
+    found = []
+    for shift, wide in ((0.0, 1.0), (-0.5, 1.0), (-signs / 2, 1.0 + 3.0 * zero)):
+        sigma = np.sqrt((part**2 * (white + wide * step**2 / 12)).sum(axis=0))  # (4)
+        _, larger = _about_zero(mean - step * shift, sigma)
+        if larger >= least:
+            found.append((1.0 - larger) * _so_near(sigma, repeat))
+    return min(sum(found), 1.0) if found else 1.0
 
 
 def _noise(values: Array) -> float:

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from fieldcal.acceptance.centred import biases_taken_out, centred, tracked
+from fieldcal.acceptance.centred import (
+    biases_taken_out,
+    centred,
+    centred_and_rounded,
+    tracked,
+)
 from fieldcal.core.samples import Block
 from fieldcal.windows import Average
 
 NOISE, RATE = 5e-4, 100.0
 COUNT, HELD = 3000, 30.0
 REPEAT, LEAST = 1e-3, 1e-4
+BOTH = 0.05, REPEAT
 EARTH = 7.292e-5
 
 
@@ -87,11 +94,51 @@ def test_both_are_told_apart_and_said() -> None:
     rng = np.random.default_rng(4)
     windows, block = at_rest(rng, 1e-3)
     block.acc[:] = 5.0 + rng.standard_normal(block.acc.shape)
-    assert biases_taken_out(windows, block, REPEAT, LEAST) == []
+    assert biases_taken_out(windows, block, BOTH, LEAST) == []
     block.gyr[:] -= 1e-3
-    (said,) = biases_taken_out(windows, block, REPEAT, LEAST)
+    (said,) = biases_taken_out(windows, block, BOTH, LEAST)
     assert "takes its bias out while it rests" in said
     block.gyr[:] += 1e-3
     block.acc[:, 1] -= block.acc[:, 1].mean()
-    (said,) = biases_taken_out(windows, block, REPEAT, LEAST)
+    (said,) = biases_taken_out(windows, block, BOTH, LEAST)
     assert "is zero in ay, closer" in said
+
+
+STEP = 5e-3
+ROUNDED = {
+    "nearest": lambda a: np.round(a / STEP) * STEP,
+    "cut": lambda a: np.trunc(a / STEP) * STEP,
+    "down": lambda a: np.floor(a / STEP) * STEP,
+}
+
+
+def faces(rng: np.random.Generator, bias: float) -> tuple[list[Average], Block]:
+    """Six faces, laid a degree beside where they should be, of unequal length."""
+    long = rng.integers(800, 1200, 6)
+    up = 9.81 * np.vstack([np.eye(3), -np.eye(3)]) + rng.normal(0, 0.2, (6, 3))
+    acc = bias * rng.standard_normal(3) + np.repeat(up, long, axis=0)
+    acc += 1e-3 * rng.standard_normal(acc.shape)
+    ends = np.concatenate([[0], np.cumsum(long)]) / RATE
+    windows = [
+        Average(np.zeros(6), np.eye(6), 21.0, 1000, a, b - 0.5 / RATE)
+        for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)
+    ]
+    t = np.arange(len(acc)) / RATE
+    return windows, Block.of(t, acc, np.zeros_like(acc))
+
+
+@pytest.mark.parametrize("mode", ROUNDED)
+def test_a_mean_that_was_taken_before_rounding(mode: str) -> None:
+    """What is left of it is the rounding's; a bias of its own stands out of that."""
+    rng, found = np.random.default_rng(6), []
+    for _ in range(20):
+        windows, block = faces(rng, 0.05)
+        own = block.acc.copy()
+        block.acc[:] = ROUNDED[mode](own)
+        assert centred_and_rounded(windows, block, 0.05, LEAST) > LEAST
+        block.acc[:] = ROUNDED[mode](own - own.mean(axis=0))
+        assert all(p > LEAST for _, p in centred(block))
+        found.append(centred_and_rounded(windows, block, 0.05, LEAST))
+    assert np.mean(np.array(found) < LEAST) > 0.6
+    block.acc[:] += 1e-3 * rng.standard_normal(block.acc.shape)
+    assert centred_and_rounded(windows, block, 0.05, LEAST) == 1.0

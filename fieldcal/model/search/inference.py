@@ -7,7 +7,7 @@ What a part of the same recording was explained by may be begun with as well.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +18,10 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportion import in_proportion
 from fieldcal.model.search.refinement import Refinement
-from fieldcal.model.search.selection import SETTLED, Search, is_function
+from fieldcal.model.search.selection import SETTLED, Search
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import whole
-from fieldcal.model.system.turn_rows import TurnRows, Turns
+from fieldcal.model.system.turn_rows import TurnRows
 
 PASSES = 8
 """Linearisations at most; a set that comes and goes is settled by weight."""
@@ -74,58 +74,12 @@ class Inference(Refinement):
     def run(self, begin: Sequence[Member] | None = None) -> Inferred:
         """Search until set and state stay.
 
-        A function that no effect makes bends the state to itself, and about that state
-        the effects that are there look worse than they are. Where it is in the best
-        set, effects are sought by themselves as well, and it in what they leave. One
-        window that is off by itself bends nothing but itself.
-
-        What explains the turns in the place of what every triad has bends it as well:
-        there they are followed from what every triad has, too.
-
         Parameters
         ----------
         begin : of any dictionary, what it is to begin with instead of with nothing;
-            a position far from where it is said to be is then not looked for
+            other states to begin from are then not looked for
 
         """
-        found = self._searched(begin)
-        if any(map(is_function, found.best.members)):
-            found = _better(found, self._apart().effects_first())
-        if self._turned_otherwise(found):
-            found = _better(found, self._apart().usual_first())
-        return found
-
-    def _turned_otherwise(self, found: Inferred) -> bool:
-        """Whether turns are explained by what not every triad has, and not by that."""
-        members = found.best.members
-        if {c.key for c, _ in self._usual()} <= {c.key for c, _ in members}:
-            return False
-        others = [group.columns for cause, group in members if not cause.usual]
-        at = np.concatenate([np.empty(0, int), *others])
-        return any(np.isin(t.columns[t.design.any(axis=0)], at).any()
-                   for t in found.turned)  # fmt: skip
-
-    def _usual(self) -> tuple[Member, ...]:
-        """What every triad has, with all its parameters."""
-        return tuple((c, c.variants[0]) for c in self.dictionary.causes if c.usual)
-
-    def usual_first(self) -> Inferred:
-        """Search from a device that has what every triad has."""
-        start: Array = np.zeros(self.dictionary.width)
-        state, values, _ = self.settled(self.nominal, start, ())
-        search = Search(self.dictionary, self.gram(state, values, None))
-        usual = search.evaluated(self._usual())
-        return self._until_it_stays(state, values, usual, ())
-
-    def _apart(self) -> Inference:
-        """The same inference, of which columns that are added are its own."""
-        system, turns = self.system.apart(), self.turns
-        if turns is not None:
-            turns = Turns(turns.turning, system.dictionary, turns.way)
-        return Inference(system, self.nominal, turns)
-
-    def _searched(self, begin: Sequence[Member] | None) -> Inferred:
-        """Search among all causes, from a device as it is nominally."""
         start: Array = np.zeros(self.dictionary.width)
         state, values, _ = self.settled(self.nominal, start, ())
         search = Search(self.dictionary, self.gram(state, values, None))
@@ -136,18 +90,6 @@ class Inference(Refinement):
         about = dict.fromkeys([found, search.evaluated(())])
         self.dictionary.joined(in_proportion(self.dictionary, list(about)))
         return self._until_it_stays(state, values, found, ())
-
-    def effects_first(self) -> Inferred:
-        """Search among effects alone, and from what was found on among all causes."""
-        every = self.dictionary.causes
-        self.dictionary.chosen(c for c in every if c.kind != "unknown")
-        start: Array = np.zeros(self.dictionary.width)
-        state, values, nothing = self.settled(self.nominal, start, ())
-        known = self._until_it_stays(state, values, nothing, ())
-        self.dictionary.joined(c for c in every if c.kind == "unknown")
-        return self._until_it_stays(
-            known.state, known.values, known.best, known.best.members
-        )
 
     def _until_it_stays(
         self, state: State, values: Array, found: Set, members: tuple[Member, ...]
@@ -188,18 +130,39 @@ class Inference(Refinement):
     def _from_nothing(
         self, state: State, values: Array, search: Search
     ) -> tuple[State, Array, Set]:
-        """The best set about a state of nothing, and where it is about another one."""
-        found, turned = search.run(thorough=False), self.turned
-        far = self._afar(state, values, search)
-        if far is not None and far[2].score > found.score:
-            return far
+        """The best set about a state of nothing, or about another beginning."""
+        best, turned = (state, values, search.run(thorough=False)), self.turned
+        for begin in self._beginnings(search, best[2]):
+            there, moved, _ = self.settled(state, values, begin.members, begin.sizes)
+            about = Search(self.dictionary, self.gram(there, moved, None))
+            found = about.run(begin.members, thorough=False)
+            if found.score > best[2].score:
+                best, turned = (there, moved, found), self.turned
         self.turned = turned
-        return state, values, found
+        return best
 
-    def _afar(
-        self, state: State, values: Array, search: Search
-    ) -> tuple[State, Array, Set] | None:
-        """The best set about a position set far from where it is said to be.
+    def _beginnings(self, search: Search, found: Set) -> Iterator[Set]:
+        """Sets whose states may be far from that of nothing, and explain more."""
+        if (far := self._afar(search)) is not None:
+            yield far
+        usual = tuple((c, c.variants[0]) for c in self.dictionary.causes if c.usual)
+        if self._turned_otherwise(found, {c.key for c, _ in usual}):
+            yield search.evaluated(usual)
+
+    def _turned_otherwise(self, found: Set, usual: set[str]) -> bool:
+        """Whether turns are explained by what not every triad has, and not by that.
+
+        It bends the state, about which what every triad has looks worse than it is.
+        """
+        if usual <= found.keys:
+            return False
+        others = [group.columns for cause, group in found.members if not cause.usual]
+        at = np.concatenate([np.empty(0, int), *others])
+        return any(np.isin(t.columns[t.design.any(axis=0)], at).any()
+                   for t in self.turned)  # fmt: skip
+
+    def _afar(self, search: Search) -> Set | None:
+        """A position set far from where it is said to be, if one seems to be.
 
         No columns about the one place show the other: what is linear in the angle
         leaves so much that it loses against whatever has more columns.
@@ -211,12 +174,7 @@ class Inference(Refinement):
                 continue
             one = search.taken(nothing, offer)
             there = whole(one.state, self.dictionary)[group.columns]
-            if np.abs(there).max() < AFAR:
-                return None
-            members = one.members
-            state, values, _ = self.settled(state, values, members, one.sizes)
-            about = Search(self.dictionary, self.gram(state, values, None))
-            return state, values, about.run(members, thorough=False)
+            return one if np.abs(there).max() >= AFAR else None
         return None
 
     def beside(self, found: Inferred, there: Set) -> Set:
@@ -242,8 +200,3 @@ class Inference(Refinement):
         own = Inference(self.system.apart(), self.nominal)
         own.turned = list(found.turned)
         return own
-
-
-def _better(one: Inferred, other: Inferred) -> Inferred:
-    """The likelier of two, each about its own state."""
-    return other if other.about_itself > one.about_itself else one

@@ -86,6 +86,7 @@ class Given(Dictionary):
     Attributes
     ----------
     explanations : the same by its own columns, the likeliest first
+    left_out : cross-coupling of the accelerometers, where it is not in the set
 
     """
 
@@ -109,6 +110,7 @@ class Given(Dictionary):
         if has & set(TILTS):
             has |= set(TILTS)
         self.explanations = carried(self, shown, has) or (Shown((), 1.0),)
+        self.left_out = self._left_out()
 
     @property
     def asked(self) -> tuple[Member, ...]:
@@ -162,6 +164,14 @@ class Given(Dictionary):
         if (lost := np.flatnonzero(self.cut)).size:
             at = self.add(General("cut", self._shorter), 3) + lost
             yield _given_cause(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
+
+    def _left_out(self) -> Group | None:
+        """Cross-coupling that the set has not, of its usual size."""
+        there = {c.name for c, _ in self.members}
+        if "cross_coupling" in there or not self.x.f.any():
+            return None
+        oriented = bool(self.x.oriented.any())
+        return self._estimated("cross_coupling", turned=not oriented).variants[0]
 
     def _estimated(
         self,

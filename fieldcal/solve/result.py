@@ -49,6 +49,7 @@ def calibration(
         words.carried(found.sure, found.causes, names, found.moved, found.ended_s),
         told.sentence if told else "",
         *left_open(method, observations, found),
+        found.magnified.sentence if found.magnified else "",
         *notes,
         *not_levelled(method, asked, observations),
     ]

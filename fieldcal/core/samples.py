@@ -85,14 +85,17 @@ class Block:
         """Build a block; what is not given is unknown, and not to be written to."""
         n = len(t)
 
+        def double(values: Array) -> Array:
+            # a signalling nan of single precision, as a damaged file has it, is a nan
+            with np.errstate(invalid="ignore"):
+                return np.asarray(values, dtype=float)
+
         def known(values: Array | None, shape: tuple[int, ...]) -> Array:
-            if values is None:
-                return np.broadcast_to(UNKNOWN, shape)
-            return np.asarray(values, dtype=float)
+            return np.broadcast_to(UNKNOWN, shape) if values is None else double(values)
 
         return cls(
-            np.asarray(t, dtype=float),
-            np.asarray(acc, dtype=float),
+            double(t),
+            double(acc),
             known(gyr, (n, 3)),
             known(temperature, (n,)),
             known(seq, (n,)),

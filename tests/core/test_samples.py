@@ -109,3 +109,9 @@ def test_the_unit_that_channels_share(names: list[str], unit: str | None) -> Non
 def test_examples() -> None:
     failed, tried = doctest.testmod(samples)
     assert tried and not failed
+
+
+def test_a_signalling_nan_of_a_damaged_file_is_a_nan() -> None:
+    read = np.array([[0x7F800001] * 3], np.uint32).view(np.float32)
+    block = Block.of(np.zeros(1), read, gyr=read)
+    assert np.isnan(block.acc).all() and np.isnan(block.gyr).all()

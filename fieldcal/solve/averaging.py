@@ -81,22 +81,30 @@ def averaged_over(
 
 def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
     """Parameters of one explanation at the end of the recording, (2) of `shown`."""
-    picked, before = picked_by(given, found.columns, nominal)
+    picked, before = picked_by(given, found.columns), _nominal_values(given, nominal)
     return before + picked @ found.mean, picked @ found.covariance @ picked.T
 
 
-def picked_by(given: Given, columns: Index, nominal: State) -> tuple[Array, Array]:
-    """Parameters by some columns, (k, c), and what they are without."""
+def picked_by(given: Given, columns: Index) -> Array:
+    """Parameters by some columns, (k, c), beside their nominal values."""
     picked = np.zeros((len(given.names), len(columns)))
-    before = np.zeros(len(given.names))
     for i, name in enumerate(given.names):
         picked[i, np.flatnonzero(columns == given.place(name)[0])[0]] = 1.0
         parameter = ParameterName.of(name)
         if parameter.sensor:
             scale, c = parameter.is_scale, parameter.channel
             picked[i] += given.ending[int(scale)][c, columns]
-            before[i] = (nominal.scale if scale else nominal.bias)[c]
-    return picked, before
+    return picked
+
+
+def _nominal_values(given: Given, nominal: State) -> Array:
+    """Nominal values of the parameters, (k,)."""
+    before = np.zeros(len(given.names))
+    for i, parameter in enumerate(map(ParameterName.of, given.names)):
+        if parameter.sensor:
+            every = nominal.scale if parameter.is_scale else nominal.bias
+            before[i] = every[parameter.channel]
+    return before
 
 
 def known_rows(given: Given, lot: LotPrior, nominal: State) -> KnownRows | None:
@@ -104,7 +112,9 @@ def known_rows(given: Given, lot: LotPrior, nominal: State) -> KnownRows | None:
     lot = lot.only(given.names)
     if not lot.names:
         return None
-    picked, before = picked_by(given, np.arange(given.width), nominal)
+    picked, before = (
+        picked_by(given, np.arange(given.width)), _nominal_values(given, nominal)
+    )  # fmt: skip
     at = [given.names.index(name) for name in lot.names]
     return KnownRows.of(picked[at], lot.mean - before[at], lot.covariance)
 

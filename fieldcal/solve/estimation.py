@@ -28,7 +28,6 @@ from fieldcal.solve.averaging import (
     picked_by,
 )
 from fieldcal.solve.given import Given, Wanted
-from fieldcal.solve.magnified import Magnified, magnified
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
 from fieldcal.solve.settling import without_bad_windows
 from fieldcal.solve.shown import Shown
@@ -84,7 +83,6 @@ class Estimated:
         went elsewhere
     wrong_angles : what wrong angles would do without being noticed
     search : of the same rows
-    magnified : what cross-coupling that is left out does at worst
 
     """
 
@@ -103,7 +101,6 @@ class Estimated:
     turns: tuple[TurnRows, ...]
     contradicted: tuple[tuple[int, int], ...] = ()
     wrong_angles: tuple[WrongAngles, ...] = ()
-    magnified: Magnified | None = None
 
     def mixed_with(self, one: Estimated, other: Estimated, weight: float) -> Estimated:
         """The same, with what another model of the tilt differs by in the uncertainty.
@@ -197,20 +194,19 @@ def estimated(
     fit = without_bad_windows(recorded.rows, given, nominal, turns)
     found, gram = fit.found, fit.gram
     parameters = averaged_over(given, gram, found, nominal, averaged)
-    picked, _ = picked_by(given, found.columns, nominal)
+    picked = picked_by(given, found.columns)
     names, values, covariance, moved, missing = determined(given, parameters)
-    at, search = [given.names.index(name) for name in names], Search(given, gram)
+    at = [given.names.index(name) for name in names]
     elsewhere = turning.contradicted if turning else ()
     counts = set(given.held[found.bad <= thresholds.CERTAIN].tolist())
     return Estimated(
         given, parameters, names, values, covariance, missing, found, fit.score, moved,
-        search,
+        Search(given, gram),
         agreement(gram, given, found, (0, 1, 2)),
         agreement(gram, given, found, (3, 4, 5)),
         fit.turned,
         tuple(pair for pair in elsewhere if counts.issuperset(pair)),
         tuple(wrong_angles(given, found, names, picked[at])),
-        magnified(given, search, names, nominal),
     )  # fmt: skip
 
 

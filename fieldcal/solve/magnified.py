@@ -14,23 +14,17 @@ uncertainties say nothing of what the device may be off by.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.names import ParameterName
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.search.selection import Search
-from fieldcal.model.state import State
 from fieldcal.solve.averaging import picked_by
-from fieldcal.solve.given import Given
-
-PER_MILLE = 1e-3
-"""Size of the coefficient that sentences speak of: 0.1 %."""
+from fieldcal.solve.estimation import Estimated
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +34,8 @@ class Magnified:
     Attributes
     ----------
     name, unit : of the parameter
-    moved : what a coefficient of one in a thousand moves it by, 1 sigma
-    times : the same over what it is of gravity, or of a scale factor of one
+    moved : 1 sigma for a coefficient of one
+    times : the same over gravity for a bias, over one for a scale factor
 
     """
 
@@ -52,50 +46,47 @@ class Magnified:
 
     @property
     def sentence(self) -> str:
-        """What is left out, what that costs, and what to do."""
+        """What it costs and what to do; nothing where positions magnify nothing."""
         if self.times <= 1:
             return ""
-        moved = f"{self.moved:.2g} {self.unit}".rstrip()
+        moved = f"{self.moved / 1000:.2g} {self.unit}".removesuffix(" 1")
         return (
-            "cross-coupling is taken as none, and these positions magnify what there is"
-            f" of it {self.times:.1f} times: each 0.1 % moves {self.name} by {moved},"
-            " which is not in the uncertainties; hold each axis up and down, or"
-            " estimate it (--cross) from nine positions or more"
+            "cross-coupling is taken as zero, and these positions magnify its effect"
+            f" {self.times:.1f} times: each 0.1 % moves {self.name} by {moved}, which"
+            " the uncertainties do not include; hold each axis up and down, or estimate"
+            " cross-coupling (--cross) from nine positions or more"
         )
 
 
-def magnified(
-    given: Given, search: Search, names: Sequence[str], nominal: State
-) -> Magnified | None:
-    """The worst that cross-coupling does to the parameters of a set, by (1).
+def magnified(found: Estimated) -> Magnified | None:
+    """The largest effect of cross-coupling on the parameters of a set, by (1).
 
     None where the set estimates it or determines nothing of the accelerometers.
     """
+    given = found.given
     if given.left_out is None:
         return None
-    there = search.evaluated(given.members).state
-    added = _added(given, given.left_out, there, nominal)
-    found = []
-    for name in names:
+    added = _added(found, given.left_out)
+    every = []
+    for name in found.names:
         parameter = ParameterName.of(name)
         if parameter.sensor == "acc":
-            whole = 1.0 if parameter.is_scale else G0
-            one = added[given.names.index(name)] * PER_MILLE
-            unit = "" if parameter.is_scale else "m/s²"
-            found.append(Magnified(name, unit, one, one / PER_MILLE / whole))
-    return max(found, key=lambda m: m.times, default=None)
+            moved = float(added[given.names.index(name)])
+            times = moved / (1.0 if parameter.is_scale else G0)
+            every.append(Magnified(name, GROUPS[parameter.group][2], moved, times))
+    return max(every, key=lambda m: m.times, default=None)
 
 
-def _added(given: Given, group: Group, there: Eliminated, nominal: State) -> Array:
-    """What not knowing a group adds to each parameter, over its usual size.
+def _added(found: Estimated, group: Group) -> Array:
+    """What an unknown group adds to each parameter, over its usual size.
 
     Back comes (k,), 1 sigma, in units of the parameter.
     """
+    there = found.search.evaluated(found.given.members).state
     inner, _ = there.rest(group.columns, group.typical)
     unknown = np.linalg.inv(np.eye(len(inner)) + inner)  # C / T^2
     rows = there.rows.matrix(there.columns, group.columns)
-    picked, _ = picked_by(given, there.columns, nominal)
-    moved = picked @ there.inverse @ rows  # D
+    moved = picked_by(found.given, there.columns) @ there.inverse @ rows  # D
     var = np.einsum("ki,ij,kj->k", moved, unknown, moved)
     out: Array = np.sqrt(np.maximum(var, 0.0))
     return out

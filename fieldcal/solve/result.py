@@ -19,6 +19,7 @@ from fieldcal.solve.borrowed import Borrowed
 from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
 from fieldcal.solve.latitude import EarthVertical
+from fieldcal.solve.magnified import magnified
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.reliability import WrongAngles
 from fieldcal.solve.warnings import closure_chi2, doubts, left_open, not_levelled
@@ -49,7 +50,7 @@ def calibration(
         words.carried(found.sure, found.causes, names, found.moved, found.ended_s),
         told.sentence if told else "",
         *left_open(method, observations, found),
-        found.magnified.sentence if found.magnified else "",
+        worst.sentence if (worst := magnified(found)) else "",
         *notes,
         *not_levelled(method, asked, observations),
     ]

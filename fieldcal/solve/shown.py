@@ -40,11 +40,6 @@ from fieldcal.physics.effect import Motion, Scatter, Sensor
 AXES = 3
 """Parameters from which on an effect is not taken on some of them alone."""
 
-BY_WINDOW = ("window", "position")
-"""Functions without physics that are an offset of single windows. A given set contains
-such offsets already, as scatter of the windows or as windows without weight. The same
-holds for angles of positions that were set wrongly (causes of the kind "position")."""
-
 CHANGING = ("time", "temperature", "force and time", "flicker")
 """Functions without physics whose value at the end is part of what the device has come
 to; those of angles and forces have no zero."""
@@ -106,8 +101,8 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
 def _adds(member: Member, has: set[str]) -> bool:
     """Whether a given set lacks a cause."""
     cause, group = member
-    if cause.kind == "position" or cause.name in BY_WINDOW:
-        return False
+    if cause.by_window:
+        return False  # it has those already, as windows that scatter or have no weight
     effect = group.effect
     if isinstance(effect, Scatter) and not {p.name for p in effect.params} <= set(
         CHANNELS

@@ -50,14 +50,8 @@ def observed(
 
 def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
     none = estimated(names=(), missing=("acc_bias.x", "acc_scale.x"), found=None)
-    none.given.names = ("acc_bias.x", "acc_scale.x")
-    carried = {
-        "sure": 0.0,
-        "causes": {},
-        "moved": np.zeros(0),
-        "ended_s": None,
-        "magnified": None,
-    }
+    none.given.names, none.given.left_out = ("acc_bias.x", "acc_scale.x"), None
+    carried = {"sure": 0.0, "causes": {}, "moved": np.zeros(0), "ended_s": None}
     vars(none).update(carried | {"values": np.zeros(0), "covariance": np.zeros((0, 0))})
     with pytest.raises(NotObservable) as error:
         result.calibration("joint", observed(TWO, False), Asked(), none, ["a note"])

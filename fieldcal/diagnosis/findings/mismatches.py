@@ -176,10 +176,6 @@ KINDS: dict[str, Kind] = {
 """Kind of mismatch of functions that no effect makes; the others go by position."""
 
 
-OF_POSITIONS = ("window", "position")
-"""Functions without physics that are an offset of single windows."""
-
-
 def followed(
     explanation: Explanation, cause: Cause, channel: int, residual: Array
 ) -> tuple[str, float, float]:
@@ -188,7 +184,7 @@ def followed(
     Correlation and share are nan where the cause belongs to single positions.
     """
     name = cause.name
-    if cause.kind == "position" or name in OF_POSITIONS:
+    if cause.by_window:
         return "the position itself", np.nan, np.nan
     x, off = explanation.rows.x, residual[:, channel]
     known = np.isfinite(off)

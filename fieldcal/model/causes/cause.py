@@ -156,6 +156,11 @@ class Cause:
         return any(g.effect is not None and g.effect.usual for g in self.variants[:1])
 
     @property
+    def by_window(self) -> bool:
+        """Whether windows are off by it one by one: angles, offsets without physics."""
+        return self.kind == "position" or self.name in ("window", "position")
+
+    @property
     def told(self) -> bool:
         """Whether it is something that is left out, and no noise."""
         return self.kind != "noise"

@@ -177,15 +177,15 @@ class _Seen:
     def _normal(self, i: int) -> Array:
         """What takes outputs to the input along itself, whatever the turns, (3,).
 
-        Without a known input, as of a rate, there is no such direction: nan.
+        Where nobody knows the input, as of a rate, or a channel of it is not seen, as
+        one that is clipped, there is no such direction: nan.
         """
         d, at = self.d, list(self.channels)
-        one, two = self.gram.loose[i][at].T
         inputs = d.x.f if 0 in self.channels else d.x.w
         v = inputs[int(np.argmax(d.x.position == d.held[i]))]
-        if not v.any():
+        if not v.any() or not (self.gram.info[i, at] > 0).all():
             return np.full(3, np.nan)
-        across = np.cross(one, two)
+        across = np.cross(*self.gram.loose[i][at].T)
         out: Array = across / (across @ (d.unit[at] * v / np.linalg.norm(v)))
         return out
 

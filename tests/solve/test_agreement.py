@@ -186,3 +186,17 @@ def test_what_does_not_turn_has_no_direction_of_its_rate() -> None:
     assert np.isnan(means._normal(len(places) - 1)).all()
     forces = agreement._Seen(one.search.gram, one.given, (0, 1, 2), known)
     assert np.isfinite(forces._normal(len(places) - 1)).all()
+
+
+def test_a_length_of_which_an_axis_is_clipped_is_no_length() -> None:
+    """Gravity along the clipped axis is as it may be, whatever the others read."""
+    n, clipped = 12, 5
+    u = by_hand(n)
+    seen = observe((HAND,) * n, u)
+    seen.mean[clipped, 1] = np.nan
+    recorded = of_means(seen)
+    nominal = State(np.zeros(6), np.ones(6), np.zeros((n, 2)), np.zeros(3))
+    one = estimated(recorded, None, nominal, Wanted())
+    assert np.isnan(one.acc.rows[clipped]).all()
+    assert np.isfinite(np.delete(one.acc.rows[:, 0], clipped)).all()
+    assert one.acc.dof == n - 1 - 6

@@ -155,7 +155,7 @@ def lot(
     useful = [one for one in units if one.good]
     if len(useful) < FEWEST:
         raise InputError(
-            f"{len(useful)} units have a good result, a lot needs {FEWEST}: run"
+            f"units with a good result: {len(useful)}, a lot needs {FEWEST}: run"
             " fieldcal batch on more sessions, or ask for fewer conditions"
         )
     names = dict.fromkeys(n for one in useful for n in one.parameters)
